@@ -1,0 +1,88 @@
+//! Decides which predictions a combiner may put together.
+
+use super::plan::{PlannedRole, TruthLink};
+use super::problem::CompileProblem;
+use super::provenance::Provenance;
+use super::resolver::{Instance, Resolver};
+use crate::channel::Channel;
+use crate::node::{Combiner, OutputPort};
+use crate::time::Duration;
+
+impl Resolver<'_> {
+    pub(super) fn combiner(&mut self, instance: &Instance<'_>, combiner: &dyn Combiner) -> Option<()> {
+        let mistakes = combiner.mistakes();
+        let sound = mistakes.is_empty();
+        self.mistakes(instance, mistakes);
+        let mut voters = None;
+        let mut truth = Some(None);
+        for port in (instance.kind.inputs)() {
+            match port.name {
+                "truth" if port.optional && instance.input("truth").is_none() => {}
+                "truth" => truth = self.single(instance, port).map(Some),
+                _ => voters = self.slots(instance, port).map(|slots| (*port, slots)),
+            }
+        }
+        let (port, voters) = voters?;
+        let truth = truth?;
+        let Some(&first) = voters.first() else {
+            let problem =
+                CompileProblem::ChannelCount { input: port.name, found: Vec::new(), expected: "one channel or more" };
+            self.diagnostics.report(instance.input_place(port.name), problem);
+            return None;
+        };
+        let mut agree = sound;
+        for &other in &voters[1..] {
+            agree &= self.agree(instance, port.name, first, other, true);
+        }
+        let ahead = self.channels[first].channel.ahead;
+        let link: Option<TruthLink> = match truth {
+            Some(truth) => {
+                agree &= self.agree(instance, port.name, first, truth, false);
+                Some(self.link(instance, truth, ahead)?)
+            }
+            None => None,
+        };
+        let gather = self.gather(instance, &port, &voters, &[Duration::ZERO])?;
+        if !agree {
+            return None;
+        }
+        let predicts = truth.or(self.channels[first].predicts);
+        let name = predicts.map_or(&self.channels[first].channel.name, |slot| &self.channels[slot].channel.name).clone();
+        let combined = Channel { name, ..self.channels[first].channel.clone() };
+        let behind = Provenance::of(voters.iter().map(|&slot| (&self.provenance[slot], Duration::ZERO)));
+        let outputs = vec![OutputPort { name: "prediction", channels: vec![combined] }];
+        let role = PlannedRole::Combiner { voters: gather, truth: link };
+        self.add(instance, outputs, role, vec![behind], predicts)
+    }
+
+    /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.
+    fn agree(&mut self, instance: &Instance<'_>, input: &str, first: usize, second: usize, votes: bool) -> bool {
+        let (a, b) = (&self.channels[first], &self.channels[second]);
+        let problem = if a.channel.unit != b.channel.unit {
+            CompileProblem::Units {
+                first: a.name.clone(),
+                first_unit: a.channel.unit.clone(),
+                second: b.name.clone(),
+                second_unit: b.channel.unit.clone(),
+            }
+        } else if a.channel.span != b.channel.span {
+            CompileProblem::Spans {
+                first: a.name.clone(),
+                first_span: a.channel.span,
+                second: b.name.clone(),
+                second_span: b.channel.span,
+            }
+        } else if votes && a.channel.ahead != b.channel.ahead {
+            CompileProblem::Horizons {
+                first: a.name.clone(),
+                first_ahead: a.channel.ahead,
+                second: b.name.clone(),
+                second_ahead: b.channel.ahead,
+            }
+        } else {
+            return true;
+        };
+        self.diagnostics.report(instance.input_place(input), problem);
+        false
+    }
+}

@@ -1,0 +1,40 @@
+//! Decides what a graph file means: references resolved, units, spans and horizons checked, an order, slots, a [`Plan`];
+//! not when it runs.
+
+mod combiner;
+mod estimator;
+mod feature;
+mod order;
+mod plan;
+mod problem;
+mod provenance;
+mod reference;
+mod resolver;
+mod scope;
+mod steps;
+
+pub use plan::{
+    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits,
+    TruthLink,
+};
+pub use problem::CompileProblem;
+pub(crate) use provenance::persistence_lag;
+pub use provenance::smallest_lag;
+
+use crate::diagnostic::Diagnostics;
+use crate::document::GraphFile;
+
+/// What a plan must offer beyond what its graph itself reads.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// The standard errors of truths whose producers can give them (a port named `stderr`).
+    pub standard_errors: bool,
+}
+
+/// Compiles a graph. All mistakes are told; without one there is a plan.
+pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
+    let nodes = resolver::read_kinds(graph, diagnostics);
+    let order = order::order(graph, &nodes, diagnostics);
+    let resolved = resolver::Resolver::new(graph, diagnostics).resolve(&nodes, &order, wanted);
+    (!diagnostics.has_errors()).then_some(resolved)
+}

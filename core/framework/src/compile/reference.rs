@@ -1,0 +1,115 @@
+//! Decides what a reference such as `gradients:stderr.plate?@150s` means as text; not what there is to refer to.
+
+/// A reference, taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reference<'a> {
+    /// The node or signal.
+    pub node: &'a str,
+    /// The output port, where one is named.
+    pub port: Option<&'a str>,
+    /// The pattern of channel names, where there is one.
+    pub channel: Option<&'a str>,
+}
+
+impl<'a> Reference<'a> {
+    /// Takes a reference apart: the first `.` or `:` ends the node's name, after a port the next `.` ends the port's.
+    #[must_use]
+    pub fn parse(text: &'a str) -> Self {
+        let Some(end) = text.find(['.', ':']) else {
+            return Self { node: text, port: None, channel: None };
+        };
+        let (node, rest) = (&text[..end], &text[end + 1..]);
+        if text.as_bytes()[end] == b'.' {
+            return Self { node, port: None, channel: Some(rest) };
+        }
+        match rest.split_once('.') {
+            Some((port, channel)) => Self { node, port: Some(port), channel: Some(channel) },
+            None => Self { node, port: Some(rest), channel: None },
+        }
+    }
+}
+
+/// Whether a pattern has anything to expand, so that it may name several channels.
+#[must_use]
+pub fn is_pattern(text: &str) -> bool {
+    text.contains(['*', '?', '{'])
+}
+
+/// Whether a channel name matches a pattern of `*` (any text), `?` (one character) and `{a,b}` (a choice).
+#[must_use]
+pub fn matches(pattern: &str, name: &str) -> bool {
+    choices(pattern).iter().any(|choice| glob(choice, name))
+}
+
+/// The patterns without choices that a pattern stands for. The number is bounded; beyond it the text is taken as it is.
+fn choices(pattern: &str) -> Vec<String> {
+    const MOST: usize = 4096;
+    let mut done = Vec::new();
+    let mut open = vec![pattern.to_owned()];
+    while let Some(text) = open.pop() {
+        let group = text.find('{').and_then(|start| text[start..].find('}').map(|len| (start, start + len)));
+        match group {
+            Some((start, end)) if done.len() + open.len() < MOST => {
+                for choice in text[start + 1..end].split(',').rev() {
+                    open.push(format!("{}{}{}", &text[..start], choice, &text[end + 1..]));
+                }
+            }
+            _ => done.push(text),
+        }
+    }
+    done
+}
+
+/// Matching with backtracking to the last star only, which is enough and takes at most pattern × name steps.
+fn glob(pattern: &str, name: &str) -> bool {
+    let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
+    let (mut p, mut n) = (0, 0);
+    let mut star = None;
+    while n < name.len() {
+        if p < pattern.len() && pattern[p] == '*' {
+            star = Some((p, n));
+            p += 1;
+        } else if p < pattern.len() && (pattern[p] == '?' || pattern[p] == name[n]) {
+            p += 1;
+            n += 1;
+        } else if let Some((at, from)) = star {
+            star = Some((at, from + 1));
+            p = at + 1;
+            n = from + 1;
+        } else {
+            return false;
+        }
+    }
+    pattern[p..].iter().all(|&c| c == '*')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_dot_or_colon_ends_the_node_and_the_next_dot_ends_the_port() {
+        let whole = Reference::parse("gradients:stderr.room@429.089s");
+        assert_eq!((whole.node, whole.port, whole.channel), ("gradients", Some("stderr"), Some("room@429.089s")));
+        let channel = Reference::parse("gradients.room@429.089s");
+        assert_eq!((channel.node, channel.port, channel.channel), ("gradients", None, Some("room@429.089s")));
+        assert_eq!(Reference::parse("vote").channel, None);
+        assert_eq!(Reference::parse("vote:weights").port, Some("weights"));
+    }
+
+    #[test]
+    fn stars_question_marks_and_choices_match_channel_names() {
+        assert!(matches("*", "room"));
+        assert!(matches("plate?@*", "plate1@150s"));
+        assert!(!matches("plate?@*", "plate12@150s"));
+        assert!(matches("{plate,holder}1@150s", "holder1@150s"));
+        assert!(!matches("{plate,holder}1", "room"));
+        assert!(matches("*a*b*", "xxaxxbxx") && !matches("*a*b*", "xxbxxaxx"));
+    }
+
+    #[test]
+    fn a_choice_inside_a_choice_or_left_open_ends_and_matches_as_it_is() {
+        assert!(!matches("{a,{b", "b"));
+        assert!(!matches(&"{a,b}".repeat(40), "x"));
+    }
+}

@@ -1,0 +1,77 @@
+//! Decides which slots a reference names.
+
+use indexmap::IndexMap;
+
+use super::problem::CompileProblem;
+use super::reference::{Reference, is_pattern, matches};
+
+/// What the names of a graph stand for, as far as it is known.
+#[derive(Debug, Default)]
+pub(crate) struct Scopes {
+    scopes: IndexMap<String, Scope>,
+}
+
+/// The output ports of a node or signal, as the rest of the graph sees them.
+#[derive(Debug, Default, Clone)]
+pub(crate) struct Scope {
+    /// Ports by name, each with its channels' slots; the first is the default.
+    pub(crate) ports: IndexMap<&'static str, IndexMap<String, usize>>,
+    /// Set when an error has been told of it, so that references to it say nothing more.
+    pub(crate) broken: bool,
+}
+
+/// The outcome of looking a reference up.
+pub(crate) enum Found {
+    /// Slots in the producer's order.
+    Slots(Vec<usize>),
+    /// Nothing, and the reason has been told where the producer stands.
+    Broken,
+}
+
+impl Scopes {
+    pub(crate) fn declare(&mut self, name: &str) {
+        self.scopes.entry(name.to_owned()).or_default();
+    }
+
+    pub(crate) fn get_mut(&mut self, name: &str) -> &mut Scope {
+        self.scopes.entry(name.to_owned()).or_default()
+    }
+
+    pub(crate) fn look_up(&self, text: &str) -> Result<Found, CompileProblem> {
+        let reference = Reference::parse(text);
+        let Some(scope) = self.scopes.get(reference.node) else {
+            let known = self.scopes.keys().cloned().collect();
+            return Err(CompileProblem::UnknownNode { node: reference.node.to_owned(), known });
+        };
+        if scope.broken {
+            return Ok(Found::Broken);
+        }
+        let port = match reference.port {
+            None => scope.ports.get_index(0).map(|(_, channels)| channels),
+            Some(port) => scope.ports.get(port),
+        };
+        let Some(channels) = port else {
+            return Err(CompileProblem::UnknownPort {
+                node: reference.node.to_owned(),
+                port: reference.port.unwrap_or_default().to_owned(),
+                known: scope.ports.keys().copied().collect(),
+            });
+        };
+        let Some(pattern) = reference.channel else {
+            return Ok(Found::Slots(channels.values().copied().collect()));
+        };
+        let slots: Vec<usize> = if is_pattern(pattern) {
+            channels.iter().filter(|(name, _)| matches(pattern, name)).map(|(_, &slot)| slot).collect()
+        } else {
+            channels.get(pattern).into_iter().copied().collect()
+        };
+        if slots.is_empty() {
+            return Err(CompileProblem::UnknownChannel {
+                node: reference.node.to_owned(),
+                channel: pattern.to_owned(),
+                known: channels.keys().cloned().collect(),
+            });
+        }
+        Ok(Found::Slots(slots))
+    }
+}

@@ -1,0 +1,15 @@
+//! How a mistake in a file is told: its code, place, reason and a way out; what counts as a mistake is decided by the layers.
+
+mod codes;
+mod collector;
+mod nearest;
+mod place;
+mod render;
+
+pub use codes::{CODES, Code, explain};
+pub use collector::{Diagnostic, Diagnostics, Problem, Severity};
+pub use nearest::nearest;
+pub use place::{Place, SourceId, Sources};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,58 @@
+//! Which known name an unknown one may have meant; it never decides that a name is wrong.
+
+/// The candidate that is spelt most like `name`, if one is near enough to be meant.
+///
+/// Near is a Damerau–Levenshtein distance of at most a third of the longer name, at least 1, capital letters aside; the first of equals is taken.
+/// A name that only continues or shortens a candidate of three letters or more counts as near too.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // A long text is not a misspelt name, and the distance takes time in the product of the lengths.
+    const LONGEST: usize = 64;
+    if name.is_empty() || name.len() > LONGEST {
+        return None;
+    }
+    let wanted = name.to_lowercase();
+    let mut best: Option<(usize, &str)> = None;
+    for candidate in candidates {
+        if candidate.len() > LONGEST || candidate == name {
+            continue;
+        }
+        let known = candidate.to_lowercase();
+        let longer = wanted.chars().count().max(known.chars().count());
+        let distance = strsim::damerau_levenshtein(&wanted, &known);
+        let shorter = wanted.len().min(known.len());
+        let continues = shorter >= 3 && (wanted.starts_with(&known) || known.starts_with(&wanted));
+        let near = distance <= (longer / 3).max(1) && distance < longer;
+        if (near || continues) && best.is_none_or(|(least, _)| distance < least) {
+            best = Some((distance, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    #[test]
+    fn a_slip_of_the_finger_finds_its_name() {
+        let names = ["thermal", "motion", "both", "vote"];
+        assert_eq!(nearest("themal", names), Some("thermal"));
+        assert_eq!(nearest("motoin", names), Some("motion"));
+        assert_eq!(nearest("Vote", names), Some("vote"));
+        assert_eq!(nearest("therm", names), Some("thermal"));
+    }
+
+    #[test]
+    fn a_name_of_its_own_finds_nothing() {
+        assert_eq!(nearest("pressure", ["thermal", "motion"]), None);
+        assert_eq!(nearest("", ["a"]), None);
+        assert_eq!(nearest("x", ["y"]), None);
+        assert_eq!(nearest(&"x".repeat(1000), ["x"]), None);
+    }
+
+    #[test]
+    fn the_nearest_of_several_is_taken_and_the_first_of_equals() {
+        assert_eq!(nearest("x12", ["x1", "x2"]), Some("x1"));
+        assert_eq!(nearest("windws", ["window", "windows"]), Some("windows"));
+    }
+}

@@ -1,0 +1,111 @@
+//! From the merged tree to declarations: which sections there are and in which order they are read; each section has a file of its own.
+
+mod names;
+mod nodes;
+mod outputs;
+mod placeholder;
+mod reading;
+mod sets;
+mod signals;
+mod time_base;
+
+use indexmap::IndexMap;
+
+use super::graph_file::GraphFile;
+use super::problem::DocumentProblem;
+use super::read::Document;
+use super::tree::{Data, Table};
+use crate::diagnostic::Diagnostics;
+use reading::{known_keys, text};
+
+const SECTIONS: [&str; 14] = [
+    "schema",
+    "name",
+    "description",
+    "extends",
+    "sets",
+    "time",
+    "signals",
+    "modules",
+    "nodes",
+    "outputs",
+    "tests",
+    "source",
+    "sinks",
+    "runtime",
+];
+const MODEL: &str = "model";
+/// Sections that only a running machine needs; they are handed on as they stand.
+const DEPLOYMENT: [&str; 4] = ["source", "sinks", "runtime", MODEL];
+
+/// Checks names, expands sets and `each`, and gives what the file declares; `None` after any error, all of which are reported.
+pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
+    let before = diagnostics.error_count();
+    let tree = document.tree;
+    let Data::Table(root) = &tree.data else {
+        let expected = "a table".to_owned();
+        diagnostics.report(
+            tree.place,
+            DocumentProblem::WrongType {
+                key: None,
+                expected,
+                found: tree.found(),
+            },
+        );
+        return None;
+    };
+    let known: Vec<&str> = SECTIONS.into_iter().chain([MODEL]).collect();
+    known_keys(root, &known, "a graph file", diagnostics);
+    if let Some(modules) = root.entry("modules") {
+        diagnostics.report(modules.key, DocumentProblem::Modules);
+    }
+    let name = text_of(root, "name", diagnostics);
+    let description = text_of(root, "description", diagnostics);
+    names::check(root, diagnostics);
+    let sets = sets::declare(root.get("sets"), diagnostics);
+    let time = time_base::declare(root.get("time"), diagnostics);
+    let sample = time.sample();
+    let signals = signals::declare(root.get("signals"), &sets, sample, diagnostics);
+    let nodes = nodes::declare(root.get("nodes"), &sets, sample, diagnostics);
+    let outputs = outputs::declare(root.get("outputs"), diagnostics);
+    let tests = root.get("tests").cloned();
+    if let Some(tests) = &tests
+        && tests.as_list().is_none()
+    {
+        let expected = "a list of tables, each under `[[tests]]`".to_owned();
+        diagnostics.report(
+            tests.place,
+            DocumentProblem::WrongType {
+                key: Some("tests".to_owned()),
+                expected,
+                found: tests.found(),
+            },
+        );
+    }
+    let deployment: IndexMap<_, _> = DEPLOYMENT
+        .iter()
+        .filter_map(|key| Some(((*key).to_owned(), root.get(key)?.clone())))
+        .collect();
+    if document.faulty || diagnostics.error_count() > before {
+        return None;
+    }
+    Some(GraphFile {
+        name,
+        description,
+        sets,
+        time,
+        signals,
+        nodes,
+        outputs,
+        tests,
+        deployment,
+        tree,
+    })
+}
+
+fn text_of(root: &Table, key: &str, diagnostics: &mut Diagnostics) -> Option<String> {
+    text(root.get(key)?, key, diagnostics).map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,418 @@
+//! `[nodes]`: each node expanded into one instance per member; kinds, references and parameters are left to the compiler.
+
+use super::placeholder;
+use super::reading::{
+    duration, in_samples, known_keys, missing, one_or_more, samples, table, text,
+};
+use super::sets::{self, Sets};
+use crate::diagnostic::Diagnostics;
+use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Entry, Table, Value};
+use crate::time::Duration;
+
+/// The most instances that a graph may have.
+const MOST_INSTANCES: usize = 200_000;
+/// The most values in all instances; about 100 bytes each.
+const MOST_VALUES: usize = 4_000_000;
+/// Keys that the framework reads; all others are the node's own.
+const OWN_KEYS: [&str; 3] = ["type", "each", "inputs"];
+
+/// What all instances made so far take.
+#[derive(Default)]
+struct Total {
+    instances: usize,
+    values: usize,
+}
+
+pub(super) fn declare(
+    nodes: Option<&Value>,
+    sets: &Sets,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Vec<NodeDecl> {
+    let Some(nodes) = nodes.and_then(|nodes| table(nodes, "nodes", diagnostics)) else {
+        return Vec::new();
+    };
+    let mut total = Total::default();
+    let mut declared = Vec::with_capacity(nodes.len());
+    for (name, entry) in nodes.iter() {
+        declared.extend(node(name, entry, sets, sample, &mut total, diagnostics));
+    }
+    declared
+}
+
+fn node(
+    name: &str,
+    entry: &Entry,
+    sets: &Sets,
+    sample: Option<Duration>,
+    total: &mut Total,
+    diagnostics: &mut Diagnostics,
+) -> Option<NodeDecl> {
+    let keys = table(&entry.value, name, diagnostics)?;
+    let what = format!("node \"{name}\"");
+    let kind = match (keys.get("type"), keys.entry("module")) {
+        (Some(value), _) => {
+            text(value, "type", diagnostics).map(|kind| (kind.to_owned(), value.place))
+        }
+        (None, Some(module)) => {
+            diagnostics.report(module.key, DocumentProblem::Modules);
+            None
+        }
+        (None, None) => {
+            missing(
+                &entry.value,
+                "type",
+                &what,
+                Some("say which kind of node it is, e.g. type = \"slope\""),
+                diagnostics,
+            );
+            None
+        }
+    };
+    let each = each(keys, sets, diagnostics);
+    if let Some(each) = &each {
+        check_placeholders(&entry.value, each, &what, diagnostics);
+    }
+    let inputs = match keys.get("inputs") {
+        Some(value) => inputs(value, &what, sample, diagnostics),
+        None => Vec::new(),
+    };
+    let mut parameters = Value::new(entry.value.place, Data::Table(own_parameters(keys)));
+    convert_samples(&mut parameters, sample, diagnostics);
+    let (kind, kind_place) = kind?;
+    let each = each?;
+    let members = room_for(
+        name,
+        entry,
+        &each,
+        &parameters,
+        inputs.len(),
+        total,
+        diagnostics,
+    )?;
+    let instances = members
+        .into_iter()
+        .map(|member| InstanceDecl {
+            inputs: inputs
+                .iter()
+                .map(|input| filled_input(input, &member.pairs))
+                .collect(),
+            parameters: filled(&parameters, &member.pairs),
+            member: (!each.is_empty()).then_some(member.name),
+        })
+        .collect();
+    let each = each.into_iter().map(|(set, _)| set.to_owned()).collect();
+    Some(NodeDecl {
+        name: name.to_owned(),
+        place: entry.key,
+        kind,
+        kind_place,
+        each,
+        instances,
+    })
+}
+
+type Each<'a> = Vec<(&'a str, &'a [String])>;
+
+/// The sets of `each` with their members; `None` after a mistake.
+fn each<'a>(keys: &'a Table, sets: &'a Sets, diagnostics: &mut Diagnostics) -> Option<Each<'a>> {
+    let Some(value) = keys.get("each") else {
+        return Some(Vec::new());
+    };
+    let names = one_or_more(value, "each", "`each`", diagnostics)?;
+    let mut each: Each<'_> = Vec::new();
+    let mut clean = true;
+    for (name, place) in &names {
+        match (
+            sets.get_key_value(name),
+            sets::find(name, *place, sets, diagnostics),
+        ) {
+            (Some((name, _)), Some(_)) if each.iter().any(|(taken, _)| taken == name) => {
+                let problem = DocumentProblem::DuplicateName {
+                    role: "set",
+                    name: name.clone(),
+                    first_role: "set",
+                    first: None,
+                };
+                diagnostics.report(*place, problem);
+                clean = false;
+            }
+            (Some((name, _)), Some(members)) => each.push((name, members)),
+            _ => clean = false,
+        }
+    }
+    clean.then_some(each)
+}
+
+/// One member of the product of all sets of `each`.
+struct Member<'a> {
+    name: String,
+    pairs: Vec<(&'a str, &'a str)>,
+}
+
+/// The members of a node, the first set slowest, if the graph has room for an instance of each.
+fn room_for<'a>(
+    name: &str,
+    entry: &Entry,
+    each: &Each<'a>,
+    parameters: &Value,
+    inputs: usize,
+    total: &mut Total,
+    diagnostics: &mut Diagnostics,
+) -> Option<Vec<Member<'a>>> {
+    let count = each
+        .iter()
+        .try_fold(1usize, |product, (_, members)| {
+            product.checked_mul(members.len())
+        })
+        .unwrap_or(usize::MAX);
+    let instances = total.instances.saturating_add(count);
+    if instances > MOST_INSTANCES {
+        let problem = DocumentProblem::TooManyInstances {
+            node: name.to_owned(),
+            instances,
+            limit: MOST_INSTANCES,
+        };
+        diagnostics.report(entry.key, problem);
+        return None;
+    }
+    let values = total
+        .values
+        .saturating_add(count.saturating_mul(weight(parameters) + weight(&entry.value) + inputs));
+    if values > MOST_VALUES {
+        diagnostics.report(
+            entry.key,
+            DocumentProblem::TooLargeExpanded {
+                node: name.to_owned(),
+                limit: MOST_VALUES,
+            },
+        );
+        return None;
+    }
+    (total.instances, total.values) = (instances, values);
+    let mut members = vec![Member {
+        name: String::new(),
+        pairs: Vec::new(),
+    }];
+    for (set, names) in each {
+        members = members
+            .iter()
+            .flat_map(|member| {
+                names.iter().map(|name| Member {
+                    name: if member.name.is_empty() {
+                        name.clone()
+                    } else {
+                        format!("{}-{name}", member.name)
+                    },
+                    pairs: member
+                        .pairs
+                        .iter()
+                        .copied()
+                        .chain([(*set, name.as_str())])
+                        .collect(),
+                })
+            })
+            .collect();
+    }
+    let mut seen = std::collections::HashSet::new();
+    if let Some(twice) = members
+        .iter()
+        .find(|member| !seen.insert(member.name.as_str()))
+    {
+        // "1" and "1-2" times "2-3" and "3" both make "1-2-3".
+        let (role, name) = ("member", twice.name.clone());
+        diagnostics.report(
+            entry.key,
+            DocumentProblem::DuplicateName {
+                role,
+                name,
+                first_role: role,
+                first: None,
+            },
+        );
+        return None;
+    }
+    Some(members)
+}
+
+/// Number of values in a tree, long texts counted as several.
+fn weight(value: &Value) -> usize {
+    match &value.data {
+        Data::Text(text) | Data::Time(text) => 1 + text.len() / 64,
+        Data::List(values) => 1 + values.iter().map(weight).sum::<usize>(),
+        Data::Table(table) => {
+            1 + table
+                .iter()
+                .map(|(key, entry)| key.len() / 64 + weight(&entry.value))
+                .sum::<usize>()
+        }
+        Data::Integer(_) | Data::Float(_) | Data::Bool(_) => 1,
+    }
+}
+
+fn check_placeholders(value: &Value, each: &Each<'_>, what: &str, diagnostics: &mut Diagnostics) {
+    match &value.data {
+        Data::Text(text) => {
+            for name in
+                placeholder::names(text).filter(|name| !each.iter().any(|(set, _)| set == name))
+            {
+                let known = each.iter().map(|(set, _)| (*set).to_owned()).collect();
+                let problem = DocumentProblem::UnknownPlaceholder {
+                    name: name.to_owned(),
+                    known,
+                    what: what.to_owned(),
+                };
+                diagnostics.report(value.place, problem);
+            }
+        }
+        Data::List(values) => values
+            .iter()
+            .for_each(|value| check_placeholders(value, each, what, diagnostics)),
+        Data::Table(table) => table
+            .iter()
+            .for_each(|(_, entry)| check_placeholders(&entry.value, each, what, diagnostics)),
+        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => {}
+    }
+}
+
+fn inputs(
+    value: &Value,
+    what: &str,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Vec<InputDecl> {
+    let Some(ports) = table(value, "inputs", diagnostics) else {
+        return Vec::new();
+    };
+    ports
+        .iter()
+        .filter_map(|(port, entry)| input(port, entry, what, sample, diagnostics))
+        .collect()
+}
+
+fn input(
+    port: &str,
+    entry: &Entry,
+    what: &str,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Option<InputDecl> {
+    let input = format!("input \"{port}\" of {what}");
+    let (from, max_age) = match &entry.value.data {
+        Data::Table(keys) => {
+            known_keys(keys, &["from", "max_age"], &input, diagnostics);
+            let max_age = keys.get("max_age").and_then(|value| {
+                Some((
+                    duration(value, "max_age", sample, diagnostics)?,
+                    value.place,
+                ))
+            });
+            match keys.get("from") {
+                Some(from) => (from, max_age),
+                None => {
+                    missing(
+                        &entry.value,
+                        "from",
+                        &input,
+                        Some("name what it reads, e.g. from = \"gradients\""),
+                        diagnostics,
+                    );
+                    return None;
+                }
+            }
+        }
+        _ => (&entry.value, None),
+    };
+    let references = one_or_more(from, port, &input, diagnostics)?;
+    Some(InputDecl {
+        port: port.to_owned(),
+        place: entry.key,
+        references,
+        max_age,
+    })
+}
+
+fn own_parameters(keys: &Table) -> Table {
+    keys.iter()
+        .filter(|(key, _)| !OWN_KEYS.contains(key))
+        .map(|(key, entry)| (key.to_owned(), entry.clone()))
+        .collect()
+}
+
+/// Writes every number of samples as the duration that it stands for.
+fn convert_samples(value: &mut Value, sample: Option<Duration>, diagnostics: &mut Diagnostics) {
+    let place = value.place;
+    match &mut value.data {
+        Data::Text(text) => {
+            if let Some(number) = samples(text) {
+                match in_samples(text, number, sample) {
+                    Ok(duration) => *text = duration.to_string(),
+                    Err(problem) => diagnostics.report(place, problem),
+                }
+            }
+        }
+        Data::List(values) => values
+            .iter_mut()
+            .for_each(|value| convert_samples(value, sample, diagnostics)),
+        Data::Table(table) => table
+            .iter_mut()
+            .for_each(|(_, entry)| convert_samples(&mut entry.value, sample, diagnostics)),
+        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => {}
+    }
+}
+
+fn filled_input(input: &InputDecl, members: &[(&str, &str)]) -> InputDecl {
+    let references = input
+        .references
+        .iter()
+        .map(|(text, place)| (placeholder::fill(text, members), *place))
+        .collect();
+    InputDecl {
+        port: input.port.clone(),
+        place: input.place,
+        references,
+        max_age: input.max_age,
+    }
+}
+
+fn filled(value: &Value, members: &[(&str, &str)]) -> Value {
+    // A table without placeholders is shared by all members, not copied.
+    if members.is_empty() || !has_placeholders(value) {
+        return value.clone();
+    }
+    let data = match &value.data {
+        Data::Text(text) => Data::Text(placeholder::fill(text, members)),
+        Data::List(values) => {
+            Data::List(values.iter().map(|value| filled(value, members)).collect())
+        }
+        Data::Table(table) => Data::Table(
+            table
+                .iter()
+                .map(|(key, entry)| {
+                    (
+                        key.to_owned(),
+                        Entry {
+                            key: entry.key,
+                            value: filled(&entry.value, members),
+                        },
+                    )
+                })
+                .collect(),
+        ),
+        scalar => scalar.clone(),
+    };
+    Value::new(value.place, data)
+}
+
+fn has_placeholders(value: &Value) -> bool {
+    match &value.data {
+        Data::Text(text) => placeholder::names(text).next().is_some(),
+        Data::List(values) => values.iter().any(has_placeholders),
+        Data::Table(table) => table
+            .iter()
+            .any(|(_, entry)| has_placeholders(&entry.value)),
+        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => false,
+    }
+}

@@ -1,0 +1,61 @@
+//! `[outputs]`: what comes out, and how it passes from an old graph to a new one; references are left to the compiler.
+
+use super::placeholder;
+use super::reading::{known_keys, missing, one_or_more, quantity, table};
+use crate::diagnostic::Diagnostics;
+use crate::document::graph_file::OutputDecl;
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Entry, Value};
+
+pub(super) fn declare(outputs: Option<&Value>, diagnostics: &mut Diagnostics) -> Vec<OutputDecl> {
+    let Some(outputs) = outputs.and_then(|outputs| table(outputs, "outputs", diagnostics)) else {
+        return Vec::new();
+    };
+    outputs
+        .iter()
+        .filter_map(|(name, entry)| output(name, entry, diagnostics))
+        .collect()
+}
+
+fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<OutputDecl> {
+    let what = format!("output \"{name}\"");
+    let (from, blend) = match &entry.value.data {
+        Data::Table(keys) => {
+            known_keys(keys, &["from", "blend"], &what, diagnostics);
+            let blend = keys
+                .get("blend")
+                .and_then(|value| quantity(value, "blend", diagnostics));
+            match keys.get("from") {
+                Some(from) => (from, blend),
+                None => {
+                    missing(
+                        &entry.value,
+                        "from",
+                        &what,
+                        Some("name what it gives, e.g. from = \"vote\""),
+                        diagnostics,
+                    );
+                    return None;
+                }
+            }
+        }
+        _ => (&entry.value, None),
+    };
+    let from = one_or_more(from, name, &what, diagnostics)?;
+    for (text, place) in &from {
+        for placeholder in placeholder::names(text) {
+            let problem = DocumentProblem::UnknownPlaceholder {
+                name: placeholder.to_owned(),
+                known: Vec::new(),
+                what: what.clone(),
+            };
+            diagnostics.report(*place, problem);
+        }
+    }
+    Some(OutputDecl {
+        name: name.to_owned(),
+        place: entry.key,
+        from,
+        blend,
+    })
+}

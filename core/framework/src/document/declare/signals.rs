@@ -1,0 +1,262 @@
+//! `[signals]`: what is measured; whether the data have it is decided when data are read.
+
+use super::names::distinct;
+use super::placeholder;
+use super::reading::{duration, known_keys, missing, quantity, table, text, texts, wrong_type};
+use super::sets::{self, Sets};
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::graph_file::SignalDecl;
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Entry, Value};
+use crate::time::Duration;
+use crate::unit::Unit;
+
+const KEYS: [&str; 6] = ["unit", "channels", "column", "range", "max_age", "optional"];
+/// The placeholder in column patterns.
+const CHANNEL: &str = "channel";
+
+pub(super) fn declare(
+    signals: Option<&Value>,
+    sets: &Sets,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Vec<SignalDecl> {
+    let Some(signals) = signals.and_then(|signals| table(signals, "signals", diagnostics)) else {
+        return Vec::new();
+    };
+    signals
+        .iter()
+        .filter_map(|(name, entry)| signal(name, entry, sets, sample, diagnostics))
+        .collect()
+}
+
+fn signal(
+    name: &str,
+    entry: &Entry,
+    sets: &Sets,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Option<SignalDecl> {
+    let keys = table(&entry.value, name, diagnostics)?;
+    let what = format!("signal \"{name}\"");
+    known_keys(keys, &KEYS, &what, diagnostics);
+    let unit = match keys.get("unit") {
+        Some(value) => unit(value, diagnostics),
+        None => {
+            missing(
+                &entry.value,
+                "unit",
+                &what,
+                Some("write a UCUM unit, e.g. unit = \"nm\", or \"1\" if it has none"),
+                diagnostics,
+            );
+            None
+        }
+    };
+    let channels = match keys.get("channels") {
+        Some(value) => channels(value, &what, sets, diagnostics),
+        None => {
+            missing(
+                &entry.value,
+                "channels",
+                &what,
+                Some("list them, or name a set"),
+                diagnostics,
+            );
+            None
+        }
+    };
+    let column = match keys.get("column") {
+        Some(value) => column(value, channels.as_deref(), &what, diagnostics),
+        None => Some(format!("{{{CHANNEL}}}")),
+    };
+    let range = match (keys.get("range"), &unit) {
+        (Some(value), unit) => range(value, unit.as_ref().map(|(unit, _)| unit), diagnostics),
+        (None, _) => None,
+    };
+    let max_age = keys
+        .get("max_age")
+        .and_then(|value| duration(value, "max_age", sample, diagnostics));
+    let optional = match (keys.get("optional"), &channels) {
+        (Some(value), Some(channels)) => optional(value, name, channels, diagnostics),
+        _ => Vec::new(),
+    };
+    let (unit, unit_place) = unit?;
+    Some(SignalDecl {
+        name: name.to_owned(),
+        place: entry.key,
+        unit,
+        unit_place,
+        channels: channels?,
+        column: column?,
+        range,
+        max_age,
+        optional,
+    })
+}
+
+fn unit(value: &Value, diagnostics: &mut Diagnostics) -> Option<(Unit, Place)> {
+    let Some(text) = value.as_text() else {
+        wrong_type(value, "unit", "a unit like \"nm\"", diagnostics);
+        return None;
+    };
+    match Unit::parse(text) {
+        Ok(unit) => Some((unit, value.place)),
+        Err(error) => {
+            diagnostics.report(value.place, DocumentProblem::Unit(error));
+            None
+        }
+    }
+}
+
+fn channels(
+    value: &Value,
+    what: &str,
+    sets: &Sets,
+    diagnostics: &mut Diagnostics,
+) -> Option<Vec<(String, Place)>> {
+    if let Some(set) = value.as_text() {
+        let members = sets::find(set, value.place, sets, diagnostics)?;
+        return Some(
+            members
+                .iter()
+                .map(|member| (member.clone(), value.place))
+                .collect(),
+        );
+    }
+    let channels = texts(
+        value,
+        "channels",
+        "a list of names, or the name of a set",
+        diagnostics,
+    )?;
+    if value.as_list().is_some_and(<[Value]>::is_empty) {
+        diagnostics.report(
+            value.place,
+            DocumentProblem::EmptyList {
+                what: format!("the list of channels of {what}"),
+            },
+        );
+    }
+    distinct(&channels, "channel", diagnostics);
+    Some(channels)
+}
+
+fn column(
+    value: &Value,
+    channels: Option<&[(String, Place)]>,
+    what: &str,
+    diagnostics: &mut Diagnostics,
+) -> Option<String> {
+    let pattern = text(value, "column", diagnostics)?;
+    let mut names_channel = false;
+    for name in placeholder::names(pattern) {
+        if name == CHANNEL {
+            names_channel = true;
+        } else {
+            let known = vec![CHANNEL.to_owned()];
+            let what = format!("a column of {what}");
+            diagnostics.report(
+                value.place,
+                DocumentProblem::UnknownPlaceholder {
+                    name: name.to_owned(),
+                    known,
+                    what,
+                },
+            );
+        }
+    }
+    let count = channels.map_or(0, <[_]>::len);
+    if !names_channel && count > 1 {
+        diagnostics.report(
+            value.place,
+            DocumentProblem::OneColumn {
+                pattern: pattern.to_owned(),
+                channels: count,
+            },
+        );
+    }
+    Some(pattern.to_owned())
+}
+
+fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> Option<(f64, f64)> {
+    let Data::List(ends) = &value.data else {
+        wrong_type(
+            value,
+            "range",
+            "a list of two quantities, the low end first",
+            diagnostics,
+        );
+        return None;
+    };
+    let [low, high] = ends.as_slice() else {
+        let found = if ends.len() == 1 {
+            "a list of 1 value".to_owned()
+        } else {
+            format!("a list of {} values", ends.len())
+        };
+        let expected = "a list of two quantities, the low end first".to_owned();
+        diagnostics.report(
+            value.place,
+            DocumentProblem::WrongType {
+                key: Some("range".to_owned()),
+                expected,
+                found,
+            },
+        );
+        return None;
+    };
+    // Both are read before either is given up, so that mistakes in both are told.
+    let (low, high) = (end(low, unit, diagnostics), end(high, unit, diagnostics));
+    let (low, high, unit) = (low?, high?, unit?);
+    if low < high {
+        return Some((low, high));
+    }
+    diagnostics.report(
+        value.place,
+        DocumentProblem::RangeOrder {
+            low,
+            high,
+            unit: unit.to_string(),
+        },
+    );
+    None
+}
+
+fn end(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> Option<f64> {
+    let quantity = quantity(value, "range", diagnostics)?;
+    let unit = unit?;
+    let converted = quantity.in_unit(unit);
+    if converted.is_none() {
+        let problem = DocumentProblem::RangeUnit {
+            found: quantity.unit.to_string(),
+            unit: unit.to_string(),
+        };
+        diagnostics.report(value.place, problem);
+    }
+    converted
+}
+
+fn optional(
+    value: &Value,
+    signal: &str,
+    channels: &[(String, Place)],
+    diagnostics: &mut Diagnostics,
+) -> Vec<String> {
+    let names = texts(value, "optional", "a list of channels", diagnostics).unwrap_or_default();
+    for (name, place) in &names {
+        if !channels.iter().any(|(channel, _)| channel == name) {
+            let known = channels
+                .iter()
+                .map(|(channel, _)| channel.clone())
+                .collect();
+            let problem = DocumentProblem::UnknownChannel {
+                name: name.clone(),
+                signal: signal.to_owned(),
+                known,
+            };
+            diagnostics.report(*place, problem);
+        }
+    }
+    names.into_iter().map(|(name, _)| name).collect()
+}

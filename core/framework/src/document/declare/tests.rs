@@ -1,0 +1,162 @@
+use std::path::Path;
+
+use super::declare;
+use crate::diagnostic::{Diagnostics, Sources};
+use crate::document::{GraphFile, Memory, TimeBase, TimeForm, load_text};
+use crate::time::Duration;
+
+const SECOND: i64 = 1_000_000_000;
+
+fn graph(text: &str) -> GraphFile {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let text = format!("schema = 1\n{text}");
+    let document = load_text(
+        Path::new("a.toml"),
+        text,
+        &Memory::new(),
+        &mut sources,
+        &mut diagnostics,
+    );
+    document
+        .and_then(|document| declare(document, &mut diagnostics))
+        .unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 120)))
+}
+
+fn time(text: &str) -> (String, TimeForm) {
+    let TimeBase::Column { column, form } = graph(text).time;
+    (column, form)
+}
+
+#[test]
+fn time_is_in_seconds_unless_the_file_says_otherwise() {
+    let numbers = |ns| TimeForm::Numbers {
+        unit: Duration::from_ns(ns),
+    };
+    assert_eq!(time(""), ("time_s".to_owned(), numbers(SECOND)));
+    assert_eq!(
+        time("[time]\ncolumn = \"t\""),
+        ("t".to_owned(), numbers(SECOND))
+    );
+    assert_eq!(
+        time("[time]\nunit = \"ms\""),
+        ("time_ms".to_owned(), numbers(SECOND / 1_000))
+    );
+    assert_eq!(
+        time("[time]\nunit = \"rfc3339\""),
+        ("time".to_owned(), TimeForm::Rfc3339)
+    );
+}
+
+#[test]
+fn a_step_or_the_unit_sample_makes_a_sample_base() {
+    let step = Duration::from_ns(80_000_000);
+    assert_eq!(
+        time("[time]\ncolumn = \"n\"\nstep = \"0.08s\""),
+        ("n".to_owned(), TimeForm::Samples { step: Some(step) })
+    );
+    assert_eq!(
+        time("[time]\nunit = \"sample\""),
+        ("sample".to_owned(), TimeForm::Samples { step: None })
+    );
+    assert_eq!(
+        graph("[time]\nunit = \"sample\"").time.sample(),
+        Some(Duration::from_ns(SECOND))
+    );
+    assert_eq!(graph("").time.sample(), None);
+}
+
+#[test]
+fn samples_become_durations_wherever_they_stand() {
+    let text = "\n[signals.p]\nunit = \"nm\"\nchannels = [\"a\"]\nmax_age = \"2 samples\"\n[nodes.n]\ntype = \"x\"\n\
+        inputs.y = { from = \"p\", max_age = \"1 sample\" }\nlags = [\"0 samples\", \"3 samples\"]\ninner.by = \"1 sample\"";
+    for (base, sample) in [
+        ("[time]\nunit = \"sample\"", SECOND),
+        ("[time]\nstep = \"0.08s\"", 80_000_000),
+    ] {
+        let graph = graph(&format!("{base}{text}"));
+        let samples = |number: i64| Duration::from_ns(number * sample);
+        assert_eq!(graph.signals[0].max_age, Some(samples(2)));
+        let instance = &graph.nodes[0].instances[0];
+        assert_eq!(
+            instance.inputs[0].max_age.map(|(age, _)| age),
+            Some(samples(1))
+        );
+        let expected = serde_json::json!({
+            "lags": [samples(0), samples(3)],
+            "inner": { "by": samples(1) },
+        });
+        assert_eq!(instance.parameters.to_json(), expected);
+    }
+}
+
+#[test]
+fn two_sets_make_their_product_the_first_slowest() {
+    let graph = graph(
+        "[sets]\nside = [\"1\", \"2\"]\naxis = [\"X\", \"Y\"]\n[nodes.n]\ntype = \"x\"\neach = [\"side\", \"axis\"]\n\
+         inputs.y = [\"p.{axis}{side}\", \"q.{a,b}\"]\nlabel = \"{side}/{axis}\"",
+    );
+    let node = &graph.nodes[0];
+    assert_eq!(node.each, ["side", "axis"]);
+    let members: Vec<&str> = node
+        .instances
+        .iter()
+        .filter_map(|instance| instance.member.as_deref())
+        .collect();
+    assert_eq!(members, ["1-X", "1-Y", "2-X", "2-Y"]);
+    let third = &node.instances[2];
+    let references: Vec<&str> = third.inputs[0]
+        .references
+        .iter()
+        .map(|(text, _)| text.as_str())
+        .collect();
+    assert_eq!(references, ["p.X2", "q.{a,b}"]);
+    assert_eq!(
+        third.parameters.to_json(),
+        serde_json::json!({ "label": "2/X" })
+    );
+}
+
+#[test]
+fn a_range_is_given_in_the_unit_of_its_signal() {
+    let graph =
+        graph("[signals.t]\nunit = \"Cel\"\nchannels = [\"a\"]\nrange = [\"0 K\", \"212 degF\"]");
+    assert_eq!(graph.signals[0].range, Some((-273.15, 100.0)));
+}
+
+#[test]
+fn deployment_sections_are_handed_on_as_they_stand() {
+    let graph =
+        graph("model = \"m.json\"\n[source]\nx = 1\n[sinks.a]\ny = 2\n[[tests]]\nname = \"t\"");
+    assert_eq!(
+        graph.deployment.keys().collect::<Vec<_>>(),
+        ["source", "sinks", "model"]
+    );
+    assert_eq!(
+        graph.tests.map(|tests| tests.to_json()),
+        Some(serde_json::json!([{ "name": "t" }]))
+    );
+}
+
+#[test]
+fn an_output_may_be_blended() {
+    let graph = graph(
+        "[outputs]\na = \"x\"\nb = [\"x\", \"y:p.c\"]\nc = { from = \"x\", blend = \"5 nm/s\" }",
+    );
+    assert_eq!(
+        graph.outputs[1]
+            .from
+            .iter()
+            .map(|(text, _)| text.as_str())
+            .collect::<Vec<_>>(),
+        ["x", "y:p.c"]
+    );
+    assert_eq!(
+        graph.outputs[2]
+            .blend
+            .as_ref()
+            .map(ToString::to_string)
+            .as_deref(),
+        Some("5 nm/s")
+    );
+    assert_eq!(graph.outputs[0].blend, None);
+}

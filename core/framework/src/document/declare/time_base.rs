@@ -1,0 +1,102 @@
+//! `[time]`: which column holds the time and how its cells are read; reading them is left to the sources.
+
+use super::reading::{duration, known_keys, table, text, wrong_type};
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::graph_file::{TimeBase, TimeForm};
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Table, Value};
+use crate::time::Duration;
+
+const SECOND: Duration = Duration::from_ns(1_000_000_000);
+/// What `unit` may be, beside the units of time.
+const SAMPLE: &str = "sample";
+const RFC_3339: &str = "rfc3339";
+const UNITS: [&str; 11] = [
+    "ns", "us", "\u{b5}s", "\u{3bc}s", "ms", "s", "min", "h", "d", SAMPLE, RFC_3339,
+];
+
+pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> TimeBase {
+    let seconds = TimeForm::Numbers { unit: SECOND };
+    let Some(time) = time.and_then(|time| table(time, "time", diagnostics)) else {
+        return TimeBase::Column {
+            column: "time_s".to_owned(),
+            form: seconds,
+        };
+    };
+    known_keys(time, &["column", "unit", "step"], "[time]", diagnostics);
+    let unit = time.get("unit").and_then(|value| unit(value, diagnostics));
+    let step = time.get("step").and_then(|value| step(value, diagnostics));
+    let form = form(time, unit, step, diagnostics);
+    let column = match time
+        .get("column")
+        .and_then(|value| text(value, "column", diagnostics))
+    {
+        Some(column) => column.to_owned(),
+        None => match (form, unit) {
+            (TimeForm::Samples { .. }, _) => SAMPLE.to_owned(),
+            (TimeForm::Rfc3339, _) => "time".to_owned(),
+            (TimeForm::Numbers { .. }, Some((name, _))) => format!("time_{name}"),
+            (TimeForm::Numbers { .. }, None) => "time_s".to_owned(),
+        },
+    };
+    TimeBase::Column { column, form }
+}
+
+fn form(
+    time: &Table,
+    unit: Option<(&str, Place)>,
+    step: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> TimeForm {
+    match (unit, time.entry("step")) {
+        (None | Some((SAMPLE, _)), Some(_)) | (Some((SAMPLE, _)), None) => {
+            TimeForm::Samples { step }
+        }
+        (Some((name, _)), Some(entry)) => {
+            diagnostics.report(
+                entry.key,
+                DocumentProblem::TimeContradiction {
+                    key: "step",
+                    with: format!("unit = \"{name}\""),
+                },
+            );
+            TimeForm::Samples { step }
+        }
+        (Some((RFC_3339, _)), None) => TimeForm::Rfc3339,
+        (Some((name, _)), None) => TimeForm::Numbers {
+            unit: format!("1{name}").parse().unwrap_or(SECOND),
+        },
+        (None, None) => TimeForm::Numbers { unit: SECOND },
+    }
+}
+
+fn unit<'a>(value: &'a Value, diagnostics: &mut Diagnostics) -> Option<(&'a str, Place)> {
+    let Some(name) = value.as_text() else {
+        wrong_type(value, "unit", "a unit of time in quotes", diagnostics);
+        return None;
+    };
+    if UNITS.contains(&name) {
+        return Some((name, value.place));
+    }
+    let choices = UNITS
+        .iter()
+        .filter(|unit| unit.is_ascii())
+        .map(|unit| (*unit).to_owned())
+        .collect();
+    let problem = DocumentProblem::UnknownChoice {
+        key: Some("unit".to_owned()),
+        found: name.to_owned(),
+        choices,
+    };
+    diagnostics.report(value.place, problem);
+    None
+}
+
+fn step(value: &Value, diagnostics: &mut Diagnostics) -> Option<Duration> {
+    let step = duration(value, "step", None, diagnostics)?;
+    if step <= Duration::ZERO {
+        diagnostics.report(value.place, DocumentProblem::StepNotPositive);
+        return None;
+    }
+    Some(step)
+}

@@ -1,0 +1,299 @@
+//! What went wrong in reading a value as a type, and where; how reading goes on is decided by the repair.
+
+use std::fmt;
+
+use serde::de::{self, Expected, Unexpected};
+
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Value};
+
+/// One step from a value into it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Step {
+    Key(String),
+    Index(usize),
+}
+
+impl Step {
+    pub(super) fn is_key(&self, key: &str) -> bool {
+        matches!(self, Step::Key(name) if name == key)
+    }
+}
+
+/// A problem and the way to it from the decoded value.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mistake {
+    pub(super) path: Vec<Step>,
+    pub(super) place: Place,
+    pub(super) problem: DocumentProblem,
+}
+
+impl Mistake {
+    pub(super) fn missing_key(&self) -> Option<&str> {
+        match &self.problem {
+            DocumentProblem::MissingKey { key, .. } => Some(key),
+            _ => None,
+        }
+    }
+
+    /// Reports it, its table called by the keys that lead there and `what` holds them all.
+    pub(super) fn report(mut self, what: &str, diagnostics: &mut Diagnostics) {
+        let steps = match self.problem {
+            DocumentProblem::UnknownKey { .. } => &self.path[..self.path.len().saturating_sub(1)],
+            _ => &self.path[..],
+        };
+        let keys: Vec<&str> = steps
+            .iter()
+            .filter_map(|step| {
+                if let Step::Key(key) = step {
+                    Some(key.as_str())
+                } else {
+                    None
+                }
+            })
+            .collect();
+        let owner = if keys.is_empty() {
+            what.to_owned()
+        } else {
+            format!("\"{}\" of {what}", keys.join("."))
+        };
+        let last = keys.last().map(|key| (*key).to_owned());
+        match &mut self.problem {
+            DocumentProblem::UnknownKey { what, .. } | DocumentProblem::MissingKey { what, .. } => {
+                *what = owner
+            }
+            DocumentProblem::WrongType { key, .. }
+            | DocumentProblem::UnknownChoice { key, .. }
+            | DocumentProblem::Refused { key, .. } => *key = last,
+            _ => {}
+        }
+        diagnostics.report(self.place, self.problem);
+    }
+}
+
+/// The error that serde carries: a problem that learns its place on the way up.
+#[derive(Debug)]
+pub(super) struct DecodeError(Box<State>);
+
+#[derive(Debug)]
+enum State {
+    Unplaced(DocumentProblem),
+    Placed(Mistake),
+}
+
+impl DecodeError {
+    pub(super) fn of(problem: DocumentProblem) -> Self {
+        DecodeError(Box::new(State::Unplaced(problem)))
+    }
+
+    /// Places the error at `value`, or inside it where only one part can be meant. An error that has a place keeps it.
+    pub(super) fn at(self, value: &Value, path: impl FnOnce() -> Vec<Step>) -> Self {
+        match *self.0 {
+            State::Placed(_) => self,
+            State::Unplaced(problem) => {
+                let mut path = path();
+                let place = match only_part_meant(value, &problem) {
+                    Some((inner, place)) => {
+                        path.extend(inner);
+                        place
+                    }
+                    None => value.place,
+                };
+                DecodeError(Box::new(State::Placed(Mistake {
+                    path,
+                    place,
+                    problem,
+                })))
+            }
+        }
+    }
+
+    pub(super) fn into_mistake(self, place: Place) -> Mistake {
+        match *self.0 {
+            State::Placed(mistake) => mistake,
+            State::Unplaced(problem) => Mistake {
+                path: Vec::new(),
+                place,
+                problem,
+            },
+        }
+    }
+
+    pub(super) fn wrong_type(found: String, expected: &dyn Expected) -> Self {
+        Self::of(DocumentProblem::WrongType {
+            key: None,
+            expected: plain(&expected.to_string()),
+            found,
+        })
+    }
+}
+
+/// The only part of a table or list that a problem from a buffered enum can be about.
+fn only_part_meant(value: &Value, problem: &DocumentProblem) -> Option<(Vec<Step>, Place)> {
+    let mut meant = Vec::new();
+    search(value, problem, &mut Vec::new(), &mut meant);
+    if meant.len() == 1 { meant.pop() } else { None }
+}
+
+fn search(
+    value: &Value,
+    problem: &DocumentProblem,
+    path: &mut Vec<Step>,
+    meant: &mut Vec<(Vec<Step>, Place)>,
+) {
+    let fits = |inner: &Value| match problem {
+        DocumentProblem::WrongType { found, .. } => inner.found() == *found,
+        DocumentProblem::UnknownChoice { found, .. } => inner.as_text() == Some(found),
+        _ => false,
+    };
+    let mut visit = |step: Step, inner: &Value, key: Place| {
+        path.push(step);
+        if matches!((problem, path.last()), (DocumentProblem::UnknownKey { key, .. }, Some(step)) if step.is_key(key))
+        {
+            meant.push((path.clone(), key));
+        } else if fits(inner) {
+            meant.push((path.clone(), inner.place));
+        }
+        search(inner, problem, path, meant);
+        path.pop();
+    };
+    match &value.data {
+        Data::Table(table) => {
+            for (key, entry) in table.iter() {
+                visit(Step::Key(key.to_owned()), &entry.value, entry.key);
+            }
+        }
+        Data::List(values) => {
+            for (index, inner) in values.iter().enumerate() {
+                visit(Step::Index(index), inner, inner.place);
+            }
+        }
+        _ => {}
+    }
+}
+
+impl fmt::Display for DecodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        use crate::diagnostic::Problem;
+        match &*self.0 {
+            State::Unplaced(problem) | State::Placed(Mistake { problem, .. }) => {
+                f.write_str(&problem.message())
+            }
+        }
+    }
+}
+
+impl std::error::Error for DecodeError {}
+
+impl de::Error for DecodeError {
+    fn custom<T: fmt::Display>(reason: T) -> Self {
+        let reason = reason.to_string();
+        let reason = match reason.strip_prefix("data did not match any variant of untagged enum ") {
+            Some(_) => "it has none of the forms that are read here".to_owned(),
+            None => reason,
+        };
+        Self::of(DocumentProblem::Refused { key: None, reason })
+    }
+
+    fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::wrong_type(found_text(found), expected)
+    }
+
+    fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::wrong_type(found_text(found), expected)
+    }
+
+    fn invalid_length(length: usize, expected: &dyn Expected) -> Self {
+        let found = if length == 1 {
+            "a list of 1 value".to_owned()
+        } else {
+            format!("a list of {length} values")
+        };
+        Self::wrong_type(found, expected)
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        let choices = expected.iter().map(|choice| (*choice).to_owned()).collect();
+        Self::of(DocumentProblem::UnknownChoice {
+            key: None,
+            found: variant.to_owned(),
+            choices,
+        })
+    }
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
+        let known = expected.iter().map(|key| (*key).to_owned()).collect();
+        Self::of(DocumentProblem::UnknownKey {
+            key: field.to_owned(),
+            what: String::new(),
+            known,
+        })
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        Self::of(DocumentProblem::MissingKey {
+            key: field.to_owned(),
+            what: String::new(),
+            advice: None,
+        })
+    }
+
+    fn duplicate_field(field: &'static str) -> Self {
+        Self::custom(format_args!(
+            "\"{field}\" stands twice, once by another name"
+        ))
+    }
+}
+
+/// What serde found, in the words of [`Value::found`].
+fn found_text(found: Unexpected<'_>) -> String {
+    match found {
+        Unexpected::Str(text) => Value::new(NOWHERE, Data::Text(text.to_owned())).found(),
+        Unexpected::Signed(number) => format!("the number {number}"),
+        Unexpected::Unsigned(number) => format!("the number {number}"),
+        Unexpected::Float(number) => format!("the number {number}"),
+        Unexpected::Bool(truth) => truth.to_string(),
+        Unexpected::Seq => "a list".to_owned(),
+        Unexpected::Map | Unexpected::StructVariant => "a table".to_owned(),
+        Unexpected::UnitVariant => "a name alone".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+const NOWHERE: Place = Place::new(crate::diagnostic::SourceId(u32::MAX), 0, 0);
+
+/// Serde's word for a type, as one says it to who writes TOML.
+fn plain(expected: &str) -> String {
+    let said = match expected {
+        "u8" | "u16" | "u32" | "u64" | "u128" | "usize" => "a whole number, 0 or more",
+        "i8" | "i16" | "i32" | "i64" | "i128" | "isize" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a string" | "string" | "a character" => "a text in quotes",
+        "a boolean" => "true or false",
+        "a sequence" => "a list",
+        "a map" => "a table",
+        "variant identifier" | "string or map" | "variant of enum" => "one of its choices",
+        "unit" => "nothing",
+        _ => {
+            return match expected.split_once(' ') {
+                Some(("struct" | "internally" | "adjacently", _)) => "a table".to_owned(),
+                Some(("enum", _)) => "one of its choices".to_owned(),
+                Some(("a", rest)) if rest.starts_with("nonzero") => {
+                    "a whole number other than 0".to_owned()
+                }
+                _ => match (tuple_length(expected), expected) {
+                    (Some(length), _) => format!("a list of {length} values"),
+                    (None, other) => other.to_owned(),
+                },
+            };
+        }
+    };
+    said.to_owned()
+}
+
+fn tuple_length(expected: &str) -> Option<&str> {
+    expected
+        .strip_prefix("a tuple of size ")
+        .or_else(|| expected.strip_prefix("an array of length "))
+}

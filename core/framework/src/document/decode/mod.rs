@@ -1,0 +1,91 @@
+//! A table of the tree into a Rust type, with every mistake reported at its place; which types there are is decided by their owners.
+//!
+//! Structs are strict: a key that the struct does not have is reported with the nearest that it has, `deny_unknown_fields` or not.
+//! Serde buffers internally tagged and untagged enums, so that strictness and places end at them: give such an enum
+//! `#[serde(deny_unknown_fields)]`. A mistake inside is shown at the value that it names where only one place fits, else at the enum's table.
+
+mod error;
+mod repair;
+mod tree;
+
+use std::cell::RefCell;
+
+use serde::de::DeserializeOwned;
+
+use super::tree::Value;
+use crate::diagnostic::Diagnostics;
+use error::{DecodeError, Mistake};
+use repair::Repair;
+use tree::{Place, TreeDeserializer};
+
+/// Reads `value` as a `T`, or reports *all* mistakes in it and gives `None`. `what` names the value in the texts, e.g. `node "thermal"`.
+///
+/// After a mistake the key at fault is taken out and the rest is read again, until what is left would only follow from mistakes told already.
+pub fn decode<T: DeserializeOwned>(
+    value: &Value,
+    what: &str,
+    diagnostics: &mut Diagnostics,
+) -> Option<T> {
+    let mut repair: Option<Repair> = None;
+    let mut clean = true;
+    // Each turn takes at least one value out of the tree; the limit only bounds the time that a hopeless file takes.
+    for _ in 0..200 {
+        let (result, unknown) = attempt::<T>(repair.as_ref().map_or(value, Repair::tree));
+        if !unknown.is_empty() {
+            clean = false;
+            let repair = repair.get_or_insert_with(|| Repair::of(value));
+            for mistake in unknown {
+                repair.take_out(&mistake.path);
+                mistake.report(what, diagnostics);
+            }
+        }
+        let mistake = match result {
+            Ok(decoded) => return clean.then_some(decoded),
+            Err(error) => error.into_mistake(value.place),
+        };
+        clean = false;
+        let repair = repair.get_or_insert_with(|| Repair::of(value));
+        if !repair.explains(&mistake) {
+            mistake.clone().report(what, diagnostics);
+        }
+        let goes_on = match mistake.missing_key() {
+            Some(key) => {
+                let stands_in = |tree: &Value| match attempt::<T>(tree).0 {
+                    Ok(_) => true,
+                    Err(error) => {
+                        let next = error.into_mistake(value.place);
+                        let at_key = next.path.len() > mistake.path.len()
+                            && next.path.starts_with(&mistake.path)
+                            && next.path[mistake.path.len()].is_key(key);
+                        let still_missing =
+                            next.path == mistake.path && next.missing_key() == Some(key);
+                        !at_key && !still_missing
+                    }
+                };
+                repair.put_in(&mistake.path, key, stands_in) || repair.take_out(&mistake.path)
+            }
+            None => repair.take_out(&mistake.path),
+        };
+        if !goes_on {
+            return None;
+        }
+    }
+    None
+}
+
+/// One reading: the result, and the unknown keys that were passed over.
+fn attempt<T: DeserializeOwned>(value: &Value) -> (Result<T, DecodeError>, Vec<Mistake>) {
+    let unknown = RefCell::new(Vec::new());
+    let result = T::deserialize(TreeDeserializer {
+        value,
+        place: Place {
+            above: None,
+            step: None,
+        },
+        unknown: &unknown,
+    });
+    (result, unknown.into_inner())
+}
+
+#[cfg(test)]
+mod tests;

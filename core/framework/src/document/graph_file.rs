@@ -1,0 +1,151 @@
+//! What a graph file declares, typed and expanded; whether it makes sense is decided by the compiler.
+
+use indexmap::IndexMap;
+
+use super::tree::Value;
+use crate::diagnostic::Place;
+use crate::quantity::Quantity;
+use crate::time::Duration;
+use crate::unit::Unit;
+
+/// A whole graph file after merging, with every `each` expanded.
+#[derive(Debug, Clone)]
+pub struct GraphFile {
+    /// The graph's name.
+    pub name: Option<String>,
+    /// What the graph is for.
+    pub description: Option<String>,
+    /// The members of each set.
+    pub sets: IndexMap<String, Vec<String>>,
+    /// How tabular sources give time.
+    pub time: TimeBase,
+    /// What is measured, in the order of the file.
+    pub signals: Vec<SignalDecl>,
+    /// The nodes, in the order of the file.
+    pub nodes: Vec<NodeDecl>,
+    /// What comes out, in the order of the file.
+    pub outputs: Vec<OutputDecl>,
+    /// The list under `[[tests]]`, as it stands.
+    pub tests: Option<Value>,
+    /// The deployment sections `source`, `sinks`, `runtime` and `model`, as they stand.
+    pub deployment: IndexMap<String, Value>,
+    /// The merged tree before expansion; what a model stores.
+    pub tree: Value,
+}
+
+/// How tabular sources give time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TimeBase {
+    /// One column holds the time of each row.
+    Column {
+        /// The column's name.
+        column: String,
+        /// How its cells are read.
+        form: TimeForm,
+    },
+}
+
+/// How a cell of the time column is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeForm {
+    /// A number; `unit` is the length of one.
+    Numbers {
+        /// Length of 1.
+        unit: Duration,
+    },
+    /// A date and time as RFC 3339 writes it.
+    Rfc3339,
+    /// A sample number.
+    Samples {
+        /// Time from one sample to the next; without it, one sample is carried as one second.
+        step: Option<Duration>,
+    },
+}
+
+impl TimeBase {
+    /// The length of one sample as it is carried inside, if samples are what counts: the step, or 1 s without one.
+    pub fn sample(&self) -> Option<Duration> {
+        let TimeBase::Column { form, .. } = self;
+        match form {
+            TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
+            TimeForm::Numbers { .. } | TimeForm::Rfc3339 => None,
+        }
+    }
+}
+
+/// A group of measured channels.
+#[derive(Debug, Clone)]
+pub struct SignalDecl {
+    /// The signal's name.
+    pub name: String,
+    /// Where it is declared.
+    pub place: Place,
+    /// The unit of its samples.
+    pub unit: Unit,
+    /// Where the unit stands.
+    pub unit_place: Place,
+    /// Its channels, each with where it is named.
+    pub channels: Vec<(String, Place)>,
+    /// The name of each channel's column, with `{channel}` for the channel.
+    pub column: String,
+    /// Lowest and highest value, in the signal's unit; beyond them a sample is absent.
+    pub range: Option<(f64, f64)>,
+    /// How long a held sample counts.
+    pub max_age: Option<Duration>,
+    /// The channels that the data may lack.
+    pub optional: Vec<String>,
+}
+
+/// A node and its instances.
+#[derive(Debug, Clone)]
+pub struct NodeDecl {
+    /// The node's name.
+    pub name: String,
+    /// Where it is declared.
+    pub place: Place,
+    /// Its `type`.
+    pub kind: String,
+    /// Where the type stands.
+    pub kind_place: Place,
+    /// The sets of its `each`, in order.
+    pub each: Vec<String>,
+    /// One per member, or one without `each`.
+    pub instances: Vec<InstanceDecl>,
+}
+
+/// One instance of a node.
+#[derive(Debug, Clone)]
+pub struct InstanceDecl {
+    /// The member of the node's sets: `Z1`, or `1-X` over two sets; none without `each`.
+    pub member: Option<String>,
+    /// The inputs, in the order of the file.
+    pub inputs: Vec<InputDecl>,
+    /// The node's table without `type`, `each` and `inputs`; members substituted, samples turned into durations.
+    pub parameters: Value,
+}
+
+/// What an input port reads.
+#[derive(Debug, Clone)]
+pub struct InputDecl {
+    /// The port's name.
+    pub port: String,
+    /// Where it is named.
+    pub place: Place,
+    /// The references, each with where it stands.
+    pub references: Vec<(String, Place)>,
+    /// How old a held value may be, and where that stands.
+    pub max_age: Option<(Duration, Place)>,
+}
+
+/// A named output.
+#[derive(Debug, Clone)]
+pub struct OutputDecl {
+    /// The output's name.
+    pub name: String,
+    /// Where it is named.
+    pub place: Place,
+    /// The references, each with where it stands.
+    pub from: Vec<(String, Place)>,
+    /// The rate at which the output passes from an old graph to a new one.
+    pub blend: Option<Quantity>,
+}

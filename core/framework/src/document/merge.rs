@@ -1,0 +1,104 @@
+//! A file laid over the one that it extends; it reads no files and knows only the keys that change how tables merge.
+
+use super::problem::DocumentProblem;
+use super::tree::{Data, Entry, Table, Value};
+use crate::diagnostic::Diagnostics;
+
+/// Lays `over` on `base`: tables merge key by key, all else replaces.
+///
+/// Under `nodes`, `false` removes an inherited node, and a node of another `type` (or `module`) replaces the inherited one whole.
+pub(super) fn merge(base: Option<Table>, over: Table, diagnostics: &mut Diagnostics) -> Table {
+    let mut merged = base.unwrap_or_default();
+    for (key, entry) in over {
+        if key == "nodes" {
+            merge_nodes(&mut merged, key, entry, diagnostics);
+        } else {
+            lay(&mut merged, key, entry);
+        }
+    }
+    merged
+}
+
+fn merge_nodes(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
+    let Entry {
+        key: key_place,
+        value: Value {
+            place,
+            data: Data::Table(nodes),
+        },
+    } = entry
+    else {
+        merged.insert(key, entry);
+        return;
+    };
+    let inherited = match merged.get_mut(&key).map(|value| &mut value.data) {
+        Some(Data::Table(table)) => table,
+        _ => {
+            merged.insert(
+                key.clone(),
+                Entry {
+                    key: key_place,
+                    value: Value::new(place, Data::Table(Table::new())),
+                },
+            );
+            match merged.get_mut(&key).map(|value| &mut value.data) {
+                Some(Data::Table(table)) => table,
+                _ => return,
+            }
+        }
+    };
+    let names: Vec<String> = inherited.keys().map(str::to_owned).collect();
+    for (name, node) in nodes {
+        if node.value.as_bool() == Some(false) {
+            if inherited.remove(&name).is_none() {
+                diagnostics.report(
+                    node.key,
+                    DocumentProblem::NothingToRemove {
+                        node: name,
+                        inherited: names.clone(),
+                    },
+                );
+            }
+        } else if inherited
+            .get(&name)
+            .is_some_and(|old| is_another_kind(old, &node.value))
+        {
+            inherited.insert(name, node);
+        } else {
+            lay(inherited, name, node);
+        }
+    }
+}
+
+fn is_another_kind(old: &Value, new: &Value) -> bool {
+    let (Some(old), Some(new)) = (old.as_table(), new.as_table()) else {
+        return true;
+    };
+    ["type", "module"].iter().any(|key| match new.get(key) {
+        Some(kind) => old.get(key).is_none_or(|old| old.data != kind.data),
+        None => false,
+    })
+}
+
+fn lay(merged: &mut Table, key: String, entry: Entry) {
+    match (merged.get_mut(&key).map(|value| &mut value.data), entry) {
+        (
+            Some(Data::Table(below)),
+            Entry {
+                value:
+                    Value {
+                        data: Data::Table(above),
+                        ..
+                    },
+                ..
+            },
+        ) => {
+            for (key, entry) in above {
+                lay(below, key, entry);
+            }
+        }
+        (_, entry) => {
+            merged.insert(key, entry);
+        }
+    }
+}

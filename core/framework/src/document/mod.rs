@@ -1,0 +1,27 @@
+//! A graph file, with what it extends, as a tree with places and then as typed declarations; whether the graph makes sense is decided by the compiler.
+//!
+//! [`load`] reads and merges files into a [`Document`]; [`declare`] checks names, expands sets and `each`, and gives a
+//! [`GraphFile`]; [`decode`] turns a table into the parameters of whoever owns it.
+
+mod declare;
+mod decode;
+mod graph_file;
+mod json;
+mod merge;
+mod problem;
+mod read;
+mod toml_text;
+mod tree;
+
+pub use declare::declare;
+pub use decode::decode;
+pub use graph_file::{
+    GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
+};
+pub use json::JsonError;
+pub use problem::DocumentProblem;
+pub use read::{Disk, Document, FileReader, Memory, load, load_text};
+pub use tree::{Data, Entry, Table, Value};
+
+#[cfg(test)]
+mod tests;

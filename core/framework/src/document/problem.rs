@@ -1,0 +1,480 @@
+//! Every mistake that reading a graph file can find, with the data of its text; where it stands is told by who reports it.
+
+use std::fmt::Write;
+
+use crate::diagnostic::{Place, Problem, nearest};
+use crate::quantity::QuantityError;
+use crate::time::DurationError;
+use crate::unit::UnitError;
+
+/// A mistake in a graph file that shows before the graph is looked at as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DocumentProblem {
+    /// Not TOML.
+    Syntax {
+        /// What the TOML parser says.
+        reason: String,
+    },
+    /// A file cannot be read.
+    Unreadable {
+        /// The path as it was tried.
+        path: String,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// A file is too large.
+    TooLarge {
+        /// The largest size in bytes.
+        limit: usize,
+    },
+    /// Tables or lists are nested too deeply.
+    TooDeep {
+        /// The greatest depth.
+        limit: usize,
+    },
+    /// Too many files extend one another.
+    LongChain {
+        /// The greatest number of files.
+        limit: usize,
+    },
+    /// A chain of `extends` comes back to itself.
+    ExtendsLoop {
+        /// The paths from the first file back to it.
+        chain: Vec<String>,
+    },
+    /// `schema` is missing.
+    SchemaMissing,
+    /// `schema` is not one that this version reads.
+    SchemaUnknown {
+        /// What was found.
+        found: String,
+    },
+    /// A key that its table does not have.
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// What the table belongs to.
+        what: String,
+        /// The keys that are known there.
+        known: Vec<String>,
+    },
+    /// A key that has no default is not there.
+    MissingKey {
+        /// The key.
+        key: String,
+        /// What the table belongs to.
+        what: String,
+        /// What to write, where that can be said.
+        advice: Option<String>,
+    },
+    /// A value of another type than its key needs.
+    WrongType {
+        /// The key or, in a list, the list's key.
+        key: Option<String>,
+        /// What is needed.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+    /// A text that is none of the choices.
+    UnknownChoice {
+        /// The key.
+        key: Option<String>,
+        /// What was found.
+        found: String,
+        /// What there is.
+        choices: Vec<String>,
+    },
+    /// The value has the right type, and its reader refuses it.
+    Refused {
+        /// The key.
+        key: Option<String>,
+        /// The reader's reason.
+        reason: String,
+    },
+    /// A number that no double or 64-bit integer holds.
+    NumberTooLarge {
+        /// The number as written.
+        number: String,
+    },
+    /// A name that breaks the rules.
+    BadName {
+        /// What it names.
+        role: &'static str,
+        /// The name.
+        name: String,
+        /// Whether it may begin with a digit.
+        digit_first: bool,
+    },
+    /// A name that is taken.
+    DuplicateName {
+        /// What it names.
+        role: &'static str,
+        /// The name.
+        name: String,
+        /// What has the name already.
+        first_role: &'static str,
+        /// Where that is.
+        first: Option<Place>,
+    },
+    /// A set that is not declared.
+    UnknownSet {
+        /// The name.
+        name: String,
+        /// The sets that there are.
+        known: Vec<String>,
+    },
+    /// `{x}` that stands for nothing.
+    UnknownPlaceholder {
+        /// What stands between the braces.
+        name: String,
+        /// What it may be here.
+        known: Vec<String>,
+        /// What it stands in.
+        what: String,
+    },
+    /// A list that needs an entry has none.
+    EmptyList {
+        /// What the list is of.
+        what: String,
+    },
+    /// `each` would make too many instances.
+    TooManyInstances {
+        /// The node.
+        node: String,
+        /// Instances of the whole graph with this node, as far as they can be counted.
+        instances: usize,
+        /// The greatest number.
+        limit: usize,
+    },
+    /// `each` would make too large a graph.
+    TooLargeExpanded {
+        /// The node.
+        node: String,
+        /// The greatest number of values in all instances together.
+        limit: usize,
+    },
+    /// A text that is no unit.
+    Unit(UnitError),
+    /// A text that is no duration.
+    Duration(DurationError),
+    /// A text that is no quantity.
+    Quantity(QuantityError),
+    /// `nodes.NAME = false` without an inherited node of that name.
+    NothingToRemove {
+        /// The node.
+        node: String,
+        /// The nodes that are inherited.
+        inherited: Vec<String>,
+    },
+    /// A number of samples where time is not counted in samples.
+    SamplesWithoutClock {
+        /// The text.
+        text: String,
+    },
+    /// Several channels would be read from one column.
+    OneColumn {
+        /// The pattern.
+        pattern: String,
+        /// The number of channels.
+        channels: usize,
+    },
+    /// A range whose ends do not measure what the signal measures.
+    RangeUnit {
+        /// The unit of the end.
+        found: String,
+        /// The unit of the signal.
+        unit: String,
+    },
+    /// A range whose low end is not below its high end.
+    RangeOrder {
+        /// The low end.
+        low: f64,
+        /// The high end.
+        high: f64,
+        /// The unit of both.
+        unit: String,
+    },
+    /// `optional` names what is not a channel.
+    UnknownChannel {
+        /// The name.
+        name: String,
+        /// The signal.
+        signal: String,
+        /// Its channels.
+        known: Vec<String>,
+    },
+    /// Two keys of `[time]` exclude each other.
+    TimeContradiction {
+        /// The key that is too much.
+        key: &'static str,
+        /// The key and value that it contradicts.
+        with: String,
+    },
+    /// A step of no length.
+    StepNotPositive,
+    /// `[modules]` or `module = …`.
+    Modules,
+}
+
+/// At most twelve names in quotes, for a list of what there is.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 12;
+    let mut text = String::new();
+    for (index, name) in names.iter().take(SHOWN).enumerate() {
+        let _ = write!(text, "{}\"{name}\"", if index == 0 { "" } else { ", " });
+    }
+    if names.len() > SHOWN {
+        let _ = write!(text, " and {} more", names.len() - SHOWN);
+    }
+    text
+}
+
+/// "did you mean" or a list of what there is.
+fn suggestion(name: &str, known: &[String], there_are: &str) -> Option<String> {
+    match nearest(name, known.iter().map(String::as_str)) {
+        Some(near) => Some(format!("did you mean \"{near}\"?")),
+        None if known.is_empty() => None,
+        None if known.len() == 1 => Some(format!("there is only {}", listed(known))),
+        None => Some(format!("{there_are} {}", listed(known))),
+    }
+}
+
+fn for_key(key: Option<&String>) -> String {
+    key.map_or_else(String::new, |key| format!(" for \"{key}\""))
+}
+
+impl Problem for DocumentProblem {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Syntax { .. } => "A001",
+            Self::Unreadable { .. } => "A002",
+            Self::TooLarge { .. } | Self::TooDeep { .. } | Self::LongChain { .. } => "A003",
+            Self::SchemaMissing | Self::SchemaUnknown { .. } => "A004",
+            Self::ExtendsLoop { .. } => "A005",
+            Self::UnknownKey { .. } => "A006",
+            Self::MissingKey { .. } => "A007",
+            Self::WrongType { .. } => "A008",
+            Self::UnknownChoice { .. } => "A009",
+            Self::Refused { .. } | Self::NumberTooLarge { .. } | Self::StepNotPositive => "A010",
+            Self::BadName { .. } => "A011",
+            Self::DuplicateName { .. } => "A012",
+            Self::UnknownSet { .. } => "A013",
+            Self::UnknownPlaceholder { .. } => "A014",
+            Self::EmptyList { .. } => "A015",
+            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => "A016",
+            Self::Unit(_) => "A017",
+            Self::Duration(_) | Self::Quantity(_) => "A018",
+            Self::NothingToRemove { .. } => "A019",
+            Self::SamplesWithoutClock { .. } => "A020",
+            Self::OneColumn { .. } => "A021",
+            Self::RangeUnit { .. } | Self::RangeOrder { .. } => "A022",
+            Self::UnknownChannel { .. } => "A023",
+            Self::TimeContradiction { .. } => "A024",
+            Self::Modules => "A025",
+        }
+    }
+
+    fn message(&self) -> String {
+        match self {
+            Self::Syntax { reason } => format!("this is not TOML: {reason}"),
+            Self::Unreadable { path, reason } => format!("cannot read \"{path}\": {reason}"),
+            Self::TooLarge { limit } => format!("the file is larger than {} MB", limit / 1_000_000),
+            Self::TooDeep { limit } => format!("keys are nested more than {limit} deep"),
+            Self::LongChain { limit } => format!("more than {limit} files extend one another"),
+            Self::ExtendsLoop { chain } => format!(
+                "`extends` comes back to its own file: {}",
+                chain.join(" -> ")
+            ),
+            Self::SchemaMissing => "the file does not say which schema it follows".to_owned(),
+            Self::SchemaUnknown { found } => format!("the schema is 1, found {found}"),
+            Self::UnknownKey { key, what, .. } => format!("{what} has no key \"{key}\""),
+            Self::MissingKey { key, what, .. } => format!("{what} needs the key \"{key}\""),
+            Self::WrongType {
+                key,
+                expected,
+                found,
+            } => format!(
+                "expected {expected}{}, found {found}",
+                for_key(key.as_ref())
+            ),
+            Self::UnknownChoice { key, found, .. } => {
+                format!("\"{found}\" is not a choice{}", for_key(key.as_ref()))
+            }
+            Self::Refused {
+                key: Some(key),
+                reason,
+            } => format!("\"{key}\" is refused: {reason}"),
+            Self::Refused { key: None, reason } => reason.clone(),
+            Self::NumberTooLarge { number } => format!("the number {number} is too large"),
+            Self::BadName { role, name, .. } => {
+                format!("\"{name}\" cannot be the name of a {role}")
+            }
+            Self::DuplicateName {
+                role,
+                name,
+                first_role,
+                ..
+            } => {
+                let article = if role == first_role { "another" } else { "a" };
+                format!("the {role} \"{name}\" has the name of {article} {first_role}")
+            }
+            Self::UnknownSet { name, .. } => format!("there is no set \"{name}\""),
+            Self::UnknownPlaceholder { name, what, .. } => {
+                format!("\"{{{name}}}\" stands for nothing in {what}")
+            }
+            Self::EmptyList { what } => format!("{what} has no entries"),
+            Self::TooManyInstances {
+                node,
+                instances,
+                limit,
+            } => {
+                format!(
+                    "with node \"{node}\" the graph has {instances} instances, more than {limit}"
+                )
+            }
+            Self::TooLargeExpanded { node, limit } => {
+                format!("with node \"{node}\" the expanded graph has more than {limit} values")
+            }
+            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error.reason(),
+            Self::Duration(error) => error.to_string(),
+            Self::Quantity(error) => error.to_string(),
+            Self::NothingToRemove { node, .. } => {
+                format!("there is no inherited node \"{node}\" to remove")
+            }
+            Self::SamplesWithoutClock { text } => {
+                format!("\"{text}\" counts samples, and the time of this graph does not")
+            }
+            Self::OneColumn { pattern, channels } => {
+                format!("{channels} channels would all be read from the column \"{pattern}\"")
+            }
+            Self::RangeUnit { found, unit } => format!(
+                "the range is in \"{found}\", which does not convert to the signal's unit \"{unit}\""
+            ),
+            Self::RangeOrder { low, high, unit } => {
+                format!("the range from {low} {unit} to {high} {unit} contains nothing")
+            }
+            Self::UnknownChannel { name, signal, .. } => {
+                format!("signal \"{signal}\" has no channel \"{name}\"")
+            }
+            Self::TimeContradiction { key, with } => format!("`{key}` has no meaning with {with}"),
+            Self::StepNotPositive => {
+                "the step from one sample to the next is longer than 0".to_owned()
+            }
+            Self::Modules => "modules are not part of this version".to_owned(),
+        }
+    }
+
+    fn label(&self) -> String {
+        match self {
+            Self::Syntax { .. } => "here".to_owned(),
+            Self::Unreadable { .. } => "named here".to_owned(),
+            Self::ExtendsLoop { .. } | Self::LongChain { .. } => "extends this file".to_owned(),
+            Self::SchemaMissing => "`schema = 1` is missing".to_owned(),
+            Self::SchemaUnknown { .. } => "not 1".to_owned(),
+            Self::UnknownKey { .. } => "unknown key".to_owned(),
+            Self::MissingKey { key, .. } => format!("\"{key}\" is missing"),
+            Self::WrongType { expected, .. } => format!("expected {expected}"),
+            Self::UnknownChoice { .. } => "not a choice".to_owned(),
+            Self::Refused { .. } => "refused".to_owned(),
+            Self::BadName { .. } => "not a name".to_owned(),
+            Self::DuplicateName { .. } => "this name is taken".to_owned(),
+            Self::UnknownSet { .. } => "not a set".to_owned(),
+            Self::UnknownPlaceholder { .. } => "stands for nothing".to_owned(),
+            Self::EmptyList { .. } => "empty".to_owned(),
+            Self::Unit(_) => "not a unit".to_owned(),
+            Self::Duration(_) => "not a duration".to_owned(),
+            Self::Quantity(QuantityError::Unit(_)) => "the unit is not known".to_owned(),
+            Self::Quantity(_) => "not a quantity".to_owned(),
+            Self::UnknownChannel { .. } => "not a channel".to_owned(),
+            Self::RangeUnit { unit, .. } => format!("does not convert to {unit}"),
+            _ => String::new(),
+        }
+    }
+
+    fn help(&self) -> Option<String> {
+        match self {
+            Self::SchemaMissing | Self::SchemaUnknown { .. } => {
+                Some("begin the file with `schema = 1`".to_owned())
+            }
+            Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
+            Self::MissingKey { advice, .. } => advice.clone(),
+            Self::WrongType {
+                expected, found, ..
+            } if found.starts_with("the number") => {
+                if expected.starts_with("a duration") {
+                    Some("a duration needs a unit, e.g. \"5min\"".to_owned())
+                } else if expected.starts_with("a quantity") {
+                    Some("a quantity needs a unit, e.g. \"150 nm/min\"".to_owned())
+                } else {
+                    None
+                }
+            }
+            Self::UnknownChoice { found, choices, .. } => {
+                suggestion(found, choices, "the choices are")
+            }
+            Self::BadName {
+                digit_first: false, ..
+            } => Some("a name begins with a letter, then letters, digits, `_` and `-`".to_owned()),
+            Self::BadName {
+                digit_first: true, ..
+            } => Some(
+                "a name begins with a letter or digit, then letters, digits, `_` and `-`"
+                    .to_owned(),
+            ),
+            Self::DuplicateName {
+                role, first_role, ..
+            } if role != first_role => {
+                Some("nodes, sets and signals share one name space".to_owned())
+            }
+            Self::UnknownSet { name, known } => suggestion(name, known, "the sets are")
+                .or_else(|| Some("declare it under `[sets]`".to_owned())),
+            Self::UnknownPlaceholder { name, known, .. } => {
+                match nearest(name, known.iter().map(String::as_str)) {
+                    Some(near) => Some(format!("did you mean \"{{{near}}}\"?")),
+                    None if known.is_empty() => {
+                        Some("only a node with `each` has members to stand for".to_owned())
+                    }
+                    None => Some(format!(
+                        "it may be {}",
+                        known
+                            .iter()
+                            .map(|name| format!("\"{{{name}}}\""))
+                            .collect::<Vec<_>>()
+                            .join(", ")
+                    )),
+                }
+            }
+            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => {
+                Some("use fewer members, or spread the graph over several files".to_owned())
+            }
+            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error
+                .advice()
+                .map(|advice| format!("write the unit as \"{advice}\"")),
+            Self::NothingToRemove { node, inherited } => {
+                suggestion(node, inherited, "the inherited nodes are")
+                    .or_else(|| Some("leave it out; nothing is inherited here".to_owned()))
+            }
+            Self::SamplesWithoutClock { .. } => Some(
+                "write a duration like \"5min\", or count samples: `[time] unit = \"sample\"`"
+                    .to_owned(),
+            ),
+            Self::OneColumn { .. } => Some("put `{channel}` into the pattern".to_owned()),
+            Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
+            Self::UnknownChannel { name, known, .. } => suggestion(name, known, "its channels are"),
+            Self::EmptyList { .. } => Some("name at least one".to_owned()),
+            _ => None,
+        }
+    }
+
+    fn related(&self) -> Vec<(Place, String)> {
+        match self {
+            Self::DuplicateName {
+                first: Some(place),
+                first_role,
+                ..
+            } => vec![(*place, format!("the {first_role} is here"))],
+            _ => Vec::new(),
+        }
+    }
+}

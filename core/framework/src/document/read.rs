@@ -1,0 +1,291 @@
+//! Reading a graph file and the files that it extends into one tree; what the tree declares is decided elsewhere.
+
+use std::collections::HashMap;
+use std::io::{self, Read};
+use std::path::{Component, Path, PathBuf};
+
+use super::merge::merge;
+use super::problem::DocumentProblem;
+use super::toml_text;
+use super::tree::{Data, Table, Value};
+use crate::diagnostic::{Diagnostics, Place, SourceId, Sources};
+
+/// The largest file that is read, in bytes.
+const LARGEST: usize = 16_000_000;
+/// The greatest number of files in a chain of `extends`.
+const LONGEST_CHAIN: usize = 16;
+
+/// Where files come from.
+pub trait FileReader {
+    /// The whole text of a file.
+    ///
+    /// # Errors
+    /// What the operating system says, also for a text that is not UTF-8.
+    fn read(&self, path: &Path) -> Result<String, io::Error>;
+}
+
+/// Files of the operating system.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Disk;
+
+impl FileReader for Disk {
+    fn read(&self, path: &Path) -> Result<String, io::Error> {
+        let mut text = String::new();
+        // One byte more than is allowed tells a file that is too large, without reading an endless one.
+        std::fs::File::open(path)?
+            .take(LARGEST as u64 + 1)
+            .read_to_string(&mut text)?;
+        Ok(text)
+    }
+}
+
+/// Files in memory, for tests and embedded programs.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    files: HashMap<PathBuf, String>,
+}
+
+impl Memory {
+    /// No files.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The same with one file more.
+    pub fn with(mut self, path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
+        self.files.insert(path.into(), text.into());
+        self
+    }
+}
+
+impl FileReader for Memory {
+    fn read(&self, path: &Path) -> Result<String, io::Error> {
+        self.files
+            .get(path)
+            .or_else(|| self.files.get(&normal(path)))
+            .cloned()
+            .ok_or_else(|| io::ErrorKind::NotFound.into())
+    }
+}
+
+/// A graph file merged with what it extends, not yet expanded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Document {
+    /// The file that was asked for.
+    pub root: SourceId,
+    /// The merged tree: a table without `extends`.
+    pub tree: Value,
+    /// A mistake is reported already that leaves the tree readable, so that more can be found in it.
+    pub(super) faulty: bool,
+}
+
+impl Document {
+    /// A tree that comes from elsewhere than files, e.g. from a model.
+    pub fn new(root: SourceId, tree: Value) -> Self {
+        Document {
+            root,
+            tree,
+            faulty: false,
+        }
+    }
+}
+
+/// Reads the file at `path` and all that it extends.
+///
+/// `None` if any of them is missing, too large or not TOML; the diagnostics say which. Every file read is added to `sources`.
+pub fn load(
+    path: &Path,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<Document> {
+    match reader.read(path) {
+        Ok(text) => load_text(path, text, reader, sources, diagnostics),
+        Err(error) => {
+            let path = path.display().to_string();
+            diagnostics.report(
+                None,
+                DocumentProblem::Unreadable {
+                    path,
+                    reason: reason(&error),
+                },
+            );
+            None
+        }
+    }
+}
+
+/// The same for a text that is at hand; `name` stands for its path, and what it extends is looked for beside it.
+pub fn load_text(
+    name: impl AsRef<Path>,
+    text: impl Into<String>,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<Document> {
+    let before = diagnostics.error_count();
+    let mut chain = Chain {
+        reader,
+        sources,
+        diagnostics,
+        paths: Vec::new(),
+        broken: false,
+    };
+    let root = SourceId(chain.sources.count());
+    let table = chain.read(name.as_ref(), text.into());
+    let broken = chain.broken;
+    let tree = Value::new(
+        Place::new(root, 0, 0),
+        Data::Table(table.filter(|_| !broken)?),
+    );
+    Some(Document {
+        root,
+        tree,
+        faulty: diagnostics.error_count() > before,
+    })
+}
+
+struct Chain<'a> {
+    reader: &'a dyn FileReader,
+    sources: &'a mut Sources,
+    diagnostics: &'a mut Diagnostics,
+    paths: Vec<PathBuf>,
+    /// Something could not be read, so that checks of the rest would report what follows from it.
+    broken: bool,
+}
+
+impl Chain<'_> {
+    fn read(&mut self, path: &Path, text: String) -> Option<Table> {
+        self.paths.push(normal(path));
+        let table = self.read_and_merge(path, text);
+        self.paths.pop();
+        if table.is_none() {
+            self.broken = true;
+        }
+        table
+    }
+
+    fn read_and_merge(&mut self, path: &Path, text: String) -> Option<Table> {
+        let shown = path.display().to_string();
+        if text.len() > LARGEST {
+            let source = self.sources.add(shown, "");
+            self.diagnostics.report(
+                Place::new(source, 0, 0),
+                DocumentProblem::TooLarge { limit: LARGEST },
+            );
+            return None;
+        }
+        let text: std::sync::Arc<str> = text.into();
+        let source = self.sources.add(shown, text.clone());
+        let before = self.diagnostics.error_count();
+        let tree = toml_text::parse(source, &text, self.diagnostics)?;
+        if self.diagnostics.error_count() > before {
+            self.broken = true;
+        }
+        let Data::Table(mut table) = tree.data else {
+            return None;
+        };
+        let schema = table
+            .get("schema")
+            .map(|value| (value.place, value.as_integer(), value.found()));
+        match schema {
+            Some((_, Some(1), _)) => {}
+            // A missing schema in a broken file may be what broke.
+            None if self.broken => {}
+            None => self
+                .diagnostics
+                .report(Place::new(source, 0, 0), DocumentProblem::SchemaMissing),
+            Some((place, _, found)) => self.fail(place, DocumentProblem::SchemaUnknown { found }),
+        }
+        let base = match table.remove("extends") {
+            Some(entry) => self.base(&entry.value),
+            None => None,
+        };
+        Some(merge(base, table, self.diagnostics))
+    }
+
+    fn base(&mut self, extends: &Value) -> Option<Table> {
+        let place = extends.place;
+        let Some(name) = extends.as_text() else {
+            let (key, expected) = (
+                Some("extends".to_owned()),
+                "the path of a file in quotes".to_owned(),
+            );
+            self.fail(
+                place,
+                DocumentProblem::WrongType {
+                    key,
+                    expected,
+                    found: extends.found(),
+                },
+            );
+            return None;
+        };
+        let path = self.sources.resolve(place, name);
+        let wanted = normal(&path);
+        if let Some(first) = self.paths.iter().position(|seen| *seen == wanted) {
+            let chain = self.paths[first..]
+                .iter()
+                .chain([&wanted])
+                .map(|path| path.display().to_string())
+                .collect();
+            self.fail(place, DocumentProblem::ExtendsLoop { chain });
+            return None;
+        }
+        if self.paths.len() >= LONGEST_CHAIN {
+            self.fail(
+                place,
+                DocumentProblem::LongChain {
+                    limit: LONGEST_CHAIN,
+                },
+            );
+            return None;
+        }
+        match self.reader.read(&path) {
+            Ok(text) => self.read(&path, text),
+            Err(error) => {
+                let path = path.display().to_string();
+                self.fail(
+                    place,
+                    DocumentProblem::Unreadable {
+                        path,
+                        reason: reason(&error),
+                    },
+                );
+                None
+            }
+        }
+    }
+
+    fn fail(&mut self, place: Place, problem: DocumentProblem) {
+        self.broken = true;
+        self.diagnostics.report(place, problem);
+    }
+}
+
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
+        io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        io::ErrorKind::InvalidData => "it is not a UTF-8 text".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+/// The path without `.` and, where that does not depend on the file system, without `..`.
+fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir
+                if matches!(normal.components().next_back(), Some(Component::Normal(_))) =>
+            {
+                normal.pop();
+            }
+            other => normal.push(other),
+        }
+    }
+    normal
+}

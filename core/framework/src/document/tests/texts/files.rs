@@ -1,0 +1,376 @@
+//! Texts of mistakes in files as such: syntax, extending, keys.
+
+use super::rendered;
+
+#[test]
+fn a_syntax_error_is_told_as_the_parser_tells_it() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+name = 
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A001]: this is not TOML: string values must be quoted, expected literal string
+ --> a.toml:2:8
+  |
+2 | name = 
+  |        ^ here
+"#
+    );
+}
+
+#[test]
+fn every_syntax_error_is_told() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+name = x y
+[sets
+axis = []
+[[nodes]
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A001]: this is not TOML: string values must be quoted, expected literal string
+ --> a.toml:2:8
+  |
+2 | name = x y
+  |        ^^^ here
+
+error[A001]: this is not TOML: unclosed table, expected `]`
+ --> a.toml:3:6
+  |
+3 | [sets
+  |      ^ here
+
+error[A001]: this is not TOML: unclosed array table, expected `]`
+ --> a.toml:5:9
+  |
+5 | [[nodes]
+  |         ^ here
+"#
+    );
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named_where_it_is_extended() {
+    let files = [(
+        "m/a.toml",
+        r#"schema = 1
+extends = "b.toml"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A002]: cannot read "m/b.toml": there is no such file
+ --> m/a.toml:2:11
+  |
+2 | extends = "b.toml"
+  |           ^^^^^^^^ named here
+"#
+    );
+}
+
+#[test]
+fn extends_is_a_text() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+extends = ["b.toml"]
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A008]: expected the path of a file in quotes for "extends", found a list
+ --> a.toml:2:11
+  |
+2 | extends = ["b.toml"]
+  |           ^^^^^^^^^^ expected the path of a file in quotes
+"#
+    );
+}
+
+#[test]
+fn deep_keys_are_refused() {
+    let files = [(
+        "a.toml",
+        &*format!("schema = 1\n{}x = 1\n", "a.".repeat(70)),
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A003]: keys are nested more than 64 deep
+ --> a.toml:2:128
+  |
+2 | ....a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.x = 1
+  |                                                          ^
+"#
+    );
+}
+
+#[test]
+fn a_loop_names_its_files() {
+    let files = [
+        (
+            "a.toml",
+            r#"schema = 1
+extends = "x/b.toml"
+"#,
+        ),
+        (
+            "x/b.toml",
+            r#"schema = 1
+extends = "../a.toml"
+"#,
+        ),
+    ];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A005]: `extends` comes back to its own file: a.toml -> x/b.toml -> a.toml
+ --> x/b.toml:2:11
+  |
+2 | extends = "../a.toml"
+  |           ^^^^^^^^^^^ extends this file
+"#
+    );
+}
+
+#[test]
+fn a_missing_schema_is_asked_for() {
+    let files = [(
+        "a.toml",
+        r#"name = "x"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A004]: the file does not say which schema it follows
+ --> a.toml:1:1
+  |
+1 | name = "x"
+  | ^ `schema = 1` is missing
+  |
+  = help: begin the file with `schema = 1`
+"#
+    );
+}
+
+#[test]
+fn another_schema_is_refused() {
+    let files = [(
+        "a.toml",
+        r#"schema = 2
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A004]: the schema is 1, found the number 2
+ --> a.toml:1:10
+  |
+1 | schema = 2
+  |          ^ not 1
+  |
+  = help: begin the file with `schema = 1`
+"#
+    );
+}
+
+#[test]
+fn an_unknown_key_gets_the_nearest_one() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+singals = 1
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A006]: a graph file has no key "singals"
+ --> a.toml:2:1
+  |
+2 | singals = 1
+  | ^^^^^^^ unknown key
+  |
+  = help: did you mean "signals"?
+"#
+    );
+}
+
+#[test]
+fn an_unknown_key_without_a_near_one_gets_the_list() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[signals.p]
+unit = "nm"
+channels = ["a", "b"]
+colour = 1
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A006]: signal "p" has no key "colour"
+ --> a.toml:5:1
+  |
+5 | colour = 1
+  | ^^^^^^ unknown key
+  |
+  = help: the keys are "unit", "channels", "column", "range", "max_age", "optional"
+"#
+    );
+}
+
+#[test]
+fn a_number_beyond_64_bits_is_refused() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[source]
+big = 9223372036854775808
+huge = 1e999
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A010]: the number 9223372036854775808 is too large
+ --> a.toml:3:7
+  |
+3 | big = 9223372036854775808
+  |       ^^^^^^^^^^^^^^^^^^^
+
+error[A010]: the number 1e999 is too large
+ --> a.toml:4:8
+  |
+4 | huge = 1e999
+  |        ^^^^^
+"#
+    );
+}
+
+#[test]
+fn there_must_be_a_node_to_remove() {
+    let files = [
+        (
+            "a.toml",
+            r#"schema = 1
+extends = "b.toml"
+nodes.themal = false
+"#,
+        ),
+        (
+            "b.toml",
+            r#"schema = 1
+[nodes.thermal]
+type = "linear"
+"#,
+        ),
+    ];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A019]: there is no inherited node "themal" to remove
+ --> a.toml:3:7
+  |
+3 | nodes.themal = false
+  |       ^^^^^^
+  |
+  = help: did you mean "thermal"?
+"#
+    );
+}
+
+#[test]
+fn modules_are_for_a_later_version() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[modules.m]
+[nodes.n]
+module = "m"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A025]: modules are not part of this version
+ --> a.toml:2:2
+  |
+2 | [modules.m]
+  |  ^^^^^^^
+
+error[A025]: modules are not part of this version
+ --> a.toml:4:1
+  |
+4 | module = "m"
+  | ^^^^^^
+"#
+    );
+}
+
+#[test]
+fn a_mistake_in_an_extended_file_is_shown_there() {
+    let files = [
+        (
+            "a.toml",
+            r#"schema = 1
+extends = "b.toml"
+name = "a"
+"#,
+        ),
+        (
+            "b.toml",
+            r#"schema = 1
+[signals.p]
+unit = "nm"
+channels = ["a", "b"]
+max_ago = "5s"
+"#,
+        ),
+    ];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A006]: signal "p" has no key "max_ago"
+ --> b.toml:5:1
+  |
+5 | max_ago = "5s"
+  | ^^^^^^^ unknown key
+  |
+  = help: did you mean "max_age"?
+"#
+    );
+}
+
+#[test]
+fn a_line_with_wide_characters_is_marked_in_the_right_place() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+description = "µm → 温度"
+name = 5 # µ
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A008]: expected a text in quotes for "name", found the number 5
+ --> a.toml:3:8
+  |
+3 | name = 5 # µ
+  |        ^ expected a text in quotes
+"#
+    );
+}

@@ -1,0 +1,64 @@
+//! Decides what can go wrong with an engine and how it is said.
+
+use std::fmt;
+
+use crate::time::Instant;
+
+/// Why an engine cannot be built, or refuses a tick.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum EngineError {
+    /// A tick that is not after the last one. The engine is as it was.
+    NotAfter {
+        /// The instant refused.
+        time: Instant,
+        /// The last instant taken.
+        last: Instant,
+    },
+    /// A row with another number of values than the plan has channels.
+    WrongWidth {
+        /// Values given.
+        found: usize,
+        /// Channels of the plan.
+        expected: usize,
+    },
+    /// A fitted estimator uses a regressor that its node does not have.
+    UnknownRegressor {
+        /// The node.
+        node: String,
+        /// The regressor that is missing.
+        regressor: String,
+        /// The regressors that the node has.
+        known: Vec<String>,
+    },
+    /// Something fitted for a node that is no estimator of this graph.
+    NotAnEstimator {
+        /// The node.
+        node: String,
+    },
+}
+
+impl fmt::Display for EngineError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotAfter { time, last } => write!(
+                f,
+                "the tick at {} ns is not after the last one at {} ns: ticks must come in the order of time",
+                time.as_ns(),
+                last.as_ns()
+            ),
+            Self::WrongWidth { found, expected } => {
+                write!(f, "{found} values were given and the graph has {expected} measured channels")
+            }
+            Self::UnknownRegressor { node, regressor, known } => write!(
+                f,
+                "the fit of `{node}` uses `{regressor}`, which the node does not have (it has {}): fit the graph again",
+                known.join(", ")
+            ),
+            Self::NotAnEstimator { node } => {
+                write!(f, "the model has a fit for `{node}`, which is no estimator of its graph: fit the graph again")
+            }
+        }
+    }
+}
+
+impl std::error::Error for EngineError {}

@@ -1,0 +1,124 @@
+//! Decides what a slot held at an earlier instant; not who asks.
+
+use std::collections::VecDeque;
+
+use crate::channel::{ABSENT, COLD};
+use crate::time::{Duration, Instant};
+
+/// The past of one slot, as far back as anybody reads it.
+///
+/// Readers ask for instants that never go back, each through a cursor of its own, so that an answer costs a step or two.
+#[derive(Debug, Clone)]
+pub(crate) struct History {
+    depth: Duration,
+    entries: VecDeque<Past>,
+    /// How many entries have been dropped at the front since the segment began.
+    dropped: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Past {
+    at: Instant,
+    value: f64,
+    stamp: Instant,
+}
+
+/// A reader's place: the number, since the segment began, of entries at or before the instant asked last.
+pub(crate) type Cursor = u64;
+
+impl History {
+    /// A history that can be asked for instants up to `depth` back.
+    pub(crate) fn new(depth: Duration) -> Self {
+        Self { depth, entries: VecDeque::new(), dropped: 0 }
+    }
+
+    /// Writes down what the slot holds from `at` on; NaN where a run gave nothing.
+    pub(crate) fn push(&mut self, at: Instant, value: f64, stamp: Instant) {
+        while self.entries.get(1).is_some_and(|next| next.at <= at - self.depth) {
+            self.entries.pop_front();
+            self.dropped += 1;
+        }
+        self.entries.push_back(Past { at, value, stamp });
+    }
+
+    /// The value that was held at `at`, and its stamp; NaN where there was none or it was older than `max_age`.
+    pub(crate) fn at(&self, at: Instant, max_age: Duration, cursor: &mut Cursor) -> (f64, Instant) {
+        *cursor = (*cursor).max(self.dropped);
+        while self.entry(*cursor).is_some_and(|next| next.at <= at) {
+            *cursor += 1;
+        }
+        match cursor.checked_sub(1).and_then(|last| self.entry(last)) {
+            Some(past) if past.value.is_nan() || at - past.stamp <= max_age => (past.value, past.stamp),
+            Some(past) => (ABSENT, past.stamp),
+            None if self.entries.is_empty() => (ABSENT, at),
+            None => (COLD, at),
+        }
+    }
+
+    /// Forgets everything.
+    pub(crate) fn clear(&mut self) {
+        self.entries.clear();
+        self.dropped = 0;
+    }
+
+    fn entry(&self, number: u64) -> Option<&Past> {
+        let index = usize::try_from(number.checked_sub(self.dropped)?).ok()?;
+        self.entries.get(index)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::channel::is_cold;
+
+    fn s(seconds: i64) -> Instant {
+        Instant::from_ns(seconds * 1_000_000_000)
+    }
+
+    fn d(seconds: i64) -> Duration {
+        Duration::from_ns(seconds * 1_000_000_000)
+    }
+
+    #[test]
+    fn the_last_value_at_or_before_the_instant_is_given_while_young_enough() {
+        let mut past = History::new(d(100));
+        let mut cursor = 0;
+        past.push(s(0), 1.0, s(0));
+        past.push(s(10), 2.0, s(10));
+        assert_eq!(past.at(s(5), d(60), &mut cursor).0, 1.0);
+        assert_eq!(past.at(s(10), d(60), &mut cursor).0, 2.0);
+        assert_eq!(past.at(s(70), d(60), &mut cursor).0, 2.0);
+        assert!(past.at(s(71), d(60), &mut cursor).0.is_nan());
+    }
+
+    #[test]
+    fn a_run_that_gave_nothing_ends_the_hold() {
+        let mut past = History::new(d(100));
+        past.push(s(0), 1.0, s(0));
+        past.push(s(10), ABSENT, s(10));
+        assert!(past.at(s(12), d(60), &mut 0).0.is_nan());
+        assert_eq!(past.at(s(9), d(60), &mut 0).0, 1.0);
+    }
+
+    #[test]
+    fn before_the_first_value_it_is_cold_and_without_any_value_absent() {
+        let mut past = History::new(d(100));
+        assert!(!is_cold(past.at(s(0), d(60), &mut 0).0));
+        past.push(s(10), 1.0, s(10));
+        assert!(is_cold(past.at(s(9), d(60), &mut 0).0));
+    }
+
+    #[test]
+    fn what_nobody_can_ask_for_any_more_is_dropped() {
+        let mut past = History::new(d(30));
+        let mut cursor = 0;
+        for t in 0..10_000 {
+            past.push(s(t), t as f64, s(t));
+            if t >= 30 {
+                assert_eq!(past.at(s(t - 30), d(60), &mut cursor).0, (t - 30) as f64);
+            }
+        }
+        assert!(past.entries.len() <= 32, "{}", past.entries.len());
+    }
+}

@@ -1,0 +1,309 @@
+//! Decides how a plan is stepped: what runs at a tick, in which order, and when truths are told; not where samples come
+//! from or go.
+
+mod error;
+mod estimate;
+mod gather;
+mod history;
+mod pairing;
+mod slots;
+mod vote;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+pub use error::EngineError;
+pub use pairing::{Paired, Pairing};
+
+pub(crate) use gather::Gathered;
+pub(crate) use history::{Cursor, History};
+pub(crate) use slots::Slots;
+
+use crate::compile::{Plan, PlannedRole, Step};
+use crate::node::{Operator, Outputs, Predictor, Role, Tick};
+use crate::time::{Duration, Instant};
+use estimate::Estimate;
+use vote::Vote;
+
+/// The fitted estimators of a graph, by instance: `thermal.Z1`.
+pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
+
+/// A running plan.
+///
+/// One thread steps it; a tick in the steady state neither allocates nor locks nor waits. Fitting, scoring, replaying and
+/// live running all step one of these.
+pub struct Engine {
+    plan: Arc<Plan>,
+    slots: Slots,
+    gathered: Vec<Gathered>,
+    histories: Vec<Option<History>>,
+    nodes: Vec<Running>,
+    last: Instant,
+    /// Set between a segment break and the first tick after it: the last instant before the break.
+    before_break: Option<Instant>,
+    rejected: Vec<u64>,
+    refused: u64,
+    outputs: Vec<f64>,
+}
+
+enum Running {
+    Operator { operator: Box<dyn Operator>, gathers: Vec<usize>, every_tick: bool, from_the_past: bool },
+    Estimate { estimate: Option<Estimate>, trigger: Option<usize> },
+    Vote(Vote),
+}
+
+impl Engine {
+    /// A plan ready to run, cold, with what has been fitted. An estimator that needs a fit and has none gives nothing.
+    ///
+    /// # Errors
+    /// When something fitted does not belong to the plan.
+    pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
+        let widths: Vec<_> = plan.gathers.iter().map(|gather| gather.entries.len()).collect();
+        let mut nodes = Vec::with_capacity(plan.nodes.len());
+        let mut used = 0;
+        for node in &plan.nodes {
+            nodes.push(match (&node.role, node.spec.role()) {
+                (PlannedRole::Feature { inputs, gathers, wanted, every_tick, from_the_past }, Role::Feature(spec)) => {
+                    Running::Operator {
+                        operator: spec.build(inputs, wanted),
+                        gathers: gathers.clone(),
+                        every_tick: *every_tick,
+                        from_the_past: *from_the_past,
+                    }
+                }
+                (PlannedRole::Estimator { regressors, gathers, every_tick, .. }, Role::Estimator(spec)) => {
+                    let given = fitted.get(&node.instance());
+                    used += usize::from(given.is_some());
+                    let names: Vec<_> = regressors.iter().map(|regressor| regressor.name.clone()).collect();
+                    let predictor = given.cloned().or_else(|| spec.fixed(&names).map(Arc::from));
+                    Running::Estimate {
+                        estimate: predictor.map(|p| Estimate::new(node, p, &widths)).transpose()?,
+                        trigger: if *every_tick { None } else { gathers.first().copied() },
+                    }
+                }
+                (PlannedRole::Combiner { voters, truth }, Role::Combiner(spec)) => {
+                    Running::Vote(Vote::new(spec.build(widths[*voters]), widths[*voters], *truth))
+                }
+                _ => unreachable!("a plan gives each node the role of its specification"),
+            });
+        }
+        if used < fitted.len() {
+            let known = |name: &&String| {
+                let is = |node: &crate::compile::PlannedNode| {
+                    matches!(node.role, PlannedRole::Estimator { .. }) && node.instance() == **name
+                };
+                !plan.nodes.iter().any(is)
+            };
+            let node = fitted.keys().find(known).cloned().unwrap_or_default();
+            return Err(EngineError::NotAnEstimator { node });
+        }
+        Ok(Self {
+            slots: Slots::new(plan.channels.len()),
+            gathered: plan.gathers.iter().map(Gathered::new).collect(),
+            histories: plan.channels.iter().map(|channel| channel.history.map(History::new)).collect(),
+            nodes,
+            last: Instant::MIN,
+            before_break: None,
+            rejected: vec![0; plan.sources.len()],
+            refused: 0,
+            outputs: vec![f64::NAN; plan.outputs.len()],
+            plan,
+        })
+    }
+
+    /// The plan that is stepped.
+    #[must_use]
+    pub fn plan(&self) -> &Arc<Plan> {
+        &self.plan
+    }
+
+    /// Takes the measurements of one instant and computes everything that follows from them.
+    ///
+    /// `samples` are in the order of [`Plan::sources`], in the units of the signals, NaN where a channel has no new value.
+    /// The answer is in the order of [`Plan::outputs`], NaN where a node did not run or gave nothing at this tick.
+    ///
+    /// # Errors
+    /// A time that is not after the last one, or another number of samples: the engine is as it was, and counts it.
+    pub fn step(&mut self, time: Instant, samples: &[f64]) -> Result<&[f64], EngineError> {
+        if samples.len() != self.plan.sources.len() {
+            return Err(EngineError::WrongWidth { found: samples.len(), expected: self.plan.sources.len() });
+        }
+        if time <= self.last {
+            self.refused += 1;
+            return Err(EngineError::NotAfter { time, last: self.last });
+        }
+        if let Some(before) = self.before_break.take() {
+            self.shift_votes(time - before);
+        }
+        self.last = time;
+        self.slots.tick += 1;
+        self.take_in(time, samples);
+        let plan = Arc::clone(&self.plan);
+        for step in &plan.steps {
+            match *step {
+                Step::Gather(gather) => {
+                    self.gathered[gather].read(&plan.gathers[gather], &self.slots, &self.histories, time);
+                }
+                Step::Run(node) => self.run(&plan, node, time),
+                Step::Capture(node) => self.capture(node, time),
+            }
+        }
+        self.remember(time);
+        for (value, output) in self.outputs.iter_mut().zip(&plan.outputs) {
+            *value = if self.slots.ran(output.slot) { self.slots.values[output.slot] } else { f64::NAN };
+        }
+        Ok(&self.outputs)
+    }
+
+    /// The next tick belongs to another segment: windows, lags and filters start afresh, what was learned stays.
+    pub fn segment(&mut self) {
+        if self.last == Instant::MIN {
+            return;
+        }
+        for node in &mut self.nodes {
+            match node {
+                Running::Operator { operator, .. } => operator.segment(),
+                Running::Estimate { .. } => {}
+                Running::Vote(vote) => vote.segment(self.last),
+            }
+        }
+        self.slots.clear();
+        self.gathered.iter_mut().for_each(Gathered::clear);
+        self.histories.iter_mut().flatten().for_each(History::clear);
+        self.before_break = Some(self.last);
+        self.last = Instant::MIN;
+    }
+
+    /// How often a channel's sample was rejected as infinite or outside its range, in the order of [`Plan::sources`].
+    #[must_use]
+    pub fn rejected(&self) -> &[u64] {
+        &self.rejected
+    }
+
+    /// How many ticks were refused because their time was not after the last one.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Whether a slot was given something at the present tick, be it nothing.
+    #[must_use]
+    pub fn ran(&self, slot: usize) -> bool {
+        self.slots.ran(slot)
+    }
+
+    /// The value that a slot was given at the present tick; NaN where its node did not run or gave nothing.
+    #[must_use]
+    pub fn value(&self, slot: usize) -> f64 {
+        if self.slots.ran(slot) { self.slots.values[slot] } else { f64::NAN }
+    }
+
+    /// The stamp of a slot's last value.
+    #[must_use]
+    pub fn stamp(&self, slot: usize) -> Instant {
+        self.slots.stamps[slot]
+    }
+
+    /// What a gather read at the present tick, and whether anything in it was fresh.
+    pub(crate) fn gathered(&self, gather: usize) -> (&[f64], bool) {
+        (&self.gathered[gather].values, self.gathered[gather].fresh)
+    }
+
+    fn take_in(&mut self, time: Instant, samples: &[f64]) {
+        for (slot, (&sample, source)) in samples.iter().zip(&self.plan.sources).enumerate() {
+            if sample.is_nan() {
+                continue;
+            }
+            let (lowest, highest) = source.range;
+            if sample.is_finite() && sample >= lowest && sample <= highest {
+                self.slots.set(slot, sample, time);
+            } else {
+                self.rejected[slot] += 1;
+            }
+        }
+    }
+
+    fn run(&mut self, plan: &Plan, index: usize, now: Instant) {
+        let node = &plan.nodes[index];
+        match &mut self.nodes[index] {
+            Running::Operator { operator, gathers, every_tick, from_the_past } => {
+                let inputs = &self.gathered;
+                if !*every_tick && !gathers.iter().any(|&gather| inputs[gather].fresh) {
+                    return;
+                }
+                let stamps = gathers.iter().filter_map(|&gather| inputs[gather].oldest()).min();
+                let range = node.slots.clone();
+                let mut outputs = Outputs {
+                    values: &mut self.slots.values[range.clone()],
+                    stamps: &mut self.slots.stamps[range.clone()],
+                    written: &mut self.slots.written[range],
+                    tick: self.slots.tick,
+                    default_stamp: if *from_the_past { now } else { stamps.unwrap_or(now) },
+                };
+                operator.step(&Tick { now, gathered: inputs, ports: gathers }, &mut outputs);
+            }
+            Running::Estimate { estimate, trigger } => {
+                if trigger.is_some_and(|gather| !self.gathered[gather].fresh) {
+                    return;
+                }
+                let prediction = estimate.as_mut().and_then(|estimate| estimate.run(&self.gathered, now));
+                let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
+                self.slots.set(node.slots.start, value, stamp);
+            }
+            Running::Vote(vote) => {
+                vote.release(now);
+                let PlannedRole::Combiner { voters, .. } = node.role else {
+                    unreachable!("a vote is planned as a combiner")
+                };
+                if self.gathered[voters].fresh {
+                    let (value, stamp) = vote.run(&self.gathered[voters], now);
+                    self.slots.set(node.slots.start, value, stamp);
+                }
+            }
+        }
+    }
+
+    fn capture(&mut self, index: usize, now: Instant) {
+        if let Running::Operator { operator, gathers, .. } = &mut self.nodes[index] {
+            operator.capture(&Tick { now, gathered: &self.gathered, ports: gathers });
+        }
+    }
+
+    /// Writes down what later ticks will ask for, and tells truths, now that all outputs of the tick are there.
+    fn remember(&mut self, now: Instant) {
+        for (slot, history) in self.histories.iter_mut().enumerate() {
+            if let Some(history) = history {
+                if self.slots.ran(slot) {
+                    history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
+                }
+            }
+        }
+        for node in &mut self.nodes {
+            if let Running::Vote(vote) = node {
+                if let Some(slot) = vote.truth() {
+                    if self.slots.fresh(slot) {
+                        vote.observe(self.slots.values[slot], now);
+                    }
+                }
+            }
+        }
+    }
+
+    fn shift_votes(&mut self, shift: Duration) {
+        for node in &mut self.nodes {
+            if let Running::Vote(vote) = node {
+                vote.shift(shift);
+            }
+        }
+    }
+}
+
+impl std::fmt::Debug for Engine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Engine")
+            .field("graph", &self.plan.name)
+            .field("tick", &self.slots.tick)
+            .field("last", &self.last)
+            .finish_non_exhaustive()
+    }
+}

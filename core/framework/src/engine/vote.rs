@@ -1,0 +1,98 @@
+//! Decides when a combiner is told of a truth; not what it makes of it.
+
+use std::collections::VecDeque;
+
+use super::gather::Gathered;
+use super::pairing::Pairing;
+use crate::compile::TruthLink;
+use crate::node::{Combine, Votes};
+use crate::time::{Duration, Instant};
+
+/// A combiner in a running plan, with the truths that the embargo still withholds from it.
+pub(crate) struct Vote {
+    combine: Box<dyn Combine>,
+    learning: Option<Learning>,
+}
+
+struct Learning {
+    link: TruthLink,
+    pairing: Pairing,
+    /// Arrival and value of truths not yet handed over, and the votes cast for each.
+    withheld: VecDeque<(Instant, f64)>,
+    votes: VecDeque<f64>,
+    row: Vec<f64>,
+}
+
+impl Vote {
+    pub(crate) fn new(combine: Box<dyn Combine>, voters: usize, link: Option<TruthLink>) -> Self {
+        let learning = link.map(|link| Learning {
+            link,
+            pairing: Pairing::new(&link, voters),
+            withheld: VecDeque::new(),
+            votes: VecDeque::new(),
+            row: vec![0.0; voters],
+        });
+        Self { combine, learning }
+    }
+
+    /// Hands over what the embargo lets through at `now`.
+    pub(crate) fn release(&mut self, now: Instant) {
+        if let Some(learning) = &mut self.learning {
+            let newest = now - learning.link.embargo();
+            learning.release(newest, &mut *self.combine);
+            self.combine.advance(newest);
+        }
+    }
+
+    /// Combines the votes of this tick: the result and its stamp.
+    pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
+        let combined = self.combine.combine(Votes(&votes.values));
+        if let Some(learning) = &mut self.learning {
+            learning.pairing.run(now, [&votes.values[..]]);
+        }
+        (combined, votes.oldest().unwrap_or(now))
+    }
+
+    /// The truth to look at after all outputs, if any.
+    pub(crate) fn truth(&self) -> Option<usize> {
+        self.learning.as_ref().map(|learning| learning.link.slot)
+    }
+
+    /// Takes a truth that has just been measured.
+    pub(crate) fn observe(&mut self, truth: f64, now: Instant) {
+        let Some(learning) = &mut self.learning else { return };
+        if let Some(paired) = learning.pairing.truth(now) {
+            learning.withheld.push_back((now, truth));
+            learning.votes.extend(paired.row);
+        }
+    }
+
+    /// Goes over into another segment, which starts `shift` later than a seamless continuation would.
+    pub(crate) fn segment(&mut self, last: Instant) {
+        if let Some(learning) = &mut self.learning {
+            // The embargo guards predictions of the segment that has ended; none of them is still to come.
+            learning.release(last, &mut *self.combine);
+            learning.pairing.clear();
+        }
+    }
+
+    /// Moves what is remembered to the clock of the segment that begins.
+    pub(crate) fn shift(&mut self, shift: Duration) {
+        self.combine.segment(shift);
+    }
+}
+
+impl Learning {
+    fn release(&mut self, newest: Instant, combine: &mut dyn Combine) {
+        while let Some(&(arrived, truth)) = self.withheld.front() {
+            if arrived > newest {
+                break;
+            }
+            self.withheld.pop_front();
+            for vote in &mut self.row {
+                *vote = self.votes.pop_front().expect("as many votes are withheld as truths times voters");
+            }
+            combine.observe(Votes(&self.row), truth, arrived);
+        }
+    }
+}

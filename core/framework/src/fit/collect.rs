@@ -1,0 +1,221 @@
+//! Decides which rows an estimator is fitted on: the regressors of its runs, paired with the truths that belong to them.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::candidates::Validity;
+use super::report::Dropped;
+use crate::compile::{Plan, PlannedRole, TrainingLimits, TruthLink};
+use crate::engine::{Engine, Pairing};
+use crate::recording::Event;
+
+/// A part of the ticks of a recording, by their number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Share {
+    pub(super) within: Range<u64>,
+    pub(super) without: Vec<Range<u64>>,
+}
+
+impl Share {
+    pub(super) fn all() -> Self {
+        Self { within: 0..u64::MAX, without: Vec::new() }
+    }
+
+    fn contains(&self, tick: u64) -> bool {
+        self.within.contains(&tick) && !self.without.iter().any(|range| range.contains(&tick))
+    }
+}
+
+/// The runs of a gather, as several estimators may share them.
+struct Tap {
+    gather: usize,
+    /// The gather whose freshness makes the node run; none where it runs at every tick.
+    trigger: Option<usize>,
+    pairing: Pairing,
+    width: usize,
+    kept: Vec<f64>,
+    last_kept: Option<u64>,
+}
+
+/// The examples of one estimator.
+pub(super) struct Trainee {
+    /// Its position in the plan.
+    pub(super) node: usize,
+    pub(super) link: TruthLink,
+    limits: TrainingLimits,
+    taps: Vec<usize>,
+    pub(super) validity: Validity,
+    pub(super) dropped: Dropped,
+    truths: Vec<f64>,
+    /// For each example and tap, the number of the kept row.
+    rows: Vec<u32>,
+    /// The first example of each segment after the first.
+    breaks: Vec<usize>,
+    segment_pending: bool,
+}
+
+/// Collects the examples of several estimators while an engine is driven.
+pub(super) struct Collector {
+    taps: Vec<Tap>,
+    pub(super) trainees: Vec<Trainee>,
+    memory: usize,
+    bytes: usize,
+    /// Set once rows no longer fit: from then on they are only counted.
+    pub(super) overflowed: bool,
+    tick: u64,
+}
+
+/// Takes the examples of one estimator, in order.
+pub(super) trait Sink {
+    fn row<'a>(&mut self, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64);
+    fn segment(&mut self);
+}
+
+impl Collector {
+    /// A collector for the estimators at these positions of the plan.
+    pub(super) fn new(plan: &Plan, nodes: &[usize], memory: usize) -> Self {
+        let mut taps = Vec::new();
+        let mut known = BTreeMap::new();
+        let mut trainees = Vec::new();
+        for &node in nodes {
+            let PlannedRole::Estimator { regressors, gathers, every_tick, truth, training } = &plan.nodes[node].role
+            else {
+                unreachable!("only estimators are trained")
+            };
+            let trigger = if *every_tick { None } else { gathers.first().copied() };
+            let shared = |&gather: &usize| {
+                let key = (gather, trigger, truth.ahead, truth.limit);
+                *known.entry(key).or_insert_with(|| {
+                    let width = plan.gathers[gather].entries.len();
+                    let pairing = Pairing::new(truth, width);
+                    taps.push(Tap { gather, trigger, pairing, width, kept: Vec::new(), last_kept: None });
+                    taps.len() - 1
+                })
+            };
+            trainees.push(Trainee {
+                node,
+                link: *truth,
+                limits: *training,
+                taps: gathers.iter().map(shared).collect(),
+                validity: Validity::new(regressors.len()),
+                dropped: Dropped::default(),
+                truths: Vec::new(),
+                rows: Vec::new(),
+                breaks: Vec::new(),
+                segment_pending: false,
+            });
+        }
+        Self { taps, trainees, memory, bytes: 0, overflowed: false, tick: 0 }
+    }
+
+    /// Begins another pass over the data, whose examples come after those of the passes before.
+    pub(super) fn rewind(&mut self) {
+        self.segment();
+        self.tick = 0;
+    }
+
+    /// Looks at what a tick did. With `live`, examples go there as they come; otherwise they are kept while they fit.
+    pub(super) fn look<S: Sink>(&mut self, engine: &Engine, event: Event, share: &Share, mut live: Option<&mut [S]>) {
+        let Event::Row(now) = event else {
+            self.segment();
+            return;
+        };
+        for tap in &mut self.taps {
+            if tap.trigger.is_none_or(|gather| engine.gathered(gather).1) {
+                tap.pairing.run(now, [engine.gathered(tap.gather).0]);
+            }
+        }
+        let tick = self.tick;
+        self.tick += 1;
+        for index in 0..self.trainees.len() {
+            let slot = self.trainees[index].link.slot;
+            let truth = engine.value(slot);
+            if truth.is_nan() || !share.contains(tick) {
+                continue;
+            }
+            let Self { taps, trainees, .. } = self;
+            let trainee = &mut trainees[index];
+            if trainee.taps.iter().any(|&tap| taps[tap].pairing.truth(now).is_none()) {
+                trainee.dropped.without_run += 1;
+            } else if !trainee.limits.admits(truth) {
+                trainee.dropped.outside_limits += 1;
+            } else if let Some(live) = &mut live {
+                if std::mem::take(&mut trainee.segment_pending) {
+                    live[index].segment();
+                }
+                let parts = trainee.taps.iter().map(|&tap| taps[tap].pairing.last());
+                live[index].row(parts, truth);
+            } else {
+                self.keep(index, truth);
+            }
+        }
+    }
+
+    /// The examples kept of one estimator, in order.
+    pub(super) fn replay(&self, index: usize, sink: &mut impl Sink) {
+        let trainee = &self.trainees[index];
+        let mut breaks = trainee.breaks.iter().peekable();
+        let width = trainee.taps.len();
+        for (example, &truth) in trainee.truths.iter().enumerate() {
+            while breaks.next_if(|&&at| at <= example).is_some() {
+                sink.segment();
+            }
+            let rows = &trainee.rows[example * width..(example + 1) * width];
+            let parts = trainee.taps.iter().zip(rows).map(|(&tap, &row)| {
+                let tap = &self.taps[tap];
+                &tap.kept[row as usize * tap.width..(row as usize + 1) * tap.width]
+            });
+            sink.row(parts, truth);
+        }
+    }
+
+    fn keep(&mut self, index: usize, truth: f64) {
+        let Self { taps, trainees, .. } = self;
+        let trainee = &mut trainees[index];
+        trainee.validity.count(trainee.taps.iter().map(|&tap| taps[tap].pairing.last()));
+        if self.overflowed {
+            return;
+        }
+        if std::mem::take(&mut trainee.segment_pending) {
+            trainee.breaks.push(trainee.truths.len());
+        }
+        trainee.truths.push(truth);
+        self.bytes += size_of::<f64>();
+        for &tap in &trainee.taps {
+            let tap = &mut taps[tap];
+            let number = tap.pairing.last_number();
+            if tap.last_kept != Some(number) {
+                tap.last_kept = Some(number);
+                tap.kept.extend_from_slice(tap.pairing.last());
+                self.bytes += tap.width * size_of::<f64>();
+            }
+            let row = u32::try_from(tap.kept.len() / tap.width.max(1) - usize::from(tap.width > 0)).unwrap_or(u32::MAX);
+            trainee.rows.push(row);
+            self.bytes += size_of::<u32>();
+        }
+        if self.bytes > self.memory {
+            self.overflow();
+        }
+    }
+
+    /// Lets go of what was kept: there is more than the stated memory holds.
+    fn overflow(&mut self) {
+        self.overflowed = true;
+        for tap in &mut self.taps {
+            tap.kept = Vec::new();
+        }
+        for trainee in &mut self.trainees {
+            trainee.truths = Vec::new();
+            trainee.rows = Vec::new();
+        }
+    }
+
+    fn segment(&mut self) {
+        for tap in &mut self.taps {
+            tap.pairing.clear();
+        }
+        for trainee in &mut self.trainees {
+            trainee.segment_pending = true;
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Decides the passes of a fit: estimators fed by estimators come after them, and learn from out-of-fold predictions.
+
+use std::sync::Arc;
+
+use super::collect::{Collector, Share};
+use super::drive::{Passed, drive};
+use super::train::{Made, Making, begin, end, train_kept};
+use super::{FitError, FitOptions, FitReport};
+use crate::compile::{Plan, PlannedRole};
+use crate::engine::{Engine, Fitted};
+use crate::node::Role;
+use crate::recording::{Event, Recording};
+
+/// A fit under way.
+pub(super) struct Fitting<'a> {
+    plan: &'a Arc<Plan>,
+    recording: &'a dyn Recording,
+    options: &'a FitOptions,
+    progress: &'a mut dyn FnMut(u64),
+    /// The estimators to be fitted, by level: those of a level are fed by levels below only.
+    levels: Vec<Vec<usize>>,
+    stepped: u64,
+    report: FitReport,
+}
+
+/// What one part of the rows of a level is made with: the estimators below, and the ticks whose truths count.
+struct Part {
+    fitted: Fitted,
+    share: Share,
+}
+
+impl<'a> Fitting<'a> {
+    pub(super) fn new(
+        plan: &'a Arc<Plan>,
+        recording: &'a dyn Recording,
+        options: &'a FitOptions,
+        progress: &'a mut dyn FnMut(u64),
+    ) -> Self {
+        let levels = levels(plan);
+        Self { plan, recording, options, progress, levels, stepped: 0, report: FitReport::default() }
+    }
+
+    pub(super) fn run(mut self) -> Result<(Fitted, FitReport), FitError> {
+        if self.levels.is_empty() {
+            let mut engine = Engine::new(Arc::clone(self.plan), &Fitted::new())?;
+            let passed = drive(&mut engine, self.recording, |_, _| {})?;
+            self.note(&engine, passed);
+            return Ok((Fitted::new(), self.report));
+        }
+        let top = self.levels.len() - 1;
+        let (fitted, made) = self.fit_up_to(top, &Share::all())?;
+        let mut made: Vec<_> = made;
+        made.sort_by_key(|(node, _)| *node);
+        self.report.estimators = made.into_iter().map(|(_, fit)| fit).collect();
+        Ok((fitted, self.report))
+    }
+
+    /// Fits all levels up to one on a share of the ticks.
+    fn fit_up_to(&mut self, top: usize, share: &Share) -> Result<(Fitted, Vec<(usize, super::EstimatorFit)>), FitError> {
+        let mut fitted = Fitted::new();
+        let mut reports = Vec::new();
+        for level in 0..=top {
+            let parts = self.parts(level, share)?;
+            let nodes = self.levels[level].clone();
+            let made = self.fit_level(&nodes, &parts)?;
+            for (&node, (fit, predictor)) in nodes.iter().zip(made) {
+                if let Some(predictor) = predictor {
+                    fitted.insert(fit.node.clone(), Arc::from(predictor));
+                }
+                reports.push((node, fit));
+            }
+        }
+        Ok((fitted, reports))
+    }
+
+    /// Estimators below are fitted without the part of the ticks that they predict for those of this level.
+    fn parts(&mut self, level: usize, share: &Share) -> Result<Vec<Part>, FitError> {
+        if level == 0 {
+            return Ok(vec![Part { fitted: Fitted::new(), share: share.clone() }]);
+        }
+        let ticks = self.report.ticks;
+        let (first, end) = (share.within.start, share.within.end.min(ticks));
+        let folds = self.options.folds.max(2) as u64;
+        let mut parts = Vec::new();
+        for fold in 0..folds {
+            let edge = |nth: u64| first + (end - first) * nth / folds;
+            let fold = edge(fold)..edge(fold + 1);
+            let mut without = share.clone();
+            without.without.push(fold.clone());
+            let (fitted, _) = self.fit_up_to(level - 1, &without)?;
+            parts.push(Part { fitted, share: Share { within: fold, without: share.without.clone() } });
+        }
+        Ok(parts)
+    }
+
+    fn fit_level(&mut self, nodes: &[usize], parts: &[Part]) -> Result<Vec<Made>, FitError> {
+        let mut collector = Collector::new(self.plan, nodes, self.options.memory);
+        self.pass(&mut collector, parts, None)?;
+        if !collector.overflowed {
+            return Ok(train_kept(self.plan, &collector, self.options));
+        }
+        let memory = self.options.memory / nodes.len().max(1);
+        let mut makings: Vec<Making> =
+            collector.trainees.iter().map(|trainee| begin(self.plan, trainee, memory)).collect();
+        let mut second = Collector::new(self.plan, nodes, 0);
+        self.pass(&mut second, parts, Some(&mut makings))?;
+        let ended = collector.trainees.iter().zip(makings);
+        Ok(ended.map(|(trainee, making)| end(self.plan, trainee, making, true)).collect())
+    }
+
+    fn pass(
+        &mut self,
+        collector: &mut Collector,
+        parts: &[Part],
+        mut live: Option<&mut Vec<Making>>,
+    ) -> Result<(), FitError> {
+        for (nth, part) in parts.iter().enumerate() {
+            if nth > 0 {
+                collector.rewind();
+            }
+            let mut engine = Engine::new(Arc::clone(self.plan), &part.fitted)?;
+            let (stepped, progress) = (&mut self.stepped, &mut self.progress);
+            let passed = drive(&mut engine, self.recording, |engine, event| {
+                collector.look(engine, event, &part.share, live.as_deref_mut().map(Vec::as_mut_slice));
+                if matches!(event, Event::Row(_)) {
+                    *stepped += 1;
+                    if stepped.is_multiple_of(4096) {
+                        progress(*stepped);
+                    }
+                }
+            })?;
+            self.note(&engine, passed);
+        }
+        Ok(())
+    }
+
+    fn note(&mut self, engine: &Engine, passed: Passed) {
+        let sources = &self.plan.sources;
+        self.report.ticks = passed.ticks;
+        self.report.segments = passed.segments;
+        self.report.period = passed.period;
+        self.report.refused = engine.refused();
+        let counted = sources.iter().zip(engine.rejected()).filter(|&(_, &count)| count > 0);
+        self.report.rejected = counted.map(|(source, &count)| (source.name.clone(), count)).collect();
+    }
+}
+
+/// The estimators that need a fit, by how many others feed them, one through the other.
+fn levels(plan: &Plan) -> Vec<Vec<usize>> {
+    let mut of_slot = vec![0_usize; plan.channels.len()];
+    let mut levels: Vec<Vec<usize>> = Vec::new();
+    for (index, node) in plan.nodes.iter().enumerate() {
+        let gathers: &[usize] = match &node.role {
+            PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => gathers,
+            PlannedRole::Combiner { voters, .. } => std::slice::from_ref(voters),
+        };
+        let slots = gathers.iter().flat_map(|&gather| &plan.gathers[gather].entries);
+        let mut level = slots.map(|entry| of_slot[entry.slot]).max().unwrap_or(0);
+        if let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) = (&node.role, node.spec.role()) {
+            let names: Vec<_> = regressors.iter().map(|regressor| regressor.name.clone()).collect();
+            if estimator.fixed(&names).is_none() {
+                if levels.len() <= level {
+                    levels.resize_with(level + 1, Vec::new);
+                }
+                levels[level].push(index);
+                level += 1;
+            }
+        }
+        of_slot[node.slots.clone()].fill(level);
+    }
+    levels
+}

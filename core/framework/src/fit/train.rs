@@ -1,0 +1,127 @@
+//! Decides how collected examples become a fitted estimator.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::FitOptions;
+use super::collect::{Collector, Sink, Trainee};
+use super::report::{EstimatorFit, Outcome};
+use crate::compile::{Plan, PlannedRole};
+use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
+
+/// A fit in the making: the complete rows of the candidates that were kept go to the trainer.
+pub(super) struct Making {
+    trainer: Box<dyn Trainer>,
+    kept: Vec<usize>,
+    row: Vec<f64>,
+    all: Vec<f64>,
+    rows: u64,
+    incomplete: u64,
+}
+
+impl Sink for Making {
+    fn row<'a>(&mut self, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64) {
+        self.all.clear();
+        for part in parts {
+            self.all.extend_from_slice(part);
+        }
+        self.row.clear();
+        self.row.extend(self.kept.iter().map(|&candidate| self.all[candidate]));
+        if self.row.iter().any(|value| value.is_nan()) {
+            self.incomplete += 1;
+        } else {
+            self.rows += 1;
+            self.trainer.row(&self.row, truth);
+        }
+    }
+
+    fn segment(&mut self) {
+        self.trainer.segment();
+    }
+}
+
+/// A fit, and what there is to tell about it.
+pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
+
+/// Starts the fit of one estimator, now that it is known which candidates have values.
+pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
+    let node = &plan.nodes[trainee.node];
+    let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) = (&node.role, node.spec.role()) else {
+        unreachable!("only estimators are trained")
+    };
+    let kept = trainee.validity.kept();
+    let setup = TrainingSetup {
+        regressors: kept.iter().map(|&candidate| regressors[candidate].clone()).collect::<Vec<Regressor>>(),
+        truth_unit: plan.channels[trainee.link.slot].channel.unit.to_string(),
+        memory,
+    };
+    let trainer = estimator.trainer(&setup);
+    Making { trainer, row: Vec::with_capacity(kept.len()), all: Vec::new(), kept, rows: 0, incomplete: 0 }
+}
+
+/// Ends the fit of one estimator.
+pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool) -> Made {
+    let node = &plan.nodes[trainee.node];
+    let truth = &plan.channels[trainee.link.slot];
+    let PlannedRole::Estimator { regressors, .. } = &node.role else { unreachable!("only estimators are trained") };
+    let mut dropped = trainee.dropped;
+    dropped.incomplete = making.incomplete;
+    let dropped_candidates = (0..regressors.len())
+        .filter(|candidate| !making.kept.contains(candidate))
+        .map(|candidate| (regressors[candidate].name.clone(), trainee.validity.share(candidate)))
+        .collect();
+    let trained = if making.rows == 0 {
+        Err(TrainingError::TooFewRows { rows: 0, needed: 2 })
+    } else {
+        making.trainer.finish()
+    };
+    let (outcome, predictor) = match trained {
+        Ok(Trained { predictor, report }) => (Outcome::Fitted(report), Some(predictor)),
+        Err(error) => (Outcome::Failed(error), None),
+    };
+    let fit = EstimatorFit {
+        node: node.instance(),
+        kind: node.kind.name,
+        truth: truth.name.clone(),
+        unit: truth.channel.unit.to_string(),
+        rows: making.rows,
+        dropped,
+        dropped_candidates,
+        streamed,
+        outcome,
+    };
+    (fit, predictor)
+}
+
+/// Fits all estimators from the examples kept, on several threads; the result does not depend on how many.
+pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOptions) -> Vec<Made> {
+    let count = collector.trainees.len();
+    let threads = options.threads.clamp(1, count.max(1));
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut made = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= count {
+                return made;
+            }
+            let trainee = &collector.trainees[index];
+            let mut making = begin(plan, trainee, options.memory / threads);
+            collector.replay(index, &mut making);
+            made.push((index, end(plan, trainee, making, false)));
+        }
+    };
+    let mut made = if threads == 1 {
+        work()
+    } else {
+        crossbeam::thread::scope(|scope| {
+            let handles: Vec<_> = (0..threads).map(|_| scope.spawn(|_| work())).collect();
+            handles
+                .into_iter()
+                .flat_map(|handle| handle.join().expect("training does not panic"))
+                .collect::<Vec<_>>()
+        })
+        .expect("training does not panic")
+    };
+    made.sort_by_key(|&(index, _)| index);
+    made.into_iter().map(|(_, made)| made).collect()
+}

@@ -1,0 +1,47 @@
+//! The dataflow framework of athermal: what a node is, how a graph file becomes a plan, and the engine that steps it.
+//!
+//! A machine is described by a **graph file** (TOML). [`document`] reads it into a tree that remembers where every value
+//! stands, [`compile`] resolves it into a [`compile::Plan`], and an [`engine::Engine`] steps the plan, one **tick** (an
+//! instant with new measurements) at a time. [`fit`] and [`score`] drive the same engine over recordings; a
+//! [`model::Model`] is a graph with what was fitted.
+//!
+//! Each layer uses only those above it in this list:
+//!
+//! | layer | decides |
+//! |---|---|
+//! | [`time`], [`unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
+//! | [`diagnostic`] | how a mistake in a file is told: code, place, reason, a way out |
+//! | [`document`] | a file (with what it extends) as a tree with places, expanded into declarations |
+//! | [`node`] | the traits that authors implement, the registry of kinds |
+//! | [`compile`] | references, units, spans, all checks, an order, slots: a plan |
+//! | [`engine`] | stepping a plan: held inputs and their ages, lags, truth alignment |
+//! | [`recording`] | what a data set offers to the layers below |
+//! | [`model`], [`fit`], [`score`] | a fitted graph, training it, scoring it |
+//!
+//! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
+//! [`register!`]; start at [`node::Feature`], [`node::Estimator`] or [`node::Combiner`].
+
+pub mod channel;
+pub mod compile;
+pub mod diagnostic;
+pub mod document;
+pub mod engine;
+pub mod fit;
+pub mod model;
+pub mod node;
+pub mod quantity;
+pub mod recording;
+mod schema;
+pub mod score;
+pub mod time;
+pub mod unit;
+
+#[doc(hidden)]
+pub use inventory;
+
+/// What [`register!`] needs at its place of use.
+#[doc(hidden)]
+pub mod __private {
+    pub use crate::node::read;
+    pub use {schemars, serde_json};
+}

@@ -1,0 +1,88 @@
+//! Decides what can go wrong with a model and how it is said.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use crate::diagnostic::{Diagnostics, Sources};
+use crate::engine::EngineError;
+
+/// Why a model or graph cannot be used.
+#[derive(Debug)]
+pub enum ModelError {
+    /// The file cannot be read.
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is no model.
+    NotAModel {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// The file was written by a later version.
+    TooNew {
+        /// The file.
+        path: PathBuf,
+        /// The version of its format.
+        version: u64,
+    },
+    /// The graph has mistakes.
+    Graph {
+        /// The mistakes.
+        diagnostics: Box<Diagnostics>,
+        /// The texts that they point into.
+        sources: Box<Sources>,
+    },
+    /// Something in the graph needs a fit and has none.
+    NotFitted {
+        /// The file.
+        path: PathBuf,
+        /// The estimators without a fit.
+        nodes: Vec<String>,
+    },
+    /// What was fitted does not belong to the graph.
+    Engine(EngineError),
+}
+
+impl fmt::Display for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unreadable { path, source } => write!(f, "cannot read {}: {source}", path.display()),
+            Self::NotAModel { path, source } => {
+                write!(f, "{} is no model: {source}; a model is what `athermal fit GRAPH --data FILE -o MODEL` writes", path.display())
+            }
+            Self::TooNew { path, version } => write!(
+                f,
+                "{} has model format {version} and this program reads format {}: use a newer athermal or fit again",
+                path.display(),
+                super::file::FORMAT
+            ),
+            Self::Graph { diagnostics, sources } => write!(f, "{}", diagnostics.render(sources, false, 100)),
+            Self::NotFitted { path, nodes } => {
+                const MOST: usize = 6;
+                let more = nodes.len().saturating_sub(MOST);
+                let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+                let shown = nodes[..nodes.len().min(MOST)].join(", ");
+                write!(
+                    f,
+                    "{} is a graph whose estimators need a fit ({shown}{more}): run `athermal fit {} --data FILE -o MODEL` and use MODEL",
+                    path.display(),
+                    path.display()
+                )
+            }
+            Self::Engine(error) => write!(f, "{error}"),
+        }
+    }
+}
+
+impl std::error::Error for ModelError {}
+
+impl From<EngineError> for ModelError {
+    fn from(error: EngineError) -> Self {
+        Self::Engine(error)
+    }
+}

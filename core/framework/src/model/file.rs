@@ -1,0 +1,142 @@
+//! Decides how a model is read and written.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Card, ModelError};
+use crate::compile::{Plan, PlannedRole, Wanted, compile};
+use crate::diagnostic::{Diagnostics, Place, Sources};
+use crate::document::{self, Disk, Document, GraphFile, Value};
+use crate::engine::{Engine, Fitted};
+use crate::node::{Predictor, Role};
+
+/// The format that this version writes.
+pub(super) const FORMAT: u64 = 1;
+
+/// A graph with what was fitted: all that is needed to run.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// The graph as declared.
+    pub graph: GraphFile,
+    /// The graph as compiled.
+    pub plan: Arc<Plan>,
+    /// The fitted estimators.
+    pub fitted: Fitted,
+    /// Where it comes from; none for a plain graph.
+    pub card: Option<Card>,
+}
+
+/// The file, as it is written.
+#[derive(Serialize)]
+struct Written<'a> {
+    athermal_model: u64,
+    card: &'a Option<Card>,
+    graph: serde_json::Value,
+    fitted: BTreeMap<&'a str, &'a dyn Predictor>,
+}
+
+/// The file, as it is read.
+#[derive(Deserialize)]
+struct ReadBack {
+    card: Option<Card>,
+    graph: serde_json::Value,
+    fitted: BTreeMap<String, Box<dyn Predictor>>,
+}
+
+#[derive(Deserialize)]
+struct Version {
+    athermal_model: u64,
+}
+
+impl Model {
+    /// Reads a model, or a graph file in whose place nothing has been fitted.
+    ///
+    /// # Errors
+    /// When the file cannot be read or has mistakes.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, ModelError> {
+        Self::load_for(path, Wanted::default())
+    }
+
+    /// Reads a model or graph, and compiles it so that it offers more than it reads itself.
+    ///
+    /// # Errors
+    /// As [`Model::load`].
+    pub fn load_for(path: impl AsRef<Path>, wanted: Wanted) -> Result<Self, ModelError> {
+        let path = path.as_ref();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            return Self::load_graph(path, wanted);
+        }
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ModelError::Unreadable { path: path.to_owned(), source })?;
+        let not_a_model = |source| ModelError::NotAModel { path: path.to_owned(), source };
+        let version = serde_json::from_str::<Version>(&text).map_err(not_a_model)?.athermal_model;
+        if version > FORMAT {
+            return Err(ModelError::TooNew { path: path.to_owned(), version });
+        }
+        let read: ReadBack = serde_json::from_str(&text).map_err(not_a_model)?;
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        let source = sources.add(path.display().to_string(), text);
+        // A model has no places worth pointing at: all of its graph stands at its beginning.
+        let place = Place { source, start: 0, end: 0 };
+        let tree = Value::from_json(&read.graph, place).map_err(|error| not_a_model(serde::de::Error::custom(error)))?;
+        let graph = document::declare(Document::new(source, tree), &mut diagnostics);
+        let plan = graph.as_ref().and_then(|graph| compile(graph, wanted, &mut diagnostics));
+        let (Some(graph), Some(plan)) = (graph, plan) else {
+            return Err(ModelError::Graph { diagnostics: Box::new(diagnostics), sources: Box::new(sources) });
+        };
+        let fitted = read.fitted.into_iter().map(|(node, predictor)| (node, Arc::from(predictor))).collect();
+        Ok(Self { graph, plan: Arc::new(plan), fitted, card: read.card })
+    }
+
+    fn load_graph(path: &Path, wanted: Wanted) -> Result<Self, ModelError> {
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        let graph = document::load(path, &Disk, &mut sources, &mut diagnostics)
+            .and_then(|read| document::declare(read, &mut diagnostics));
+        let plan = graph.as_ref().and_then(|graph| compile(graph, wanted, &mut diagnostics));
+        match (graph, plan) {
+            (Some(graph), Some(plan)) if !diagnostics.has_errors() => {
+                Ok(Self { graph, plan: Arc::new(plan), fitted: Fitted::new(), card: None })
+            }
+            _ => Err(ModelError::Graph { diagnostics: Box::new(diagnostics), sources: Box::new(sources) }),
+        }
+    }
+
+    /// The estimators that need a fit and have none.
+    #[must_use]
+    pub fn unfitted(&self) -> Vec<String> {
+        let needs = |node: &&crate::compile::PlannedNode| match (&node.role, node.spec.role()) {
+            (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) => {
+                let names: Vec<_> = regressors.iter().map(|regressor| regressor.name.clone()).collect();
+                estimator.fixed(&names).is_none() && !self.fitted.contains_key(&node.instance())
+            }
+            _ => false,
+        };
+        self.plan.nodes.iter().filter(needs).map(crate::compile::PlannedNode::instance).collect()
+    }
+
+    /// An engine that runs the model, cold.
+    ///
+    /// # Errors
+    /// When what was fitted does not belong to the graph.
+    pub fn engine(&self) -> Result<Engine, ModelError> {
+        Ok(Engine::new(Arc::clone(&self.plan), &self.fitted)?)
+    }
+
+    /// The model as text: JSON, readable and the same for the same model.
+    ///
+    /// # Errors
+    /// When something fitted cannot be written.
+    pub fn to_text(&self) -> Result<String, serde_json::Error> {
+        let fitted = self.fitted.iter().map(|(node, predictor)| (node.as_str(), &**predictor)).collect();
+        let written = Written {
+            athermal_model: FORMAT,
+            card: &self.card,
+            graph: Value::to_json(&self.graph.tree),
+            fitted,
+        };
+        serde_json::to_string_pretty(&written).map(|text| text + "\n")
+    }
+}

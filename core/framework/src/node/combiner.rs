@@ -1,0 +1,88 @@
+//! Decides what the author of a combiner implements: one prediction from several.
+
+use std::fmt::Debug;
+
+use super::{InputPort, Mistake};
+use crate::time::{Duration, Instant};
+
+/// A node that makes one prediction of several for the same instant.
+///
+/// The framework holds votes and their ages, and hands over truths only when the embargo lets them through. The ports are
+/// `voters`, and `truth` where the combiner learns from errors. A whole combiner, the median of the votes at hand:
+///
+/// ```
+/// use athermal_core::node::{Combine, Combiner, InputPort, Votes};
+/// use schemars::JsonSchema;
+/// use serde::{Deserialize, Serialize};
+///
+/// /// The median of the votes.
+/// #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+/// #[serde(deny_unknown_fields)]
+/// pub struct Middle {}
+///
+/// impl Combiner for Middle {
+///     fn inputs() -> &'static [InputPort] {
+///         const { &[InputPort::held("voters", "predictions of the same truth")] }
+///     }
+///
+///     fn build(&self, _voters: usize) -> Box<dyn Combine> {
+///         Box::new(Median)
+///     }
+/// }
+///
+/// struct Median;
+///
+/// impl Combine for Median {
+///     fn combine(&self, votes: Votes<'_>) -> f64 {
+///         let below = |v: f64| votes.present().filter(|&(_, w)| w < v).count();
+///         let count = votes.present().count();
+///         let middle = votes.present().find(|&(_, v)| below(v) <= count / 2 && count / 2 < below(v) + 1);
+///         middle.map_or(f64::NAN, |(_, v)| v)
+///     }
+/// }
+///
+/// athermal_core::register!(Middle, Combiner, "middle");
+/// # fn main() {}
+/// ```
+pub trait Combiner: Debug + Send + Sync {
+    /// The input ports: `voters`, and `truth` where it learns.
+    fn inputs() -> &'static [InputPort]
+    where
+        Self: Sized;
+
+    /// Mistakes in the parameters that their types do not exclude.
+    fn mistakes(&self) -> Vec<Mistake> {
+        Vec::new()
+    }
+
+    /// What runs, for this many voters.
+    fn build(&self, voters: usize) -> Box<dyn Combine>;
+}
+
+/// A running combiner.
+pub trait Combine: Send {
+    /// The combined prediction; NaN where none can be given.
+    fn combine(&self, votes: Votes<'_>) -> f64;
+
+    /// A truth and the votes that were cast for it. `arrived` is when the truth was measured.
+    fn observe(&mut self, _votes: Votes<'_>, _truth: f64, _arrived: Instant) {}
+
+    /// Called before [`combine`](Combine::combine): truths up to `newest` have been handed over, none later will count.
+    fn advance(&mut self, _newest: Instant) {}
+
+    /// The next tick belongs to another segment of the data, whose clock is `shift` ahead of a seamless continuation.
+    ///
+    /// What was learned stays; instants that are kept move by `shift`.
+    fn segment(&mut self, _shift: Duration) {}
+}
+
+/// The votes for one instant, in the order of the `voters` port; NaN where a voter has none.
+#[derive(Debug, Clone, Copy)]
+pub struct Votes<'a>(pub &'a [f64]);
+
+impl Votes<'_> {
+    /// The votes that are there, each with its voter's index.
+    pub fn present(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.0.iter().copied().enumerate().filter(|(_, vote)| !vote.is_nan())
+    }
+}

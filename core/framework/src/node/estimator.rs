@@ -1,0 +1,234 @@
+//! Decides what the author of an estimator implements: learning from rows, and predicting from a row.
+
+use std::fmt::Debug;
+
+use serde::{Deserialize, Serialize};
+
+use super::{InputPort, Mistake};
+use crate::time::Duration;
+
+/// A node that predicts the value which its `truth` will have, `ahead` of now.
+///
+/// The author says which regressors are wanted, and trains on rows. The framework pairs rows with truths at the right
+/// instants, keeps horizons and embargo, drops rows without a value and scores the outcome.
+///
+/// A whole estimator, which predicts the mean of the truths that it was fitted on:
+///
+/// ```
+/// use athermal_core::node::{
+///     Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+/// };
+/// use schemars::JsonSchema;
+/// use serde::{Deserialize, Serialize};
+///
+/// /// Predicts the mean of the truths of the fit.
+/// #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+/// #[serde(deny_unknown_fields)]
+/// pub struct Mean {}
+///
+/// impl Estimator for Mean {
+///     fn inputs() -> &'static [InputPort] {
+///         const { &[InputPort::truth("what is predicted")] }
+///     }
+///
+///     fn regressors(&self) -> Regressors {
+///         Regressors { every_tick: true, ..Regressors::default() }
+///     }
+///
+///     fn trainer(&self, _setup: &TrainingSetup) -> Box<dyn Trainer> {
+///         Box::new(Averaging { sum: 0.0, rows: 0 })
+///     }
+/// }
+///
+/// struct Averaging {
+///     sum: f64,
+///     rows: usize,
+/// }
+///
+/// impl Trainer for Averaging {
+///     fn row(&mut self, _regressors: &[f64], truth: f64) {
+///         self.sum += truth;
+///         self.rows += 1;
+///     }
+///
+///     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+///         let mean = MeanOfFit { mean: self.sum / self.rows as f64 };
+///         Ok(Trained { predictor: Box::new(mean), report: TrainingReport::default() })
+///     }
+/// }
+///
+/// #[derive(Debug, Clone, Serialize, Deserialize)]
+/// struct MeanOfFit {
+///     mean: f64,
+/// }
+///
+/// #[typetag::serde(name = "mean_of_fit")]
+/// impl Predictor for MeanOfFit {
+///     fn uses(&self) -> &[String] {
+///         &[]
+///     }
+///
+///     fn predict(&self, _regressors: &[f64]) -> f64 {
+///         self.mean
+///     }
+/// }
+///
+/// athermal_core::register!(Mean, Estimator, "mean_of_fit");
+/// # fn main() {}
+/// ```
+pub trait Estimator: Debug + Send + Sync {
+    /// The input ports: `truth`, and where features are taken, `features`.
+    fn inputs() -> &'static [InputPort]
+    where
+        Self: Sized;
+
+    /// Which regressors make up a row.
+    fn regressors(&self) -> Regressors;
+
+    /// Mistakes in the parameters that their types do not exclude.
+    fn mistakes(&self) -> Vec<Mistake> {
+        Vec::new()
+    }
+
+    /// The predictor of a kind that needs no fit, given the names of its regressors.
+    fn fixed(&self, _regressors: &[String]) -> Option<Box<dyn Predictor>> {
+        None
+    }
+
+    /// What learns from the rows.
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer>;
+}
+
+/// Which regressors an estimator wants.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Regressors {
+    /// The lags at which each channel of the `features` port is read; none means no features.
+    pub feature_lags: Vec<Duration>,
+    /// The lags at which the truth is read.
+    pub truth_lags: TruthLags,
+    /// Whether the answer changes with time alone, so that the node runs at every tick.
+    pub every_tick: bool,
+}
+
+/// The lags at which the truth is a regressor.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum TruthLags {
+    /// It is none.
+    #[default]
+    None,
+    /// At these lags, counted back from the instant of the run.
+    At(Vec<Duration>),
+    /// At the smallest lag that sees nothing of the answer.
+    SmallestLegal,
+}
+
+/// A regressor as reports and models name it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Regressor {
+    /// The channel and, where it has one, the lag: `gradients.room@150s`, `drift.Z1 lag 5min`.
+    pub name: String,
+    /// The unit of its values.
+    pub unit: String,
+}
+
+/// What a trainer knows before the first row.
+#[derive(Debug, Clone)]
+pub struct TrainingSetup {
+    /// The regressors, in the order of a row's values.
+    pub regressors: Vec<Regressor>,
+    /// The unit of the truth.
+    pub truth_unit: String,
+    /// How many bytes of rows the trainer may keep.
+    pub memory: usize,
+}
+
+/// Takes the rows of one fit, in order.
+pub trait Trainer: Send {
+    /// One row: the regressors, all of them present, and the truth that they belong to.
+    fn row(&mut self, regressors: &[f64], truth: f64);
+
+    /// The next row belongs to another segment of the data.
+    fn segment(&mut self) {}
+
+    /// The result.
+    ///
+    /// # Errors
+    /// When the rows do not allow one.
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError>;
+}
+
+/// Why a fit gave nothing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TrainingError {
+    /// Fewer rows than are needed.
+    TooFewRows {
+        /// Rows that there were.
+        rows: usize,
+        /// Rows that are needed.
+        needed: usize,
+    },
+    /// The numbers allow no solution.
+    Unsolvable {
+        /// What is wrong with them, in words.
+        reason: String,
+    },
+}
+
+impl std::fmt::Display for TrainingError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::TooFewRows { rows, needed } => {
+                write!(f, "{rows} complete rows, and at least {needed} are needed")
+            }
+            Self::Unsolvable { reason } => write!(f, "{reason}"),
+        }
+    }
+}
+
+/// What a fit gave.
+#[derive(Debug)]
+pub struct Trained {
+    /// What predicts from now on.
+    pub predictor: Box<dyn Predictor>,
+    /// How the fit went.
+    pub report: TrainingReport,
+}
+
+/// How a fit went, for people and model cards.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct TrainingReport {
+    /// The regressors chosen, in the order in which they were, with the score after each.
+    pub selection: Vec<SelectionStep>,
+    /// Condition number of the standardised design.
+    #[serde(default, with = "crate::model::number_or_none", skip_serializing_if = "Option::is_none")]
+    pub condition: Option<f64>,
+    /// Root mean square error over the rows of the fit, in the unit of the truth.
+    #[serde(default, with = "crate::model::number_or_none", skip_serializing_if = "Option::is_none")]
+    pub in_sample_rmse: Option<f64>,
+    /// What the user should know, a sentence each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+}
+
+/// A regressor chosen by selection.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SelectionStep {
+    /// Its name.
+    pub regressor: String,
+    /// The cross-validation score with it and all before it: the mean over the folds.
+    #[serde(with = "crate::model::number")]
+    pub score: f64,
+    /// The score of each fold.
+    #[serde(default, with = "crate::model::numbers")]
+    pub folds: Vec<f64>,
+}
+
+/// A fitted estimator. Predicting never changes what was learned.
+#[typetag::serde(tag = "type")]
+pub trait Predictor: Debug + Send + Sync {
+    /// The names of the regressors that [`predict`](Predictor::predict) takes, in order.
+    fn uses(&self) -> &[String];
+
+    /// The prediction, from present values of the used regressors.
+    fn predict(&self, regressors: &[f64]) -> f64;
+}

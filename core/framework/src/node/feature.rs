@@ -1,0 +1,168 @@
+//! Decides what the author of a feature implements: from inputs at a tick to outputs.
+
+use std::fmt::Debug;
+
+use super::{InputPort, Inputs, Mistake, OutputPort};
+use crate::engine::Gathered;
+use crate::time::{Duration, Instant};
+
+/// A node that computes channels from channels: slopes, filters, delays.
+///
+/// The framework looks after absence, rates, ages and the order of nodes: [`Operator::step`] runs at a tick when at least
+/// one input is fresh, and sees NaN where an input has no value.
+///
+/// A whole node, which gives the difference of each channel to its previous value:
+///
+/// ```
+/// use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+/// use schemars::JsonSchema;
+/// use serde::{Deserialize, Serialize};
+///
+/// /// The difference of each channel to its value before.
+/// #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+/// #[serde(deny_unknown_fields)]
+/// pub struct Difference {}
+///
+/// impl Feature for Difference {
+///     fn inputs() -> &'static [InputPort] {
+///         const { &[InputPort::fresh("signal", "what is differenced")] }
+///     }
+///
+///     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+///         let mut channels = inputs.port("signal").to_vec();
+///         for channel in &mut channels {
+///             channel.unit = channel.unit.difference();
+///         }
+///         Ok(vec![OutputPort { name: "difference", channels }])
+///     }
+///
+///     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+///         Box::new(Differencing { last: vec![f64::NAN; inputs.port("signal").len()] })
+///     }
+/// }
+///
+/// struct Differencing {
+///     last: Vec<f64>,
+/// }
+///
+/// impl Operator for Differencing {
+///     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+///         for (i, &value) in tick.port(0).iter().enumerate() {
+///             if !value.is_nan() {
+///                 outputs.set(i, value - self.last[i]);
+///                 self.last[i] = value;
+///             }
+///         }
+///     }
+///
+///     fn segment(&mut self) {
+///         self.last.fill(f64::NAN);
+///     }
+/// }
+///
+/// athermal_core::register!(Difference, Feature, "difference");
+/// # fn main() {}
+/// ```
+pub trait Feature: Debug + Send + Sync {
+    /// The input ports.
+    fn inputs() -> &'static [InputPort]
+    where
+        Self: Sized;
+
+    /// The output ports for these inputs; the first is the default.
+    ///
+    /// # Errors
+    /// Every mistake in the parameters, or in how the inputs fit them.
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>>;
+
+    /// What runs. `wanted[i]` says whether anybody reads output port `i`.
+    fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator>;
+
+    /// Whether the answer changes with time alone, so that the node runs at every tick.
+    fn every_tick(&self) -> bool {
+        false
+    }
+
+    /// The time by which the outputs lag the inputs, where the node moves values in time.
+    fn delay(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// Whether outputs depend only on inputs of earlier ticks, so that the node may close a loop.
+    ///
+    /// Such a node gets its inputs through [`Operator::capture`] once all outputs of the tick are there.
+    fn from_the_past(&self) -> bool {
+        false
+    }
+}
+
+/// A running feature.
+pub trait Operator: Send {
+    /// Computes the outputs of this tick. An output that is not set keeps its last value, which others may hold on to.
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>);
+
+    /// Takes the inputs of this tick after all outputs are there; only for kinds that say [`Feature::from_the_past`].
+    fn capture(&mut self, _tick: &Tick<'_>) {}
+
+    /// Starts afresh: the next tick belongs to another segment of the data.
+    fn segment(&mut self);
+}
+
+/// What an operator sees of the present tick.
+#[derive(Debug)]
+pub struct Tick<'a> {
+    /// The instant of the tick.
+    pub now: Instant,
+    pub(crate) gathered: &'a [Gathered],
+    pub(crate) ports: &'a [usize],
+}
+
+impl<'a> Tick<'a> {
+    /// The values of an input port in channel order; NaN where there is none.
+    #[must_use]
+    pub fn port(&self, index: usize) -> &'a [f64] {
+        &self.gathered[self.ports[index]].values
+    }
+
+    /// The stamps of the values of an input port; of no meaning where there is no value.
+    #[must_use]
+    pub fn stamps(&self, index: usize) -> &'a [Instant] {
+        &self.gathered[self.ports[index]].stamps
+    }
+}
+
+/// Where an operator puts its results: all channels of its ports, one port after the other.
+#[derive(Debug)]
+pub struct Outputs<'a> {
+    pub(crate) values: &'a mut [f64],
+    pub(crate) stamps: &'a mut [Instant],
+    pub(crate) written: &'a mut [u64],
+    pub(crate) tick: u64,
+    pub(crate) default_stamp: Instant,
+}
+
+impl Outputs<'_> {
+    /// Gives a value, or NaN for "ran, and has nothing". The stamp is the oldest among the inputs' present values.
+    pub fn set(&mut self, index: usize, value: f64) {
+        self.set_stamped(index, value, self.default_stamp);
+    }
+
+    /// Gives a value with a stamp of its own, such as a window's newest sample.
+    pub fn set_stamped(&mut self, index: usize, value: f64, stamp: Instant) {
+        self.values[index] = value;
+        self.stamps[index] = stamp;
+        self.written[index] = self.tick;
+    }
+
+    /// The number of output channels, over all ports.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether the node has no outputs.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+}

@@ -1,0 +1,22 @@
+//! Decides what authors of nodes implement and how a kind becomes known; not which nodes a graph has.
+//!
+//! A node *kind* is a serde struct of parameters plus one role: [`Feature`], [`Estimator`] or [`Combiner`]. The struct is
+//! the specification: building what runs from it does no I/O and spawns nothing. [`register!`](crate::register) makes the
+//! kind known under its name.
+
+mod combiner;
+mod estimator;
+mod feature;
+mod port;
+mod registry;
+
+pub use combiner::{Combine, Combiner, Votes};
+pub use estimator::{
+    Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer, TrainingError,
+    TrainingReport, TrainingSetup, TruthLags,
+};
+pub use feature::{Feature, Operator, Outputs, Tick};
+pub use port::{InputPort, Inputs, Mistake, OutputPort, Read};
+#[doc(hidden)]
+pub use registry::read;
+pub use registry::{Kind, NodeSpec, Role, RoleName, kind, kinds};

@@ -1,0 +1,109 @@
+//! Decides how a node declares its ports and says what is wrong with its inputs; not which channels reach them.
+
+use crate::channel::Channel;
+
+/// How an input port reads its channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Read {
+    /// Only values that are new at this tick.
+    Fresh,
+    /// The last value, while it is not older than its maximum age.
+    Held,
+    /// The measured value of what is predicted; the framework pairs it with predictions, the node never reads it as data.
+    Truth,
+}
+
+/// An input port as the kind declares it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InputPort {
+    /// The name under `inputs.` in a graph file.
+    pub name: &'static str,
+    /// How it is read.
+    pub read: Read,
+    /// Whether a graph may leave it out.
+    pub optional: bool,
+    /// One line for people.
+    pub summary: &'static str,
+}
+
+impl InputPort {
+    /// A port that takes only new values.
+    #[must_use]
+    pub const fn fresh(name: &'static str, summary: &'static str) -> Self {
+        Self { name, read: Read::Fresh, optional: false, summary }
+    }
+
+    /// A port that takes the last value up to its maximum age.
+    #[must_use]
+    pub const fn held(name: &'static str, summary: &'static str) -> Self {
+        Self { name, read: Read::Held, optional: false, summary }
+    }
+
+    /// The port of the truth.
+    #[must_use]
+    pub const fn truth(summary: &'static str) -> Self {
+        Self { name: "truth", read: Read::Truth, optional: false, summary }
+    }
+
+    /// The same port, which a graph may leave out.
+    #[must_use]
+    pub const fn or_none(mut self) -> Self {
+        self.optional = true;
+        self
+    }
+}
+
+/// An output port: a named, ordered bundle of channels. A node's first port is its default.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputPort {
+    /// The name after the `:` of a reference.
+    pub name: &'static str,
+    /// Its channels, in order.
+    pub channels: Vec<Channel>,
+}
+
+/// The channels that reach a node, port by port, as known when the graph is compiled.
+#[derive(Debug, Clone, Default)]
+pub struct Inputs {
+    /// The node's declared ports and the channels of each, in declared order; empty for an optional port left out.
+    pub ports: Vec<(InputPort, Vec<Channel>)>,
+    /// The member of `each` that this instance stands for.
+    pub member: Option<String>,
+}
+
+impl Inputs {
+    /// The channels of a port; none where the port has been left out.
+    #[must_use]
+    pub fn port(&self, name: &str) -> &[Channel] {
+        self.ports
+            .iter()
+            .find(|(port, _)| port.name == name)
+            .map_or(&[], |(_, channels)| channels)
+    }
+}
+
+/// What a kind finds wrong with its parameters or inputs when a graph is compiled.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mistake {
+    /// The parameter (`windows`, `selection.folds`) or input port (`inputs.signal`) at fault.
+    pub at: String,
+    /// What was found and what is allowed.
+    pub message: String,
+    /// What to write instead.
+    pub help: Option<String>,
+}
+
+impl Mistake {
+    /// A mistake at a parameter or `inputs.PORT`.
+    #[must_use]
+    pub fn at(at: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { at: at.into(), message: message.into(), help: None }
+    }
+
+    /// Adds the way out.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}

@@ -1,0 +1,152 @@
+//! Decides how a kind becomes known and is looked up by name; not what kinds there are.
+
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::sync::OnceLock;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::{Combiner, Estimator, Feature, InputPort};
+use crate::diagnostic::Diagnostics;
+use crate::document::{Value, decode};
+
+/// The specification of a node: the parameters of some kind, read from a graph.
+pub trait NodeSpec: Debug + Send + Sync {
+    /// The parameters seen as their role.
+    fn role(&self) -> Role<'_>;
+
+    /// The parameters as data, with defaults filled in: two equal ones behave alike.
+    fn parameters(&self) -> serde_json::Value;
+}
+
+/// A specification as what it is.
+#[derive(Debug, Clone, Copy)]
+pub enum Role<'a> {
+    /// Channels from channels.
+    Feature(&'a dyn Feature),
+    /// A prediction of the truth.
+    Estimator(&'a dyn Estimator),
+    /// One prediction of several.
+    Combiner(&'a dyn Combiner),
+}
+
+/// The name of a role.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RoleName {
+    /// See [`Feature`].
+    Feature,
+    /// See [`Estimator`].
+    Estimator,
+    /// See [`Combiner`].
+    Combiner,
+}
+
+impl std::fmt::Display for RoleName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Feature => "feature",
+            Self::Estimator => "estimator",
+            Self::Combiner => "combiner",
+        })
+    }
+}
+
+/// A kind of node, as registered.
+#[derive(Debug)]
+pub struct Kind {
+    /// What a graph file says as `type`.
+    pub name: &'static str,
+    /// Its role.
+    pub role: RoleName,
+    /// The crate that brings it.
+    pub package: &'static str,
+    /// The version of that crate.
+    pub version: &'static str,
+    /// The input ports.
+    pub inputs: fn() -> &'static [InputPort],
+    /// Reads its parameters, telling every mistake in them.
+    pub read: fn(&Value, &mut Diagnostics) -> Option<Box<dyn NodeSpec>>,
+    /// The JSON Schema of its parameters, with the documentation.
+    pub schema: fn() -> schemars::Schema,
+}
+
+impl Kind {
+    /// The first sentence of the documentation.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let documentation = self.documentation();
+        let paragraph = documentation.split("\n\n").next().unwrap_or_default();
+        paragraph.replace('\n', " ")
+    }
+
+    /// The documentation of the parameters' struct.
+    #[must_use]
+    pub fn documentation(&self) -> String {
+        (self.schema)().get("description").and_then(|text| text.as_str()).unwrap_or_default().to_owned()
+    }
+}
+
+inventory::collect!(Kind);
+
+/// Reads parameters of one concrete type; [`register!`](crate::register) makes use of it.
+#[doc(hidden)]
+pub fn read<T: NodeSpec + DeserializeOwned + 'static>(
+    value: &Value,
+    diagnostics: &mut Diagnostics,
+) -> Option<Box<dyn NodeSpec>> {
+    decode::<T>(value, "the node", diagnostics).map(|spec| Box::new(spec) as Box<dyn NodeSpec>)
+}
+
+/// All kinds linked into this program, by name; where two crates brought the same name, both.
+pub fn kinds() -> &'static BTreeMap<&'static str, Vec<&'static Kind>> {
+    static KINDS: OnceLock<BTreeMap<&'static str, Vec<&'static Kind>>> = OnceLock::new();
+    KINDS.get_or_init(|| {
+        let mut kinds = BTreeMap::<_, Vec<_>>::new();
+        for kind in inventory::iter::<Kind> {
+            kinds.entry(kind.name).or_default().push(kind);
+        }
+        for same in kinds.values_mut() {
+            same.sort_by_key(|kind| kind.package);
+        }
+        kinds
+    })
+}
+
+/// The kind of a name, if there is one.
+#[must_use]
+pub fn kind(name: &str) -> Option<&'static Kind> {
+    kinds().get(name).and_then(|same| same.first().copied())
+}
+
+/// Makes a kind of node known: its parameters' type, its role, and the name that graph files use.
+///
+/// The type implements the role's trait, `Serialize`, `Deserialize` and `JsonSchema`; its doc comments become the
+/// documentation of the kind.
+#[macro_export]
+macro_rules! register {
+    ($spec:ty, $role:ident, $name:literal) => {
+        impl $crate::node::NodeSpec for $spec {
+            fn role(&self) -> $crate::node::Role<'_> {
+                $crate::node::Role::$role(self)
+            }
+
+            fn parameters(&self) -> $crate::__private::serde_json::Value {
+                $crate::__private::serde_json::to_value(self).unwrap_or_default()
+            }
+        }
+
+        $crate::inventory::submit! {
+            $crate::node::Kind {
+                name: $name,
+                role: $crate::node::RoleName::$role,
+                package: env!("CARGO_PKG_NAME"),
+                version: env!("CARGO_PKG_VERSION"),
+                inputs: <$spec as $crate::node::$role>::inputs,
+                read: $crate::__private::read::<$spec>,
+                schema: || $crate::__private::schemars::schema_for!($spec),
+            }
+        }
+    };
+}

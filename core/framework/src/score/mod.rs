@@ -1,0 +1,50 @@
+//! Decides how predictions are scored against the truths measured later; not how they are made.
+
+mod table;
+mod watch;
+
+use std::sync::Arc;
+
+pub use table::{Score, Scores};
+
+use crate::compile::Plan;
+use crate::engine::{Engine, Fitted};
+use crate::fit::{FitError, drive};
+use crate::quantity::Quantity;
+use crate::recording::Recording;
+
+/// How predictions are scored.
+#[derive(Debug, Clone, Default)]
+pub struct ScoreOptions {
+    /// Only truths whose absolute value is below count.
+    pub abs_truth_below: Option<Quantity>,
+    /// Every row on all of its own instants, rather than on those valid for all rows of a truth.
+    pub each_on_its_own: bool,
+}
+
+/// Steps a plan over a recording, cold, and scores every prediction in it.
+///
+/// A truth at `τ` is compared with the output of the predicting node's last run at or before `τ − ahead`. `progress` is
+/// told the number of ticks stepped so far.
+///
+/// # Errors
+/// When the recording cannot be read, or the fit does not belong to the plan.
+pub fn score(
+    plan: &Arc<Plan>,
+    fitted: &Fitted,
+    recording: &dyn Recording,
+    options: &ScoreOptions,
+    progress: &mut dyn FnMut(u64),
+) -> Result<Scores, FitError> {
+    let mut engine = Engine::new(Arc::clone(plan), fitted)?;
+    let mut watch = watch::Watch::new(plan);
+    let mut stepped = 0;
+    let passed = drive(&mut engine, recording, |engine, event| {
+        watch.look(engine, event);
+        stepped += 1;
+        if stepped % 4096 == 0 {
+            progress(stepped);
+        }
+    })?;
+    Ok(table::table(plan, &watch, &engine, passed.period, passed.ticks, options))
+}

@@ -1,0 +1,176 @@
+//! Decides on which instants each prediction is scored, and the figures.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::ScoreOptions;
+use super::watch::{Truth, Watch};
+use crate::compile::Plan;
+use crate::engine::Engine;
+use crate::time::Instant;
+
+/// The share of instants below which a prediction does not restrict those on which the others are scored.
+const RESTRICTS: f64 = 0.5;
+
+/// The scores of all predictions of a plan.
+#[derive(Debug, Clone, Default)]
+pub struct Scores {
+    /// The first and last instant of the data.
+    pub period: Option<(Instant, Instant)>,
+    /// Ticks stepped.
+    pub ticks: u64,
+    /// Ticks refused because their time was not after the one before.
+    pub refused: u64,
+    /// Samples rejected as infinite or out of range, by measured channel.
+    pub rejected: Vec<(String, u64)>,
+    /// A row for each prediction, those of one truth together, in the order of the plan.
+    pub scores: Vec<Score>,
+}
+
+/// How well one prediction did. Errors are prediction minus truth, in the unit of the truth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Score {
+    /// The channel: `vote.Z1`.
+    pub output: String,
+    /// Its node.
+    pub node: String,
+    /// The kind of the node.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// What it predicts.
+    pub truth: String,
+    /// The unit of the truth and of all errors.
+    pub unit: String,
+    /// Its horizon in seconds.
+    pub ahead_s: f64,
+    /// Instants scored.
+    pub n: usize,
+    /// Root mean square error.
+    pub rmse: Option<f64>,
+    /// 1 − SSE / Σ y².
+    pub r2_zero: Option<f64>,
+    /// 1 − SSE / Σ (y − ȳ)².
+    pub r2_mean: Option<f64>,
+    /// Mean error.
+    pub bias: Option<f64>,
+    /// Largest absolute error.
+    pub max_abs: Option<f64>,
+    /// Share of the instants with a truth within the limit at which there is a prediction.
+    pub valid: Option<f64>,
+    /// Root mean square of the truth on the same instants: the error of predicting zero.
+    pub baseline_zero: Option<f64>,
+    /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, on the same instants.
+    pub baseline_persistence: Option<f64>,
+    /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines.
+    pub truth_noise: Option<f64>,
+    /// Whether it is scored on instants of its own.
+    pub own_instants: bool,
+}
+
+impl Score {
+    /// Whether the prediction is worse than predicting zero.
+    #[must_use]
+    pub fn is_worse_than_nothing(&self) -> bool {
+        matches!((self.rmse, self.baseline_zero), (Some(rmse), Some(zero)) if rmse > zero)
+    }
+}
+
+pub(super) fn table(
+    plan: &Arc<Plan>,
+    watch: &Watch,
+    engine: &Engine,
+    period: Option<(Instant, Instant)>,
+    ticks: u64,
+    options: &ScoreOptions,
+) -> Scores {
+    let rejected = plan.sources.iter().zip(engine.rejected()).filter(|&(_, &count)| count > 0);
+    Scores {
+        period,
+        ticks,
+        refused: engine.refused(),
+        rejected: rejected.map(|(source, &count)| (source.name.clone(), count)).collect(),
+        scores: watch.truths.iter().flat_map(|truth| scores(plan, truth, options)).collect(),
+    }
+}
+
+fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
+    let of = &plan.channels[truth.slot];
+    let limit = options.abs_truth_below.as_ref().and_then(|limit| limit.in_unit(&of.channel.unit));
+    let counted: Vec<usize> =
+        (0..truth.values.len()).filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit)).collect();
+    let valid: Vec<f64> = truth
+        .predictions
+        .iter()
+        .map(|prediction| {
+            let there = counted.iter().filter(|&&i| !prediction.values[i].is_nan()).count();
+            there as f64 / counted.len() as f64
+        })
+        .collect();
+    let restricting = |nth: usize| valid[nth] >= RESTRICTS;
+    let common: Vec<usize> = counted
+        .iter()
+        .copied()
+        .filter(|&i| {
+            let mut rows = truth.predictions.iter().enumerate();
+            rows.all(|(nth, prediction)| !restricting(nth) || !prediction.values[i].is_nan())
+        })
+        .collect();
+    truth
+        .predictions
+        .iter()
+        .enumerate()
+        .map(|(nth, prediction)| {
+            let own_instants = options.each_on_its_own || !restricting(nth);
+            let instants: Vec<usize> = if own_instants {
+                counted.iter().copied().filter(|&i| !prediction.values[i].is_nan()).collect()
+            } else {
+                common.clone()
+            };
+            let node = &plan.nodes[prediction.node];
+            let errors = || instants.iter().map(|&i| prediction.values[i] - truth.values[i]);
+            let truths = || instants.iter().map(|&i| truth.values[i]);
+            let persistence = &truth.persistences[&prediction.ahead].values;
+            let n = instants.len();
+            let mean = mean(truths());
+            let about_mean = mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());
+            let squared: f64 = errors().map(|e| e * e).sum();
+            let about_zero: f64 = truths().map(|y| y * y).sum();
+            let share = |of: f64| (of > 0.0).then(|| 1.0 - squared / of);
+            Score {
+                output: plan.channels[prediction.slot].name.clone(),
+                node: node.name.clone(),
+                kind: node.kind.name,
+                truth: of.name.clone(),
+                unit: of.channel.unit.to_string(),
+                ahead_s: prediction.ahead.secs(),
+                n,
+                rmse: root_mean_square(errors()),
+                r2_zero: share(about_zero),
+                r2_mean: about_mean.and_then(share),
+                bias: self::mean(errors()),
+                max_abs: errors().map(f64::abs).reduce(f64::max),
+                valid: (!counted.is_empty()).then_some(valid[nth]),
+                baseline_zero: root_mean_square(truths()),
+                baseline_persistence: root_mean_square(
+                    instants.iter().map(|&i| persistence[i] - truth.values[i]).filter(|e| !e.is_nan()),
+                ),
+                truth_noise: root_mean_square(instants.iter().map(|&i| truth.errors[i]).filter(|e| !e.is_nan())),
+                own_instants,
+            }
+        })
+        .collect()
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut n) = (0.0, 0_usize);
+    for value in values {
+        sum += value;
+        n += 1;
+    }
+    (n > 0).then(|| sum / n as f64)
+}
+
+fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
+    mean(values.map(|value| value * value)).map(f64::sqrt)
+}

@@ -1,0 +1,145 @@
+//! Decides what is written down while an engine is driven, so that predictions can be scored.
+
+use std::collections::BTreeMap;
+
+use crate::compile::{Plan, TruthLink, persistence_lag};
+use crate::engine::{Cursor, Engine, History, Pairing};
+use crate::recording::Event;
+use crate::time::{Duration, Instant};
+
+/// Everything scored of one plan.
+pub(super) struct Watch {
+    pub(super) truths: Vec<Truth>,
+}
+
+/// A truth and all predictions of it.
+pub(super) struct Truth {
+    pub(super) slot: usize,
+    /// The slot of its standard error, where its node gives one.
+    error_slot: Option<usize>,
+    pub(super) values: Vec<f64>,
+    pub(super) errors: Vec<f64>,
+    pub(super) predictions: Vec<Prediction>,
+    pub(super) persistences: BTreeMap<Duration, Persistence>,
+}
+
+/// A predicted channel.
+pub(super) struct Prediction {
+    pub(super) slot: usize,
+    pub(super) node: usize,
+    pub(super) ahead: Duration,
+    pairing: Pairing,
+    pub(super) values: Vec<f64>,
+}
+
+/// The truth at the smallest lag that sees nothing of the answer, for one horizon.
+pub(super) struct Persistence {
+    lag: Duration,
+    max_age: Duration,
+    history: History,
+    cursor: Cursor,
+    pairing: Pairing,
+    pub(super) values: Vec<f64>,
+}
+
+impl Watch {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let mut truths: BTreeMap<usize, Truth> = BTreeMap::new();
+        for (slot, channel) in plan.channels.iter().enumerate() {
+            let (Some(of), Some(node)) = (channel.predicts, channel.node) else { continue };
+            let (span, ahead) = (plan.channels[of].channel.span, channel.channel.ahead);
+            let Some(limit) = plan.channels[of].channel.default_max_age() else { continue };
+            let link = TruthLink { slot: of, ahead, span, limit };
+            let truth = truths.entry(of).or_insert_with(|| Truth::new(plan, of));
+            let pairing = Pairing::new(&link, 1);
+            truth.predictions.push(Prediction { slot, node, ahead, pairing, values: Vec::new() });
+            truth.persistences.entry(ahead).or_insert_with(|| Persistence::new(&link));
+        }
+        Self { truths: truths.into_values().collect() }
+    }
+
+    /// Looks at what a tick did.
+    pub(super) fn look(&mut self, engine: &Engine, event: Event) {
+        for truth in &mut self.truths {
+            match event {
+                Event::Row(now) => truth.look(engine, now),
+                Event::Segment => truth.segment(),
+            }
+        }
+    }
+}
+
+impl Truth {
+    fn new(plan: &Plan, slot: usize) -> Self {
+        let error_slot = plan.channels[slot].node.and_then(|node| {
+            let ports = &plan.nodes[node].ports;
+            let place = slot - ports.first()?.1.start;
+            let (_, errors) = ports.iter().find(|(name, _)| *name == "stderr")?;
+            errors.clone().nth(place)
+        });
+        Self {
+            slot,
+            error_slot,
+            values: Vec::new(),
+            errors: Vec::new(),
+            predictions: Vec::new(),
+            persistences: BTreeMap::new(),
+        }
+    }
+
+    fn look(&mut self, engine: &Engine, now: Instant) {
+        for prediction in &mut self.predictions {
+            if engine.ran(prediction.slot) {
+                prediction.pairing.run(now, [&[engine.value(prediction.slot)][..]]);
+            }
+        }
+        let measured = engine.ran(self.slot);
+        for persistence in self.persistences.values_mut() {
+            if measured {
+                persistence.history.push(now, engine.value(self.slot), engine.stamp(self.slot));
+            }
+            let asked = now - persistence.lag;
+            let (value, _) = persistence.history.at(asked, persistence.max_age, &mut persistence.cursor);
+            persistence.pairing.run(now, [&[value][..]]);
+        }
+        let value = engine.value(self.slot);
+        if value.is_nan() {
+            return;
+        }
+        self.values.push(value);
+        self.errors.push(self.error_slot.map_or(f64::NAN, |slot| engine.value(slot)));
+        for prediction in &mut self.predictions {
+            let paired = prediction.pairing.truth(now).map_or(f64::NAN, |paired| paired.row[0]);
+            prediction.values.push(paired);
+        }
+        for persistence in self.persistences.values_mut() {
+            let paired = persistence.pairing.truth(now).map_or(f64::NAN, |paired| paired.row[0]);
+            persistence.values.push(paired);
+        }
+    }
+
+    fn segment(&mut self) {
+        for prediction in &mut self.predictions {
+            prediction.pairing.clear();
+        }
+        for persistence in self.persistences.values_mut() {
+            persistence.pairing.clear();
+            persistence.history.clear();
+            persistence.cursor = 0;
+        }
+    }
+}
+
+impl Persistence {
+    fn new(link: &TruthLink) -> Self {
+        let lag = persistence_lag(link.span, link.ahead);
+        Self {
+            lag,
+            max_age: link.limit,
+            history: History::new(lag),
+            cursor: 0,
+            pairing: Pairing::new(link, 1),
+            values: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,432 @@
+//! Training rows as Gram matrices of blocks, in their order. Decides how many rows make a block and when rows are no longer
+//! kept; does not decide what is fitted on them.
+
+use crate::{Gram, NumericsError, contiguous_folds};
+use std::ops::Range;
+
+/// How many rows the smallest block has.
+pub const BLOCK_ROWS: usize = 256;
+/// How many bytes of rows are kept unless stated otherwise.
+pub const DEFAULT_ROW_MEMORY: usize = 64 << 20;
+const MOST_BLOCKS: usize = 1024;
+const FEWEST_BLOCKS: usize = 64;
+const BLOCK_MEMORY: usize = 64 << 20;
+
+/// Rows of regressors and a target, streamed into blocks of 256 rows.
+///
+/// The rows themselves are kept while they fit a stated memory. Then fold edges are exact and a solver can go back to the
+/// rows. Beyond it only the blocks stay: at most 1,024 of them (fewer, but at least 64, when they would take more than 64 MB),
+/// since neighbours are merged in pairs when there are more. So memory is bounded for any number of rows.
+/// All blocks share the first row as their shift. The same rows in the same order give the same bits.
+#[derive(Debug, Clone)]
+pub struct GramBlocks {
+    width: usize,
+    row_memory: usize,
+    most_blocks: usize,
+    /// Rows per closed block: [`BLOCK_ROWS`] times a power of two.
+    block_rows: usize,
+    closed: Vec<Gram>,
+    /// The block being filled, whole chunks only.
+    open: Gram,
+    /// The rows that do not make a whole chunk yet.
+    pending: Chunk,
+    /// Whole chunks of [`BLOCK_ROWS`] rows, while all rows are kept.
+    kept: Option<Vec<Chunk>>,
+    scratch: Vec<f64>,
+}
+
+/// Up to [`BLOCK_ROWS`] rows one after the other.
+#[derive(Debug, Clone, Default)]
+struct Chunk {
+    values: Vec<f64>,
+    /// Empty when all weights are 1.
+    weights: Vec<f64>,
+}
+
+impl Chunk {
+    fn part(&self, rows: Range<usize>, order: usize) -> (&[f64], Option<&[f64]>) {
+        let weights = (!self.weights.is_empty()).then(|| &self.weights[rows.clone()]);
+        (&self.values[rows.start * order..rows.end * order], weights)
+    }
+}
+
+impl GramBlocks {
+    /// No rows yet, of `width` regressors; keeps up to [`DEFAULT_ROW_MEMORY`] bytes of rows.
+    pub fn new(width: usize) -> Self {
+        Self::with_row_memory(width, DEFAULT_ROW_MEMORY)
+    }
+
+    /// No rows yet, of `width` regressors; keeps up to `row_memory` bytes of rows (0: none).
+    pub fn with_row_memory(width: usize, row_memory: usize) -> Self {
+        let order = width + 1;
+        let block_bytes = order * order * size_of::<f64>();
+        Self {
+            width,
+            row_memory,
+            most_blocks: (BLOCK_MEMORY / block_bytes).clamp(FEWEST_BLOCKS, MOST_BLOCKS),
+            block_rows: BLOCK_ROWS,
+            closed: Vec::new(),
+            open: Gram::new(width),
+            pending: Chunk::default(),
+            kept: (row_memory > 0).then(Vec::new),
+            scratch: Vec::new(),
+        }
+    }
+
+    /// The number of regressors.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The number of rows so far.
+    pub fn count(&self) -> u64 {
+        self.pending_start() + self.pending_rows() as u64
+    }
+
+    /// How many blocks there are now, the one being filled among them.
+    pub fn blocks(&self) -> usize {
+        self.closed.len() + usize::from(self.open.count() > 0 || self.pending_rows() > 0)
+    }
+
+    /// How many rows a whole block has now: 256 times a power of two.
+    pub fn block_rows(&self) -> usize {
+        self.block_rows
+    }
+
+    /// Adds one row.
+    ///
+    /// # Panics
+    /// When `x` has not `width` values.
+    pub fn push(&mut self, x: &[f64], y: f64) {
+        self.push_weighted(x, y, 1.0);
+    }
+
+    /// Adds one row of the given weight (not negative).
+    ///
+    /// # Panics
+    /// When `x` has not `width` values.
+    pub fn push_weighted(&mut self, x: &[f64], y: f64, weight: f64) {
+        assert_eq!(x.len(), self.width, "a row has the width of its blocks");
+        let pending = &mut self.pending;
+        if pending.values.capacity() == 0 {
+            pending.values.reserve_exact(BLOCK_ROWS * (self.width + 1));
+        }
+        if weight != 1.0 && pending.weights.is_empty() {
+            let before = pending.values.len() / (self.width + 1);
+            pending.weights.resize(before, 1.0);
+            pending.weights.push(weight);
+        } else if !pending.weights.is_empty() {
+            pending.weights.push(weight);
+        }
+        pending.values.extend_from_slice(x);
+        pending.values.push(y);
+        if pending.values.len() == BLOCK_ROWS * (self.width + 1) {
+            self.close_chunk();
+        }
+    }
+
+    fn close_chunk(&mut self) {
+        let order = self.width + 1;
+        let (values, weights) = self.pending.part(0..BLOCK_ROWS, order);
+        self.open.add_rows(values, weights, &mut self.scratch);
+        if self.open.count() == self.block_rows as u64 {
+            let next = self.open.emptied();
+            self.closed.push(std::mem::replace(&mut self.open, next));
+            if self.closed.len() > self.most_blocks {
+                self.halve_blocks();
+            }
+        }
+        let bytes = self.pending_start() as usize * order * size_of::<f64>();
+        if bytes > self.row_memory {
+            self.kept = None;
+        }
+        match &mut self.kept {
+            Some(kept) => kept.push(std::mem::take(&mut self.pending)),
+            None => {
+                self.pending.values.clear();
+                self.pending.weights.clear();
+            }
+        }
+    }
+
+    fn halve_blocks(&mut self) {
+        let mut blocks = std::mem::take(&mut self.closed).into_iter();
+        while let Some(mut first) = blocks.next() {
+            match blocks.next() {
+                Some(second) => {
+                    first.add_same_shift(&second);
+                    self.closed.push(first);
+                }
+                None => self.open = first,
+            }
+        }
+        self.block_rows *= 2;
+    }
+
+    fn closed_rows(&self) -> u64 {
+        (self.closed.len() * self.block_rows) as u64
+    }
+
+    fn pending_start(&self) -> u64 {
+        self.closed_rows() + self.open.count()
+    }
+
+    fn pending_rows(&self) -> usize {
+        self.pending.values.len() / (self.width + 1)
+    }
+
+    /// The statistics of all rows, summed in their order.
+    pub fn total(&self) -> Gram {
+        let mut total = self.open.emptied();
+        for block in &self.closed {
+            total.add_same_shift(block);
+        }
+        self.add_tail(&mut total);
+        total
+    }
+
+    /// Adds the block being filled and the rows that wait for it.
+    fn add_tail(&self, gram: &mut Gram) {
+        gram.add_same_shift(&self.open);
+        let (values, weights) = self.pending.part(0..self.pending_rows(), self.width + 1);
+        gram.add_rows(values, weights, &mut Vec::new());
+    }
+
+    /// Whether fold edges fall on exact rows: all rows are still kept. If not, they snap to the nearest block.
+    pub fn exact_folds(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// The statistics of `folds` contiguous folds, in order: exactly those of [`contiguous_folds`] while rows are kept
+    /// (see [`GramBlocks::exact_folds`]), else with each edge moved to the nearest edge of a block.
+    ///
+    /// # Errors
+    /// [`NumericsError::Folds`] for fewer than two folds or too few rows or blocks to fill them.
+    pub fn folds(&self, folds: usize) -> Result<Vec<Gram>, NumericsError> {
+        let ranges = contiguous_folds(self.count(), folds)?;
+        if let Some(kept) = &self.kept {
+            return Ok(ranges
+                .into_iter()
+                .map(|range| self.exact_span(kept, range))
+                .collect());
+        }
+        ranges
+            .into_iter()
+            .map(|range| {
+                let snapped = self.snap(range.start)..self.snap(range.end);
+                if snapped.is_empty() {
+                    return Err(NumericsError::Folds {
+                        folds,
+                        rows: self.count(),
+                    });
+                }
+                Ok(self.block_span(snapped))
+            })
+            .collect()
+    }
+
+    fn exact_span(&self, kept: &[Chunk], rows: Range<u64>) -> Gram {
+        let order = self.width + 1;
+        let mut gram = self.open.emptied();
+        let mut scratch = Vec::new();
+        let (mut at, end) = (rows.start as usize, rows.end as usize);
+        while at < end {
+            let block = at / self.block_rows;
+            let whole = at.is_multiple_of(self.block_rows) && at + self.block_rows <= end;
+            if whole && let Some(closed) = self.closed.get(block) {
+                gram.add_same_shift(closed);
+                at += self.block_rows;
+                continue;
+            }
+            let chunk = at / BLOCK_ROWS;
+            let start = chunk * BLOCK_ROWS;
+            let stop = end.min(start + BLOCK_ROWS);
+            let source = kept.get(chunk).unwrap_or(&self.pending);
+            let (values, weights) = source.part(at - start..stop - start, order);
+            gram.add_rows(values, weights, &mut scratch);
+            at = stop;
+        }
+        gram
+    }
+
+    /// The nearest edge of a block, the end of all rows among them; the later one when two are as near.
+    fn snap(&self, row: u64) -> u64 {
+        let size = self.block_rows as u64;
+        let nearest = (row + size / 2) / size * size;
+        if nearest <= self.closed_rows() && row < self.count() {
+            nearest
+        } else {
+            self.count()
+        }
+    }
+
+    fn block_span(&self, rows: Range<u64>) -> Gram {
+        let size = self.block_rows as u64;
+        let mut gram = self.open.emptied();
+        let whole =
+            (rows.start / size) as usize..(rows.end.min(self.closed_rows()) / size) as usize;
+        for block in &self.closed[whole] {
+            gram.add_same_shift(block);
+        }
+        if rows.end == self.count() {
+            self.add_tail(&mut gram);
+        }
+        gram
+    }
+
+    /// All rows, in order, while they are kept.
+    pub fn rows(&self) -> Option<Rows<'_>> {
+        self.kept.as_deref().map(|kept| Rows {
+            order: self.width + 1,
+            kept,
+            pending: &self.pending,
+        })
+    }
+}
+
+/// The rows that [`GramBlocks`] keeps.
+#[derive(Debug, Clone, Copy)]
+pub struct Rows<'a> {
+    order: usize,
+    kept: &'a [Chunk],
+    pending: &'a Chunk,
+}
+
+impl<'a> Rows<'a> {
+    /// The number of rows.
+    pub fn count(&self) -> u64 {
+        (self.kept.len() * BLOCK_ROWS + self.pending.values.len() / self.order) as u64
+    }
+
+    /// The number of regressors in a row.
+    pub fn width(&self) -> usize {
+        self.order - 1
+    }
+
+    /// Each row as its regressors, its target and its weight.
+    pub fn iter(&self) -> impl Iterator<Item = (&'a [f64], f64, f64)> {
+        let order = self.order;
+        self.kept
+            .iter()
+            .chain([self.pending])
+            .flat_map(move |chunk| {
+                chunk
+                    .values
+                    .chunks_exact(order)
+                    .enumerate()
+                    .map(move |(index, row)| {
+                        let weight = chunk.weights.get(index).copied().unwrap_or(1.0);
+                        (&row[..order - 1], row[order - 1], weight)
+                    })
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(i: u64) -> ([f64; 2], f64) {
+        let t = i as f64;
+        (
+            [20.0 + (0.37 * t).sin(), (0.11 * t).cos()],
+            (0.05 * t).sin(),
+        )
+    }
+
+    fn filled(rows: u64, row_memory: usize) -> GramBlocks {
+        let mut blocks = GramBlocks::with_row_memory(2, row_memory);
+        for i in 0..rows {
+            let (x, y) = row(i);
+            blocks.push(&x, y);
+        }
+        blocks
+    }
+
+    fn direct(rows: Range<u64>) -> Gram {
+        let (x, y) = row(0);
+        let mut gram = Gram::with_shift(vec![x[0], x[1], y]).unwrap();
+        for i in rows {
+            let (x, y) = row(i);
+            gram.push(&x, y);
+        }
+        gram
+    }
+
+    fn assert_near(a: &Gram, b: &Gram) {
+        assert_eq!(a.count(), b.count());
+        let (left, right) = (a.moments(), b.moments());
+        for j in 0..=a.width() {
+            assert!((a.means()[j] - b.means()[j]).abs() < 1e-12);
+            for i in 0..=a.width() {
+                let size = (left[(i, i)] * left[(j, j)]).sqrt();
+                assert!((left[(i, j)] - right[(i, j)]).abs() < 1e-12 * size);
+            }
+        }
+    }
+
+    #[test]
+    fn kept_rows_give_the_folds_to_the_row() {
+        let blocks = filled(1000, DEFAULT_ROW_MEMORY);
+        assert!(blocks.exact_folds());
+        let folds = blocks.folds(3).unwrap();
+        for (fold, rows) in folds.iter().zip([0..334, 334..667, 667..1000]) {
+            assert_near(fold, &direct(rows));
+        }
+        assert_near(&blocks.total(), &direct(0..1000));
+    }
+
+    #[test]
+    fn without_kept_rows_fold_edges_snap_to_blocks() {
+        let blocks = filled(2000, 0);
+        assert!(!blocks.exact_folds());
+        assert!(blocks.rows().is_none());
+        let folds = blocks.folds(3).unwrap();
+        for (fold, rows) in folds.iter().zip([0..768, 768..1280, 1280..2000]) {
+            assert_near(fold, &direct(rows));
+        }
+    }
+
+    #[test]
+    fn rows_are_dropped_beyond_the_stated_memory_only() {
+        let bytes_per_row = 3 * size_of::<f64>();
+        assert!(filled(512, 512 * bytes_per_row + 511).exact_folds());
+        assert!(!filled(512, 512 * bytes_per_row - 1).exact_folds());
+    }
+
+    #[test]
+    fn blocks_stay_bounded_and_keep_every_row() {
+        let rows = 256 * 1024 * 2 + 300;
+        let blocks = filled(rows, 0);
+        assert!(blocks.blocks() <= 1025);
+        assert_eq!(blocks.block_rows(), 512);
+        assert_near(&blocks.total(), &direct(0..rows));
+        let counted: u64 = blocks.folds(7).unwrap().iter().map(Gram::count).sum();
+        assert_eq!(counted, rows);
+    }
+
+    #[test]
+    fn the_same_rows_give_the_same_bits_whether_they_are_kept_or_not() {
+        assert_eq!(
+            filled(5000, 0).total(),
+            filled(5000, DEFAULT_ROW_MEMORY).total()
+        );
+        assert_ne!(filled(5000, 0).total(), filled(5001, 0).total());
+    }
+
+    #[test]
+    fn too_few_blocks_for_the_folds_are_refused_rather_than_empty() {
+        assert!(filled(300, 0).folds(3).is_err());
+        assert!(filled(300, DEFAULT_ROW_MEMORY).folds(3).is_ok());
+    }
+
+    #[test]
+    fn weights_are_kept_with_the_rows() {
+        let mut blocks = GramBlocks::new(1);
+        blocks.push(&[1.0], 2.0);
+        blocks.push_weighted(&[3.0], 4.0, 0.5);
+        let rows: Vec<_> = blocks.rows().unwrap().iter().collect();
+        assert_eq!(rows, [(&[1.0][..], 2.0, 1.0), (&[3.0][..], 4.0, 0.5)]);
+        assert_eq!(blocks.total().weight(), 1.5);
+    }
+}

@@ -1,0 +1,102 @@
+//! What can be wrong with a request to this library. Does not decide how a caller words it for its own users.
+
+use std::fmt;
+
+/// Why statistics could not be combined or solved.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum NumericsError {
+    /// Two things that must have the same number of regressors do not.
+    Width {
+        /// The width that was needed.
+        expected: usize,
+        /// The width that was given.
+        found: usize,
+    },
+    /// A difference of two Gram matrices needs one shift in both, and the part may not be larger than the whole.
+    NotAPart,
+    /// A column index is not below the number of regressors.
+    Column {
+        /// The index that was asked for.
+        column: usize,
+        /// The number of regressors.
+        width: usize,
+    },
+    /// A column was asked for more than once.
+    RepeatedColumn {
+        /// The index that stands there twice.
+        column: usize,
+    },
+    /// There are too few rows for what was asked.
+    TooFewRows {
+        /// How many rows are needed at least.
+        needed: u64,
+        /// How many there are.
+        found: u64,
+    },
+    /// The statistics contain NaN or infinities.
+    NotFinite,
+    /// A column's scale is not a positive finite number.
+    Scale {
+        /// The column.
+        column: usize,
+        /// Its scale.
+        scale: f64,
+    },
+    /// A parameter is out of its range.
+    Parameter {
+        /// The name of the parameter.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Cross-validation needs at least two folds and a row in each.
+    Folds {
+        /// How many folds were asked for.
+        folds: usize,
+        /// How many rows there are.
+        rows: u64,
+    },
+    /// A factorisation did not converge.
+    NoConvergence,
+}
+
+impl fmt::Display for NumericsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Width { expected, found } => {
+                write!(f, "{found} regressors where {expected} are needed")
+            }
+            Self::NotAPart => write!(
+                f,
+                "the rows to take away are not a part of these: their shift or their number does not fit"
+            ),
+            Self::Column { column, width } => {
+                write!(f, "column {column} of {width} columns does not exist")
+            }
+            Self::RepeatedColumn { column } => write!(f, "column {column} is listed twice"),
+            Self::TooFewRows { needed, found } => {
+                write!(f, "{found} rows where at least {needed} are needed")
+            }
+            Self::NotFinite => write!(f, "the rows contain NaN or infinite values"),
+            Self::Scale { column, scale } => write!(
+                f,
+                "the scale of column {column} is {scale}; it must be positive and finite"
+            ),
+            Self::Parameter {
+                name,
+                value,
+                allowed,
+            } => write!(f, "{name} is {value}; it must be {allowed}"),
+            Self::Folds { folds, rows } => write!(
+                f,
+                "{rows} rows cannot be cut into {folds} folds; at least two folds and one row in each are needed"
+            ),
+            Self::NoConvergence => write!(f, "the factorisation did not converge"),
+        }
+    }
+}
+
+impl std::error::Error for NumericsError {}

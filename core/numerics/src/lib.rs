@@ -1,0 +1,49 @@
+//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, stochastic gradients.
+//!
+//! Decides how rows of regressors become statistics and how statistics become coefficients. Does not decide where rows
+//! come from, what a regressor is called or what its unit is. Everything runs on the calling thread, and the same rows
+//! in the same order give the same bits.
+//!
+//! ```
+//! use athermal_numerics::{GramBlocks, LeastSquares, Standardization};
+//!
+//! let mut training = GramBlocks::new(2);
+//! for i in 0..100 {
+//!     let t = f64::from(i);
+//!     let x = [t, (0.1 * t).sin()];
+//!     training.push(&x, 3.0 * x[0] - 5.0 * x[1] + 7.0);
+//! }
+//! let gram = training.total();
+//! let scales = Standardization::of(&gram).scales;
+//! let fit = LeastSquares::ordinary().solve(&gram, &[0, 1], &scales, training.rows())?;
+//! assert!((fit.coefficients[0] - 3.0).abs() < 1e-9 && (fit.intercept - 7.0).abs() < 1e-9);
+//! # Ok::<(), athermal_numerics::NumericsError>(())
+//! ```
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod blocks;
+mod error;
+mod fold_state;
+mod folds;
+mod gram;
+mod least_squares;
+mod normal_equations;
+mod orthogonal;
+mod scaler;
+mod score;
+mod selection;
+mod sgd;
+
+pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
+pub use error::NumericsError;
+pub use folds::{Split, contiguous_folds, leave_one_out};
+pub use gram::Gram;
+pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
+pub use scaler::{Standardization, Standardizer};
+pub use score::{Score, ScoreAccumulator};
+pub use selection::{CandidateScore, ForwardSelection, Selection, SelectionScore, SelectionStep};
+pub use sgd::{LearningRate, Sgd, SgdOptions};
+
+#[cfg(test)]
+mod oracle;

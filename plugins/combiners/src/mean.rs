@@ -1,0 +1,42 @@
+//! The plain average of votes.
+
+use athermal_core::node::{Combine, Combiner, InputPort, Votes};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The mean of the votes that are there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Mean {}
+
+impl Combiner for Mean {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::held("voters", "predictions of the same truth")] }
+    }
+
+    fn build(&self, _voters: usize) -> Box<dyn Combine> {
+        Box::new(Average)
+    }
+}
+
+struct Average;
+
+impl Combine for Average {
+    fn combine(&self, votes: Votes<'_>) -> f64 {
+        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| (sum + vote, count + 1.0));
+        if count > 0.0 { sum / count } else { f64::NAN }
+    }
+}
+
+athermal_core::register!(Mean, Combiner, "mean");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absent_voters_drop_out_of_the_mean() {
+        assert_eq!(Average.combine(Votes(&[1.0, f64::NAN, 4.0])), 2.5);
+        assert!(Average.combine(Votes(&[f64::NAN])).is_nan());
+    }
+}

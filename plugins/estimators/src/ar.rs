@@ -1,0 +1,45 @@
+//! The endogenous estimator: drift from past drift.
+
+use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::regression::{LinearTrainer, Solver, lag_mistakes};
+
+/// Autoregression: linear regression of the truth on its own past.
+///
+/// `ŷ(t + ahead) = b₀ + Σ b_l y(t − L_l)` (Ljung 1999, section 4.2). Lags count back from the instant of the run, and the
+/// value taken is the last one at or before the instant asked for. A lag whose window overlaps the predicted one is an
+/// error. The answer changes with time alone, so the node runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ar {
+    /// The lags of the truth, such as `["0s", "5min", "10min"]`.
+    pub lags: Vec<Duration>,
+    /// How coefficients are found.
+    #[serde(default)]
+    pub solver: Solver,
+}
+
+impl Estimator for Ar {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::truth("what is predicted, from its own past")] }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors { truth_lags: TruthLags::At(self.lags.clone()), every_tick: true, ..Regressors::default() }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = self.solver.mistakes();
+        mistakes.extend(lag_mistakes("lags", &self.lags));
+        mistakes
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(LinearTrainer::new(setup, self.solver, None))
+    }
+}
+
+athermal_core::register!(Ar, Estimator, "ar");

@@ -1,0 +1,65 @@
+//! The estimator with both: drift from past drift and temperatures.
+
+use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::regression::{LinearTrainer, Selection, Solver, lag_mistakes};
+
+/// Autoregression with exogenous inputs: linear regression of the truth on features and on its own past.
+///
+/// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t − F) + Σ a_l y(t − L_l)` (Ljung 1999, section 4.2). With a selection, lags are
+/// candidates like the features. The answer changes with time alone, so the node runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Arx {
+    /// The lags of the truth, such as `["0s", "5min", "10min"]`.
+    pub lags: Vec<Duration>,
+    /// The lags at which each feature is read.
+    #[serde(default = "now")]
+    pub feature_lags: Vec<Duration>,
+    /// How coefficients are found.
+    #[serde(default)]
+    pub solver: Solver,
+    /// How features and lags are chosen; without it, all are used.
+    #[serde(default)]
+    pub selection: Option<Selection>,
+}
+
+fn now() -> Vec<Duration> {
+    vec![Duration::ZERO]
+}
+
+impl Estimator for Arx {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("features", "what the prediction is made of beside the past"),
+                InputPort::truth("what is predicted, from its own past and the features"),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: self.feature_lags.clone(),
+            truth_lags: TruthLags::At(self.lags.clone()),
+            every_tick: true,
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = self.solver.mistakes();
+        mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
+        mistakes.extend(lag_mistakes("lags", &self.lags));
+        mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
+        mistakes
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(LinearTrainer::new(setup, self.solver, self.selection))
+    }
+}
+
+athermal_core::register!(Arx, Estimator, "arx");

@@ -1,0 +1,15 @@
+//! Estimator nodes of athermal: linear, AR and ARX regression, and the baselines `zero` and `persistence`.
+
+mod ar;
+mod arx;
+mod linear;
+mod persistence;
+mod regression;
+mod zero;
+
+pub use ar::Ar;
+pub use arx::Arx;
+pub use linear::Linear;
+pub use persistence::Persistence;
+pub use regression::{LinearPredictor, Selection, Solver};
+pub use zero::Zero;

@@ -1,0 +1,51 @@
+//! The exogenous estimator: drift from temperatures.
+
+use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::regression::{LinearTrainer, Selection, Solver};
+
+/// Linear regression of the truth on features.
+///
+/// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t)`. Features are standardised over all training rows (mean 0, population variance 1)
+/// before the solver sees them; the stated coefficients are for the features as they are. With a selection, features are
+/// added one by one by cross-validation, as in Mandelli, Dankwart and Napoli, section 3.3.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Linear {
+    /// How coefficients are found.
+    #[serde(default)]
+    pub solver: Solver,
+    /// How features are chosen; without it, all are used.
+    #[serde(default)]
+    pub selection: Option<Selection>,
+}
+
+impl Estimator for Linear {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("features", "what the prediction is made of, such as slopes of temperatures"),
+                InputPort::truth("what is predicted, such as the drift of an axis"),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors { feature_lags: vec![Duration::ZERO], ..Regressors::default() }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = self.solver.mistakes();
+        mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
+        mistakes
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(LinearTrainer::new(setup, self.solver, self.selection))
+    }
+}
+
+athermal_core::register!(Linear, Estimator, "linear");

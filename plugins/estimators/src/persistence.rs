@@ -1,0 +1,60 @@
+//! The baseline "it goes on as it did".
+
+use athermal_core::node::{
+    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    TruthLags,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Predicts the last truth that shares nothing with the predicted one: the truth at the smallest legal lag.
+///
+/// It needs no fit, and runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Persistence {}
+
+impl Estimator for Persistence {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::truth("what is predicted to stay as it was")] }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors { truth_lags: TruthLags::SmallestLegal, every_tick: true, ..Regressors::default() }
+    }
+
+    fn fixed(&self, regressors: &[String]) -> Option<Box<dyn Predictor>> {
+        Some(Box::new(Same { regressors: regressors.to_vec() }))
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(Same { regressors: setup.regressors.iter().map(|regressor| regressor.name.clone()).collect() })
+    }
+}
+
+/// The prediction that repeats its only regressor.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Same {
+    regressors: Vec<String>,
+}
+
+#[typetag::serde(name = "persistence")]
+impl Predictor for Same {
+    fn uses(&self) -> &[String] {
+        &self.regressors
+    }
+
+    fn predict(&self, regressors: &[f64]) -> f64 {
+        regressors[0]
+    }
+}
+
+impl Trainer for Same {
+    fn row(&mut self, _regressors: &[f64], _truth: f64) {}
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        Ok(Trained { predictor: self, report: TrainingReport::default() })
+    }
+}
+
+athermal_core::register!(Persistence, Estimator, "persistence");

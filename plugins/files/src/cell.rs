@@ -1,0 +1,124 @@
+//! A cell as a value: a number, no value, or neither. Not what follows from a cell that is neither.
+
+/// Longest number with a decimal comma that is looked at; the longest exact double in decimal stays below it.
+const COMMA_CELL: usize = 1100;
+
+/// The value of a cell, `NaN` for "no value" (empty, `NaN`, `null` in any case); `None` when it is neither.
+///
+/// Infinities stay: what they mean is the engine's to say.
+#[inline]
+pub(crate) fn value(cell: &[u8], decimal_comma: bool) -> Option<f64> {
+    if cell.is_empty() {
+        return Some(f64::NAN);
+    }
+    match fast_float2::parse(cell) {
+        Ok(value) => Some(value),
+        Err(_) => unusual(trim(cell), decimal_comma),
+    }
+}
+
+#[cold]
+fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
+    if cell.is_empty() || cell.eq_ignore_ascii_case(b"null") {
+        return Some(f64::NAN);
+    }
+    if decimal_comma && let Some(comma) = single_comma(cell) {
+        let mut point = [0; COMMA_CELL];
+        let copy = point.get_mut(..cell.len())?;
+        copy.copy_from_slice(cell);
+        copy[comma] = b'.';
+        return fast_float2::parse(copy).ok();
+    }
+    fast_float2::parse(cell).ok()
+}
+
+/// Where the only comma stands, if there is one and no point.
+pub(crate) fn single_comma(cell: &[u8]) -> Option<usize> {
+    let mut marks = cell
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| matches!(b, b',' | b'.'));
+    match (marks.next(), marks.next()) {
+        (Some((at, b',')), None) => Some(at),
+        _ => None,
+    }
+}
+
+/// Without the spaces around it, and without quotes that stand inside such spaces (` "a" `).
+#[inline]
+pub(crate) fn trim(cell: &[u8]) -> &[u8] {
+    let cell = cell.trim_ascii();
+    match cell {
+        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
+        _ => cell,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn empty_nan_and_null_are_no_value() {
+        for text in [
+            "", "  ", "NaN", "nan", "NAN", "-nan", "null", "NULL", " null ",
+        ] {
+            assert!(
+                value(text.as_bytes(), false).is_some_and(f64::is_nan),
+                "{text:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn infinities_stay_infinite() {
+        for text in ["inf", "Infinity", "+inf", "1e999"] {
+            assert_eq!(
+                value(text.as_bytes(), false),
+                Some(f64::INFINITY),
+                "{text:?}"
+            );
+        }
+        assert_eq!(value(b"-inf", false), Some(f64::NEG_INFINITY));
+    }
+
+    #[test]
+    fn numbers_may_have_spaces_or_a_sign() {
+        assert_eq!(value(b" 21.5\t", false), Some(21.5));
+        assert_eq!(value(b"+3", false), Some(3.0));
+        assert_eq!(value(b" \"4\" ", false), Some(4.0));
+    }
+
+    #[test]
+    fn other_text_is_neither_number_nor_absence() {
+        for text in ["NA", "-", "off", "1,5", "1 2", "0x10", "21.5C"] {
+            assert_eq!(value(text.as_bytes(), false), None, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_comma_is_a_decimal_point_only_where_it_may_be() {
+        assert_eq!(value(b"1,5", true), Some(1.5));
+        assert_eq!(value(b" -0,25e2 ", true), Some(-25.0));
+        assert_eq!(value(b"1.234,5", true), None);
+        assert_eq!(value(b"1,234,5", true), None);
+    }
+
+    #[test]
+    fn every_double_is_read_to_the_last_bit() {
+        for number in [
+            0.1,
+            1.0 / 3.0,
+            f64::MIN_POSITIVE,
+            5e-324,
+            f64::MAX,
+            -73.967_322_07,
+        ] {
+            let text = format!("{number:?}");
+            assert_eq!(
+                value(text.as_bytes(), false).map(f64::to_bits),
+                Some(number.to_bits())
+            );
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! The columns that a file has against those that are wanted: the delimiter, missing and doubled names. Not their cells.
+
+use csv::{ByteRecord, ReaderBuilder};
+
+use crate::cell::trim;
+use crate::error::excerpt;
+use crate::{FileError, Place};
+
+/// What may stand between cells, the most usual first.
+const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
+
+/// How alike two names must be for one to be suggested for the other (Jaro–Winkler, 0 to 1).
+const ALIKE: f64 = 0.8;
+
+/// The delimiter under which a header line shows the most of the wanted columns, then the most columns.
+pub(crate) fn choose_delimiter<'a>(
+    header: &[u8],
+    wanted: impl Iterator<Item = &'a str> + Clone,
+) -> u8 {
+    let score = |delimiter: u8| {
+        let names = names_in(header, delimiter);
+        let wanted = wanted
+            .clone()
+            .filter(|name| position(&names, name).is_some());
+        (wanted.count(), names.len())
+    };
+    // `max_by_key` takes the last of equals; the most usual delimiter is to win.
+    DELIMITERS
+        .into_iter()
+        .rev()
+        .max_by_key(|&delimiter| score(delimiter))
+        .unwrap_or(b',')
+}
+
+fn names_in(header: &[u8], delimiter: u8) -> Vec<String> {
+    let mut record = ByteRecord::new();
+    let read = ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(delimiter)
+        .from_reader(header)
+        .read_byte_record(&mut record);
+    match read {
+        Ok(true) => record.iter().map(name).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The name that a header cell gives.
+pub(crate) fn name(cell: &[u8]) -> String {
+    String::from_utf8_lossy(trim(cell)).into_owned()
+}
+
+/// Where a name stands.
+pub(crate) fn position(names: &[String], wanted: &str) -> Option<usize> {
+    names.iter().position(|name| name == wanted)
+}
+
+/// Refuses names that stand twice; columns without a name may be many.
+pub(crate) fn check_unique(
+    names: &[String],
+    place: impl FnOnce() -> Place,
+) -> Result<(), FileError> {
+    let mut sorted: Vec<usize> = (0..names.len()).filter(|&i| !names[i].is_empty()).collect();
+    sorted.sort_by(|&a, &b| names[a].cmp(&names[b]).then(a.cmp(&b)));
+    match sorted
+        .windows(2)
+        .find(|pair| names[pair[0]] == names[pair[1]])
+    {
+        None => Ok(()),
+        Some(pair) => Err(FileError::DuplicateColumn {
+            place: place(),
+            column: excerpt(names[pair[0]].as_bytes()),
+            positions: [pair[0] + 1, pair[1] + 1],
+        }),
+    }
+}
+
+/// The error for a column that is not among the names found.
+pub(crate) fn missing(place: Place, column: &str, found: &[String]) -> FileError {
+    let wanted = column.to_lowercase();
+    let alike = |name: &String| strsim::jaro_winkler(&wanted, &name.to_lowercase());
+    let nearest = found
+        .iter()
+        .filter(|name| !name.is_empty())
+        .map(|name| (alike(name), name))
+        .filter(|(alike, _)| *alike >= ALIKE)
+        .max_by(|(a, _), (b, _)| a.total_cmp(b));
+    FileError::MissingColumn {
+        place,
+        column: column.to_owned(),
+        found: found.iter().map(|name| excerpt(name.as_bytes())).collect(),
+        nearest: nearest.map(|(_, name)| name.clone()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chosen(header: &str, wanted: &[&str]) -> char {
+        char::from(choose_delimiter(header.as_bytes(), wanted.iter().copied()))
+    }
+
+    #[test]
+    fn the_delimiter_is_the_one_that_shows_the_wanted_columns() {
+        assert_eq!(chosen("t,a,b", &["a"]), ',');
+        assert_eq!(chosen("t;a;b", &["a"]), ';');
+        assert_eq!(chosen("t\ta\tb", &["a"]), '\t');
+        assert_eq!(chosen("t|a|b", &["a"]), '|');
+        assert_eq!(chosen("t;a, b, c, d;e", &["a, b, c, d"]), ';');
+        assert_eq!(chosen("t", &[]), ',');
+        assert_eq!(chosen("x;y;z", &["a"]), ';');
+    }
+
+    #[test]
+    fn a_delimiter_within_quotes_does_not_count() {
+        assert_eq!(chosen("\"p;q;r;s\",x", &[]), ',');
+    }
+
+    #[test]
+    fn the_nearest_name_is_suggested_and_a_distant_one_is_not() {
+        let found = [
+            "time_s".to_owned(),
+            "room_degC".to_owned(),
+            "chuck_degC".to_owned(),
+        ];
+        let place = Place {
+            file: "a".into(),
+            line: 1,
+        };
+        let nearest = |wanted: &str| match missing(place.clone(), wanted, &found) {
+            FileError::MissingColumn { nearest, .. } => nearest,
+            other => panic!("{other}"),
+        };
+        assert_eq!(nearest("Room_degc").as_deref(), Some("room_degC"));
+        assert_eq!(nearest("chuk_degC").as_deref(), Some("chuck_degC"));
+        assert_eq!(nearest("pressure"), None);
+    }
+
+    #[test]
+    fn a_doubled_name_is_refused_with_both_places() {
+        let names = ["a", "b", "", "", "a"].map(str::to_owned);
+        let place = || Place {
+            file: "f".into(),
+            line: 1,
+        };
+        let error = check_unique(&names, place).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "f:1: the name `a` stands at columns 1 and 5; give each column a name of its own"
+        );
+        assert!(check_unique(&names[..4], place).is_ok());
+    }
+}

@@ -1,0 +1,412 @@
+//! CSV as rows of cells: header, quoting, ragged and cut-off rows. Not what a cell means.
+
+use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
+
+use crate::columns;
+use crate::ledger::Ledger;
+use crate::lines::{LONGEST_ROW, Lines};
+use crate::reader::Cells;
+use crate::{FileError, Layout, Place};
+
+/// The rows of a CSV file.
+pub(crate) struct CsvRows {
+    lines: Lines,
+    splitter: csv_core::Reader,
+    cells: Vec<u8>,
+    ends: Vec<usize>,
+    row_line: u64,
+    delimiter: u8,
+    names: Vec<String>,
+    time: usize,
+    channels: Vec<Option<usize>>,
+}
+
+/// How a row came out of the stream.
+enum Record {
+    End,
+    Row { cells: usize, complete: bool },
+}
+
+impl CsvRows {
+    /// Reads the header and finds the wanted columns in it.
+    pub fn new(lines: Lines, layout: &Layout, delimiter: Option<u8>) -> Result<Self, FileError> {
+        let mut rows = Self::headed(lines, delimiter, layout.names())?;
+        let names = &rows.names;
+        let missing = |name: &str| columns::missing(rows.place(), name, names);
+        let time = &layout.time.column;
+        let time_at = columns::position(names, time).ok_or_else(|| missing(time))?;
+        let channels =
+            layout
+                .channels
+                .iter()
+                .map(|channel| match columns::position(names, &channel.column) {
+                    None if !channel.optional => Err(missing(&channel.column)),
+                    found => Ok(found),
+                });
+        rows.channels = channels.collect::<Result<_, _>>()?;
+        rows.time = time_at;
+        Ok(rows)
+    }
+
+    /// Reads the header; the delimiter, unless stated, is the one that shows the most of the wanted columns.
+    pub fn headed<'a>(
+        mut lines: Lines,
+        delimiter: Option<u8>,
+        wanted: impl Iterator<Item = &'a str> + Clone,
+    ) -> Result<Self, FileError> {
+        if !lines.advance_to_content()? {
+            return Err(FileError::Empty { file: lines.file });
+        }
+        if std::str::from_utf8(lines.text()).is_err() || lines.text().contains(&0) {
+            return Err(FileError::NotText {
+                place: lines.place(),
+            });
+        }
+        let delimiter =
+            delimiter.unwrap_or_else(|| columns::choose_delimiter(lines.text(), wanted));
+        lines.hold();
+        let splitter = ReaderBuilder::new()
+            .delimiter(delimiter)
+            .terminator(Terminator::Any(b'\n'))
+            .build();
+        let mut rows = Self {
+            lines,
+            splitter,
+            cells: vec![0; 1024],
+            ends: vec![0; 64],
+            row_line: 0,
+            delimiter,
+            names: Vec::new(),
+            time: 0,
+            channels: Vec::new(),
+        };
+        let Record::Row { cells, .. } = rows.read_record()? else {
+            return Err(FileError::Empty {
+                file: rows.lines.file,
+            });
+        };
+        rows.names = (0..cells).map(|i| columns::name(rows.column(i))).collect();
+        columns::check_unique(&rows.names, || rows.place())?;
+        Ok(rows)
+    }
+
+    /// The names in the header.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// What stands between cells.
+    pub fn delimiter(&self) -> u8 {
+        self.delimiter
+    }
+
+    /// The texts of the current row.
+    pub fn texts(&self) -> Vec<String> {
+        (0..self.names.len())
+            .map(|i| columns::name(self.column(i)))
+            .collect()
+    }
+
+    /// Reads one record into `cells`, over several lines if it has line breaks in quotes.
+    fn read_record(&mut self) -> Result<Record, FileError> {
+        if !self.lines.advance_to_content()? {
+            return Ok(Record::End);
+        }
+        self.row_line = self.lines.number();
+        let (mut used, mut written, mut counted) = (0, 0, 0);
+        loop {
+            let line = &self.lines.text()[used..];
+            let (result, read, bytes, ends) = self.splitter.read_record(
+                line,
+                &mut self.cells[written..],
+                &mut self.ends[counted..],
+            );
+            used += read;
+            written += bytes;
+            counted += ends;
+            match result {
+                ReadRecordResult::Record => {
+                    self.drop_carriage_return(counted);
+                    return Ok(Record::Row {
+                        cells: counted,
+                        complete: self.lines.is_complete(),
+                    });
+                }
+                ReadRecordResult::OutputFull if written >= LONGEST_ROW => {
+                    return Err(FileError::UnclosedQuote {
+                        place: self.lines.place_of(self.row_line),
+                    });
+                }
+                ReadRecordResult::OutputFull => self.cells.resize(2 * self.cells.len(), 0),
+                ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len(), 0),
+                ReadRecordResult::InputEmpty if self.lines.is_complete() => {
+                    used = 0;
+                    if !self.lines.advance()? {
+                        return Err(FileError::UnclosedQuote {
+                            place: self.lines.place_of(self.row_line),
+                        });
+                    }
+                }
+                // The next call sees an empty input, which ends the record.
+                ReadRecordResult::InputEmpty if self.row_line == self.lines.number() => {}
+                ReadRecordResult::InputEmpty => {
+                    return Err(FileError::UnclosedQuote {
+                        place: self.lines.place_of(self.row_line),
+                    });
+                }
+                ReadRecordResult::End => return Ok(Record::End),
+            }
+        }
+    }
+
+    /// A line may end in CR LF; only LF ends a record, so that a stray CR cannot shift the rest of a line.
+    fn drop_carriage_return(&mut self, counted: usize) {
+        if let Some(last) = counted.checked_sub(1)
+            && self.column(last).ends_with(b"\r")
+        {
+            self.ends[last] -= 1;
+        }
+    }
+
+    fn column(&self, index: usize) -> &[u8] {
+        let start = if index == 0 { 0 } else { self.ends[index - 1] };
+        &self.cells[start..self.ends[index]]
+    }
+}
+
+impl Cells for CsvRows {
+    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
+        loop {
+            let Record::Row { cells, complete } = self.read_record()? else {
+                return Ok(false);
+            };
+            let expected = self.names.len();
+            if cells == expected {
+                return Ok(true);
+            }
+            let place = self.lines.place_of(self.row_line);
+            if !complete && cells < expected {
+                ledger.report.truncated = Some(place);
+                return Ok(false);
+            }
+            ledger.refuse_row(|| FileError::CellCount {
+                place,
+                expected,
+                found: cells,
+            })?;
+        }
+    }
+
+    fn time(&self) -> &[u8] {
+        self.column(self.time)
+    }
+
+    fn channel(&self, index: usize) -> &[u8] {
+        self.channels[index].map_or(&[], |column| self.column(column))
+    }
+
+    fn decimal_comma(&self) -> bool {
+        self.delimiter == b';'
+    }
+
+    fn place(&self) -> Place {
+        self.lines.place_of(self.row_line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{FileError, Layout, Options, Reader, Row, TimeForm};
+
+    fn reader(text: &str, options: Options) -> Result<Reader, FileError> {
+        let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
+        Reader::from_read(
+            "f.csv",
+            std::io::Cursor::new(text.to_owned()),
+            layout,
+            options,
+        )
+    }
+
+    /// All rows as text, the way `{:?}` shows numbers, and the reader for its report.
+    fn read_with(text: &str, options: Options) -> (String, Reader) {
+        let mut reader = reader(text, options).unwrap();
+        let mut row = Row::default();
+        let mut told = Vec::new();
+        while reader.next_into(&mut row).unwrap() {
+            told.push(format!("{} {:?}", row.time_text, row.values));
+        }
+        (told.join("; "), reader)
+    }
+
+    fn read(text: &str) -> String {
+        read_with(text, Options::default()).0
+    }
+
+    /// The message of the first error.
+    fn error(text: &str) -> String {
+        let mut reader = match reader(text, Options::default()) {
+            Ok(reader) => reader,
+            Err(error) => return error.to_string(),
+        };
+        let mut row = Row::default();
+        loop {
+            match reader.next_into(&mut row) {
+                Ok(true) => {}
+                Ok(false) => panic!("there was no error"),
+                Err(error) => return error.to_string(),
+            }
+        }
+    }
+
+    fn lenient() -> Options {
+        Options {
+            lenient: true,
+            ..Options::default()
+        }
+    }
+
+    const TWO_ROWS: &str = "0 [1.0, 2.5]; 1 [3.0, NaN]";
+
+    #[test]
+    fn every_delimiter_is_recognised() {
+        for delimiter in [",", ";", "\t", "|"] {
+            let text = "t,b,skipped,a\n0,2.5,x,1\n1,,y,3\n".replace(',', delimiter);
+            assert_eq!(read(&text), TWO_ROWS, "{delimiter:?}");
+        }
+    }
+
+    #[test]
+    fn a_stated_delimiter_is_taken() {
+        let options = Options {
+            delimiter: Some(b'/'),
+            ..Options::default()
+        };
+        assert_eq!(read_with("t/a/b\n0/1/2.5\n", options).0, "0 [1.0, 2.5]");
+    }
+
+    #[test]
+    fn a_decimal_comma_is_read_where_a_semicolon_separates() {
+        assert_eq!(read("t;a;b\n0,5;1,5;-2,25e1\n"), "0.5 [1.5, -22.5]");
+        assert!(error("t\ta\tb\n0\t1,5\t2\n").contains("`1,5`"));
+    }
+
+    #[test]
+    fn marks_of_other_programs_do_no_harm() {
+        assert_eq!(read("\u{feff}t,a,b\r\n0,1,2.5\r\n1,3,\r\n"), TWO_ROWS);
+        assert_eq!(
+            read("# note\n\nt,a,b\n\n0,1,2.5\n  \n# 1,1,1\n1,3,\n\n"),
+            TWO_ROWS
+        );
+        assert_eq!(read(" t , \"a\" ,b\n 0 , 1, 2.5 \n1,3, \n"), TWO_ROWS);
+    }
+
+    #[test]
+    fn quoted_names_and_cells_are_read() {
+        let text = "\"t\",\"a\",\"b\",\"a, \"\"quoted\"\" note\"\n\"0\",\"1\",2.5,\"x, y\nz\"\n1,3,\"\",\"\"\n";
+        assert_eq!(read(text), TWO_ROWS);
+    }
+
+    #[test]
+    fn a_row_keeps_its_line_after_comments_and_quoted_line_breaks() {
+        assert_eq!(
+            error("# one\nt,a,b\n0,\"1\n\",2\n\n# six\n1,off,2\n"),
+            "f.csv:7: column `a`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently to take it as absent"
+        );
+    }
+
+    #[test]
+    fn a_doubled_name_is_an_error() {
+        assert!(error("t,a,b,a\n").starts_with("f.csv:1: the name `a` stands at columns 2 and 4"));
+    }
+
+    #[test]
+    fn a_missing_column_is_an_error_that_lists_those_found() {
+        assert_eq!(
+            error("t,a,bb\n0,1,2\n"),
+            "f.csv:1: there is no column `b`; found `t`, `a`, `bb`; did you mean `bb`?"
+        );
+        assert!(
+            error("time,a,b\n")
+                .starts_with("f.csv:1: there is no column `t`; found `time`, `a`, `b`")
+        );
+    }
+
+    #[test]
+    fn an_optional_column_that_is_missing_is_absent_throughout() {
+        let mut layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
+        layout.channels[0].optional = true;
+        let mut reader =
+            Reader::from_read("f.csv", &b"t,b\n0,1\n1,2\n"[..], layout, Options::default())
+                .unwrap();
+        let mut row = Row::default();
+        for expected in [1.0, 2.0] {
+            assert!(reader.next_into(&mut row).unwrap());
+            assert!(row.values[0].is_nan());
+            assert_eq!(row.values[1], expected);
+        }
+    }
+
+    #[test]
+    fn a_row_of_another_length_is_an_error_or_left_out() {
+        let text = "t,a,b\n0,1,2.5\n5,1\n6,1,2,3\n1,3,\n";
+        assert_eq!(
+            error(text),
+            "f.csv:3: 2 cells where the header has 3; correct the row, or read leniently to leave it out"
+        );
+        let (rows, reader) = read_with(text, lenient());
+        assert_eq!(rows, TWO_ROWS);
+        assert_eq!(reader.report().refused_rows.count, 2);
+        assert_eq!(reader.report().rows, 2);
+    }
+
+    #[test]
+    fn a_last_line_that_was_cut_off_is_reported_and_the_rest_used() {
+        let (rows, reader) = read_with("t,a,b\n0,1,2.5\n1,3,\n2,4", Options::default());
+        assert_eq!(rows, TWO_ROWS);
+        assert_eq!(
+            reader.report().truncated.as_ref().map(|place| place.line),
+            Some(4)
+        );
+        assert_eq!(reader.report().refused_rows.count, 0);
+    }
+
+    #[test]
+    fn a_last_line_with_all_cells_but_no_end_is_complete() {
+        let (rows, reader) = read_with("t,a,b\n0,1,2.5\n1,3,", Options::default());
+        assert_eq!(rows, TWO_ROWS);
+        assert!(reader.report().truncated.is_none());
+    }
+
+    #[test]
+    fn a_quote_that_is_never_closed_is_an_error_at_its_row() {
+        assert!(
+            error("t,a,b\n0,1,\"2\n1,3,\n2,4,5\n")
+                .starts_with("f.csv:2: a quoted cell starts here")
+        );
+        let endless = format!("t,a,b\n0,1,\"{}", "2\n".repeat(1_000_000));
+        assert!(error(&endless).starts_with("f.csv:2: a quoted cell starts here"));
+    }
+
+    #[test]
+    fn an_empty_file_and_one_without_rows_differ() {
+        assert!(matches!(
+            reader("", Options::default()),
+            Err(FileError::Empty { .. })
+        ));
+        assert!(matches!(
+            reader("# only\n\n", Options::default()),
+            Err(FileError::Empty { .. })
+        ));
+        assert_eq!(read("t,a,b\n"), "");
+        assert_eq!(read("t,a,b"), "");
+    }
+
+    #[test]
+    fn two_byte_text_is_refused_with_advice() {
+        let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
+        let utf16 = b"\xff\xfet\0,\0a\0\n\0";
+        let refused = Reader::from_read("f.csv", &utf16[..], layout, Options::default());
+        assert!(matches!(refused, Err(FileError::NotText { place }) if place.line == 1));
+    }
+}

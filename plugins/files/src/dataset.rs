@@ -1,0 +1,90 @@
+//! Files as a recording of a graph: its columns looked up, and read from the beginning as often as fitting asks for it.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+use athermal_core::compile::Plan;
+use athermal_core::document::{TimeBase, TimeForm as Declared};
+use athermal_core::recording::{self, RecordingError, Rows};
+use athermal_core::time::{Duration, Instant};
+
+use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, Row, TimeColumn, TimeForm};
+
+/// How a sample number is carried where the graph gives no step.
+const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
+
+/// What a graph expects of a table: how time is given, and a column for each measured channel.
+#[must_use]
+pub fn layout(plan: &Plan) -> Layout {
+    let TimeBase::Column { column, form } = &plan.time;
+    let form = match form {
+        Declared::Numbers { unit } => TimeForm::Numbers { ns_per_unit: unit.as_ns() },
+        Declared::Rfc3339 => TimeForm::Rfc3339,
+        Declared::Samples { step } => TimeForm::Samples { step_ns: step.unwrap_or(ONE_SECOND).as_ns() },
+    };
+    Layout {
+        time: TimeColumn { column: column.clone(), form },
+        channels: plan
+            .sources
+            .iter()
+            .map(|source| ChannelColumn { column: source.column.clone(), optional: source.optional })
+            .collect(),
+    }
+}
+
+/// One or more files as a data set.
+#[derive(Debug)]
+pub struct Dataset {
+    paths: Vec<PathBuf>,
+    options: Options,
+    reports: RefCell<Vec<(String, Report)>>,
+}
+
+impl Dataset {
+    /// A data set of these files.
+    #[must_use]
+    pub fn new(paths: Vec<PathBuf>, options: Options) -> Self {
+        Self { paths, options, reports: RefCell::new(Vec::new()) }
+    }
+
+    /// The files.
+    #[must_use]
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// What was met in each file, as of the last time that all were read to their end.
+    #[must_use]
+    pub fn reports(&self) -> Vec<(String, Report)> {
+        self.reports.borrow().clone()
+    }
+}
+
+impl recording::Recording for Dataset {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+        let recording = Recording::join(&self.paths, layout(plan), self.options.clone())?;
+        Ok(Box::new(Reading { recording, row: Row::default(), reports: &self.reports }))
+    }
+}
+
+struct Reading<'a> {
+    recording: Recording,
+    row: Row,
+    reports: &'a RefCell<Vec<(String, Report)>>,
+}
+
+impl Rows for Reading<'_> {
+    fn next(&mut self, values: &mut [f64]) -> Result<Option<recording::Event>, RecordingError> {
+        match self.recording.next_into(&mut self.row)? {
+            Event::Row => {
+                values.copy_from_slice(&self.row.values);
+                Ok(Some(recording::Event::Row(Instant::from_ns(self.row.time_ns))))
+            }
+            Event::Segment => Ok(Some(recording::Event::Segment)),
+            Event::End => {
+                *self.reports.borrow_mut() = self.recording.reports().to_vec();
+                Ok(None)
+            }
+        }
+    }
+}

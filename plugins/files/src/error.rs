@@ -1,0 +1,360 @@
+//! What can be wrong with a file: each error says what, where, and what to do. Not which of them a lenient reader forgives.
+
+use std::fmt;
+use std::io;
+use std::sync::Arc;
+
+/// Longest piece of a file that a message repeats, in characters.
+const EXCERPT: usize = 60;
+
+/// A line of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The name of the file as it was given, or `standard input`.
+    pub file: Arc<str>,
+    /// The line, counted from 1; the first of a row that spans several.
+    pub line: u64,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.file, self.line)
+    }
+}
+
+/// What went wrong while a recording was read or written.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The file could not be opened or created.
+    Open {
+        /// The name of the file.
+        file: Arc<str>,
+        /// What the system said.
+        source: Arc<io::Error>,
+    },
+    /// Reading stopped in the middle of a file.
+    Read {
+        /// The line that was being read.
+        place: Place,
+        /// What the system said.
+        source: Arc<io::Error>,
+    },
+    /// Writing failed.
+    Write {
+        /// The name of the file.
+        file: Arc<str>,
+        /// What the system said.
+        source: Arc<io::Error>,
+    },
+    /// Standard input is one of several files to be joined.
+    StandardInputInList,
+    /// There is nothing in the file but blank lines and comments.
+    Empty {
+        /// The name of the file.
+        file: Arc<str>,
+    },
+    /// The file is not text, or text of two bytes per character.
+    NotText {
+        /// The line with the first such byte.
+        place: Place,
+    },
+    /// A line, or a quoted cell, goes on beyond what a row of a recording can be.
+    TooLong {
+        /// Where it starts.
+        place: Place,
+        /// The longest row that is read, in bytes.
+        limit: usize,
+    },
+    /// A quoted cell that never ends.
+    UnclosedQuote {
+        /// The row in which the cell starts.
+        place: Place,
+    },
+    /// Two columns have one name.
+    DuplicateColumn {
+        /// The header, or the object.
+        place: Place,
+        /// The name.
+        column: String,
+        /// Where the columns stand, counted from 1.
+        positions: [usize; 2],
+    },
+    /// A column that is needed is not there.
+    MissingColumn {
+        /// The header, or the last line looked at.
+        place: Place,
+        /// The name of the column.
+        column: String,
+        /// The names that are there.
+        found: Vec<String>,
+        /// The most similar of them, if one is similar.
+        nearest: Option<String>,
+    },
+    /// A cell that is neither a number nor "no value".
+    BadCell {
+        /// The row.
+        place: Place,
+        /// The name of the column.
+        column: String,
+        /// The text of the cell.
+        found: String,
+    },
+    /// A time cell that is not in the stated form, or beyond 64 bits of nanoseconds.
+    BadTime {
+        /// The row.
+        place: Place,
+        /// The name of the column.
+        column: String,
+        /// The text of the cell.
+        found: String,
+        /// What the cell should look like.
+        expected: &'static str,
+    },
+    /// An instant that is not after the one before.
+    TimeNotAfter {
+        /// The row.
+        place: Place,
+        /// Its time, in nanoseconds.
+        time_ns: i64,
+        /// The newest time before it, in nanoseconds.
+        previous_ns: i64,
+    },
+    /// A row with more or fewer cells than the header.
+    CellCount {
+        /// The row.
+        place: Place,
+        /// The number of columns in the header.
+        expected: usize,
+        /// The number of cells in the row.
+        found: usize,
+    },
+    /// A line that is not one JSON object.
+    BadObject {
+        /// The line.
+        place: Place,
+        /// What the parser said.
+        reason: String,
+    },
+    /// A row to be written has not as many values as there are columns.
+    ValueCount {
+        /// The name of the file.
+        file: Arc<str>,
+        /// The number of value columns.
+        expected: usize,
+        /// The number of values.
+        found: usize,
+    },
+}
+
+impl FileError {
+    /// Whether whoever read the output went away, as `head` does: a reason to stop, but no failure.
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Open { file, source } => {
+                write!(
+                    f,
+                    "{file}: cannot be opened: {source}; check the path and the rights"
+                )
+            }
+            Self::Read { place, source } => write!(f, "{place}: cannot be read further: {source}"),
+            Self::Write { file, source } => write!(f, "{file}: cannot be written: {source}"),
+            Self::StandardInputInList => write!(
+                f,
+                "standard input cannot be joined with other files, whose order is found by opening them twice; save it to a file first"
+            ),
+            Self::Empty { file } => write!(
+                f,
+                "{file}: is empty; a recording starts with a line of column names (CSV) or an object (JSON lines)"
+            ),
+            Self::NotText { place } => {
+                write!(
+                    f,
+                    "{place}: is not text in UTF-8; save the recording as CSV or JSON lines in UTF-8"
+                )
+            }
+            Self::TooLong { place, limit } => write!(
+                f,
+                "{place}: a row longer than {limit} bytes starts here; look for a quote that is not closed or missing line ends"
+            ),
+            Self::UnclosedQuote { place } => {
+                write!(
+                    f,
+                    "{place}: a quoted cell starts here that never ends; close the quote or remove it"
+                )
+            }
+            Self::DuplicateColumn {
+                place,
+                column,
+                positions: [first, second],
+            } => write!(
+                f,
+                "{place}: the name `{column}` stands at columns {first} and {second}; give each column a name of its own"
+            ),
+            Self::MissingColumn {
+                place,
+                column,
+                found,
+                nearest,
+            } => {
+                write!(f, "{place}: there is no column `{column}`; found ")?;
+                list(f, found)?;
+                match nearest {
+                    Some(nearest) => write!(f, "; did you mean `{nearest}`?"),
+                    None => write!(
+                        f,
+                        "; correct the name, or make it optional if it is a channel"
+                    ),
+                }
+            }
+            Self::BadCell {
+                place,
+                column,
+                found,
+            } => write!(
+                f,
+                "{place}: column `{column}`: expected a number, found `{found}`; leave the cell empty where there is no value, or read leniently to take it as absent"
+            ),
+            Self::BadTime {
+                place,
+                column,
+                found,
+                expected,
+            } => {
+                write!(f, "{place}: column `{column}`: expected {expected}, found ")?;
+                match found.as_str() {
+                    "" => write!(f, "nothing")?,
+                    found => write!(f, "`{found}`")?,
+                }
+                write!(
+                    f,
+                    "; correct the time or how it is to be read, or read leniently to leave the row out"
+                )
+            }
+            Self::TimeNotAfter {
+                place,
+                time_ns,
+                previous_ns,
+            } => write!(
+                f,
+                "{place}: the time {time_ns} ns is not after {previous_ns} ns; the row was left out"
+            ),
+            Self::CellCount {
+                place,
+                expected,
+                found,
+            } => write!(
+                f,
+                "{place}: {found} cells where the header has {expected}; correct the row, or read leniently to leave it out"
+            ),
+            Self::BadObject { place, reason } => write!(
+                f,
+                "{place}: expected one JSON object on the line: {reason}; write one object per line, or read leniently to leave the line out"
+            ),
+            Self::ValueCount {
+                file,
+                expected,
+                found,
+            } => write!(f, "{file}: {found} values for {expected} columns"),
+        }
+    }
+}
+
+impl std::error::Error for FileError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Open { source, .. } | Self::Read { source, .. } | Self::Write { source, .. } => {
+                Some(source.as_ref())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Bytes of a file as a message may repeat them.
+pub(crate) fn excerpt(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * EXCERPT + 4)]);
+    let mut short: String = text.chars().take(EXCERPT).collect();
+    if short.len() < bytes.len() && text.chars().count() > EXCERPT {
+        short.push('…');
+    }
+    short
+}
+
+fn list(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
+    if names.is_empty() {
+        return write!(f, "no columns");
+    }
+    for (index, name) in names.iter().enumerate() {
+        let comma = if index == 0 { "" } else { ", " };
+        write!(f, "{comma}`{name}`")?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place() -> Place {
+        Place {
+            file: "run.csv".into(),
+            line: 12,
+        }
+    }
+
+    #[test]
+    fn messages_say_what_where_and_what_to_do() {
+        let bad = FileError::BadCell {
+            place: place(),
+            column: "room".into(),
+            found: "off".into(),
+        };
+        assert_eq!(
+            bad.to_string(),
+            "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently to take it as absent"
+        );
+        let missing = FileError::MissingColumn {
+            place: place(),
+            column: "rom".into(),
+            found: vec!["time_s".into(), "room".into()],
+            nearest: Some("room".into()),
+        };
+        assert_eq!(
+            missing.to_string(),
+            "run.csv:12: there is no column `rom`; found `time_s`, `room`; did you mean `room`?"
+        );
+        let time = FileError::BadTime {
+            place: place(),
+            column: "time_s".into(),
+            found: String::new(),
+            expected: "a decimal number",
+        };
+        assert_eq!(
+            time.to_string(),
+            "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently to leave the row out"
+        );
+        let count = FileError::CellCount {
+            place: place(),
+            expected: 3,
+            found: 2,
+        };
+        assert_eq!(
+            count.to_string(),
+            "run.csv:12: 2 cells where the header has 3; correct the row, or read leniently to leave it out"
+        );
+    }
+
+    #[test]
+    fn an_excerpt_is_short_and_never_cuts_a_character() {
+        assert_eq!(excerpt("21,5 °C".as_bytes()), "21,5 °C");
+        let long = "é".repeat(500);
+        assert_eq!(excerpt(long.as_bytes()), "é".repeat(EXCERPT) + "…");
+    }
+}

@@ -1,0 +1,56 @@
+//! Which of the two formats a file has: from its name, else from its first byte. Not how either is read.
+
+use std::path::Path;
+
+/// A format of recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A line of column names, then rows of cells; separated by `,`, `;`, tab or `|`.
+    Csv,
+    /// One JSON object per line.
+    JsonLines,
+}
+
+impl Format {
+    /// The format that a file's name promises: `.csv`, `.tsv`, `.txt`, or `.jsonl`, `.ndjson`, `.json`; `None` for others.
+    pub fn from_path(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "csv" | "tsv" | "txt" => Some(Self::Csv),
+            "jsonl" | "ndjson" | "json" => Some(Self::JsonLines),
+            _ => None,
+        }
+    }
+
+    /// The format of a text that starts with this line.
+    pub(crate) fn from_first_line(line: &[u8]) -> Self {
+        match line.trim_ascii_start().first() {
+            Some(b'{') => Self::JsonLines,
+            _ => Self::Csv,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_file_tells_its_format() {
+        for name in ["a.csv", "b/a.TSV", "a.b.txt"] {
+            assert_eq!(
+                Format::from_path(Path::new(name)),
+                Some(Format::Csv),
+                "{name}"
+            );
+        }
+        for name in ["a.jsonl", "a.ndjson", "a.JSON"] {
+            assert_eq!(
+                Format::from_path(Path::new(name)),
+                Some(Format::JsonLines),
+                "{name}"
+            );
+        }
+        assert_eq!(Format::from_path(Path::new("recording")), None);
+    }
+}

@@ -1,0 +1,96 @@
+//! A time cell as nanoseconds. Not whether time may step back there.
+
+use jiff::Timestamp;
+use jiff::fmt::temporal::DateTimeParser;
+use jiff::tz::Offset;
+
+use crate::TimeForm;
+use crate::decimal::Decimal;
+
+/// A civil date is ten characters long; only behind it can a sign belong to an offset.
+const DATE_LENGTH: usize = 10;
+
+impl TimeForm {
+    /// The instant that a trimmed cell stands for, or `None` if it is not of this form or does not fit into 64 bits.
+    pub(crate) fn read(self, text: &[u8]) -> Option<i64> {
+        match self {
+            Self::Numbers { ns_per_unit } => Decimal::parse(text)?.times(ns_per_unit),
+            Self::Samples { step_ns } => {
+                let number = Decimal::parse(text)?;
+                number.is_whole().then(|| number.times(step_ns))?
+            }
+            Self::Rfc3339 => i64::try_from(timestamp(text)?.as_nanosecond()).ok(),
+        }
+    }
+
+    /// What a cell should look like, for a message.
+    pub(crate) fn expected(self) -> &'static str {
+        match self {
+            Self::Numbers { .. } => "a decimal number",
+            Self::Samples { .. } => "a whole sample number",
+            Self::Rfc3339 => "a date and time such as 2013-07-04T00:00:00Z",
+        }
+    }
+}
+
+fn timestamp(text: &[u8]) -> Option<Timestamp> {
+    static PARSER: DateTimeParser = DateTimeParser::new();
+    let zoned = text
+        .iter()
+        .skip(DATE_LENGTH)
+        .any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'));
+    if zoned {
+        return PARSER.parse_timestamp(text).ok();
+    }
+    let civil = PARSER.parse_datetime(text).ok()?;
+    Offset::UTC.to_timestamp(civil).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2013-07-04T00:00:00Z: 15,890 days after 1970-01-01.
+    const DAY: i64 = 15_890 * 86_400 * 1_000_000_000;
+
+    #[test]
+    fn text_without_a_zone_is_utc() {
+        for text in [
+            "2013-07-04",
+            "2013-07-04 00:00:00",
+            "2013-07-04T00:00",
+            "2013-07-04T00:00:00Z",
+        ] {
+            assert_eq!(TimeForm::Rfc3339.read(text.as_bytes()), Some(DAY), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_offset_is_taken_into_account() {
+        let two_hours = 7_200_000_000_000;
+        assert_eq!(
+            TimeForm::Rfc3339.read(b"2013-07-04T00:00:00.5+02:00"),
+            Some(DAY - two_hours + 500_000_000)
+        );
+        assert_eq!(
+            TimeForm::Rfc3339.read(b"2013-07-04 00:00:00-02:00"),
+            Some(DAY + two_hours)
+        );
+    }
+
+    #[test]
+    fn sample_numbers_count_steps_and_must_be_whole() {
+        let form = TimeForm::Samples {
+            step_ns: 80_000_000,
+        };
+        assert_eq!(form.read(b"999"), Some(79_920_000_000));
+        assert_eq!(form.read(b"3.0"), Some(240_000_000));
+        assert_eq!(form.read(b"3.5"), None);
+    }
+
+    #[test]
+    fn a_date_beyond_64_bits_of_nanoseconds_is_refused() {
+        assert_eq!(TimeForm::Rfc3339.read(b"2400-01-01T00:00:00Z"), None);
+        assert_eq!(TimeForm::Rfc3339.read(b"yesterday"), None);
+    }
+}

@@ -1,0 +1,83 @@
+//! What is wanted from a recording: which column gives time, and which give channels. Not where they stand in a file.
+
+/// The columns to read, by name; a column that is not named here is skipped.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Layout {
+    /// The column that gives the instant of each row.
+    pub time: TimeColumn,
+    /// The columns that give values, in the order of [`Row::values`](crate::Row::values).
+    pub channels: Vec<ChannelColumn>,
+}
+
+/// The column that gives the instant of each row.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeColumn {
+    /// The name of the column (CSV) or key (JSON lines).
+    pub column: String,
+    /// How its cells are written.
+    pub form: TimeForm,
+}
+
+/// How an instant is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeForm {
+    /// Decimal numbers of a unit, read exactly and rounded to the nearest nanosecond: `0.3`, `1e3`.
+    Numbers {
+        /// Nanoseconds in one unit: 1,000,000,000 for seconds, 1,000,000 for milliseconds.
+        ns_per_unit: i64,
+    },
+    /// RFC 3339 text such as `2013-07-04T00:00:00Z`; without a zone (`2013-07-04 00:00:00`, `2013-07-04`) it is UTC.
+    /// Nanoseconds then count from 1970-01-01T00:00:00Z.
+    Rfc3339,
+    /// Whole sample numbers, a fixed time apart.
+    Samples {
+        /// Nanoseconds from one sample to the next.
+        step_ns: i64,
+    },
+}
+
+impl TimeForm {
+    /// Decimal numbers of seconds.
+    pub const SECONDS: Self = Self::Numbers {
+        ns_per_unit: 1_000_000_000,
+    };
+}
+
+/// A column that gives the values of one channel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelColumn {
+    /// The name of the column (CSV) or key (JSON lines).
+    pub column: String,
+    /// Whether the data may lack the column; the channel is then absent throughout.
+    pub optional: bool,
+}
+
+impl Layout {
+    /// A layout in which every channel column must be there.
+    pub fn new<C: Into<String>>(
+        time: impl Into<String>,
+        form: TimeForm,
+        channels: impl IntoIterator<Item = C>,
+    ) -> Self {
+        let channels = channels
+            .into_iter()
+            .map(|column| ChannelColumn {
+                column: column.into(),
+                optional: false,
+            })
+            .collect();
+        Self {
+            time: TimeColumn {
+                column: time.into(),
+                form,
+            },
+            channels,
+        }
+    }
+
+    /// The names of all columns wanted, time first.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> + Clone {
+        std::iter::once(self.time.column.as_str())
+            .chain(self.channels.iter().map(|c| c.column.as_str()))
+    }
+}

@@ -1,0 +1,90 @@
+//! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
+
+use crate::{FileError, Place};
+
+/// What a reader met on its way; complete once the reader has come to the end.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    /// Rows given.
+    pub rows: u64,
+    /// Rows left out because their time was not after the one before ([`FileError::TimeNotAfter`]).
+    pub refused_time: Count,
+    /// Cells taken as absent because they could not be read; only when reading leniently.
+    pub bad_cells: Count,
+    /// Rows left out because of their time cell, number of cells or syntax; only when reading leniently.
+    pub refused_rows: Count,
+    /// The last line, when it was cut off in the middle and left out.
+    pub truncated: Option<Place>,
+}
+
+/// How often something was met, and the first time.
+#[derive(Debug, Clone, Default)]
+pub struct Count {
+    /// How often.
+    pub count: u64,
+    /// What it was the first time, with its place.
+    pub first: Option<FileError>,
+}
+
+impl Count {
+    fn add(&mut self, error: impl FnOnce() -> FileError) {
+        self.count += 1;
+        self.first.get_or_insert_with(error);
+    }
+}
+
+/// The account that a reader keeps.
+pub(crate) struct Ledger {
+    pub report: Report,
+    lenient: bool,
+    last_ns: Option<i64>,
+}
+
+impl Ledger {
+    pub fn new(lenient: bool) -> Self {
+        Self {
+            report: Report::default(),
+            lenient,
+            last_ns: None,
+        }
+    }
+
+    /// Whether the row at this instant can be used: strictly after the one before.
+    pub fn accepts(&mut self, time_ns: i64, place: impl FnOnce() -> Place) -> bool {
+        match self.last_ns {
+            Some(previous_ns) if time_ns <= previous_ns => {
+                self.report.refused_time.add(|| FileError::TimeNotAfter {
+                    place: place(),
+                    time_ns,
+                    previous_ns,
+                });
+                false
+            }
+            _ => {
+                self.last_ns = Some(time_ns);
+                self.report.rows += 1;
+                true
+            }
+        }
+    }
+
+    /// A cell that cannot be read.
+    #[cold]
+    pub fn bad_cell(&mut self, error: impl FnOnce() -> FileError) -> Result<(), FileError> {
+        if !self.lenient {
+            return Err(error());
+        }
+        self.report.bad_cells.add(error);
+        Ok(())
+    }
+
+    /// A row that cannot be used.
+    #[cold]
+    pub fn refuse_row(&mut self, error: impl FnOnce() -> FileError) -> Result<(), FileError> {
+        if !self.lenient {
+            return Err(error());
+        }
+        self.report.refused_rows.add(error);
+        Ok(())
+    }
+}

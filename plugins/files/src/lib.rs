@@ -1,0 +1,49 @@
+//! Recordings in files: CSV and JSON lines, read and written row by row in constant memory.
+//!
+//! This package decides what bytes mean: delimiters, quoting, numbers, instants, what "no value" looks like, and what is
+//! done with a line that cannot be used. It does not decide what a channel is for, its unit, or when a value is too old.
+//!
+//! ```
+//! use athermal_files::{Layout, Options, Reader, Row, TimeForm};
+//!
+//! let text = "time_s,plate,room\n0.0,21.5,\n0.3,21.6,20.9\n";
+//! let layout = Layout::new("time_s", TimeForm::SECONDS, ["room", "plate"]);
+//! let mut reader = Reader::from_read("example.csv", text.as_bytes(), layout, Options::default())?;
+//! let mut row = Row::default();
+//! assert!(reader.next_into(&mut row)?);
+//! assert!(row.values[0].is_nan());
+//! assert!(reader.next_into(&mut row)?);
+//! assert_eq!(row.time_ns, 300_000_000);
+//! assert_eq!(row.values, [20.9, 21.6]);
+//! # Ok::<(), athermal_files::FileError>(())
+//! ```
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod cell;
+mod columns;
+mod csv_rows;
+mod dataset;
+mod decimal;
+mod description;
+mod error;
+mod format;
+mod instant;
+mod json_objects;
+mod json_rows;
+mod layout;
+mod ledger;
+mod lines;
+mod reader;
+mod recording;
+mod writer;
+
+pub use dataset::{Dataset, layout};
+pub use description::Description;
+pub use error::{FileError, Place};
+pub use format::Format;
+pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
+pub use ledger::{Count, Report};
+pub use reader::{Options, Reader, Row};
+pub use recording::{Event, Recording};
+pub use writer::{Flush, Writer};

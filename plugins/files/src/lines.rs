@@ -1,0 +1,180 @@
+//! Lines of a byte stream, each as soon as it is there, in constant memory. Not what a line means, save that blank
+//! lines and comments mean nothing.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::{FileError, Format, Place};
+
+/// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
+pub(crate) const LONGEST_ROW: usize = 1 << 20;
+
+const BUFFER: usize = 64 * 1024;
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// A stream cut into lines.
+pub(crate) struct Lines {
+    pub file: Arc<str>,
+    input: BufReader<Box<dyn Read + Send>>,
+    line: Vec<u8>,
+    number: u64,
+    held: bool,
+}
+
+impl Lines {
+    pub fn new(file: Arc<str>, input: Box<dyn Read + Send>) -> Self {
+        Self {
+            file,
+            input: BufReader::with_capacity(BUFFER, input),
+            line: Vec::new(),
+            number: 0,
+            held: false,
+        }
+    }
+
+    /// A file, or standard input for `-`.
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        if path == Path::new("-") {
+            return Ok(Self::new("standard input".into(), Box::new(io::stdin())));
+        }
+        let file: Arc<str> = path.display().to_string().into();
+        match File::open(path) {
+            Ok(input) => Ok(Self::new(file, Box::new(input))),
+            Err(source) => Err(FileError::Open {
+                file,
+                source: Arc::new(source),
+            }),
+        }
+    }
+
+    /// Goes to the next line; false at the end of the stream.
+    pub fn advance(&mut self) -> Result<bool, FileError> {
+        if std::mem::take(&mut self.held) {
+            return Ok(true);
+        }
+        self.line.clear();
+        let limit = LONGEST_ROW as u64 + 1;
+        let read = (&mut self.input)
+            .take(limit)
+            .read_until(b'\n', &mut self.line);
+        if let Err(source) = read {
+            return Err(FileError::Read {
+                place: self.place_of(self.number + 1),
+                source: Arc::new(source),
+            });
+        }
+        if self.line.is_empty() {
+            return Ok(false);
+        }
+        self.number += 1;
+        if self.number == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
+            self.line.drain(..BYTE_ORDER_MARK.len());
+        }
+        if self.line.len() > LONGEST_ROW {
+            return Err(FileError::TooLong {
+                place: self.place(),
+                limit: LONGEST_ROW,
+            });
+        }
+        Ok(true)
+    }
+
+    /// Goes to the next line that is neither blank nor a comment; false at the end of the stream.
+    pub fn advance_to_content(&mut self) -> Result<bool, FileError> {
+        while self.advance()? {
+            if !matches!(self.line.trim_ascii_start().first(), None | Some(b'#')) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The format stated, or the one that the first line looks like; that line stays to be read.
+    pub fn format_or(&mut self, stated: Option<Format>) -> Result<Format, FileError> {
+        if let Some(format) = stated {
+            return Ok(format);
+        }
+        if !self.advance_to_content()? {
+            return Err(FileError::Empty {
+                file: self.file.clone(),
+            });
+        }
+        self.hold();
+        Ok(Format::from_first_line(&self.line))
+    }
+
+    /// Gives the current line once more at the next call.
+    pub fn hold(&mut self) {
+        self.held = true;
+    }
+
+    /// The current line with its end, if it has one.
+    pub fn text(&self) -> &[u8] {
+        &self.line
+    }
+
+    /// The number of the current line, from 1.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Whether the current line has an end; only the last one of a stream may not.
+    pub fn is_complete(&self) -> bool {
+        self.line.ends_with(b"\n")
+    }
+
+    pub fn place(&self) -> Place {
+        self.place_of(self.number)
+    }
+
+    pub fn place_of(&self, line: u64) -> Place {
+        Place {
+            file: self.file.clone(),
+            line,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(bytes: &'static [u8]) -> Lines {
+        Lines::new("test".into(), Box::new(bytes))
+    }
+
+    #[test]
+    fn blank_lines_and_comments_are_skipped_and_counted() {
+        let mut lines = lines(b"\xef\xbb\xbf# made by hand\n\r\n  # more\n \t\na,b\r\n");
+        assert!(lines.advance_to_content().unwrap());
+        assert_eq!((lines.text(), lines.number()), (&b"a,b\r\n"[..], 5));
+        assert!(!lines.advance_to_content().unwrap());
+    }
+
+    #[test]
+    fn a_line_that_is_held_comes_again() {
+        let mut lines = lines(b"a\nb");
+        assert!(lines.advance().unwrap());
+        lines.hold();
+        assert!(lines.advance().unwrap());
+        assert_eq!(
+            (lines.text(), lines.number(), lines.is_complete()),
+            (&b"a\n"[..], 1, true)
+        );
+        assert!(lines.advance().unwrap());
+        assert_eq!(
+            (lines.text(), lines.number(), lines.is_complete()),
+            (&b"b"[..], 2, false)
+        );
+    }
+
+    #[test]
+    fn an_endless_line_is_an_error_and_not_a_full_memory() {
+        let mut lines = Lines::new("test".into(), Box::new(std::io::repeat(b'x')));
+        assert!(
+            matches!(lines.advance(), Err(FileError::TooLong { place, .. }) if place.line == 1)
+        );
+    }
+}

@@ -1,0 +1,222 @@
+//! Several files as one recording: their order, and where one does not continue the other. Not how a file is read.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::{FileError, Layout, Options, Reader, Report, Row};
+
+/// What comes next in a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// A row.
+    Row,
+    /// The rows that follow do not continue those before: windows, lags and filters start afresh.
+    Segment,
+    /// There is nothing more.
+    End,
+}
+
+/// The rows of one or more files, one file open at a time.
+///
+/// Files whose first instants all differ are read in the order of these, others in the order given. A file that starts after the last
+/// instant of the one before continues it; one that starts at or before it, such as when each counts from 0, is a segment of its own.
+/// That also holds for files that cover the same period with different columns: they are not merged. A file
+/// without rows is passed over.
+pub struct Recording {
+    rest: std::vec::IntoIter<PathBuf>,
+    layout: Layout,
+    options: Options,
+    current: Option<(String, Reader)>,
+    last_ns: Option<i64>,
+    /// The first row of a segment waits until the break has been told.
+    waiting: Option<Row>,
+    reports: Vec<(String, Report)>,
+}
+
+impl Recording {
+    /// Opens each file once to check its columns and to see its first row, and puts them in order.
+    ///
+    /// `-` is standard input and cannot be read twice; it is taken as it comes when it stands alone.
+    ///
+    /// # Errors
+    /// As for [`Reader::open`] and, for the first row of each file, [`Reader::next_into`].
+    pub fn join<P: AsRef<Path>>(
+        paths: impl IntoIterator<Item = P>,
+        layout: Layout,
+        options: Options,
+    ) -> Result<Self, FileError> {
+        let mut paths: Vec<PathBuf> = paths.into_iter().map(|p| p.as_ref().to_owned()).collect();
+        if paths.len() > 1 {
+            if paths.iter().any(|path| path == Path::new("-")) {
+                return Err(FileError::StandardInputInList);
+            }
+            paths = in_order(paths, &layout, &options)?;
+        }
+        Ok(Self {
+            rest: paths.into_iter(),
+            layout,
+            options,
+            current: None,
+            last_ns: None,
+            waiting: None,
+            reports: Vec::new(),
+        })
+    }
+
+    /// Goes on to what comes next, with `row` filled if it is a row.
+    ///
+    /// # Errors
+    /// As for [`Reader::open`] and [`Reader::next_into`].
+    pub fn next_into(&mut self, row: &mut Row) -> Result<Event, FileError> {
+        if let Some(waiting) = self.waiting.take() {
+            *row = waiting;
+            return Ok(self.advanced_to(row));
+        }
+        loop {
+            if let Some((_, reader)) = &mut self.current {
+                let first = reader.report().rows == 0;
+                if reader.next_into(row)? {
+                    if first && self.last_ns.is_some_and(|last| row.time_ns <= last) {
+                        self.waiting = Some(std::mem::take(row));
+                        return Ok(Event::Segment);
+                    }
+                    return Ok(self.advanced_to(row));
+                }
+            }
+            self.close();
+            let Some(path) = self.rest.next() else {
+                return Ok(Event::End);
+            };
+            let reader = Reader::open(&path, self.layout.clone(), self.options.clone())?;
+            self.current = Some((path.display().to_string(), reader));
+        }
+    }
+
+    /// The files read to their end so far, in the order of reading, and what was met in each.
+    pub fn reports(&self) -> &[(String, Report)] {
+        &self.reports
+    }
+
+    fn advanced_to(&mut self, row: &Row) -> Event {
+        self.last_ns = Some(row.time_ns);
+        Event::Row
+    }
+
+    fn close(&mut self) {
+        if let Some((name, reader)) = self.current.take() {
+            self.reports.push((name, reader.report().clone()));
+        }
+    }
+}
+
+fn in_order(
+    paths: Vec<PathBuf>,
+    layout: &Layout,
+    options: &Options,
+) -> Result<Vec<PathBuf>, FileError> {
+    let mut row = Row::default();
+    let mut known = Vec::with_capacity(paths.len());
+    for path in paths {
+        let mut reader = Reader::open(&path, layout.clone(), options.clone())?;
+        let first = reader.next_into(&mut row)?.then_some(row.time_ns);
+        known.push((first, path));
+    }
+    let starts: Vec<i64> = known.iter().filter_map(|(first, _)| *first).collect();
+    let different: BTreeSet<i64> = starts.iter().copied().collect();
+    if different.len() == starts.len() {
+        known.sort_by_key(|(first, _)| *first);
+    }
+    Ok(known.into_iter().map(|(_, path)| path).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::TimeForm;
+
+    /// Reads the parts, each in a file of its own, and tells rows by their value and breaks by `|`.
+    fn told(test: &str, parts: &[&str]) -> String {
+        let folder =
+            std::env::temp_dir().join(format!("athermal-files-{}-{test}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let paths: Vec<PathBuf> = (0..parts.len())
+            .map(|i| folder.join(format!("{i}.csv")))
+            .collect();
+        for (path, part) in paths.iter().zip(parts) {
+            std::fs::write(path, part).unwrap();
+        }
+        let layout = Layout::new("t", TimeForm::SECONDS, ["x"]);
+        let mut recording = Recording::join(&paths, layout, Options::default()).unwrap();
+        let mut row = Row::default();
+        let mut told = String::new();
+        loop {
+            match recording.next_into(&mut row).unwrap() {
+                Event::Row => told += &format!("{}@{} ", row.values[0], row.time_text),
+                Event::Segment => told += "| ",
+                Event::End => break,
+            }
+        }
+        assert_eq!(recording.reports().len(), parts.len());
+        std::fs::remove_dir_all(&folder).unwrap();
+        told.trim_end().to_owned()
+    }
+
+    #[test]
+    fn files_are_put_in_the_order_of_their_first_instants() {
+        let parts = ["t,x\n20,3\n30,4\n", "t,x\n0,1\n10,2\n"];
+        assert_eq!(told("order", &parts), "1@0 2@10 3@20 4@30");
+    }
+
+    #[test]
+    fn files_whose_times_start_again_are_segments_in_the_order_given() {
+        let parts = ["t,x\n0,5\n10,6\n", "t,x\n0,1\n10,2\n", "t,x\n20,3\n"];
+        assert_eq!(told("again", &parts), "5@0 6@10 | 1@0 2@10 3@20");
+    }
+
+    #[test]
+    fn a_file_that_starts_at_the_last_instant_of_the_other_is_a_segment() {
+        assert_eq!(
+            told("touch", &["t,x\n0,1\n10,2\n", "t,x\n10,3\n"]),
+            "1@0 2@10 | 3@10"
+        );
+    }
+
+    #[test]
+    fn files_that_overlap_are_segments() {
+        let parts = ["t,x\n5,3\n15,4\n", "t,x\n0,1\n10,2\n"];
+        assert_eq!(told("overlap", &parts), "1@0 2@10 | 3@5 4@15");
+    }
+
+    #[test]
+    fn a_file_without_rows_is_passed_over() {
+        let parts = ["t,x\n0,1\n", "t,x\n", "t,x\n0,2\n"];
+        assert_eq!(told("norows", &parts), "1@0 | 2@0");
+    }
+
+    #[test]
+    fn a_single_file_is_one_segment() {
+        assert_eq!(told("single", &["t,x\n0,1\n10,2\n"]), "1@0 2@10");
+    }
+
+    #[test]
+    fn standard_input_stands_alone() {
+        let layout = Layout::new("t", TimeForm::SECONDS, ["x"]);
+        let joined = Recording::join(["-", "a.csv"], layout, Options::default());
+        assert!(matches!(joined, Err(FileError::StandardInputInList)));
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_named_before_any_row_is_read() {
+        let layout = Layout::new("t", TimeForm::SECONDS, ["x"]);
+        let joined = Recording::join(
+            ["no-such-a.csv", "no-such-b.csv"],
+            layout,
+            Options::default(),
+        );
+        let error = joined.err().unwrap();
+        assert!(
+            matches!(&error, FileError::Open { file, .. } if &**file == "no-such-a.csv"),
+            "{error}"
+        );
+    }
+}

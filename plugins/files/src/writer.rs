@@ -1,0 +1,424 @@
+//! Rows written as CSV or JSON lines, in the shortest numbers that read back to the same bits. Not which columns there are.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::json_objects::JsonObjects;
+use crate::{FileError, Format};
+
+/// Bytes held back at most.
+pub(crate) const BUFFER: usize = 64 * 1024;
+
+/// When a row leaves the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flush {
+    /// Each row at once: for pipes and terminals.
+    EachRow,
+    /// When a buffer is full, and at the end: for files.
+    Buffered,
+}
+
+/// Writes a recording row by row; after the first row without allocating.
+pub struct Writer {
+    file: Arc<str>,
+    flush: Flush,
+    columns: usize,
+    number: zmij::Buffer,
+    instant: String,
+    rows: Rows,
+}
+
+enum Rows {
+    Csv(Box<csv::Writer<Box<dyn Write + Send>>>),
+    Json(JsonObjects),
+}
+
+impl Writer {
+    /// Creates a file, or takes standard output for `-`, and writes the column names (CSV).
+    ///
+    /// The format is what the name says, CSV if it says nothing.
+    ///
+    /// # Errors
+    /// The file cannot be created or written.
+    pub fn create(
+        path: impl AsRef<Path>,
+        time_column: &str,
+        columns: &[String],
+        flush: Flush,
+    ) -> Result<Self, FileError> {
+        let path = path.as_ref();
+        let format = Format::from_path(path).unwrap_or(Format::Csv);
+        if path == Path::new("-") {
+            return Self::to_write(
+                "standard output",
+                io::stdout(),
+                format,
+                time_column,
+                columns,
+                flush,
+            );
+        }
+        let file = path.display().to_string();
+        let output = File::create(path).map_err(|source| FileError::Open {
+            file: file.as_str().into(),
+            source: Arc::new(source),
+        })?;
+        Self::to_write(&file, output, format, time_column, columns, flush)
+    }
+
+    /// Writes to any stream of bytes; `name` stands for it in messages.
+    ///
+    /// # Errors
+    /// The column names cannot be written.
+    pub fn to_write(
+        name: &str,
+        output: impl Write + Send + 'static,
+        format: Format,
+        time_column: &str,
+        columns: &[String],
+        flush: Flush,
+    ) -> Result<Self, FileError> {
+        let output: Box<dyn Write + Send> = Box::new(output);
+        let rows = match format {
+            Format::Csv => Rows::Csv(Box::new(
+                csv::WriterBuilder::new()
+                    .comment(Some(b'#'))
+                    .buffer_capacity(BUFFER)
+                    .from_writer(output),
+            )),
+            Format::JsonLines => Rows::Json(JsonObjects::new(output, time_column, columns)),
+        };
+        let mut writer = Self {
+            file: name.into(),
+            flush,
+            columns: columns.len(),
+            number: zmij::Buffer::new(),
+            instant: String::new(),
+            rows,
+        };
+        let header = writer.write_header(time_column, columns);
+        header.map_err(|source| writer.failed(source))?;
+        Ok(writer)
+    }
+
+    /// Writes one row: its instant as the input had it, or where `time_text` is empty `time_ns` as exact decimal seconds;
+    /// then one value per column, `NaN` as an empty cell (CSV) or `null`, infinities as `inf` and `-inf` (text in JSON).
+    ///
+    /// # Errors
+    /// The number of values is not that of the columns, or writing failed.
+    pub fn write_row(
+        &mut self,
+        time_text: &str,
+        time_ns: i64,
+        values: &[f64],
+    ) -> Result<(), FileError> {
+        if values.len() != self.columns {
+            return Err(FileError::ValueCount {
+                file: self.file.clone(),
+                expected: self.columns,
+                found: values.len(),
+            });
+        }
+        let time_text = match time_text {
+            "" => {
+                decimal_seconds(time_ns, &mut self.instant);
+                self.instant.as_str()
+            }
+            text => text,
+        };
+        let written = match &mut self.rows {
+            Rows::Csv(csv) => write_cells(csv, &mut self.number, time_text, values),
+            Rows::Json(json) => json.write(&mut self.number, time_text, values),
+        };
+        written
+            .and_then(|()| self.flush_when(self.flush == Flush::EachRow))
+            .map_err(|source| self.failed(source))
+    }
+
+    /// Writes what is still held back. Dropping a writer does the same but cannot report a failure.
+    ///
+    /// # Errors
+    /// Writing failed.
+    pub fn finish(mut self) -> Result<(), FileError> {
+        self.flush_when(true).map_err(|source| self.failed(source))
+    }
+
+    fn write_header(&mut self, time_column: &str, columns: &[String]) -> io::Result<()> {
+        if let Rows::Csv(csv) = &mut self.rows {
+            csv.write_field(time_column).map_err(io_error)?;
+            csv.write_record(columns).map_err(io_error)?;
+        }
+        self.flush_when(self.flush == Flush::EachRow)
+    }
+
+    fn flush_when(&mut self, now: bool) -> io::Result<()> {
+        match &mut self.rows {
+            _ if !now => Ok(()),
+            Rows::Csv(csv) => csv.flush(),
+            Rows::Json(json) => json.flush(),
+        }
+    }
+
+    fn failed(&self, source: io::Error) -> FileError {
+        FileError::Write {
+            file: self.file.clone(),
+            source: Arc::new(source),
+        }
+    }
+}
+
+fn write_cells<W: Write>(
+    csv: &mut csv::Writer<W>,
+    number: &mut zmij::Buffer,
+    time_text: &str,
+    values: &[f64],
+) -> io::Result<()> {
+    csv.write_field(time_text).map_err(io_error)?;
+    for &value in values {
+        csv.write_field(text_of(value, number)).map_err(io_error)?;
+    }
+    csv.write_record(None::<&[u8]>).map_err(io_error)
+}
+
+/// The error as the system gave it: turned by `From`, it would lose its kind.
+fn io_error(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}
+
+/// The text of a number; empty for no value.
+pub(crate) fn text_of(value: f64, number: &mut zmij::Buffer) -> &str {
+    if value.is_finite() {
+        number.format_finite(value)
+    } else if value.is_nan() {
+        ""
+    } else if value > 0.0 {
+        "inf"
+    } else {
+        "-inf"
+    }
+}
+
+fn decimal_seconds(time_ns: i64, text: &mut String) {
+    use std::fmt::Write as _;
+    const SECOND: u64 = 1_000_000_000;
+    let size = time_ns.unsigned_abs();
+    let sign = if time_ns < 0 { "-" } else { "" };
+    text.clear();
+    // Writing to a `String` cannot fail.
+    let _ = write!(text, "{sign}{}.{:09}", size / SECOND, size % SECOND);
+    let kept = text.trim_end_matches('0').trim_end_matches('.').len();
+    text.truncate(kept);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::{Layout, Options, Reader, Row, TimeForm};
+
+    /// A stream that can still be seen after the writer has taken it.
+    #[derive(Clone, Default)]
+    struct Shared(Arc<Mutex<Vec<u8>>>);
+
+    impl Shared {
+        fn text(&self) -> String {
+            String::from_utf8(self.0.lock().unwrap().clone()).unwrap()
+        }
+    }
+
+    impl Write for Shared {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn writer(shared: &Shared, format: Format, columns: &[&str], flush: Flush) -> Writer {
+        let columns: Vec<String> = columns.iter().map(|&name| name.to_owned()).collect();
+        Writer::to_write("out", shared.clone(), format, "time", &columns, flush).unwrap()
+    }
+
+    #[test]
+    fn csv_has_names_times_as_given_and_empty_cells_for_no_value() {
+        let shared = Shared::default();
+        let mut writer = writer(&shared, Format::Csv, &["a", "b, \"c\""], Flush::Buffered);
+        writer.write_row("0.50", 0, &[0.1, f64::NAN]).unwrap();
+        writer
+            .write_row(
+                "2013-07-04 00:00:00",
+                0,
+                &[f64::INFINITY, f64::NEG_INFINITY],
+            )
+            .unwrap();
+        writer.finish().unwrap();
+        assert_eq!(
+            shared.text(),
+            "time,a,\"b, \"\"c\"\"\"\n0.50,0.1,\n2013-07-04 00:00:00,inf,-inf\n"
+        );
+    }
+
+    #[test]
+    fn json_lines_are_valid_json_whatever_the_value() {
+        let shared = Shared::default();
+        let mut writer = writer(
+            &shared,
+            Format::JsonLines,
+            &["a \"b\"", "c"],
+            Flush::Buffered,
+        );
+        writer.write_row("0.50", 0, &[0.1, f64::NAN]).unwrap();
+        writer
+            .write_row("1970-01-01", 0, &[f64::INFINITY, f64::NEG_INFINITY])
+            .unwrap();
+        writer.write_row("+.5", 0, &[1e300, -0.0]).unwrap();
+        drop(writer);
+        let text = shared.text();
+        let objects: Vec<serde_json::Value> = text
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        assert_eq!(
+            objects[0],
+            serde_json::json!({"time": 0.5, "a \"b\"": 0.1, "c": null})
+        );
+        assert_eq!(
+            objects[1],
+            serde_json::json!({"time": "1970-01-01", "a \"b\"": "inf", "c": "-inf"})
+        );
+        assert_eq!(
+            objects[2],
+            serde_json::json!({"time": "+.5", "a \"b\"": 1e300, "c": -0.0})
+        );
+        assert!(text.starts_with("{\"time\":0.50,"), "{text}");
+    }
+
+    #[test]
+    fn a_time_without_text_is_written_as_exact_seconds() {
+        let shared = Shared::default();
+        let mut writer = writer(&shared, Format::Csv, &[], Flush::Buffered);
+        for time_ns in [
+            0,
+            300_000_000,
+            -1,
+            1_700_000_000_123_456_789,
+            20_000_000_000,
+        ] {
+            writer.write_row("", time_ns, &[]).unwrap();
+        }
+        writer.finish().unwrap();
+        assert_eq!(
+            shared.text(),
+            "time\n0\n0.3\n-0.000000001\n1700000000.123456789\n20\n"
+        );
+    }
+
+    #[test]
+    fn a_row_leaves_at_once_only_when_asked_to() {
+        for format in [Format::Csv, Format::JsonLines] {
+            let (at_once, later) = (Shared::default(), Shared::default());
+            let mut eager = writer(&at_once, format, &["a"], Flush::EachRow);
+            let mut buffered = writer(&later, format, &["a"], Flush::Buffered);
+            for writer in [&mut eager, &mut buffered] {
+                writer.write_row("7", 0, &[1.5]).unwrap();
+            }
+            assert!(at_once.text().ends_with('\n') && at_once.text().contains("1.5"));
+            assert_eq!(later.text(), "");
+            drop(buffered);
+            assert_eq!(later.text(), at_once.text());
+        }
+    }
+
+    /// A pipe whose reader went away.
+    struct Closed;
+
+    impl Write for Closed {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(io::ErrorKind::BrokenPipe.into())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_closed_pipe_is_told_from_other_failures() {
+        for format in [Format::Csv, Format::JsonLines] {
+            let mut writer = Writer::to_write(
+                "out",
+                Closed,
+                format,
+                "t",
+                &["a".to_owned()],
+                Flush::Buffered,
+            )
+            .unwrap();
+            let failed = (0..100_000).find_map(|_| writer.write_row("0", 0, &[1.0]).err());
+            assert!(
+                failed.is_some_and(|error| error.is_closed_pipe()),
+                "{format:?}"
+            );
+            assert!(
+                writer.finish().is_err_and(|error| error.is_closed_pipe()),
+                "{format:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_row_of_another_length_is_refused_and_not_written() {
+        let shared = Shared::default();
+        let mut writer = writer(&shared, Format::Csv, &["a"], Flush::EachRow);
+        assert!(matches!(
+            writer.write_row("0", 0, &[1.0, 2.0]),
+            Err(FileError::ValueCount {
+                expected: 1,
+                found: 2,
+                ..
+            })
+        ));
+        assert_eq!(shared.text(), "time,a\n");
+    }
+
+    #[test]
+    fn what_is_written_reads_back_to_the_same_bits() {
+        let numbers = [
+            0.1,
+            1.0 / 3.0,
+            f64::MAX,
+            f64::MIN_POSITIVE,
+            5e-324,
+            -0.0,
+            1e16,
+            123_456_789.125,
+        ];
+        for format in [Format::Csv, Format::JsonLines] {
+            let shared = Shared::default();
+            let mut writer = writer(&shared, format, &["#a", "b"], Flush::Buffered);
+            for (index, &number) in numbers.iter().enumerate() {
+                writer
+                    .write_row("", index as i64, &[number, f64::NAN])
+                    .unwrap();
+            }
+            writer.finish().unwrap();
+            let layout = Layout::new("time", TimeForm::SECONDS, ["#a", "b"]);
+            let text = std::io::Cursor::new(shared.text());
+            let mut reader = Reader::from_read("out", text, layout, Options::default()).unwrap();
+            let mut row = Row::default();
+            for (index, &number) in numbers.iter().enumerate() {
+                assert!(reader.next_into(&mut row).unwrap());
+                assert_eq!(row.time_ns, index as i64);
+                assert_eq!(row.values[0].to_bits(), number.to_bits());
+                assert!(row.values[1].is_nan());
+            }
+            assert!(!reader.next_into(&mut row).unwrap());
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! `athermal check`: looks for mistakes in graph files.
+
+use std::path::PathBuf;
+
+use athermal::core::compile::{Wanted, compile};
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{self, Disk};
+use clap::Args;
+
+use crate::figures::count;
+use crate::terminal::{Answer, Failure, Format, Terminal};
+
+/// Look for mistakes in a graph file
+///
+/// All mistakes are told at once, each with its place and a way out. Nothing is fitted and no data are read.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml")]
+pub struct Check {
+    /// Graph files
+    #[arg(required = true, value_name = "GRAPH")]
+    graphs: Vec<PathBuf>,
+    /// Take warnings as a reason to say no (exit status 1)
+    #[arg(long)]
+    strict: bool,
+}
+
+impl Check {
+    /// Checks the files.
+    ///
+    /// # Errors
+    /// When one has mistakes.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        let mut fine = Vec::new();
+        for path in &self.graphs {
+            let before = diagnostics.error_count();
+            let mut of_file = Diagnostics::new();
+            let graph = document::load(path, &Disk, &mut sources, &mut of_file)
+                .and_then(|read| document::declare(read, &mut of_file));
+            let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut of_file));
+            diagnostics.extend(of_file);
+            if let Some(plan) = plan.filter(|_| diagnostics.error_count() == before) {
+                fine.push((path, plan));
+            }
+        }
+        if terminal.format == Format::Json {
+            println!("{:#}", diagnostics.to_json(&sources));
+        } else {
+            terminal.diagnostics(&diagnostics, &sources);
+            for (path, plan) in fine {
+                let nodes: std::collections::BTreeSet<_> = plan.nodes.iter().map(|node| &node.name).collect();
+                terminal.note(format_args!(
+                    "{}: {} measured channels, {} nodes ({} instances), {} outputs",
+                    path.display(),
+                    count(plan.sources.len() as u64),
+                    count(nodes.len() as u64),
+                    count(plan.nodes.len() as u64),
+                    count(plan.outputs.len() as u64),
+                ));
+            }
+        }
+        if diagnostics.has_errors() {
+            Err(Failure::Told(2))
+        } else if self.strict && !diagnostics.is_empty() {
+            Ok(Answer::No)
+        } else {
+            Ok(Answer::Fine)
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Decides how recorded data are named on the command line, and what is told of them after reading.
+
+use std::path::PathBuf;
+
+use athermal::core::model::DataCard;
+use athermal::files::{Dataset, Options, Report};
+use clap::Args;
+
+use crate::figures::count;
+use crate::terminal::{Failure, Terminal};
+
+/// Recorded data.
+#[derive(Debug, Args)]
+pub struct Data {
+    /// CSV or JSON lines; several files are joined in the order of time, or are segments when their times start again
+    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Take cells and rows that cannot be read as missing, and count them
+    #[arg(long)]
+    lenient: bool,
+}
+
+impl Data {
+    /// The data set.
+    #[must_use]
+    pub fn dataset(&self) -> Dataset {
+        Dataset::new(self.files.clone(), Options { lenient: self.lenient, ..Options::default() })
+    }
+
+    /// What a model's card says of the files.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn cards(&self, dataset: &Dataset) -> Result<Vec<DataCard>, Failure> {
+        let reports = dataset.reports();
+        let mut cards = Vec::with_capacity(self.files.len());
+        for path in &self.files {
+            let content = std::fs::read(path)
+                .map_err(|error| Failure::Outside(format!("cannot read {}: {error}", path.display())))?;
+            let name = path.display().to_string();
+            let rows = reports.iter().find(|(file, _)| *file == name).map_or(0, |(_, report)| report.rows);
+            cards.push(DataCard { path: name, rows, bytes: content.len() as u64, hash: fnv_1a(&content) });
+        }
+        Ok(cards)
+    }
+}
+
+/// Tells of rows and cells that were not taken, and of samples that were rejected.
+pub fn tell(terminal: &Terminal, reports: &[(String, Report)], refused: u64, rejected: &[(String, u64)]) {
+    for (file, report) in reports {
+        let counted = [
+            (&report.bad_cells, "unreadable cell", "taken as missing"),
+            (&report.refused_rows, "unreadable row", "left out"),
+            (&report.refused_time, "row whose time is not after the one before", "left out"),
+        ];
+        for (found, what, then) in counted {
+            if let Some(first) = &found.first {
+                let n = count(found.count);
+                terminal.warning(format_args!("{file}: {n} × {what}, {then}; the first: {first}"));
+            }
+        }
+        if let Some(place) = &report.truncated {
+            terminal.warning(format_args!("{place}: the last line is cut off and was left out"));
+        }
+    }
+    if refused > 0 {
+        terminal.warning(format_args!("{} rows were refused because their time is not after the one before", count(refused)));
+    }
+    for (channel, n) in rejected {
+        terminal.warning(format_args!("{channel}: {} samples are infinite or out of range, taken as missing", count(*n)));
+    }
+}
+
+/// Fowler, Noll and Vo's hash in its variant 1a with 64 bits: for telling files apart, not for guarding them.
+fn fnv_1a(content: &[u8]) -> String {
+    let hash = content
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_that_of_the_published_test_vectors() {
+        // Vectors from the FNV reference page: the empty string, "a" and "foobar".
+        assert_eq!(fnv_1a(b""), "cbf29ce484222325");
+        assert_eq!(fnv_1a(b"a"), "af63dc4c8601ec8c");
+        assert_eq!(fnv_1a(b"foobar"), "85944171f73967e8");
+    }
+}

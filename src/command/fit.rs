@@ -1,0 +1,186 @@
+//! `athermal fit`: fits a graph's estimators on recorded data and writes a model.
+
+use std::path::PathBuf;
+
+use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
+use athermal::core::model::{Card, EstimatorCard, Period};
+use athermal::Model;
+use clap::Args;
+use serde_json::json;
+
+use super::data::{self, Data};
+use crate::figures::{count, number};
+use crate::terminal::{Answer, Failure, Format, Terminal};
+
+/// Fit a graph's estimators on recorded data
+///
+/// Prints for each estimator the rows used and left out, the regressors chosen with their cross-validation scores, the
+/// condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
+/// needed to run.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \
+                        athermal fit machine.toml --data monday.csv tuesday.csv -o model.json")]
+pub struct Fit {
+    /// The graph, or a model whose graph is fitted anew
+    graph: PathBuf,
+    #[command(flatten)]
+    data: Data,
+    /// Where the model goes; `-` is standard output
+    #[arg(long, short, value_name = "MODEL")]
+    output: PathBuf,
+    /// Threads that train estimators; the result does not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
+    #[arg(long, value_name = "MB", default_value_t = 64)]
+    memory: usize,
+}
+
+impl Fit {
+    /// Fits, reports and writes.
+    ///
+    /// # Errors
+    /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let mut model = Model::load(&self.graph)?;
+        let dataset = self.data.dataset();
+        let defaults = FitOptions::default();
+        let options = FitOptions {
+            memory: self.memory.saturating_mul(1 << 20),
+            threads: self.threads.unwrap_or(defaults.threads),
+            ..defaults
+        };
+        let mut progress = terminal.progress("fitting");
+        let (fitted, report) = fit(&model.plan, &dataset, &options, &mut |ticks| progress.tell(ticks))?;
+        drop(progress);
+        model.fitted = fitted;
+        model.card = Some(Card {
+            athermal: env!("CARGO_PKG_VERSION").to_owned(),
+            created: created(),
+            data: self.data.cards(&dataset)?,
+            period: report.period.map(|(from, to)| Period { from_s: seconds(from), to_s: seconds(to) }),
+            ticks: report.ticks,
+            estimators: report.estimators.iter().filter_map(card).collect(),
+        });
+        let text = model
+            .to_text()
+            .map_err(|error| Failure::Outside(format!("the model cannot be written as JSON: {error}")))?;
+        self.tell(terminal, &report);
+        data::tell(terminal, &dataset.reports(), report.refused, &report.rejected);
+        if self.output.as_os_str() == "-" {
+            print!("{text}");
+        } else {
+            write_aside(&self.output, &text)?;
+            if terminal.format == Format::Table {
+                terminal.note(format_args!("wrote {}", self.output.display()));
+            }
+        }
+        let failed = report.estimators.iter().any(|fit| matches!(fit.outcome, Outcome::Failed(_)));
+        Ok(if failed { Answer::No } else { Answer::Fine })
+    }
+
+    fn tell(&self, terminal: &Terminal, report: &FitReport) {
+        let to_stdout = self.output.as_os_str() == "-";
+        if terminal.format == Format::Json && !to_stdout {
+            let estimators: Vec<_> = report
+                .estimators
+                .iter()
+                .map(|fit| match (&fit.outcome, card(fit)) {
+                    (_, Some(card)) => json!(card),
+                    (Outcome::Failed(error), None) => json!({ "node": fit.node, "error": error.to_string() }),
+                    (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
+                })
+                .collect();
+            println!("{:#}", json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators }));
+            return;
+        }
+        for fit in &report.estimators {
+            if let Outcome::Failed(error) = &fit.outcome {
+                terminal.warning(format_args!("{} could not be fitted: {error}; it will give no prediction", fit.node));
+            }
+            if !terminal.quiet && !to_stdout {
+                print!("{}", describe(fit));
+            }
+        }
+    }
+}
+
+/// What is told of one estimator.
+fn describe(fit: &EstimatorFit) -> String {
+    use std::fmt::Write as _;
+    let mut text = String::new();
+    let _ = write!(text, "{} ({} of {}): {} rows", fit.node, fit.kind, fit.truth, count(fit.rows));
+    let dropped = [
+        (fit.dropped.outside_limits, "outside the limits"),
+        (fit.dropped.without_run, "without a run before"),
+        (fit.dropped.incomplete, "incomplete"),
+    ];
+    let dropped: Vec<_> =
+        dropped.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n))).collect();
+    if !dropped.is_empty() {
+        let _ = write!(text, ", left out {}", dropped.join(", "));
+    }
+    text.push('\n');
+    for (name, share) in &fit.dropped_candidates {
+        let _ = writeln!(text, "  left out {name}: a value in only {:.0} % of the rows", 100.0 * share);
+    }
+    let Outcome::Fitted(report) = &fit.outcome else { return text };
+    for (step, chosen) in report.selection.iter().enumerate() {
+        let _ = writeln!(text, "  {:>2}  {:<44} R² {:.4}", step + 1, chosen.regressor, chosen.score);
+    }
+    let mut facts = Vec::new();
+    if let Some(rmse) = report.in_sample_rmse {
+        facts.push(format!("in-sample RMSE {} {}", number(rmse), fit.unit));
+    }
+    if let Some(condition) = report.condition {
+        facts.push(format!("condition number {}", number(condition)));
+    }
+    if fit.streamed {
+        facts.push("rows streamed".to_owned());
+    }
+    if !facts.is_empty() {
+        let _ = writeln!(text, "  {}", facts.join(", "));
+    }
+    for note in &report.notes {
+        let _ = writeln!(text, "  note: {note}");
+    }
+    text
+}
+
+fn card(fit: &EstimatorFit) -> Option<EstimatorCard> {
+    let Outcome::Fitted(report) = &fit.outcome else { return None };
+    Some(EstimatorCard {
+        node: fit.node.clone(),
+        kind: fit.kind.to_owned(),
+        truth: fit.truth.clone(),
+        unit: fit.unit.clone(),
+        rows: fit.rows,
+        dropped: fit.dropped,
+        dropped_candidates: fit.dropped_candidates.clone(),
+        report: report.clone(),
+    })
+}
+
+fn seconds(instant: athermal::Instant) -> f64 {
+    instant.as_ns() as f64 / 1e9
+}
+
+/// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.
+fn created() -> Option<String> {
+    let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok());
+    let seconds = stated.or_else(|| {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).ok()?;
+        i64::try_from(now.as_secs()).ok()
+    })?;
+    jiff::Timestamp::from_second(seconds).ok().map(|time| time.to_string())
+}
+
+/// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one.
+fn write_aside(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+    let mut aside = path.as_os_str().to_owned();
+    aside.push(".part");
+    let aside = PathBuf::from(aside);
+    std::fs::write(&aside, text)
+        .and_then(|()| std::fs::rename(&aside, path))
+        .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
+}

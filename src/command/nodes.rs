@@ -1,0 +1,119 @@
+//! `athermal nodes`: lists the node types of this program, or explains one.
+
+use athermal::core::diagnostic::nearest;
+use athermal::core::node::{Kind, Read, kind, kinds};
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::terminal::{Answer, Failure, Format, Terminal};
+
+/// List the node types, or explain one
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  athermal nodes\n  athermal nodes slope")]
+pub struct Nodes {
+    /// The type to explain
+    name: Option<String>,
+}
+
+impl Nodes {
+    /// Lists or explains.
+    ///
+    /// # Errors
+    /// When there is no type of the name.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        match &self.name {
+            None => list(terminal),
+            Some(name) => match kind(name) {
+                Some(kind) => explain(terminal, kind),
+                None => {
+                    let near = nearest(name, kinds().keys().copied());
+                    let near = near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
+                    let message = format!("there is no node type `{name}`{near} (`athermal nodes` lists them all)");
+                    return Err(Failure::Request(message));
+                }
+            },
+        }
+        Ok(Answer::Fine)
+    }
+}
+
+fn list(terminal: &Terminal) {
+    if terminal.format == Format::Json {
+        let all: Vec<Value> = kinds().values().flatten().map(|kind| describe(kind)).collect();
+        println!("{:#}", json!({ "nodes": all }));
+        return;
+    }
+    let mut roles: Vec<_> = kinds().values().flatten().map(|kind| kind.role).collect();
+    roles.sort();
+    roles.dedup();
+    for role in roles {
+        println!("{role}s");
+        for kind in kinds().values().flatten().filter(|kind| kind.role == role) {
+            println!("  {:<14} {}", kind.name, kind.summary());
+        }
+    }
+}
+
+fn explain(terminal: &Terminal, kind: &Kind) {
+    if terminal.format == Format::Json {
+        println!("{:#}", describe(kind));
+        return;
+    }
+    println!("{} ({}, from {} {})\n", kind.name, kind.role, kind.package, kind.version);
+    println!("{}\n", kind.documentation());
+    println!("Inputs:");
+    for port in (kind.inputs)() {
+        let read = match port.read {
+            Read::Fresh => "new values only",
+            Read::Held => "the last value, up to its maximum age",
+            Read::Truth => "paired with predictions",
+        };
+        let optional = if port.optional { ", may be left out" } else { "" };
+        println!("  inputs.{:<10} {} ({read}{optional})", port.name, port.summary);
+    }
+    let schema = Value::from((kind.schema)());
+    println!("\nParameters:");
+    if kind.role == athermal::core::node::RoleName::Estimator {
+        println!("  ahead (duration) – how far ahead of now the truth is predicted; required");
+        println!("  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on");
+    }
+    let empty = serde_json::Map::new();
+    let properties = schema["properties"].as_object().unwrap_or(&empty);
+    let required: Vec<&str> =
+        schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    for (name, property) in properties {
+        let description = property["description"].as_str().unwrap_or_default().replace('\n', " ");
+        let default = match &property["default"] {
+            Value::Null if required.contains(&name.as_str()) => "; required".to_owned(),
+            Value::Null => String::new(),
+            default => format!("; default {default}"),
+        };
+        println!("  {name} – {}{default}", description.trim_end_matches('.'));
+    }
+    if properties.is_empty() && kind.role != athermal::core::node::RoleName::Estimator {
+        println!("  none");
+    }
+}
+
+fn describe(kind: &Kind) -> Value {
+    let inputs: Vec<Value> = (kind.inputs)()
+        .iter()
+        .map(|port| {
+            let read = match port.read {
+                Read::Fresh => "fresh",
+                Read::Held => "held",
+                Read::Truth => "truth",
+            };
+            json!({ "name": port.name, "summary": port.summary, "read": read, "optional": port.optional })
+        })
+        .collect();
+    json!({
+        "name": kind.name,
+        "role": kind.role,
+        "summary": kind.summary(),
+        "package": kind.package,
+        "version": kind.version,
+        "inputs": inputs,
+        "parameters": Value::from((kind.schema)()),
+    })
+}

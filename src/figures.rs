@@ -1,0 +1,94 @@
+//! Decides how numbers and tables look in text for people.
+
+use std::fmt::Write as _;
+
+/// A number to about four significant digits, without an exponent where that is readable.
+#[must_use]
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if !value.is_finite() {
+        format!("{value}")
+    } else if size != 0.0 && !(1e-3..1e6).contains(&size) {
+        format!("{value:.2e}")
+    } else if size >= 1000.0 || size == 0.0 {
+        format!("{value:.0}")
+    } else if size >= 100.0 {
+        format!("{value:.1}")
+    } else if size >= 1.0 {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.3}")
+    }
+}
+
+/// A number that may be missing.
+#[must_use]
+pub fn or_dash(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), number)
+}
+
+/// A count with separators between thousands.
+#[must_use]
+pub fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A table with the first column to the left and the others to the right, each as wide as it must be.
+#[must_use]
+pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
+    let width = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count());
+        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..header.len()).map(width).collect();
+    let mut text = String::new();
+    let header: Vec<String> = header.iter().map(|&cell| cell.to_owned()).collect();
+    for row in std::iter::once(&header).chain(rows) {
+        let mut line = String::new();
+        for (column, cell) in row.iter().enumerate() {
+            match widths.get(column) {
+                Some(&width) if column == 0 => {
+                    let _ = write!(line, "{cell:<width$}");
+                }
+                Some(&width) => {
+                    let _ = write!(line, "  {cell:>width$}");
+                }
+                None => {
+                    let _ = write!(line, "  {cell}");
+                }
+            }
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_the_digits_that_matter() {
+        assert_eq!(number(31.7149), "31.71");
+        assert_eq!(number(0.041_23), "0.041");
+        assert_eq!(number(1234.6), "1235");
+        assert_eq!(number(1e-9), "1.00e-9");
+        assert_eq!(number(f64::NAN), "NaN");
+    }
+
+    #[test]
+    fn counts_have_separators() {
+        assert_eq!(count(1), "1");
+        assert_eq!(count(1234), "1,234");
+        assert_eq!(count(1_234_567), "1,234,567");
+    }
+}

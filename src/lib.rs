@@ -1,0 +1,27 @@
+//! Predicts and corrects the thermal drift of precision machines.
+//!
+//! A graph file wires measurements through features, estimators and combiners; it is fitted on history, scored, and then
+//! run, live or from a loop of one's own:
+//!
+//! ```no_run
+//! use athermal::{Instant, Model};
+//!
+//! let mut engine = Model::load("model.json")?.engine()?;
+//! let samples = [21.5, 21.4]; // one per measured channel, NaN where there is no new value
+//! let predicted = engine.step(Instant::from_ns(10_000_000_000), &samples)?;
+//! println!("{predicted:?}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! This package links every built-in plugin: whoever uses it can load any graph that the command line can.
+
+pub use athermal_core as core;
+pub use athermal_core::engine::{Engine, EngineError};
+pub use athermal_core::model::{Model, ModelError};
+pub use athermal_core::time::{Duration, Instant};
+pub use athermal_files as files;
+
+// A plugin that no code names is left out by the linker.
+use athermal_combiners as _;
+use athermal_estimators as _;
+use athermal_features as _;
