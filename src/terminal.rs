@@ -49,7 +49,11 @@ impl Terminal {
     pub fn new(options: &Options) -> Self {
         let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let colour = std::io::stderr().is_terminal() && !plain;
-        Self { format: options.format, quiet: options.quiet, colour }
+        Self {
+            format: options.format,
+            quiet: options.quiet,
+            colour,
+        }
     }
 
     /// Says something that the user should know beside the result.
@@ -67,9 +71,14 @@ impl Terminal {
     /// Says why the program gives up.
     pub fn error(&self, failure: &Failure) {
         match failure {
-            Failure::Graph { diagnostics, sources } => self.diagnostics(diagnostics, sources),
+            Failure::Graph {
+                diagnostics,
+                sources,
+            } => self.diagnostics(diagnostics, sources),
             Failure::Told(_) => {}
-            Failure::Request(text) | Failure::Outside(text) => self.labelled("error", "\x1b[1;31m", text),
+            Failure::Request(text) | Failure::Outside(text) => {
+                self.labelled("error", "\x1b[1;31m", text)
+            }
         }
     }
 
@@ -85,8 +94,11 @@ impl Terminal {
             let (errors, warnings) = (diagnostics.error_count(), diagnostics.warning_count());
             let counted = [(errors, "error"), (warnings, "warning")];
             let counted = counted.iter().filter(|(count, _)| *count > 0);
-            let words: Vec<_> =
-                counted.map(|(count, what)| format!("{count} {what}{}", if *count == 1 { "" } else { "s" })).collect();
+            let words: Vec<_> = counted
+                .map(|(count, what)| {
+                    format!("{count} {what}{}", if *count == 1 { "" } else { "s" })
+                })
+                .collect();
             self.note(words.join(", "));
         }
     }
@@ -95,7 +107,12 @@ impl Terminal {
     #[must_use]
     pub fn progress(&self, what: &'static str) -> Progress {
         let shown = std::io::stderr().is_terminal() && !self.quiet;
-        Progress { what, shown, began: Instant::now(), last: None }
+        Progress {
+            what,
+            shown,
+            began: Instant::now(),
+            last: None,
+        }
     }
 
     fn labelled(&self, label: &str, colour: &str, text: &dyn fmt::Display) {
@@ -127,10 +144,17 @@ impl Progress {
         if !self.shown || self.began.elapsed() < Duration::from_secs(1) {
             return;
         }
-        if self.last.is_none_or(|last| last.elapsed() > Duration::from_millis(100)) {
+        if self
+            .last
+            .is_none_or(|last| last.elapsed() > Duration::from_millis(100))
+        {
             self.last = Some(Instant::now());
             let rate = ticks as f64 / self.began.elapsed().as_secs_f64();
-            let _ = write!(std::io::stderr(), "\r{}: {ticks} ticks, {rate:.0} per second ", self.what);
+            let _ = write!(
+                std::io::stderr(),
+                "\r{}: {ticks} ticks, {rate:.0} per second ",
+                self.what
+            );
         }
     }
 }
@@ -194,7 +218,13 @@ impl Failure {
 impl From<ModelError> for Failure {
     fn from(error: ModelError) -> Self {
         match error {
-            ModelError::Graph { diagnostics, sources } => Self::Graph { diagnostics, sources },
+            ModelError::Graph {
+                diagnostics,
+                sources,
+            } => Self::Graph {
+                diagnostics,
+                sources,
+            },
             ModelError::Unreadable { .. } => Self::Outside(error.to_string()),
             other => Self::Request(other.to_string()),
         }
@@ -208,7 +238,9 @@ impl From<FileError> for Failure {
             return Self::Told(0);
         }
         match error {
-            FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => Self::Outside(error.to_string()),
+            FileError::Open { .. } | FileError::Read { .. } | FileError::Write { .. } => {
+                Self::Outside(error.to_string())
+            }
             other => Self::Request(other.to_string()),
         }
     }

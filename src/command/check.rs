@@ -14,7 +14,9 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 ///
 /// All mistakes are told at once, each with its place and a way out. Nothing is fitted and no data are read.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml")]
+#[command(
+    after_help = "Examples:\n  athermal check graphs/die-tester.toml\n  athermal check --strict *.toml"
+)]
 pub struct Check {
     /// Graph files
     #[arg(required = true, value_name = "GRAPH")]
@@ -48,7 +50,8 @@ impl Check {
         } else {
             terminal.diagnostics(&diagnostics, &sources);
             for (path, plan) in fine {
-                let nodes: std::collections::BTreeSet<_> = plan.nodes.iter().map(|node| &node.name).collect();
+                let nodes: std::collections::BTreeSet<_> =
+                    plan.nodes.iter().map(|node| &node.name).collect();
                 terminal.note(format_args!(
                     "{}: {} measured channels, {} nodes ({} instances), {} outputs",
                     path.display(),

@@ -24,7 +24,13 @@ impl Data {
     /// The data set.
     #[must_use]
     pub fn dataset(&self) -> Dataset {
-        Dataset::new(self.files.clone(), Options { lenient: self.lenient, ..Options::default() })
+        Dataset::new(
+            self.files.clone(),
+            Options {
+                lenient: self.lenient,
+                ..Options::default()
+            },
+        )
     }
 
     /// What a model's card says of the files.
@@ -35,39 +41,67 @@ impl Data {
         let reports = dataset.reports();
         let mut cards = Vec::with_capacity(self.files.len());
         for path in &self.files {
-            let content = std::fs::read(path)
-                .map_err(|error| Failure::Outside(format!("cannot read {}: {error}", path.display())))?;
+            let content = std::fs::read(path).map_err(|error| {
+                Failure::Outside(format!("cannot read {}: {error}", path.display()))
+            })?;
             let name = path.display().to_string();
-            let rows = reports.iter().find(|(file, _)| *file == name).map_or(0, |(_, report)| report.rows);
-            cards.push(DataCard { path: name, rows, bytes: content.len() as u64, hash: fnv_1a(&content) });
+            let rows = reports
+                .iter()
+                .find(|(file, _)| *file == name)
+                .map_or(0, |(_, report)| report.rows);
+            cards.push(DataCard {
+                path: name,
+                rows,
+                bytes: content.len() as u64,
+                hash: fnv_1a(&content),
+            });
         }
         Ok(cards)
     }
 }
 
 /// Tells of rows and cells that were not taken, and of samples that were rejected.
-pub fn tell(terminal: &Terminal, reports: &[(String, Report)], refused: u64, rejected: &[(String, u64)]) {
+pub fn tell(
+    terminal: &Terminal,
+    reports: &[(String, Report)],
+    refused: u64,
+    rejected: &[(String, u64)],
+) {
     for (file, report) in reports {
         let counted = [
             (&report.bad_cells, "unreadable cell", "taken as missing"),
             (&report.refused_rows, "unreadable row", "left out"),
-            (&report.refused_time, "row whose time is not after the one before", "left out"),
+            (
+                &report.refused_time,
+                "row whose time is not after the one before",
+                "left out",
+            ),
         ];
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
                 let n = count(found.count);
-                terminal.warning(format_args!("{file}: {n} × {what}, {then}; the first: {first}"));
+                terminal.warning(format_args!(
+                    "{file}: {n} × {what}, {then}; the first: {first}"
+                ));
             }
         }
         if let Some(place) = &report.truncated {
-            terminal.warning(format_args!("{place}: the last line is cut off and was left out"));
+            terminal.warning(format_args!(
+                "{place}: the last line is cut off and was left out"
+            ));
         }
     }
     if refused > 0 {
-        terminal.warning(format_args!("{} rows were refused because their time is not after the one before", count(refused)));
+        terminal.warning(format_args!(
+            "{} rows were refused because their time is not after the one before",
+            count(refused)
+        ));
     }
     for (channel, n) in rejected {
-        terminal.warning(format_args!("{channel}: {} samples are infinite or out of range, taken as missing", count(*n)));
+        terminal.warning(format_args!(
+            "{channel}: {} samples are infinite or out of range, taken as missing",
+            count(*n)
+        ));
     }
 }
 
@@ -75,7 +109,9 @@ pub fn tell(terminal: &Terminal, reports: &[(String, Report)], refused: u64, rej
 fn fnv_1a(content: &[u8]) -> String {
     let hash = content
         .iter()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        });
     format!("{hash:016x}")
 }
 

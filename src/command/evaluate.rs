@@ -20,8 +20,10 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
-                        athermal evaluate model.json --data test.csv --abs-truth-below \"250 nm/min\" --format json")]
+#[command(
+    after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
+                        athermal evaluate model.json --data test.csv --abs-truth-below \"250 nm/min\" --format json"
+)]
 pub struct Evaluate {
     /// The model, or a graph in which nothing needs fitting
     model: PathBuf,
@@ -41,33 +43,66 @@ impl Evaluate {
     /// # Errors
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let model = load_fitted(&self.model, Wanted { standard_errors: true })?;
+        let model = load_fitted(
+            &self.model,
+            Wanted {
+                standard_errors: true,
+            },
+        )?;
         self.check_limit(&model)?;
         let dataset = self.data.dataset();
-        let options =
-            ScoreOptions { abs_truth_below: self.abs_truth_below.clone(), each_on_its_own: self.each_on_its_own };
+        let options = ScoreOptions {
+            abs_truth_below: self.abs_truth_below.clone(),
+            each_on_its_own: self.each_on_its_own,
+        };
         let mut progress = terminal.progress("evaluating");
-        let scores = score(&model.plan, &model.fitted, &dataset, &options, &mut |ticks| progress.tell(ticks))?;
+        let scores = score(
+            &model.plan,
+            &model.fitted,
+            &dataset,
+            &options,
+            &mut |ticks| progress.tell(ticks),
+        )?;
         drop(progress);
         if terminal.format == Format::Json {
-            let files: Vec<_> = dataset.paths().iter().map(|path| path.display().to_string()).collect();
+            let files: Vec<_> = dataset
+                .paths()
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect();
             let period = scores.period.map(|(from, to)| {
                 json!({ "from_s": from.as_ns() as f64 / 1e9, "to_s": to.as_ns() as f64 / 1e9, "ticks": scores.ticks })
             });
-            println!("{:#}", json!({ "data": files, "period": period, "scores": scores.scores }));
+            println!(
+                "{:#}",
+                json!({ "data": files, "period": period, "scores": scores.scores })
+            );
         } else {
             print!("{}", describe(&scores));
         }
-        data::tell(terminal, &dataset.reports(), scores.refused, &scores.rejected);
+        data::tell(
+            terminal,
+            &dataset.reports(),
+            scores.refused,
+            &scores.rejected,
+        );
         if scores.scores.is_empty() {
-            terminal.warning("the graph has no prediction of a measured truth, so there is nothing to score");
+            terminal.warning(
+                "the graph has no prediction of a measured truth, so there is nothing to score",
+            );
         }
         Ok(Answer::Fine)
     }
 
     fn check_limit(&self, model: &Model) -> Result<(), Failure> {
-        let Some(limit) = &self.abs_truth_below else { return Ok(()) };
-        let truths = model.plan.channels.iter().filter_map(|channel| channel.predicts);
+        let Some(limit) = &self.abs_truth_below else {
+            return Ok(());
+        };
+        let truths = model
+            .plan
+            .channels
+            .iter()
+            .filter_map(|channel| channel.predicts);
         for slot in truths {
             let truth = &model.plan.channels[slot];
             if limit.in_unit(&truth.channel.unit).is_none() {
@@ -89,7 +124,11 @@ pub fn load_fitted(path: &std::path::Path, wanted: Wanted) -> Result<Model, Fail
     let model = Model::load_for(path, wanted)?;
     let nodes = model.unfitted();
     if model.card.is_none() && !nodes.is_empty() {
-        return Err(ModelError::NotFitted { path: path.to_owned(), nodes }.into());
+        return Err(ModelError::NotFitted {
+            path: path.to_owned(),
+            nodes,
+        }
+        .into());
     }
     Ok(model)
 }
@@ -97,12 +136,27 @@ pub fn load_fitted(path: &std::path::Path, wanted: Wanted) -> Result<Model, Fail
 fn describe(scores: &Scores) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
-    let mut truths: Vec<&str> = scores.scores.iter().map(|score| score.truth.as_str()).collect();
+    let mut truths: Vec<&str> = scores
+        .scores
+        .iter()
+        .map(|score| score.truth.as_str())
+        .collect();
     truths.dedup();
     for truth in truths {
-        let rows: Vec<&Score> = scores.scores.iter().filter(|score| score.truth == truth).collect();
-        let Some(first) = rows.iter().find(|row| !row.own_instants).or(rows.first()) else { continue };
-        let _ = writeln!(text, "{truth} in {}, {} instants", first.unit, count(first.n as u64));
+        let rows: Vec<&Score> = scores
+            .scores
+            .iter()
+            .filter(|score| score.truth == truth)
+            .collect();
+        let Some(first) = rows.iter().find(|row| !row.own_instants).or(rows.first()) else {
+            continue;
+        };
+        let _ = writeln!(
+            text,
+            "{truth} in {}, {} instants",
+            first.unit,
+            count(first.n as u64)
+        );
         let _ = writeln!(
             text,
             "  no model {}, persistence {}, noise of the truth {}",
@@ -110,7 +164,16 @@ fn describe(scores: &Scores) -> String {
             or_dash(first.baseline_persistence),
             or_dash(first.truth_noise)
         );
-        let header = ["  prediction", "ahead", "RMSE", "R²", "R²mean", "bias", "largest", "valid"];
+        let header = [
+            "  prediction",
+            "ahead",
+            "RMSE",
+            "R²",
+            "R²mean",
+            "bias",
+            "largest",
+            "valid",
+        ];
         let cells: Vec<Vec<String>> = rows.iter().map(|row| line(row)).collect();
         text.push_str(&table(&header, &cells));
         text.push('\n');
@@ -119,8 +182,10 @@ fn describe(scores: &Scores) -> String {
 }
 
 fn line(score: &Score) -> Vec<String> {
-    let ratio = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
-    let ahead = athermal::Duration::from_secs_f64(score.ahead_s).unwrap_or(athermal::Duration::ZERO);
+    let ratio =
+        |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+    let ahead =
+        athermal::Duration::from_secs_f64(score.ahead_s).unwrap_or(athermal::Duration::ZERO);
     let mut cells = vec![
         format!("  {}", score.output),
         ahead.to_string(),
@@ -129,14 +194,20 @@ fn line(score: &Score) -> Vec<String> {
         ratio(score.r2_mean),
         or_dash(score.bias),
         or_dash(score.max_abs),
-        score.valid.map_or_else(|| "-".to_owned(), |valid| format!("{:.1}%", 100.0 * valid)),
+        score
+            .valid
+            .map_or_else(|| "-".to_owned(), |valid| format!("{:.1}%", 100.0 * valid)),
     ];
     let mut remarks = Vec::new();
     if score.is_worse_than_nothing() {
         remarks.push("worse than no model".to_owned());
     }
     if score.own_instants {
-        remarks.push(format!("on its own {} instants (no model {})", score.n, score.baseline_zero.map_or("-".into(), number)));
+        remarks.push(format!(
+            "on its own {} instants (no model {})",
+            score.n,
+            score.baseline_zero.map_or("-".into(), number)
+        ));
     }
     if !remarks.is_empty() {
         cells.push(remarks.join(", "));

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use athermal::Model;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
-use athermal::Model;
 use clap::Args;
 use serde_json::json;
 
@@ -18,8 +18,10 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \
-                        athermal fit machine.toml --data monday.csv tuesday.csv -o model.json")]
+#[command(
+    after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \
+                        athermal fit machine.toml --data monday.csv tuesday.csv -o model.json"
+)]
 pub struct Fit {
     /// The graph, or a model whose graph is fitted anew
     graph: PathBuf,
@@ -51,22 +53,32 @@ impl Fit {
             ..defaults
         };
         let mut progress = terminal.progress("fitting");
-        let (fitted, report) = fit(&model.plan, &dataset, &options, &mut |ticks| progress.tell(ticks))?;
+        let (fitted, report) = fit(&model.plan, &dataset, &options, &mut |ticks| {
+            progress.tell(ticks)
+        })?;
         drop(progress);
         model.fitted = fitted;
         model.card = Some(Card {
             athermal: env!("CARGO_PKG_VERSION").to_owned(),
             created: created(),
             data: self.data.cards(&dataset)?,
-            period: report.period.map(|(from, to)| Period { from_s: seconds(from), to_s: seconds(to) }),
+            period: report.period.map(|(from, to)| Period {
+                from_s: seconds(from),
+                to_s: seconds(to),
+            }),
             ticks: report.ticks,
             estimators: report.estimators.iter().filter_map(card).collect(),
         });
-        let text = model
-            .to_text()
-            .map_err(|error| Failure::Outside(format!("the model cannot be written as JSON: {error}")))?;
+        let text = model.to_text().map_err(|error| {
+            Failure::Outside(format!("the model cannot be written as JSON: {error}"))
+        })?;
         self.tell(terminal, &report);
-        data::tell(terminal, &dataset.reports(), report.refused, &report.rejected);
+        data::tell(
+            terminal,
+            &dataset.reports(),
+            report.refused,
+            &report.rejected,
+        );
         if self.output.as_os_str() == "-" {
             print!("{text}");
         } else {
@@ -75,7 +87,10 @@ impl Fit {
                 terminal.note(format_args!("wrote {}", self.output.display()));
             }
         }
-        let failed = report.estimators.iter().any(|fit| matches!(fit.outcome, Outcome::Failed(_)));
+        let failed = report
+            .estimators
+            .iter()
+            .any(|fit| matches!(fit.outcome, Outcome::Failed(_)));
         Ok(if failed { Answer::No } else { Answer::Fine })
     }
 
@@ -87,16 +102,24 @@ impl Fit {
                 .iter()
                 .map(|fit| match (&fit.outcome, card(fit)) {
                     (_, Some(card)) => json!(card),
-                    (Outcome::Failed(error), None) => json!({ "node": fit.node, "error": error.to_string() }),
+                    (Outcome::Failed(error), None) => {
+                        json!({ "node": fit.node, "error": error.to_string() })
+                    }
                     (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
-            println!("{:#}", json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators }));
+            println!(
+                "{:#}",
+                json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators })
+            );
             return;
         }
         for fit in &report.estimators {
             if let Outcome::Failed(error) = &fit.outcome {
-                terminal.warning(format_args!("{} could not be fitted: {error}; it will give no prediction", fit.node));
+                terminal.warning(format_args!(
+                    "{} could not be fitted: {error}; it will give no prediction",
+                    fit.node
+                ));
             }
             if !terminal.quiet && !to_stdout {
                 print!("{}", describe(fit));
@@ -109,24 +132,46 @@ impl Fit {
 fn describe(fit: &EstimatorFit) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
-    let _ = write!(text, "{} ({} of {}): {} rows", fit.node, fit.kind, fit.truth, count(fit.rows));
+    let _ = write!(
+        text,
+        "{} ({} of {}): {} rows",
+        fit.node,
+        fit.kind,
+        fit.truth,
+        count(fit.rows)
+    );
     let dropped = [
         (fit.dropped.outside_limits, "outside the limits"),
         (fit.dropped.without_run, "without a run before"),
         (fit.dropped.incomplete, "incomplete"),
     ];
-    let dropped: Vec<_> =
-        dropped.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", count(*n))).collect();
+    let dropped: Vec<_> = dropped
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, why)| format!("{} {why}", count(*n)))
+        .collect();
     if !dropped.is_empty() {
         let _ = write!(text, ", left out {}", dropped.join(", "));
     }
     text.push('\n');
     for (name, share) in &fit.dropped_candidates {
-        let _ = writeln!(text, "  left out {name}: a value in only {:.0} % of the rows", 100.0 * share);
+        let _ = writeln!(
+            text,
+            "  left out {name}: a value in only {:.0} % of the rows",
+            100.0 * share
+        );
     }
-    let Outcome::Fitted(report) = &fit.outcome else { return text };
+    let Outcome::Fitted(report) = &fit.outcome else {
+        return text;
+    };
     for (step, chosen) in report.selection.iter().enumerate() {
-        let _ = writeln!(text, "  {:>2}  {:<44} R² {:.4}", step + 1, chosen.regressor, chosen.score);
+        let _ = writeln!(
+            text,
+            "  {:>2}  {:<44} R² {:.4}",
+            step + 1,
+            chosen.regressor,
+            chosen.score
+        );
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {
@@ -148,7 +193,9 @@ fn describe(fit: &EstimatorFit) -> String {
 }
 
 fn card(fit: &EstimatorFit) -> Option<EstimatorCard> {
-    let Outcome::Fitted(report) = &fit.outcome else { return None };
+    let Outcome::Fitted(report) = &fit.outcome else {
+        return None;
+    };
     Some(EstimatorCard {
         node: fit.node.clone(),
         kind: fit.kind.to_owned(),
@@ -167,12 +214,18 @@ fn seconds(instant: athermal::Instant) -> f64 {
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.
 fn created() -> Option<String> {
-    let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|text| text.parse().ok());
+    let stated = std::env::var("SOURCE_DATE_EPOCH")
+        .ok()
+        .and_then(|text| text.parse().ok());
     let seconds = stated.or_else(|| {
-        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).ok()?;
+        let now = std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .ok()?;
         i64::try_from(now.as_secs()).ok()
     })?;
-    jiff::Timestamp::from_second(seconds).ok().map(|time| time.to_string())
+    jiff::Timestamp::from_second(seconds)
+        .ok()
+        .map(|time| time.to_string())
 }
 
 /// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one.

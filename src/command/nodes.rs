@@ -27,8 +27,11 @@ impl Nodes {
                 Some(kind) => explain(terminal, kind),
                 None => {
                     let near = nearest(name, kinds().keys().copied());
-                    let near = near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
-                    let message = format!("there is no node type `{name}`{near} (`athermal nodes` lists them all)");
+                    let near =
+                        near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
+                    let message = format!(
+                        "there is no node type `{name}`{near} (`athermal nodes` lists them all)"
+                    );
                     return Err(Failure::Request(message));
                 }
             },
@@ -39,7 +42,11 @@ impl Nodes {
 
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all: Vec<Value> = kinds().values().flatten().map(|kind| describe(kind)).collect();
+        let all: Vec<Value> = kinds()
+            .values()
+            .flatten()
+            .map(|kind| describe(kind))
+            .collect();
         println!("{:#}", json!({ "nodes": all }));
         return;
     }
@@ -59,7 +66,10 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         println!("{:#}", describe(kind));
         return;
     }
-    println!("{} ({}, from {} {})\n", kind.name, kind.role, kind.package, kind.version);
+    println!(
+        "{} ({}, from {} {})\n",
+        kind.name, kind.role, kind.package, kind.version
+    );
     println!("{}\n", kind.documentation());
     println!("Inputs:");
     for port in (kind.inputs)() {
@@ -68,21 +78,37 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             Read::Held => "the last value, up to its maximum age",
             Read::Truth => "paired with predictions",
         };
-        let optional = if port.optional { ", may be left out" } else { "" };
-        println!("  inputs.{:<10} {} ({read}{optional})", port.name, port.summary);
+        let optional = if port.optional {
+            ", may be left out"
+        } else {
+            ""
+        };
+        println!(
+            "  inputs.{:<10} {} ({read}{optional})",
+            port.name, port.summary
+        );
     }
     let schema = Value::from((kind.schema)());
     println!("\nParameters:");
     if kind.role == athermal::core::node::RoleName::Estimator {
         println!("  ahead (duration) – how far ahead of now the truth is predicted; required");
-        println!("  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on");
+        println!(
+            "  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on"
+        );
     }
     let empty = serde_json::Map::new();
     let properties = schema["properties"].as_object().unwrap_or(&empty);
-    let required: Vec<&str> =
-        schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    let required: Vec<&str> = schema["required"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+        .collect();
     for (name, property) in properties {
-        let description = property["description"].as_str().unwrap_or_default().replace('\n', " ");
+        let description = property["description"]
+            .as_str()
+            .unwrap_or_default()
+            .replace('\n', " ");
         let default = match &property["default"] {
             Value::Null if required.contains(&name.as_str()) => "; required".to_owned(),
             Value::Null => String::new(),

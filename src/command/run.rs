@@ -17,8 +17,10 @@ use crate::terminal::{Answer, Failure, Terminal};
 /// Reads rows of measurements and writes one row per tick with the graph's outputs, as soon as it is read. Columns are the
 /// time as in the input, then the outputs; a cell is empty where the node did not run or gave nothing at the tick.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  athermal run model.json --input test.csv --output predicted.csv\n  \
-                        tail -f log.csv | athermal run model.json --input - --output -")]
+#[command(
+    after_help = "Examples:\n  athermal run model.json --input test.csv --output predicted.csv\n  \
+                        tail -f log.csv | athermal run model.json --input - --output -"
+)]
 pub struct Run {
     /// The model, or a graph in which nothing needs fitting
     model: PathBuf,
@@ -42,11 +44,22 @@ impl Run {
         let model = load_fitted(&self.model, Wanted::default())?;
         let mut engine = model.engine()?;
         let plan = std::sync::Arc::clone(engine.plan());
-        let options = Options { lenient: self.lenient, ..Options::default() };
+        let options = Options {
+            lenient: self.lenient,
+            ..Options::default()
+        };
         let mut reader = Reader::open(&self.input, layout(&plan), options)?;
         let TimeBase::Column { column, .. } = &plan.time;
-        let columns: Vec<String> = plan.outputs.iter().map(|output| output.name.clone()).collect();
-        let flush = if self.input.as_os_str() == "-" { Flush::EachRow } else { Flush::Buffered };
+        let columns: Vec<String> = plan
+            .outputs
+            .iter()
+            .map(|output| output.name.clone())
+            .collect();
+        let flush = if self.input.as_os_str() == "-" {
+            Flush::EachRow
+        } else {
+            Flush::Buffered
+        };
         let mut writer = Writer::create(&self.output, column, &columns, flush)?;
         let mut row = Row::default();
         while reader.next_into(&mut row)? {
@@ -58,8 +71,14 @@ impl Run {
         }
         writer.finish()?;
         let reports = [(self.input.display().to_string(), reader.report().clone())];
-        let counted = plan.sources.iter().zip(engine.rejected()).filter(|&(_, &count)| count > 0);
-        let rejected: Vec<_> = counted.map(|(source, &count)| (source.name.clone(), count)).collect();
+        let counted = plan
+            .sources
+            .iter()
+            .zip(engine.rejected())
+            .filter(|&(_, &count)| count > 0);
+        let rejected: Vec<_> = counted
+            .map(|(source, &count)| (source.name.clone(), count))
+            .collect();
         data::tell(terminal, &reports, engine.refused(), &rejected);
         Ok(Answer::Fine)
     }

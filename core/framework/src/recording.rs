@@ -59,7 +59,11 @@ impl Table {
         let mut rows = recording.open(plan)?;
         let mut values = vec![f64::NAN; plan.sources.len()];
         while let Some(event) = rows.next(&mut values)? {
-            let row = if matches!(event, Event::Row(_)) { values.clone() } else { Vec::new() };
+            let row = if matches!(event, Event::Row(_)) {
+                values.clone()
+            } else {
+                Vec::new()
+            };
             table.events.push((event, row));
         }
         Ok(table)

@@ -60,10 +60,19 @@ impl Combiner for AutoWeighted {
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         if self.memory <= Duration::ZERO {
-            mistakes.push(Mistake::at("memory", format!("`memory` is {} and must be longer than nothing", self.memory)));
+            mistakes.push(Mistake::at(
+                "memory",
+                format!(
+                    "`memory` is {} and must be longer than nothing",
+                    self.memory
+                ),
+            ));
         }
         if !(0.0..=16.0).contains(&self.power) {
-            mistakes.push(Mistake::at("power", format!("`power` is {} and must be from 0 to 16", self.power)));
+            mistakes.push(Mistake::at(
+                "power",
+                format!("`power` is {} and must be from 0 to 16", self.power),
+            ));
         }
         mistakes
     }
@@ -112,7 +121,10 @@ impl Weigher {
             }
         }
         let weight_of_new = if known > 0.0 { weights / known } else { 1.0 };
-        (weighted + weight_of_new * sum_of_new, weights + weight_of_new * new)
+        (
+            weighted + weight_of_new * sum_of_new,
+            weights + weight_of_new * new,
+        )
     }
 
     fn present_squares<'a>(&'a self, votes: Votes<'a>) -> impl Iterator<Item = f64> + 'a {
@@ -131,23 +143,36 @@ impl Combine for Weigher {
             Weighting::InversePower => {
                 // Relative to the best voter, so that nothing over- or underflows; an error of exactly zero counts as
                 // the smallest number there is.
-                let best = self.present_squares(votes).fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE);
+                let best = self
+                    .present_squares(votes)
+                    .fold(f64::INFINITY, f64::min)
+                    .max(f64::MIN_POSITIVE);
                 self.sums(votes, |mean_square| {
                     let ratio = best / mean_square.max(f64::MIN_POSITIVE);
-                    if power == 2.0 { ratio } else { ratio.powf(0.5 * power) }
+                    if power == 2.0 {
+                        ratio
+                    } else {
+                        ratio.powf(0.5 * power)
+                    }
                 })
             }
             Weighting::AsPrinted | Weighting::AsPrintedRaw => {
                 let total: f64 = self.present_squares(votes).map(f64::sqrt).sum();
                 self.sums(votes, |mean_square| {
-                    let share = if total > 0.0 { mean_square.sqrt() / total } else { 1.0 };
+                    let share = if total > 0.0 {
+                        mean_square.sqrt() / total
+                    } else {
+                        1.0
+                    };
                     share * share
                 })
             }
         };
         if weights == 0.0 {
             f64::NAN
-        } else if self.parameters.weights == Weighting::AsPrintedRaw && self.present_squares(votes).next().is_some() {
+        } else if self.parameters.weights == Weighting::AsPrintedRaw
+            && self.present_squares(votes).next().is_some()
+        {
             weighted
         } else {
             weighted / weights
@@ -166,7 +191,10 @@ impl Combine for Weigher {
         for voter in 0..self.memories.len() {
             let memory = &mut self.memories[voter];
             let before = memory.len();
-            while memory.front().is_some_and(|&(arrived, _)| arrived <= forgotten) {
+            while memory
+                .front()
+                .is_some_and(|&(arrived, _)| arrived <= forgotten)
+            {
                 memory.pop_front();
             }
             if memory.len() < before {

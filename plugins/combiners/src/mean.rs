@@ -23,7 +23,9 @@ struct Average;
 
 impl Combine for Average {
     fn combine(&self, votes: Votes<'_>) -> f64 {
-        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| (sum + vote, count + 1.0));
+        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
+            (sum + vote, count + 1.0)
+        });
         if count > 0.0 { sum / count } else { f64::NAN }
     }
 }

@@ -1,6 +1,8 @@
 //! The endogenous estimator: drift from past drift.
 
-use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags};
+use athermal_core::node::{
+    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,7 +30,11 @@ impl Estimator for Ar {
     }
 
     fn regressors(&self) -> Regressors {
-        Regressors { truth_lags: TruthLags::At(self.lags.clone()), every_tick: true, ..Regressors::default() }
+        Regressors {
+            truth_lags: TruthLags::At(self.lags.clone()),
+            every_tick: true,
+            ..Regressors::default()
+        }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

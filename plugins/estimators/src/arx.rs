@@ -1,6 +1,8 @@
 //! The estimator with both: drift from past drift and temperatures.
 
-use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags};
+use athermal_core::node::{
+    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -27,14 +27,20 @@ impl Estimator for Linear {
     fn inputs() -> &'static [InputPort] {
         const {
             &[
-                InputPort::held("features", "what the prediction is made of, such as slopes of temperatures"),
+                InputPort::held(
+                    "features",
+                    "what the prediction is made of, such as slopes of temperatures",
+                ),
                 InputPort::truth("what is predicted, such as the drift of an axis"),
             ]
         }
     }
 
     fn regressors(&self) -> Regressors {
-        Regressors { feature_lags: vec![Duration::ZERO], ..Regressors::default() }
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            ..Regressors::default()
+        }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

@@ -1,8 +1,8 @@
 //! The baseline "it goes on as it did".
 
 use athermal_core::node::{
-    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
-    TruthLags,
+    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
+    TrainingSetup, TruthLags,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,15 +20,27 @@ impl Estimator for Persistence {
     }
 
     fn regressors(&self) -> Regressors {
-        Regressors { truth_lags: TruthLags::SmallestLegal, every_tick: true, ..Regressors::default() }
+        Regressors {
+            truth_lags: TruthLags::SmallestLegal,
+            every_tick: true,
+            ..Regressors::default()
+        }
     }
 
     fn fixed(&self, regressors: &[String]) -> Option<Box<dyn Predictor>> {
-        Some(Box::new(Same { regressors: regressors.to_vec() }))
+        Some(Box::new(Same {
+            regressors: regressors.to_vec(),
+        }))
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(Same { regressors: setup.regressors.iter().map(|regressor| regressor.name.clone()).collect() })
+        Box::new(Same {
+            regressors: setup
+                .regressors
+                .iter()
+                .map(|regressor| regressor.name.clone())
+                .collect(),
+        })
     }
 }
 
@@ -53,7 +65,10 @@ impl Trainer for Same {
     fn row(&mut self, _regressors: &[f64], _truth: f64) {}
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
-        Ok(Trained { predictor: self, report: TrainingReport::default() })
+        Ok(Trained {
+            predictor: self,
+            report: TrainingReport::default(),
+        })
     }
 }
 

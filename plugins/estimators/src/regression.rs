@@ -1,11 +1,14 @@
 //! What the linear estimators share: how coefficients are found and regressors chosen; which regressors there are is theirs.
 
 use athermal_core::model::{number, numbers};
-use athermal_core::node::{Mistake, Predictor, SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
+use athermal_core::node::{
+    Mistake, Predictor, SelectionStep, Trained, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
+};
 use athermal_core::time::Duration;
 use athermal_numerics::{
-    ForwardSelection, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError, SelectionScore, Sgd,
-    SgdOptions, Standardization,
+    ForwardSelection, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
+    SelectionScore, Sgd, SgdOptions, Standardization,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -112,10 +115,25 @@ impl Solver {
             }
         };
         match *self {
-            Self::Ridge { alpha } => check("alpha", alpha, alpha >= 0.0 && alpha.is_finite(), "0 or more"),
+            Self::Ridge { alpha } => check(
+                "alpha",
+                alpha,
+                alpha >= 0.0 && alpha.is_finite(),
+                "0 or more",
+            ),
             Self::Ols {} => {}
-            Self::Sgd { alpha, eta0, power, epochs } => {
-                check("alpha", alpha, alpha >= 0.0 && alpha.is_finite(), "0 or more");
+            Self::Sgd {
+                alpha,
+                eta0,
+                power,
+                epochs,
+            } => {
+                check(
+                    "alpha",
+                    alpha,
+                    alpha >= 0.0 && alpha.is_finite(),
+                    "0 or more",
+                );
                 check("eta0", eta0, eta0 > 0.0 && eta0.is_finite(), "above 0");
                 check("power", power, (0.0..=1.0).contains(&power), "from 0 to 1");
                 check("epochs", epochs as f64, epochs >= 1, "1 or more");
@@ -136,16 +154,29 @@ impl Solver {
 impl Selection {
     /// Parameters out of their range.
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
-        let Self::Forward { folds, tolerance, most } = *self;
+        let Self::Forward {
+            folds,
+            tolerance,
+            most,
+        } = *self;
         let mut mistakes = Vec::new();
         if folds < 2 {
-            mistakes.push(Mistake::at("selection.folds", format!("`folds` is {folds} and must be 2 or more")));
+            mistakes.push(Mistake::at(
+                "selection.folds",
+                format!("`folds` is {folds} and must be 2 or more"),
+            ));
         }
         if !tolerance.is_finite() {
-            mistakes.push(Mistake::at("selection.tolerance", format!("`tolerance` is {tolerance} and must be a number")));
+            mistakes.push(Mistake::at(
+                "selection.tolerance",
+                format!("`tolerance` is {tolerance} and must be a number"),
+            ));
         }
         if most == Some(0) {
-            mistakes.push(Mistake::at("selection.most", "`most` is 0 and must be 1 or more"));
+            mistakes.push(Mistake::at(
+                "selection.most",
+                "`most` is 0 and must be 1 or more",
+            ));
         }
         mistakes
     }
@@ -155,11 +186,17 @@ impl Selection {
 pub(crate) fn lag_mistakes(name: &str, lags: &[Duration]) -> Vec<Mistake> {
     let mut mistakes = Vec::new();
     if lags.is_empty() {
-        mistakes.push(Mistake::at(name, format!("`{name}` is empty")).help("give one lag or more, such as [\"5min\"]"));
+        mistakes.push(
+            Mistake::at(name, format!("`{name}` is empty"))
+                .help("give one lag or more, such as [\"5min\"]"),
+        );
     }
     for (i, lag) in lags.iter().enumerate() {
         if lags[..i].contains(lag) {
-            mistakes.push(Mistake::at(name, format!("the lag {lag} stands twice in `{name}`")));
+            mistakes.push(Mistake::at(
+                name,
+                format!("the lag {lag} stands twice in `{name}`"),
+            ));
         }
     }
     mistakes
@@ -176,13 +213,31 @@ pub(crate) struct LinearTrainer {
 
 impl LinearTrainer {
     pub(crate) fn new(setup: &TrainingSetup, solver: Solver, selection: Option<Selection>) -> Self {
-        let names: Vec<_> = setup.regressors.iter().map(|regressor| regressor.name.clone()).collect();
+        let names: Vec<_> = setup
+            .regressors
+            .iter()
+            .map(|regressor| regressor.name.clone())
+            .collect();
         let blocks = GramBlocks::with_row_memory(names.len(), setup.memory);
-        Self { names, solver, selection, blocks }
+        Self {
+            names,
+            solver,
+            selection,
+            blocks,
+        }
     }
 
-    fn chosen(&self, scales: &[f64], report: &mut TrainingReport) -> Result<Vec<usize>, NumericsError> {
-        let Some(Selection::Forward { folds, tolerance, most }) = self.selection else {
+    fn chosen(
+        &self,
+        scales: &[f64],
+        report: &mut TrainingReport,
+    ) -> Result<Vec<usize>, NumericsError> {
+        let Some(Selection::Forward {
+            folds,
+            tolerance,
+            most,
+        }) = self.selection
+        else {
             return Ok((0..self.names.len()).collect());
         };
         let selection = ForwardSelection {
@@ -194,7 +249,9 @@ impl LinearTrainer {
         let selected = selection.run(&self.blocks, folds, scales)?;
         if !self.blocks.exact_folds() {
             let rows = self.blocks.block_rows();
-            report.notes.push(format!("the rows did not fit in memory, so folds end at multiples of {rows} rows"));
+            report.notes.push(format!(
+                "the rows did not fit in memory, so folds end at multiples of {rows} rows"
+            ));
         }
         report.selection = selected
             .steps
@@ -216,20 +273,34 @@ impl LinearTrainer {
         let fit = squares.solve(&gram, &columns, &standard.scales, self.blocks.rows())?;
         report.condition = Some(fit.condition);
         self.note(&fit, report);
-        let names = columns.iter().map(|&column| self.names[column].clone()).collect();
+        let names = columns
+            .iter()
+            .map(|&column| self.names[column].clone())
+            .collect();
         let predictor = match self.solver {
             Solver::Ridge { .. } | Solver::Ols {} => LinearPredictor {
                 regressors: names,
                 coefficients: fit.coefficients.clone(),
                 intercept: fit.intercept,
             },
-            Solver::Sgd { alpha, eta0, power, epochs } => {
+            Solver::Sgd {
+                alpha,
+                eta0,
+                power,
+                epochs,
+            } => {
                 let rate = if power == 0.0 {
                     LearningRate::Constant { eta0 }
                 } else {
                     LearningRate::InvScaling { eta0, power }
                 };
-                self.descend(SgdOptions { alpha, rate }, epochs, &columns, names, &standard)?
+                self.descend(
+                    SgdOptions { alpha, rate },
+                    epochs,
+                    &columns,
+                    names,
+                    &standard,
+                )?
             }
         };
         report.in_sample_rmse = Some(match self.blocks.rows() {
@@ -255,31 +326,60 @@ impl LinearTrainer {
         standard: &Standardization,
     ) -> Result<LinearPredictor, NumericsError> {
         let Some(rows) = self.blocks.rows() else {
-            return Err(NumericsError::TooFewRows { needed: self.blocks.count(), found: 0 });
+            return Err(NumericsError::TooFewRows {
+                needed: self.blocks.count(),
+                found: 0,
+            });
         };
         let mean = rows.iter().map(|(_, y, _)| y).sum::<f64>() / rows.count() as f64;
         let scaled: Vec<(Vec<f64>, f64)> = rows
             .iter()
             .map(|(x, y, _)| {
-                let scale = |&column: &usize| (x[column] - standard.means[column]) / standard.scales[column];
+                let scale = |&column: &usize| {
+                    (x[column] - standard.means[column]) / standard.scales[column]
+                };
                 (columns.iter().map(scale).collect(), y - mean)
             })
             .collect();
         let mut sgd = Sgd::new(columns.len(), options)?;
         sgd.epochs(scaled.iter().map(|(x, y)| (x.as_slice(), *y)), epochs);
-        let coefficients: Vec<f64> =
-            sgd.weights().iter().zip(columns).map(|(w, &column)| w / standard.scales[column]).collect();
-        let shift: f64 = coefficients.iter().zip(columns).map(|(b, &column)| b * standard.means[column]).sum();
-        Ok(LinearPredictor { regressors: names, coefficients, intercept: sgd.intercept() + mean - shift })
+        let coefficients: Vec<f64> = sgd
+            .weights()
+            .iter()
+            .zip(columns)
+            .map(|(w, &column)| w / standard.scales[column])
+            .collect();
+        let shift: f64 = coefficients
+            .iter()
+            .zip(columns)
+            .map(|(b, &column)| b * standard.means[column])
+            .sum();
+        Ok(LinearPredictor {
+            regressors: names,
+            coefficients,
+            intercept: sgd.intercept() + mean - shift,
+        })
     }
 
     fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
-        let names = |columns: &[usize]| columns.iter().map(|&c| self.names[c].as_str()).collect::<Vec<_>>().join(", ");
+        let names = |columns: &[usize]| {
+            columns
+                .iter()
+                .map(|&c| self.names[c].as_str())
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
         if !fit.constant.is_empty() {
-            report.notes.push(format!("constant, so without effect: {}", names(&fit.constant)));
+            report.notes.push(format!(
+                "constant, so without effect: {}",
+                names(&fit.constant)
+            ));
         }
         if !fit.collinear.is_empty() {
-            report.notes.push(format!("nearly a combination of the others: {}", names(&fit.collinear)));
+            report.notes.push(format!(
+                "nearly a combination of the others: {}",
+                names(&fit.collinear)
+            ));
         }
         match fit.method {
             Method::Cholesky => {}
@@ -302,12 +402,17 @@ impl Trainer for LinearTrainer {
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         match self.solve(&mut report) {
-            Ok(predictor) => Ok(Trained { predictor: Box::new(predictor), report }),
+            Ok(predictor) => Ok(Trained {
+                predictor: Box::new(predictor),
+                report,
+            }),
             Err(NumericsError::TooFewRows { needed, found }) => Err(TrainingError::TooFewRows {
                 rows: usize::try_from(found).unwrap_or(usize::MAX),
                 needed: usize::try_from(needed).unwrap_or(usize::MAX),
             }),
-            Err(error) => Err(TrainingError::Unsolvable { reason: error.to_string() }),
+            Err(error) => Err(TrainingError::Unsolvable {
+                reason: error.to_string(),
+            }),
         }
     }
 }

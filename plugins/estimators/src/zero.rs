@@ -1,7 +1,8 @@
 //! The baseline "nothing moves".
 
 use athermal_core::node::{
-    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,10 @@ impl Estimator for Zero {
     }
 
     fn regressors(&self) -> Regressors {
-        Regressors { every_tick: true, ..Regressors::default() }
+        Regressors {
+            every_tick: true,
+            ..Regressors::default()
+        }
     }
 
     fn fixed(&self, _regressors: &[String]) -> Option<Box<dyn Predictor>> {
@@ -50,7 +54,10 @@ impl Trainer for Nothing {
     fn row(&mut self, _regressors: &[f64], _truth: f64) {}
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
-        Ok(Trained { predictor: self, report: TrainingReport::default() })
+        Ok(Trained {
+            predictor: self,
+            report: TrainingReport::default(),
+        })
     }
 }
 

@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 use std::fmt;
 
 use athermal_core::channel::{Channel, is_unchanged};
-use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use schemars::JsonSchema;
@@ -38,7 +40,10 @@ impl TryFrom<String> for Lateness {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
-        let ticks = text.trim().strip_suffix("ticks").or_else(|| text.trim().strip_suffix("tick"));
+        let ticks = text
+            .trim()
+            .strip_suffix("ticks")
+            .or_else(|| text.trim().strip_suffix("tick"));
         if let Some(count) = ticks {
             return match count.trim().parse() {
                 Ok(count) if count > 0 => Ok(Self::Ticks(count)),
@@ -47,8 +52,12 @@ impl TryFrom<String> for Lateness {
         }
         match text.parse::<Duration>() {
             Ok(time) if time > Duration::ZERO => Ok(Self::Time(time)),
-            Ok(_) => Err(format!("a delay must be longer than nothing, found {text:?}")),
-            Err(error) => Err(format!("{error}; a delay is a duration such as \"5min\", or \"1 tick\"")),
+            Ok(_) => Err(format!(
+                "a delay must be longer than nothing, found {text:?}"
+            )),
+            Err(error) => Err(format!(
+                "{error}; a delay is a duration such as \"5min\", or \"1 tick\""
+            )),
         }
     }
 }
@@ -99,24 +108,42 @@ impl Feature for Delay {
                 max_age: None,
             }],
             (None, []) => {
-                let mistake = Mistake::at("inputs.signal", "a delay that closes a loop must say its unit");
-                return Err(vec![mistake.help("add `unit = \"nm\"`, the unit of what it delays")]);
+                let mistake = Mistake::at(
+                    "inputs.signal",
+                    "a delay that closes a loop must say its unit",
+                );
+                return Err(vec![
+                    mistake.help("add `unit = \"nm\"`, the unit of what it delays"),
+                ]);
             }
             (Some(unit), channels) => {
                 if let Some(other) = channels.iter().find(|channel| channel.unit != *unit) {
-                    let message = format!("`unit` is {unit}, and `{}` is in {}", other.name, other.unit);
-                    return Err(vec![Mistake::at("unit", message).help("leave `unit` out, or give that of the input")]);
+                    let message = format!(
+                        "`unit` is {unit}, and `{}` is in {}",
+                        other.name, other.unit
+                    );
+                    return Err(vec![
+                        Mistake::at("unit", message)
+                            .help("leave `unit` out, or give that of the input"),
+                    ]);
                 }
                 channels.to_vec()
             }
             (None, channels) => channels.to_vec(),
         };
-        Ok(vec![OutputPort { name: "delayed", channels }])
+        Ok(vec![OutputPort {
+            name: "delayed",
+            channels,
+        }])
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let channels = inputs.port("signal").len().max(1);
-        Box::new(Delaying { delay: self.delay, queues: vec![VecDeque::new(); channels], tick: 0 })
+        Box::new(Delaying {
+            delay: self.delay,
+            queues: vec![VecDeque::new(); channels],
+            tick: 0,
+        })
     }
 
     fn every_tick(&self) -> bool {
@@ -130,7 +157,7 @@ impl Feature for Delay {
         }
     }
 
-    fn from_the_past(&self) -> bool {
+    fn closes_loops(&self) -> bool {
         true
     }
 }
@@ -171,7 +198,10 @@ impl Operator for Delaying {
                 self.queues[channel].pop_front();
                 due = Some(waiting);
             }
-            if let Some(Waiting { at, value, stamp, .. }) = due {
+            if let Some(Waiting {
+                at, value, stamp, ..
+            }) = due
+            {
                 let moved = match self.delay {
                     Lateness::Ticks(_) => tick.now - at,
                     Lateness::Time(time) => time,
@@ -182,9 +212,18 @@ impl Operator for Delaying {
     }
 
     fn capture(&mut self, tick: &Tick<'_>) {
-        for (queue, (&value, &stamp)) in self.queues.iter_mut().zip(tick.port(0).iter().zip(tick.stamps(0))) {
+        for (queue, (&value, &stamp)) in self
+            .queues
+            .iter_mut()
+            .zip(tick.port(0).iter().zip(tick.stamps(0)))
+        {
             if !is_unchanged(value) {
-                queue.push_back(Waiting { tick: self.tick, at: tick.now, value, stamp });
+                queue.push_back(Waiting {
+                    tick: self.tick,
+                    at: tick.now,
+                    value,
+                    stamp,
+                });
             }
         }
     }

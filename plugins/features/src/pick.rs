@@ -1,7 +1,9 @@
 //! A bundle of chosen channels under one name.
 
 use athermal_core::channel::is_unchanged;
-use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,15 +28,28 @@ impl Feature for Pick {
         let mut channels = inputs.port("signal").to_vec();
         if let Some(names) = &self.names {
             if names.len() != channels.len() {
-                let message = format!("`names` has {} names for {} channels", names.len(), channels.len());
-                let now: Vec<_> = channels.iter().map(|channel| channel.name.as_str()).collect();
-                return Err(vec![Mistake::at("names", message).help(format!("the channels are {}", now.join(", ")))]);
+                let message = format!(
+                    "`names` has {} names for {} channels",
+                    names.len(),
+                    channels.len()
+                );
+                let now: Vec<_> = channels
+                    .iter()
+                    .map(|channel| channel.name.as_str())
+                    .collect();
+                return Err(vec![
+                    Mistake::at("names", message)
+                        .help(format!("the channels are {}", now.join(", "))),
+                ]);
             }
             for (channel, name) in channels.iter_mut().zip(names) {
                 channel.name.clone_from(name);
             }
         }
-        Ok(vec![OutputPort { name: "signal", channels }])
+        Ok(vec![OutputPort {
+            name: "signal",
+            channels,
+        }])
     }
 
     fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

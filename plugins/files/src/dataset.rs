@@ -18,16 +18,26 @@ const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
 pub fn layout(plan: &Plan) -> Layout {
     let TimeBase::Column { column, form } = &plan.time;
     let form = match form {
-        Declared::Numbers { unit } => TimeForm::Numbers { ns_per_unit: unit.as_ns() },
+        Declared::Numbers { unit } => TimeForm::Numbers {
+            ns_per_unit: unit.as_ns(),
+        },
         Declared::Rfc3339 => TimeForm::Rfc3339,
-        Declared::Samples { step } => TimeForm::Samples { step_ns: step.unwrap_or(ONE_SECOND).as_ns() },
+        Declared::Samples { step } => TimeForm::Samples {
+            step_ns: step.unwrap_or(ONE_SECOND).as_ns(),
+        },
     };
     Layout {
-        time: TimeColumn { column: column.clone(), form },
+        time: TimeColumn {
+            column: column.clone(),
+            form,
+        },
         channels: plan
             .sources
             .iter()
-            .map(|source| ChannelColumn { column: source.column.clone(), optional: source.optional })
+            .map(|source| ChannelColumn {
+                column: source.column.clone(),
+                optional: source.optional,
+            })
             .collect(),
     }
 }
@@ -44,7 +54,11 @@ impl Dataset {
     /// A data set of these files.
     #[must_use]
     pub fn new(paths: Vec<PathBuf>, options: Options) -> Self {
-        Self { paths, options, reports: RefCell::new(Vec::new()) }
+        Self {
+            paths,
+            options,
+            reports: RefCell::new(Vec::new()),
+        }
     }
 
     /// The files.
@@ -63,7 +77,11 @@ impl Dataset {
 impl recording::Recording for Dataset {
     fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
         let recording = Recording::join(&self.paths, layout(plan), self.options.clone())?;
-        Ok(Box::new(Reading { recording, row: Row::default(), reports: &self.reports }))
+        Ok(Box::new(Reading {
+            recording,
+            row: Row::default(),
+            reports: &self.reports,
+        }))
     }
 }
 
@@ -78,7 +96,9 @@ impl Rows for Reading<'_> {
         match self.recording.next_into(&mut self.row)? {
             Event::Row => {
                 values.copy_from_slice(&self.row.values);
-                Ok(Some(recording::Event::Row(Instant::from_ns(self.row.time_ns))))
+                Ok(Some(recording::Event::Row(Instant::from_ns(
+                    self.row.time_ns,
+                ))))
             }
             Event::Segment => Ok(Some(recording::Event::Segment)),
             Event::End => {

@@ -9,7 +9,11 @@ use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;
 
 impl Resolver<'_> {
-    pub(super) fn combiner(&mut self, instance: &Instance<'_>, combiner: &dyn Combiner) -> Option<()> {
+    pub(super) fn combiner(
+        &mut self,
+        instance: &Instance<'_>,
+        combiner: &dyn Combiner,
+    ) -> Option<()> {
         let mistakes = combiner.mistakes();
         let sound = mistakes.is_empty();
         self.mistakes(instance, mistakes);
@@ -25,9 +29,13 @@ impl Resolver<'_> {
         let (port, voters) = voters?;
         let truth = truth?;
         let Some(&first) = voters.first() else {
-            let problem =
-                CompileProblem::ChannelCount { input: port.name, found: Vec::new(), expected: "one channel or more" };
-            self.diagnostics.report(instance.input_place(port.name), problem);
+            let problem = CompileProblem::ChannelCount {
+                input: port.name,
+                found: Vec::new(),
+                expected: "one channel or more",
+            };
+            self.diagnostics
+                .report(instance.input_place(port.name), problem);
             return None;
         };
         let mut agree = sound;
@@ -47,16 +55,40 @@ impl Resolver<'_> {
             return None;
         }
         let predicts = truth.or(self.channels[first].predicts);
-        let name = predicts.map_or(&self.channels[first].channel.name, |slot| &self.channels[slot].channel.name).clone();
-        let combined = Channel { name, ..self.channels[first].channel.clone() };
-        let behind = Provenance::of(voters.iter().map(|&slot| (&self.provenance[slot], Duration::ZERO)));
-        let outputs = vec![OutputPort { name: "prediction", channels: vec![combined] }];
-        let role = PlannedRole::Combiner { voters: gather, truth: link };
+        let name = predicts
+            .map_or(&self.channels[first].channel.name, |slot| {
+                &self.channels[slot].channel.name
+            })
+            .clone();
+        let combined = Channel {
+            name,
+            ..self.channels[first].channel.clone()
+        };
+        let behind = Provenance::of(
+            voters
+                .iter()
+                .map(|&slot| (&self.provenance[slot], Duration::ZERO)),
+        );
+        let outputs = vec![OutputPort {
+            name: "prediction",
+            channels: vec![combined],
+        }];
+        let role = PlannedRole::Combiner {
+            voters: gather,
+            truth: link,
+        };
         self.add(instance, outputs, role, vec![behind], predicts)
     }
 
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.
-    fn agree(&mut self, instance: &Instance<'_>, input: &str, first: usize, second: usize, votes: bool) -> bool {
+    fn agree(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        first: usize,
+        second: usize,
+        votes: bool,
+    ) -> bool {
         let (a, b) = (&self.channels[first], &self.channels[second]);
         let problem = if a.channel.unit != b.channel.unit {
             CompileProblem::Units {
@@ -82,7 +114,8 @@ impl Resolver<'_> {
         } else {
             return true;
         };
-        self.diagnostics.report(instance.input_place(input), problem);
+        self.diagnostics
+            .report(instance.input_place(input), problem);
         false
     }
 }

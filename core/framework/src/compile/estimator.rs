@@ -11,13 +11,22 @@ use crate::quantity::Quantity;
 use crate::time::Duration;
 
 impl Resolver<'_> {
-    pub(super) fn estimator(&mut self, instance: &Instance<'_>, estimator: &dyn Estimator) -> Option<()> {
+    pub(super) fn estimator(
+        &mut self,
+        instance: &Instance<'_>,
+        estimator: &dyn Estimator,
+    ) -> Option<()> {
         let mistakes = estimator.mistakes();
         let sound = mistakes.is_empty();
         self.mistakes(instance, mistakes);
         let ahead = instance.read.estimator.ahead;
         if ahead.is_none() {
-            self.diagnostics.report(instance.node.place, CompileProblem::NoHorizon { kind: instance.kind.name });
+            self.diagnostics.report(
+                instance.node.place,
+                CompileProblem::NoHorizon {
+                    kind: instance.kind.name,
+                },
+            );
         }
         let mut features = Some((None, Vec::new()));
         let mut truth = None;
@@ -67,9 +76,16 @@ impl Resolver<'_> {
         if !whole {
             return None;
         }
-        let behind = Provenance::of(behind.iter().map(|&(slot, lag)| (&self.provenance[slot], lag)));
+        let behind = Provenance::of(
+            behind
+                .iter()
+                .map(|&(slot, lag)| (&self.provenance[slot], lag)),
+        );
         let of = &self.channels[truth].channel;
-        let prediction = Channel { ahead: link.ahead, ..of.clone() };
+        let prediction = Channel {
+            ahead: link.ahead,
+            ..of.clone()
+        };
         let role = PlannedRole::Estimator {
             regressors,
             gathers,
@@ -77,22 +93,41 @@ impl Resolver<'_> {
             truth: link,
             training: training?,
         };
-        let port = OutputPort { name: "prediction", channels: vec![prediction] };
+        let port = OutputPort {
+            name: "prediction",
+            channels: vec![prediction],
+        };
         self.add(instance, vec![port], role, vec![behind], Some(truth))
     }
 
     /// A truth as predictions `ahead` of it are paired with it.
-    pub(super) fn link(&mut self, instance: &Instance<'_>, truth: usize, ahead: Duration) -> Option<TruthLink> {
+    pub(super) fn link(
+        &mut self,
+        instance: &Instance<'_>,
+        truth: usize,
+        ahead: Duration,
+    ) -> Option<TruthLink> {
         let channel = &self.channels[truth].channel;
         if channel.ahead != Duration::ZERO || self.channels[truth].predicts.is_some() {
-            let problem = CompileProblem::PredictedTruth { channel: self.channels[truth].name.clone() };
-            self.diagnostics.report(instance.input_place("truth"), problem);
+            let problem = CompileProblem::PredictedTruth {
+                channel: self.channels[truth].name.clone(),
+            };
+            self.diagnostics
+                .report(instance.input_place("truth"), problem);
             return None;
         }
         let span = channel.span;
-        let limit =
-            if span > Duration::ZERO { Some(span) } else { self.max_age(instance, "truth", truth) };
-        Some(TruthLink { slot: truth, ahead, span, limit: limit? })
+        let limit = if span > Duration::ZERO {
+            Some(span)
+        } else {
+            self.max_age(instance, "truth", truth)
+        };
+        Some(TruthLink {
+            slot: truth,
+            ahead,
+            span,
+            limit: limit?,
+        })
     }
 
     fn regressor(&self, slot: usize, lag: Duration, of_truth: bool) -> Regressor {
@@ -104,12 +139,24 @@ impl Resolver<'_> {
         } else {
             from.name.clone()
         };
-        Regressor { name, unit: from.channel.unit.to_string() }
+        Regressor {
+            name,
+            unit: from.channel.unit.to_string(),
+        }
     }
 
     /// Whether a feature, read at a lag, may know what it knows of the truth's signal.
-    fn check_feature(&mut self, instance: &Instance<'_>, slot: usize, lag: Duration, link: &TruthLink) -> bool {
-        let of_truth: Vec<usize> = self.provenance[link.slot].sources().map(|(source, _)| source).collect();
+    fn check_feature(
+        &mut self,
+        instance: &Instance<'_>,
+        slot: usize,
+        lag: Duration,
+        link: &TruthLink,
+    ) -> bool {
+        let of_truth: Vec<usize> = self.provenance[link.slot]
+            .sources()
+            .map(|(source, _)| source)
+            .collect();
         let nearest = self.provenance[slot]
             .sources()
             .filter(|(source, _)| of_truth.contains(source))
@@ -147,14 +194,21 @@ impl Resolver<'_> {
         let mut size = |limit: Option<Quantity>, default: f64| match limit {
             None => default,
             Some(limit) => limit.in_unit(&unit).unwrap_or_else(|| {
-                let problem = CompileProblem::LimitUnit { found: limit.unit.clone(), expected: unit.clone() };
-                self.diagnostics.report(instance.parameter_place("train"), problem);
+                let problem = CompileProblem::LimitUnit {
+                    found: limit.unit.clone(),
+                    expected: unit.clone(),
+                };
+                self.diagnostics
+                    .report(instance.parameter_place("train"), problem);
                 whole = false;
                 default
             }),
         };
         let none = TrainingLimits::NONE;
-        let limits = TrainingLimits { below: size(below, none.below), above: size(above, none.above) };
+        let limits = TrainingLimits {
+            below: size(below, none.below),
+            above: size(above, none.above),
+        };
         whole.then_some(limits)
     }
 }

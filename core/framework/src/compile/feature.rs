@@ -8,7 +8,12 @@ use crate::time::Duration;
 
 impl Resolver<'_> {
     /// Resolves a feature. One that closes a loop is given its inputs later, and knows none of them here.
-    pub(super) fn feature(&mut self, instance: &Instance<'_>, feature: &dyn Feature, closes: bool) -> Option<()> {
+    pub(super) fn feature(
+        &mut self,
+        instance: &Instance<'_>,
+        feature: &dyn Feature,
+        closes: bool,
+    ) -> Option<()> {
         let mut ports = Vec::new();
         let mut gathers = Vec::new();
         let mut whole = true;
@@ -32,7 +37,10 @@ impl Resolver<'_> {
         if !whole {
             return None;
         }
-        let slots: Vec<usize> = ports.iter().flat_map(|(_, slots)| slots.iter().copied()).collect();
+        let slots: Vec<usize> = ports
+            .iter()
+            .flat_map(|(_, slots)| slots.iter().copied())
+            .collect();
         let inputs = self.inputs(instance, ports);
         let outputs = match feature.outputs(&inputs) {
             Ok(outputs) => outputs,
@@ -41,20 +49,29 @@ impl Resolver<'_> {
                 return None;
             }
         };
-        let behind = self.behind(&slots, outputs.iter().map(|port| port.channels.len()), feature.delay());
+        let behind = self.behind(
+            &slots,
+            outputs.iter().map(|port| port.channels.len()),
+            feature.delay(),
+        );
         let role = PlannedRole::Feature {
             inputs,
             gathers,
             wanted: vec![true; outputs.len()],
             every_tick: feature.every_tick(),
-            from_the_past: feature.from_the_past(),
+            closes_loops: feature.closes_loops(),
         };
         self.add(instance, outputs, role, behind, None)
     }
 
     /// What is behind each output. A port with as many channels as there are inputs, or a multiple, is taken to compute
     /// each from its own input, in order; any other mixes all inputs.
-    fn behind(&self, slots: &[usize], ports: impl Iterator<Item = usize>, delay: Duration) -> Vec<Provenance> {
+    fn behind(
+        &self,
+        slots: &[usize],
+        ports: impl Iterator<Item = usize>,
+        delay: Duration,
+    ) -> Vec<Provenance> {
         let mut behind = Vec::new();
         for channels in ports {
             if !slots.is_empty() && channels % slots.len() == 0 {

@@ -14,8 +14,8 @@ mod scope;
 mod steps;
 
 pub use plan::{
-    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits,
-    TruthLink,
+    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+    Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;

@@ -28,18 +28,27 @@ pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diag
     let mut order = Order::default();
     for component in loops(&edges) {
         let inside: BTreeSet<_> = component.iter().map(|n| n.index()).collect();
-        for &node in inside.iter().filter(|&&node| read[node].from_the_past()) {
+        for &node in inside.iter().filter(|&&node| read[node].closes_loops()) {
             order.closing.insert(node);
             edges.retain_edges(|edges, edge| {
-                edges.edge_endpoints(edge).is_none_or(|(from, to)| to.index() != node || !inside.contains(&from.index()))
+                edges
+                    .edge_endpoints(edge)
+                    .is_none_or(|(from, to)| to.index() != node || !inside.contains(&from.index()))
             });
         }
     }
     for component in loops(&edges) {
         let path = path(&edges, &component);
         order.looping.extend(path.iter().copied());
-        let names = path.iter().chain(&path[..1]).map(|&node| graph.nodes[node].name.clone()).collect();
-        diagnostics.report(graph.nodes[path[0]].place, CompileProblem::Cycle { path: names });
+        let names = path
+            .iter()
+            .chain(&path[..1])
+            .map(|&node| graph.nodes[node].name.clone())
+            .collect();
+        diagnostics.report(
+            graph.nodes[path[0]].place,
+            CompileProblem::Cycle { path: names },
+        );
         order.looping.extend(component.iter().map(|n| n.index()));
     }
     order.nodes = sorted(&edges, &order.looping);
@@ -48,8 +57,12 @@ pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diag
 
 /// An edge from each node to those that read it.
 fn edges(graph: &GraphFile) -> DiGraph<(), ()> {
-    let position: HashMap<&str, usize> =
-        graph.nodes.iter().enumerate().map(|(position, node)| (node.name.as_str(), position)).collect();
+    let position: HashMap<&str, usize> = graph
+        .nodes
+        .iter()
+        .enumerate()
+        .map(|(position, node)| (node.name.as_str(), position))
+        .collect();
     let mut edges = DiGraph::with_capacity(graph.nodes.len(), graph.nodes.len());
     for _ in &graph.nodes {
         edges.add_node(());
@@ -57,7 +70,10 @@ fn edges(graph: &GraphFile) -> DiGraph<(), ()> {
     for (to, node) in graph.nodes.iter().enumerate() {
         let mut from = BTreeSet::new();
         for input in node.instances.iter().flat_map(|instance| &instance.inputs) {
-            let heads = input.references.iter().map(|(text, _)| Reference::parse(text).node);
+            let heads = input
+                .references
+                .iter()
+                .map(|(text, _)| Reference::parse(text).node);
             from.extend(heads.filter_map(|head| position.get(head).copied()));
         }
         for from in from {
@@ -119,8 +135,9 @@ fn sorted(edges: &DiGraph<(), ()>, looping: &BTreeSet<usize>) -> Vec<usize> {
                 .count()
         })
         .collect();
-    let mut ready: BTreeSet<usize> =
-        (0..waiting.len()).filter(|&node| waiting[node] == 0 && !looping.contains(&node)).collect();
+    let mut ready: BTreeSet<usize> = (0..waiting.len())
+        .filter(|&node| waiting[node] == 0 && !looping.contains(&node))
+        .collect();
     let mut sorted = Vec::with_capacity(waiting.len());
     while let Some(node) = ready.pop_first() {
         sorted.push(node);

@@ -122,7 +122,7 @@ pub enum PlannedRole {
         /// Whether it runs at every tick.
         every_tick: bool,
         /// Whether its inputs are taken after all outputs are there.
-        from_the_past: bool,
+        closes_loops: bool,
     },
     /// A prediction of a truth.
     Estimator {
@@ -178,7 +178,10 @@ pub struct TrainingLimits {
 
 impl TrainingLimits {
     /// No limits.
-    pub const NONE: Self = Self { below: f64::INFINITY, above: 0.0 };
+    pub const NONE: Self = Self {
+        below: f64::INFINITY,
+        above: 0.0,
+    };
 
     /// Whether a row of this truth takes part.
     #[must_use]

@@ -9,35 +9,85 @@ use crate::unit::Unit;
 #[allow(missing_docs)] // each variant's fields are the data of the sentence that `message` makes of them
 pub enum CompileProblem {
     /// A `type` that no linked crate brings.
-    UnknownKind { kind: String, known: Vec<&'static str> },
+    UnknownKind {
+        kind: String,
+        known: Vec<&'static str>,
+    },
     /// Two crates bring the same kind.
-    KindTwice { kind: String, packages: Vec<&'static str> },
+    KindTwice {
+        kind: String,
+        packages: Vec<&'static str>,
+    },
     /// A reference to a node or signal that is not there.
     UnknownNode { node: String, known: Vec<String> },
     /// A reference to a port that the node does not have.
-    UnknownPort { node: String, port: String, known: Vec<&'static str> },
+    UnknownPort {
+        node: String,
+        port: String,
+        known: Vec<&'static str>,
+    },
     /// A reference that matches no channel.
-    UnknownChannel { node: String, channel: String, known: Vec<String> },
+    UnknownChannel {
+        node: String,
+        channel: String,
+        known: Vec<String>,
+    },
     /// An input that the kind does not have.
-    UnknownInput { kind: &'static str, input: String, known: Vec<&'static str> },
+    UnknownInput {
+        kind: &'static str,
+        input: String,
+        known: Vec<&'static str>,
+    },
     /// An input that the kind needs and the node does not give.
-    MissingInput { kind: &'static str, input: &'static str, summary: &'static str },
+    MissingInput {
+        kind: &'static str,
+        input: &'static str,
+        summary: &'static str,
+    },
     /// An input with another number of channels than it takes.
-    ChannelCount { input: &'static str, found: Vec<String>, expected: &'static str },
+    ChannelCount {
+        input: &'static str,
+        found: Vec<String>,
+        expected: &'static str,
+    },
     /// Two things that must have the same unit.
-    Units { first: String, first_unit: Unit, second: String, second_unit: Unit },
+    Units {
+        first: String,
+        first_unit: Unit,
+        second: String,
+        second_unit: Unit,
+    },
     /// Two things that must summarise the same length of time.
-    Spans { first: String, first_span: Duration, second: String, second_span: Duration },
+    Spans {
+        first: String,
+        first_span: Duration,
+        second: String,
+        second_span: Duration,
+    },
     /// Two predictions that must have the same horizon.
-    Horizons { first: String, first_ahead: Duration, second: String, second_ahead: Duration },
+    Horizons {
+        first: String,
+        first_ahead: Duration,
+        second: String,
+        second_ahead: Duration,
+    },
     /// A loop without a delay.
     Cycle { path: Vec<String> },
     /// A regressor that contains part of the answer.
-    Leak { regressor: String, lag: Duration, truth: String, span: Duration, ahead: Duration },
+    Leak {
+        regressor: String,
+        lag: Duration,
+        truth: String,
+        span: Duration,
+        ahead: Duration,
+    },
     /// A held input whose age nothing bounds.
     NoMaxAge { channel: String, input: String },
     /// A mistake that the kind found.
-    Parameter { message: String, help: Option<String> },
+    Parameter {
+        message: String,
+        help: Option<String>,
+    },
     /// An estimator without a horizon.
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
@@ -58,7 +108,11 @@ pub enum CompileProblem {
 
 fn names<T: AsRef<str>>(known: &[T]) -> String {
     const MOST: usize = 12;
-    let shown: Vec<_> = known.iter().take(MOST).map(|name| format!("`{}`", name.as_ref())).collect();
+    let shown: Vec<_> = known
+        .iter()
+        .take(MOST)
+        .map(|name| format!("`{}`", name.as_ref()))
+        .collect();
     match known.len() {
         0 => "nothing".to_owned(),
         n if n > MOST => format!("{} and {} more", shown.join(", "), n - MOST),
@@ -113,39 +167,82 @@ impl Problem for CompileProblem {
         match self {
             Self::UnknownKind { kind, .. } => format!("there is no node type `{kind}`"),
             Self::KindTwice { kind, packages } => {
-                format!("the node type `{kind}` is brought by several crates: {}", names(packages))
+                format!(
+                    "the node type `{kind}` is brought by several crates: {}",
+                    names(packages)
+                )
             }
             Self::UnknownNode { node, .. } => format!("there is no node or signal `{node}`"),
             Self::UnknownPort { node, port, .. } => format!("`{node}` has no output port `{port}`"),
-            Self::UnknownChannel { node, channel, .. } => format!("`{node}` has no channel that matches `{channel}`"),
+            Self::UnknownChannel { node, channel, .. } => {
+                format!("`{node}` has no channel that matches `{channel}`")
+            }
             Self::UnknownInput { kind, input, .. } => format!("`{kind}` has no input `{input}`"),
             Self::MissingInput { kind, input, .. } => format!("`{kind}` needs the input `{input}`"),
-            Self::ChannelCount { input, found, expected } => {
-                format!("the input `{input}` takes {expected} and is given {}", found.len())
+            Self::ChannelCount {
+                input,
+                found,
+                expected,
+            } => {
+                format!(
+                    "the input `{input}` takes {expected} and is given {}",
+                    found.len()
+                )
             }
-            Self::Units { first, first_unit, second, second_unit } => {
+            Self::Units {
+                first,
+                first_unit,
+                second,
+                second_unit,
+            } => {
                 format!("`{first}` is in {first_unit} and `{second}` in {second_unit}")
             }
-            Self::Spans { first, first_span, second, second_span } => {
+            Self::Spans {
+                first,
+                first_span,
+                second,
+                second_span,
+            } => {
                 format!("`{first}` summarises {first_span} and `{second}` {second_span}")
             }
-            Self::Horizons { first, first_ahead, second, second_ahead } => {
+            Self::Horizons {
+                first,
+                first_ahead,
+                second,
+                second_ahead,
+            } => {
                 format!("`{first}` looks {first_ahead} ahead and `{second}` {second_ahead}")
             }
-            Self::Cycle { path } => format!("these nodes wait for each other: {}", path.join(" → ")),
-            Self::Leak { regressor, truth, .. } => {
-                format!("`{regressor}` contains part of the answer: it overlaps the value of `{truth}` that is predicted")
+            Self::Cycle { path } => {
+                format!("these nodes wait for each other: {}", path.join(" → "))
             }
-            Self::NoMaxAge { channel, .. } => format!("nothing says how long a value of `{channel}` counts"),
+            Self::Leak {
+                regressor, truth, ..
+            } => {
+                format!(
+                    "`{regressor}` contains part of the answer: it overlaps the value of `{truth}` that is predicted"
+                )
+            }
+            Self::NoMaxAge { channel, .. } => {
+                format!("nothing says how long a value of `{channel}` counts")
+            }
             Self::Parameter { message, .. } => message.clone(),
-            Self::NoHorizon { kind } => format!("`{kind}` needs to know how far `ahead` it predicts"),
-            Self::PredictedTruth { channel } => format!("`{channel}` is a prediction and cannot be the truth"),
+            Self::NoHorizon { kind } => {
+                format!("`{kind}` needs to know how far `ahead` it predicts")
+            }
+            Self::PredictedTruth { channel } => {
+                format!("`{channel}` is a prediction and cannot be the truth")
+            }
             Self::LimitUnit { found, expected } => {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
             Self::DuplicateName { name, what } => format!("there are two {what} named `{name}`"),
-            Self::UnusedNode { node } => format!("nothing that comes out depends on the node `{node}`"),
-            Self::UnusedSignal { signal } => format!("nothing that comes out depends on the signal `{signal}`"),
+            Self::UnusedNode { node } => {
+                format!("nothing that comes out depends on the node `{node}`")
+            }
+            Self::UnusedSignal { signal } => {
+                format!("nothing that comes out depends on the signal `{signal}`")
+            }
             Self::Unreachable { output } => format!("no signal reaches the output `{output}`"),
             Self::NoOutputs => "the graph has no outputs".to_owned(),
         }
@@ -182,42 +279,67 @@ impl Problem for CompileProblem {
     fn help(&self) -> Option<String> {
         Some(match self {
             Self::UnknownKind { kind, known } => or_known(kind, known, "types in this program:"),
-            Self::KindTwice { .. } => "leave one of the crates out when the program is built".to_owned(),
+            Self::KindTwice { .. } => {
+                "leave one of the crates out when the program is built".to_owned()
+            }
             Self::UnknownNode { node, known } => or_known(node, known, "the graph has"),
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
-            Self::UnknownChannel { channel, known, .. } => or_known(channel, known, "its channels are"),
+            Self::UnknownChannel { channel, known, .. } => {
+                or_known(channel, known, "its channels are")
+            }
             Self::UnknownInput { input, known, .. } => or_known(input, known, "its inputs are"),
-            Self::MissingInput { input, summary, .. } => format!("add `inputs.{input} = \"…\"`: {summary}"),
-            Self::ChannelCount { found, .. } => format!("the reference stands for {}", names(found)),
-            Self::Units { .. } => "give both in the same unit, with `unit = \"…\"` where they are computed".to_owned(),
+            Self::MissingInput { input, summary, .. } => {
+                format!("add `inputs.{input} = \"…\"`: {summary}")
+            }
+            Self::ChannelCount { found, .. } => {
+                format!("the reference stands for {}", names(found))
+            }
+            Self::Units { .. } => {
+                "give both in the same unit, with `unit = \"…\"` where they are computed".to_owned()
+            }
             Self::Spans { .. } => "compute both over windows of the same length".to_owned(),
             Self::Horizons { .. } => "give both the same `ahead`".to_owned(),
             Self::Cycle { .. } => "let the feedback go through a `delay` node".to_owned(),
-            Self::Leak { lag, span, ahead, .. } => {
+            Self::Leak {
+                lag, span, ahead, ..
+            } => {
                 let smallest = super::smallest_lag(*span, *ahead);
-                let smallest =
-                    if *span == Duration::ZERO && *ahead == Duration::ZERO { "one sample".to_owned() } else { smallest.to_string() };
+                let smallest = if *span == Duration::ZERO && *ahead == Duration::ZERO {
+                    "one sample".to_owned()
+                } else {
+                    smallest.to_string()
+                };
                 format!(
                     "the truth summarises {span} and is predicted {ahead} ahead, so the smallest lag allowed is {smallest} \
                      (here it is {lag})"
                 )
             }
             Self::NoMaxAge { input, .. } => {
-                format!("say `max_age` on the signal, or `inputs.{input} = {{ from = \"…\", max_age = \"1min\" }}`")
+                format!(
+                    "say `max_age` on the signal, or `inputs.{input} = {{ from = \"…\", max_age = \"1min\" }}`"
+                )
             }
             Self::Parameter { help, .. } => return help.clone(),
             Self::NoHorizon { .. } => {
                 "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor".to_owned()
             }
-            Self::PredictedTruth { .. } => "refer to something measured, such as the slope of a position".to_owned(),
+            Self::PredictedTruth { .. } => {
+                "refer to something measured, such as the slope of a position".to_owned()
+            }
             Self::LimitUnit { expected, .. } => format!("write the limit in {expected}"),
-            Self::DuplicateName { .. } => "give one of them another name, or refer to fewer channels".to_owned(),
+            Self::DuplicateName { .. } => {
+                "give one of them another name, or refer to fewer channels".to_owned()
+            }
             Self::UnusedNode { node } => {
-                format!("refer to it, name it under `[outputs]`, or remove it (`nodes.{node} = false`)")
+                format!(
+                    "refer to it, name it under `[outputs]`, or remove it (`nodes.{node} = false`)"
+                )
             }
             Self::UnusedSignal { .. } => "refer to it or remove it".to_owned(),
             Self::Unreachable { .. } => "check the inputs on the way to it".to_owned(),
-            Self::NoOutputs => "name what the graph is for: `[outputs]` and `predicted = \"NODE\"`".to_owned(),
+            Self::NoOutputs => {
+                "name what the graph is for: `[outputs]` and `predicted = \"NODE\"`".to_owned()
+            }
         })
     }
 }

@@ -20,10 +20,14 @@ impl Provenance {
     #[must_use]
     pub fn of<'a>(parts: impl IntoIterator<Item = (&'a Provenance, Duration)>) -> Self {
         let mut parts = parts.into_iter();
-        let Some((first, delay)) = parts.next() else { return Self::default() };
+        let Some((first, delay)) = parts.next() else {
+            return Self::default();
+        };
         let mut all = first.clone();
         if delay != Duration::ZERO {
-            Arc::make_mut(&mut all.0).values_mut().for_each(|d| *d = *d + delay);
+            Arc::make_mut(&mut all.0)
+                .values_mut()
+                .for_each(|d| *d += delay);
         }
         for (part, delay) in parts {
             if delay == Duration::ZERO && Arc::ptr_eq(&part.0, &all.0) {
@@ -59,7 +63,11 @@ pub(crate) const ONE_SAMPLE: Duration = Duration::from_ns(1);
 #[must_use]
 pub(crate) fn persistence_lag(span: Duration, ahead: Duration) -> Duration {
     let lag = smallest_lag(span, ahead);
-    if leaks(lag, span, ahead) { ONE_SAMPLE } else { lag }
+    if leaks(lag, span, ahead) {
+        ONE_SAMPLE
+    } else {
+        lag
+    }
 }
 
 /// Whether a value of the truth's signal, this much delayed, shares something with the predicted value.

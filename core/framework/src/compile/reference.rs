@@ -16,15 +16,31 @@ impl<'a> Reference<'a> {
     #[must_use]
     pub fn parse(text: &'a str) -> Self {
         let Some(end) = text.find(['.', ':']) else {
-            return Self { node: text, port: None, channel: None };
+            return Self {
+                node: text,
+                port: None,
+                channel: None,
+            };
         };
         let (node, rest) = (&text[..end], &text[end + 1..]);
         if text.as_bytes()[end] == b'.' {
-            return Self { node, port: None, channel: Some(rest) };
+            return Self {
+                node,
+                port: None,
+                channel: Some(rest),
+            };
         }
         match rest.split_once('.') {
-            Some((port, channel)) => Self { node, port: Some(port), channel: Some(channel) },
-            None => Self { node, port: Some(rest), channel: None },
+            Some((port, channel)) => Self {
+                node,
+                port: Some(port),
+                channel: Some(channel),
+            },
+            None => Self {
+                node,
+                port: Some(rest),
+                channel: None,
+            },
         }
     }
 }
@@ -47,7 +63,9 @@ fn choices(pattern: &str) -> Vec<String> {
     let mut done = Vec::new();
     let mut open = vec![pattern.to_owned()];
     while let Some(text) = open.pop() {
-        let group = text.find('{').and_then(|start| text[start..].find('}').map(|len| (start, start + len)));
+        let group = text
+            .find('{')
+            .and_then(|start| text[start..].find('}').map(|len| (start, start + len)));
         match group {
             Some((start, end)) if done.len() + open.len() < MOST => {
                 for choice in text[start + 1..end].split(',').rev() {
@@ -62,7 +80,8 @@ fn choices(pattern: &str) -> Vec<String> {
 
 /// Matching with backtracking to the last star only, which is enough and takes at most pattern × name steps.
 fn glob(pattern: &str, name: &str) -> bool {
-    let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
+    let (pattern, name): (Vec<char>, Vec<char>) =
+        (pattern.chars().collect(), name.chars().collect());
     let (mut p, mut n) = (0, 0);
     let mut star = None;
     while n < name.len() {
@@ -90,9 +109,15 @@ mod tests {
     #[test]
     fn the_first_dot_or_colon_ends_the_node_and_the_next_dot_ends_the_port() {
         let whole = Reference::parse("gradients:stderr.room@429.089s");
-        assert_eq!((whole.node, whole.port, whole.channel), ("gradients", Some("stderr"), Some("room@429.089s")));
+        assert_eq!(
+            (whole.node, whole.port, whole.channel),
+            ("gradients", Some("stderr"), Some("room@429.089s"))
+        );
         let channel = Reference::parse("gradients.room@429.089s");
-        assert_eq!((channel.node, channel.port, channel.channel), ("gradients", None, Some("room@429.089s")));
+        assert_eq!(
+            (channel.node, channel.port, channel.channel),
+            ("gradients", None, Some("room@429.089s"))
+        );
         assert_eq!(Reference::parse("vote").channel, None);
         assert_eq!(Reference::parse("vote:weights").port, Some("weights"));
     }

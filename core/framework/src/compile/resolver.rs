@@ -8,7 +8,9 @@ use indexmap::IndexSet;
 use serde::Deserialize;
 
 use super::order::Order;
-use super::plan::{Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel};
+use super::plan::{
+    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::scope::{Found, Scopes};
@@ -16,7 +18,9 @@ use super::{Wanted, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
-use crate::node::{InputPort, Inputs, Kind, Mistake, NodeSpec, OutputPort, Read, Role, RoleName, kinds};
+use crate::node::{
+    InputPort, Inputs, Kind, Mistake, NodeSpec, OutputPort, Read, Role, RoleName, kinds,
+};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -58,17 +62,24 @@ pub(crate) struct Limits {
 
 impl ReadNode {
     /// Whether the node takes its inputs for later ticks only.
-    pub(crate) fn from_the_past(&self) -> bool {
-        self.instances.iter().flatten().any(|instance| match instance.spec.role() {
-            Role::Feature(feature) => feature.from_the_past(),
-            _ => false,
-        })
+    pub(crate) fn closes_loops(&self) -> bool {
+        self.instances
+            .iter()
+            .flatten()
+            .any(|instance| match instance.spec.role() {
+                Role::Feature(feature) => feature.closes_loops(),
+                _ => false,
+            })
     }
 }
 
 /// Looks every node's kind up and reads its parameters.
 pub(crate) fn read_kinds(graph: &GraphFile, diagnostics: &mut Diagnostics) -> Vec<ReadNode> {
-    graph.nodes.iter().map(|node| read_node(node, diagnostics)).collect()
+    graph
+        .nodes
+        .iter()
+        .map(|node| read_node(node, diagnostics))
+        .collect()
 }
 
 fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
@@ -76,18 +87,27 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
         Some([kind]) => Some(*kind),
         Some(several) => {
             let packages = several.iter().map(|kind| kind.package).collect();
-            let problem = CompileProblem::KindTwice { kind: node.kind.clone(), packages };
+            let problem = CompileProblem::KindTwice {
+                kind: node.kind.clone(),
+                packages,
+            };
             diagnostics.report(node.kind_place, problem);
             None
         }
         None => {
-            let problem =
-                CompileProblem::UnknownKind { kind: node.kind.clone(), known: kinds().keys().copied().collect() };
+            let problem = CompileProblem::UnknownKind {
+                kind: node.kind.clone(),
+                known: kinds().keys().copied().collect(),
+            };
             diagnostics.report(node.kind_place, problem);
             None
         }
     };
-    let instances = node.instances.iter().map(|instance| read_instance(kind?, node, instance, diagnostics)).collect();
+    let instances = node
+        .instances
+        .iter()
+        .map(|instance| read_instance(kind?, node, instance, diagnostics))
+        .collect();
     ReadNode { kind, instances }
 }
 
@@ -98,7 +118,10 @@ fn read_instance(
     diagnostics: &mut Diagnostics,
 ) -> Option<ReadInstance> {
     let mut parameters = instance.parameters.clone();
-    let mut framework = Value { place: parameters.place, data: Data::Table(Table::new()) };
+    let mut framework = Value {
+        place: parameters.place,
+        data: Data::Table(Table::new()),
+    };
     if let (RoleName::Estimator, Data::Table(own), Data::Table(taken)) =
         (kind.role, &mut parameters.data, &mut framework.data)
     {
@@ -112,7 +135,10 @@ fn read_instance(
     diagnostics.within(context, |diagnostics| {
         let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
         let spec = (kind.read)(&parameters, diagnostics);
-        Some(ReadInstance { spec: Arc::from(spec?), estimator: estimator? })
+        Some(ReadInstance {
+            spec: Arc::from(spec?),
+            estimator: estimator?,
+        })
     })
 }
 
@@ -135,7 +161,8 @@ pub(crate) struct Instance<'a> {
 impl Instance<'_> {
     /// The place of an input, or of the node where the input is not given.
     pub(crate) fn input_place(&self, port: &str) -> Place {
-        self.input(port).map_or(self.node.place, |input| input.place)
+        self.input(port)
+            .map_or(self.node.place, |input| input.place)
     }
 
     pub(crate) fn input(&self, port: &str) -> Option<&InputDecl> {
@@ -144,10 +171,16 @@ impl Instance<'_> {
 
     /// The place of an element of a list among the parameters, or of the list.
     pub(crate) fn element_place(&self, key: &str, nth: usize) -> Place {
-        let Data::Table(table) = &self.decl.parameters.data else { return self.node.place };
-        let Some(list) = table.get(key) else { return self.node.place };
+        let Data::Table(table) = &self.decl.parameters.data else {
+            return self.node.place;
+        };
+        let Some(list) = table.get(key) else {
+            return self.node.place;
+        };
         match &list.data {
-            Data::List(elements) => elements.get(nth).map_or(list.place, |element| element.place),
+            Data::List(elements) => elements
+                .get(nth)
+                .map_or(list.place, |element| element.place),
             _ => list.place,
         }
     }
@@ -157,7 +190,9 @@ impl Instance<'_> {
         let mut place = self.node.place;
         let mut value = &self.decl.parameters;
         for key in path.split('.') {
-            let Data::Table(table) = &value.data else { break };
+            let Data::Table(table) = &value.data else {
+                break;
+            };
             let Some(entry) = table.get(key) else { break };
             (place, value) = (entry.place, entry);
         }
@@ -212,7 +247,12 @@ impl<'g> Resolver<'g> {
                     self.scopes.get_mut(&node.name).broken = true;
                     continue;
                 };
-                let instance = Instance { node, decl, kind, read: read.clone() };
+                let instance = Instance {
+                    node,
+                    decl,
+                    kind,
+                    read: read.clone(),
+                };
                 let before = self.nodes.len();
                 let context = context(node, decl);
                 let outer = self.diagnostics.scope(Some(context));
@@ -258,7 +298,11 @@ impl<'g> Resolver<'g> {
                 });
                 self.provenance.push(Provenance::source(slot));
                 let scope = self.scopes.get_mut(&signal.name);
-                scope.ports.entry("").or_default().insert(channel.clone(), slot);
+                scope
+                    .ports
+                    .entry("")
+                    .or_default()
+                    .insert(channel.clone(), slot);
             }
         }
     }
@@ -269,8 +313,11 @@ impl<'g> Resolver<'g> {
         for input in &instance.decl.inputs {
             if !ports.iter().any(|port| port.name == input.port) {
                 let known = ports.iter().map(|port| port.name).collect();
-                let problem =
-                    CompileProblem::UnknownInput { kind: instance.kind.name, input: input.port.clone(), known };
+                let problem = CompileProblem::UnknownInput {
+                    kind: instance.kind.name,
+                    input: input.port.clone(),
+                    known,
+                };
                 self.diagnostics.report(input.place, problem);
             }
         }
@@ -283,13 +330,20 @@ impl<'g> Resolver<'g> {
     }
 
     /// Looks up what an input refers to: slots in order, none for an optional input left out.
-    pub(crate) fn slots(&mut self, instance: &Instance<'_>, port: &InputPort) -> Option<Vec<usize>> {
+    pub(crate) fn slots(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+    ) -> Option<Vec<usize>> {
         let Some(input) = instance.input(port.name) else {
             if port.optional {
                 return Some(Vec::new());
             }
-            let problem =
-                CompileProblem::MissingInput { kind: instance.kind.name, input: port.name, summary: port.summary };
+            let problem = CompileProblem::MissingInput {
+                kind: instance.kind.name,
+                input: port.name,
+                summary: port.summary,
+            };
             self.diagnostics.report(instance.node.place, problem);
             return None;
         };
@@ -312,7 +366,7 @@ impl<'g> Resolver<'g> {
             }
             Ok(Found::Broken) => None,
             Err(problem) => {
-                self.diagnostics.report(place, problem);
+                self.diagnostics.report(place, *problem);
                 None
             }
         }
@@ -324,19 +378,38 @@ impl<'g> Resolver<'g> {
         if let [slot] = slots[..] {
             return Some(slot);
         }
-        let found = slots.iter().map(|&slot| self.channels[slot].name.clone()).collect();
-        let problem = CompileProblem::ChannelCount { input: port.name, found, expected: "one channel" };
-        self.diagnostics.report(instance.input_place(port.name), problem);
+        let found = slots
+            .iter()
+            .map(|&slot| self.channels[slot].name.clone())
+            .collect();
+        let problem = CompileProblem::ChannelCount {
+            input: port.name,
+            found,
+            expected: "one channel",
+        };
+        self.diagnostics
+            .report(instance.input_place(port.name), problem);
         None
     }
 
     /// How long a held value of each slot counts at an input.
-    pub(crate) fn max_age(&mut self, instance: &Instance<'_>, port: &str, slot: usize) -> Option<Duration> {
-        let stated = instance.input(port).and_then(|input| input.max_age).map(|(age, _)| age);
+    pub(crate) fn max_age(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &str,
+        slot: usize,
+    ) -> Option<Duration> {
+        let stated = instance
+            .input(port)
+            .and_then(|input| input.max_age)
+            .map(|(age, _)| age);
         let age = stated.or_else(|| self.channels[slot].channel.default_max_age());
         if age.is_none() {
             let channel = self.channels[slot].name.clone();
-            let problem = CompileProblem::NoMaxAge { channel, input: port.to_owned() };
+            let problem = CompileProblem::NoMaxAge {
+                channel,
+                input: port.to_owned(),
+            };
             self.diagnostics.report(instance.input_place(port), problem);
         }
         age
@@ -357,22 +430,42 @@ impl<'g> Resolver<'g> {
                     Read::Fresh => Some(Duration::ZERO),
                     Read::Held | Read::Truth => self.max_age(instance, port.name, slot),
                 };
-                entries.push(Entry { slot, lag, max_age: max_age? });
+                entries.push(Entry {
+                    slot,
+                    lag,
+                    max_age: max_age?,
+                });
                 if lag > Duration::ZERO {
                     let history = &mut self.channels[slot].history;
                     *history = Some(history.map_or(lag, |deepest| deepest.max(lag)));
                 }
             }
         }
-        let read = if port.read == Read::Fresh { Read::Fresh } else { Read::Held };
+        let read = if port.read == Read::Fresh {
+            Read::Fresh
+        } else {
+            Read::Held
+        };
         Some(self.gathers.insert_full(Gather { read, entries }).0)
     }
 
     /// The channels of slots, as kinds see them.
-    pub(crate) fn inputs(&self, instance: &Instance<'_>, ports: Vec<(InputPort, Vec<usize>)>) -> Inputs {
-        let channels = |slots: Vec<usize>| slots.into_iter().map(|slot| self.channels[slot].channel.clone()).collect();
+    pub(crate) fn inputs(
+        &self,
+        instance: &Instance<'_>,
+        ports: Vec<(InputPort, Vec<usize>)>,
+    ) -> Inputs {
+        let channels = |slots: Vec<usize>| {
+            slots
+                .into_iter()
+                .map(|slot| self.channels[slot].channel.clone())
+                .collect()
+        };
         Inputs {
-            ports: ports.into_iter().map(|(port, slots)| (port, channels(slots))).collect(),
+            ports: ports
+                .into_iter()
+                .map(|(port, slots)| (port, channels(slots)))
+                .collect(),
             member: instance.decl.member.clone(),
         }
     }
@@ -383,7 +476,10 @@ impl<'g> Resolver<'g> {
                 Some(port) => instance.input_place(port),
                 None => instance.parameter_place(&mistake.at),
             };
-            let problem = CompileProblem::Parameter { message: mistake.message, help: mistake.help };
+            let problem = CompileProblem::Parameter {
+                message: mistake.message,
+                help: mistake.help,
+            };
             self.diagnostics.report(place, problem);
         }
     }
@@ -426,8 +522,17 @@ impl<'g> Resolver<'g> {
                 });
                 self.provenance.push(behind.next().unwrap_or_default());
                 let scope = self.scopes.get_mut(&instance.node.name);
-                if scope.ports.entry(port.name).or_default().insert(outward.clone(), slot).is_some() {
-                    let problem = CompileProblem::DuplicateName { name: outward, what: "output channels" };
+                if scope
+                    .ports
+                    .entry(port.name)
+                    .or_default()
+                    .insert(outward.clone(), slot)
+                    .is_some()
+                {
+                    let problem = CompileProblem::DuplicateName {
+                        name: outward,
+                        what: "output channels",
+                    };
                     self.diagnostics.report(instance.node.place, problem);
                     whole = false;
                 }
@@ -450,8 +555,12 @@ impl<'g> Resolver<'g> {
     fn close(&mut self, index: usize, instance: &Instance<'_>) {
         let mut gathers = Vec::new();
         for port in (instance.kind.inputs)() {
-            let Some(slots) = self.slots(instance, port) else { return };
-            let Some(gather) = self.gather(instance, port, &slots, &[Duration::ZERO]) else { return };
+            let Some(slots) = self.slots(instance, port) else {
+                return;
+            };
+            let Some(gather) = self.gather(instance, port, &slots, &[Duration::ZERO]) else {
+                return;
+            };
             for (&from, to) in slots.iter().zip(self.nodes[index].slots.clone()) {
                 let (from, to) = (&self.channels[from], &self.channels[to]);
                 if from.channel.unit != to.channel.unit {
@@ -461,21 +570,29 @@ impl<'g> Resolver<'g> {
                         second: to.name.clone(),
                         second_unit: to.channel.unit.clone(),
                     };
-                    self.diagnostics.report(instance.input_place(port.name), problem);
+                    self.diagnostics
+                        .report(instance.input_place(port.name), problem);
                 }
             }
             if slots.len() != self.nodes[index].slots.len() {
-                let found = slots.iter().map(|&slot| self.channels[slot].name.clone()).collect();
+                let found = slots
+                    .iter()
+                    .map(|&slot| self.channels[slot].name.clone())
+                    .collect();
                 let problem = CompileProblem::ChannelCount {
                     input: port.name,
                     found,
                     expected: "one channel, since it closes a loop,",
                 };
-                self.diagnostics.report(instance.input_place(port.name), problem);
+                self.diagnostics
+                    .report(instance.input_place(port.name), problem);
             }
             gathers.push(gather);
         }
-        if let PlannedRole::Feature { gathers: planned, .. } = &mut self.nodes[index].role {
+        if let PlannedRole::Feature {
+            gathers: planned, ..
+        } = &mut self.nodes[index].role
+        {
             *planned = gathers;
         }
     }
@@ -487,13 +604,23 @@ impl<'g> Resolver<'g> {
         for output in &graph.outputs {
             for (text, place) in &output.from {
                 for slot in self.look_up(text, *place).unwrap_or_default() {
-                    let channel = self.channels[slot].name.split_once('.').map_or("", |(_, channel)| channel);
+                    let channel = self.channels[slot]
+                        .name
+                        .split_once('.')
+                        .map_or("", |(_, channel)| channel);
                     let name = format!("{}.{channel}", output.name);
                     if !names.insert(name.clone()) {
-                        let problem = CompileProblem::DuplicateName { name: name.clone(), what: "output columns" };
+                        let problem = CompileProblem::DuplicateName {
+                            name: name.clone(),
+                            what: "output columns",
+                        };
                         self.diagnostics.report(*place, problem);
                     }
-                    outputs.push(PlannedOutput { name, slot, blend: output.blend.clone() });
+                    outputs.push(PlannedOutput {
+                        name,
+                        slot,
+                        blend: output.blend.clone(),
+                    });
                 }
             }
         }

@@ -37,11 +37,14 @@ impl Scopes {
         self.scopes.entry(name.to_owned()).or_default()
     }
 
-    pub(crate) fn look_up(&self, text: &str) -> Result<Found, CompileProblem> {
+    pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
         let reference = Reference::parse(text);
         let Some(scope) = self.scopes.get(reference.node) else {
             let known = self.scopes.keys().cloned().collect();
-            return Err(CompileProblem::UnknownNode { node: reference.node.to_owned(), known });
+            return Err(Box::new(CompileProblem::UnknownNode {
+                node: reference.node.to_owned(),
+                known,
+            }));
         };
         if scope.broken {
             return Ok(Found::Broken);
@@ -51,26 +54,30 @@ impl Scopes {
             Some(port) => scope.ports.get(port),
         };
         let Some(channels) = port else {
-            return Err(CompileProblem::UnknownPort {
+            return Err(Box::new(CompileProblem::UnknownPort {
                 node: reference.node.to_owned(),
                 port: reference.port.unwrap_or_default().to_owned(),
                 known: scope.ports.keys().copied().collect(),
-            });
+            }));
         };
         let Some(pattern) = reference.channel else {
             return Ok(Found::Slots(channels.values().copied().collect()));
         };
         let slots: Vec<usize> = if is_pattern(pattern) {
-            channels.iter().filter(|(name, _)| matches(pattern, name)).map(|(_, &slot)| slot).collect()
+            channels
+                .iter()
+                .filter(|(name, _)| matches(pattern, name))
+                .map(|(_, &slot)| slot)
+                .collect()
         } else {
             channels.get(pattern).into_iter().copied().collect()
         };
         if slots.is_empty() {
-            return Err(CompileProblem::UnknownChannel {
+            return Err(Box::new(CompileProblem::UnknownChannel {
                 node: reference.node.to_owned(),
                 channel: pattern.to_owned(),
                 known: channels.keys().cloned().collect(),
-            });
+            }));
         }
         Ok(Found::Slots(slots))
     }

@@ -16,17 +16,33 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
     let mut gathered = HashSet::new();
     let mut late = Vec::new();
     for (index, node) in plan.nodes.iter().enumerate() {
-        let from_the_past = matches!(node.role, PlannedRole::Feature { from_the_past: true, .. });
+        let closes_loops = matches!(
+            node.role,
+            PlannedRole::Feature {
+                closes_loops: true,
+                ..
+            }
+        );
         let gathers = gathers(&node.role);
-        if from_the_past {
+        if closes_loops {
             late.push((index, gathers));
         } else {
-            steps.extend(gathers.into_iter().filter(|&gather| gathered.insert(gather)).map(Step::Gather));
+            steps.extend(
+                gathers
+                    .into_iter()
+                    .filter(|&gather| gathered.insert(gather))
+                    .map(Step::Gather),
+            );
         }
         steps.push(Step::Run(index));
     }
     for (index, gathers) in late {
-        steps.extend(gathers.into_iter().filter(|&gather| gathered.insert(gather)).map(Step::Gather));
+        steps.extend(
+            gathers
+                .into_iter()
+                .filter(|&gather| gathered.insert(gather))
+                .map(Step::Gather),
+        );
         steps.push(Step::Capture(index));
     }
     steps
@@ -34,20 +50,27 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
 
 fn gathers(role: &PlannedRole) -> Vec<usize> {
     match role {
-        PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => gathers.clone(),
+        PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
+            gathers.clone()
+        }
         PlannedRole::Combiner { voters, .. } => vec![*voters],
     }
 }
 
 /// Notes which ports of features somebody reads. The first is always computed.
 pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wanted) {
-    let truths: BTreeSet<usize> = plan.nodes.iter().filter_map(|node| truth(&node.role)).collect();
+    let truths: BTreeSet<usize> = plan
+        .nodes
+        .iter()
+        .filter_map(|node| truth(&node.role))
+        .collect();
     for node in &mut plan.nodes {
         let is_truth = truths.range(node.slots.clone()).next().is_some();
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
                 let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
-                ports[index] = index == 0 || error_of_truth || read.range(slots.clone()).next().is_some();
+                ports[index] =
+                    index == 0 || error_of_truth || read.range(slots.clone()).next().is_some();
             }
         }
     }
@@ -70,9 +93,14 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
     let fed = fed(plan);
     for output in &graph.outputs {
         let prefix = format!("{}.", output.name);
-        let of_it = plan.outputs.iter().filter(|column| column.name.starts_with(&prefix));
+        let of_it = plan
+            .outputs
+            .iter()
+            .filter(|column| column.name.starts_with(&prefix));
         if let Some(dry) = of_it.into_iter().find(|column| !fed.contains(&column.slot)) {
-            let problem = CompileProblem::Unreachable { output: dry.name.clone() };
+            let problem = CompileProblem::Unreachable {
+                output: dry.name.clone(),
+            };
             diagnostics.report(output.place, problem);
         }
     }
@@ -83,16 +111,31 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         .filter(|node| used.range(node.slots.clone()).next().is_some())
         .map(|node| node.name.as_str())
         .collect();
-    for node in graph.nodes.iter().filter(|node| !used_nodes.contains(node.name.as_str())) {
+    for node in graph
+        .nodes
+        .iter()
+        .filter(|node| !used_nodes.contains(node.name.as_str()))
+    {
         if !node.instances.is_empty() {
-            diagnostics.report(node.place, CompileProblem::UnusedNode { node: node.name.clone() });
+            diagnostics.report(
+                node.place,
+                CompileProblem::UnusedNode {
+                    node: node.name.clone(),
+                },
+            );
         }
     }
     for signal in &graph.signals {
         let prefix = format!("{}.", signal.name);
-        let is_used = |slot: &usize| used.contains(slot) && plan.channels[*slot].name.starts_with(&prefix);
+        let is_used =
+            |slot: &usize| used.contains(slot) && plan.channels[*slot].name.starts_with(&prefix);
         if !(0..plan.sources.len()).any(|slot| is_used(&slot)) {
-            diagnostics.report(signal.place, CompileProblem::UnusedSignal { signal: signal.name.clone() });
+            diagnostics.report(
+                signal.place,
+                CompileProblem::UnusedSignal {
+                    signal: signal.name.clone(),
+                },
+            );
         }
     }
 }
@@ -100,7 +143,9 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
 /// The slots that a node reads, with its truth.
 fn reads(plan: &Plan, node: usize) -> impl Iterator<Item = usize> + '_ {
     let role = &plan.nodes[node].role;
-    let data = gathers(role).into_iter().flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
+    let data = gathers(role)
+        .into_iter()
+        .flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
     data.chain(truth(role))
 }
 
@@ -130,10 +175,10 @@ fn used(plan: &Plan) -> BTreeSet<usize> {
         if !used.insert(slot) {
             continue;
         }
-        if let Some(node) = plan.channels[slot].node {
-            if seen.insert(node) {
-                open.extend(reads(plan, node));
-            }
+        if let Some(node) = plan.channels[slot].node
+            && seen.insert(node)
+        {
+            open.extend(reads(plan, node));
         }
     }
     used

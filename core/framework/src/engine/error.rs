@@ -47,15 +47,25 @@ impl fmt::Display for EngineError {
                 last.as_ns()
             ),
             Self::WrongWidth { found, expected } => {
-                write!(f, "{found} values were given and the graph has {expected} measured channels")
+                write!(
+                    f,
+                    "{found} values were given and the graph has {expected} measured channels"
+                )
             }
-            Self::UnknownRegressor { node, regressor, known } => write!(
+            Self::UnknownRegressor {
+                node,
+                regressor,
+                known,
+            } => write!(
                 f,
                 "the fit of `{node}` uses `{regressor}`, which the node does not have (it has {}): fit the graph again",
                 known.join(", ")
             ),
             Self::NotAnEstimator { node } => {
-                write!(f, "the model has a fit for `{node}`, which is no estimator of its graph: fit the graph again")
+                write!(
+                    f,
+                    "the model has a fit for `{node}`, which is no estimator of its graph: fit the graph again"
+                )
             }
         }
     }

@@ -27,21 +27,44 @@ impl Estimate {
         predictor: Arc<dyn Predictor>,
         widths: &[usize],
     ) -> Result<Self, EngineError> {
-        let PlannedRole::Estimator { regressors, gathers, .. } = &node.role else {
-            return Err(EngineError::NotAnEstimator { node: node.instance() });
+        let PlannedRole::Estimator {
+            regressors,
+            gathers,
+            ..
+        } = &node.role
+        else {
+            return Err(EngineError::NotAnEstimator {
+                node: node.instance(),
+            });
         };
-        let places: Vec<_> =
-            gathers.iter().flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place))).collect();
-        let place = |name: &String| match regressors.iter().position(|regressor| regressor.name == *name) {
+        let places: Vec<_> = gathers
+            .iter()
+            .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
+            .collect();
+        let place = |name: &String| match regressors
+            .iter()
+            .position(|regressor| regressor.name == *name)
+        {
             Some(index) => Ok(places[index]),
             None => Err(EngineError::UnknownRegressor {
                 node: node.instance(),
                 regressor: name.clone(),
-                known: regressors.iter().map(|regressor| regressor.name.clone()).collect(),
+                known: regressors
+                    .iter()
+                    .map(|regressor| regressor.name.clone())
+                    .collect(),
             }),
         };
-        let places = predictor.uses().iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { row: vec![0.0; places.len()], predictor, places })
+        let places = predictor
+            .uses()
+            .iter()
+            .map(place)
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            row: vec![0.0; places.len()],
+            predictor,
+            places,
+        })
     }
 
     /// The prediction and its stamp, the oldest among the values used; none where one of them is missing.
@@ -57,6 +80,8 @@ impl Estimate {
             oldest = Some(oldest.map_or(stamp, |o: Instant| o.min(stamp)));
         }
         let prediction = self.predictor.predict(&self.row);
-        prediction.is_finite().then_some((prediction, oldest.unwrap_or(now)))
+        prediction
+            .is_finite()
+            .then_some((prediction, oldest.unwrap_or(now)))
     }
 }

@@ -31,12 +31,21 @@ impl Gathered {
     }
 
     /// Reads the slots as they stand now.
-    pub(crate) fn read(&mut self, gather: &Gather, slots: &Slots, histories: &[Option<History>], now: Instant) {
+    pub(crate) fn read(
+        &mut self,
+        gather: &Gather,
+        slots: &Slots,
+        histories: &[Option<History>],
+        now: Instant,
+    ) {
         self.fresh = false;
         for (i, entry) in gather.entries.iter().enumerate() {
             let (value, stamp) = if entry.lag > Duration::ZERO {
-                let history = histories[entry.slot].as_ref().expect("a slot that is read with a lag has a history");
-                let (value, stamp) = history.at(now - entry.lag, entry.max_age, &mut self.cursors[i]);
+                let history = histories[entry.slot]
+                    .as_ref()
+                    .expect("a slot that is read with a lag has a history");
+                let (value, stamp) =
+                    history.at(now - entry.lag, entry.max_age, &mut self.cursors[i]);
                 (value, stamp + entry.lag)
             } else {
                 let (value, stamp) = (slots.values[entry.slot], slots.stamps[entry.slot]);
@@ -44,7 +53,9 @@ impl Gathered {
                 self.fresh |= new;
                 match gather.read {
                     Read::Fresh if slots.written[entry.slot] != slots.tick => (UNCHANGED, stamp),
-                    Read::Held | Read::Truth if !value.is_nan() && now - stamp > entry.max_age => (ABSENT, stamp),
+                    Read::Held | Read::Truth if !value.is_nan() && now - stamp > entry.max_age => {
+                        (ABSENT, stamp)
+                    }
                     _ => (value, stamp),
                 }
             };
@@ -55,7 +66,11 @@ impl Gathered {
 
     /// The oldest stamp among the values that are there.
     pub(crate) fn oldest(&self) -> Option<Instant> {
-        let present = self.values.iter().zip(&self.stamps).filter(|(value, _)| !value.is_nan());
+        let present = self
+            .values
+            .iter()
+            .zip(&self.stamps)
+            .filter(|(value, _)| !value.is_nan());
         present.map(|(_, &stamp)| stamp).min()
     }
 

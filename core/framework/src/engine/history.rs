@@ -29,12 +29,20 @@ pub(crate) type Cursor = u64;
 impl History {
     /// A history that can be asked for instants up to `depth` back.
     pub(crate) fn new(depth: Duration) -> Self {
-        Self { depth, entries: VecDeque::new(), dropped: 0 }
+        Self {
+            depth,
+            entries: VecDeque::new(),
+            dropped: 0,
+        }
     }
 
     /// Writes down what the slot holds from `at` on; NaN where a run gave nothing.
     pub(crate) fn push(&mut self, at: Instant, value: f64, stamp: Instant) {
-        while self.entries.get(1).is_some_and(|next| next.at <= at - self.depth) {
+        while self
+            .entries
+            .get(1)
+            .is_some_and(|next| next.at <= at - self.depth)
+        {
             self.entries.pop_front();
             self.dropped += 1;
         }
@@ -48,7 +56,9 @@ impl History {
             *cursor += 1;
         }
         match cursor.checked_sub(1).and_then(|last| self.entry(last)) {
-            Some(past) if past.value.is_nan() || at - past.stamp <= max_age => (past.value, past.stamp),
+            Some(past) if past.value.is_nan() || at - past.stamp <= max_age => {
+                (past.value, past.stamp)
+            }
             Some(past) => (ABSENT, past.stamp),
             None if self.entries.is_empty() => (ABSENT, at),
             None => (COLD, at),

@@ -37,6 +37,10 @@ pub struct Engine {
     slots: Slots,
     gathered: Vec<Gathered>,
     histories: Vec<Option<History>>,
+    /// The slots that have a history.
+    recorded: Vec<usize>,
+    /// The nodes that are told truths.
+    voting: Vec<usize>,
     nodes: Vec<Running>,
     last: Instant,
     /// Set between a segment break and the first tick after it: the last instant before the break.
@@ -47,8 +51,16 @@ pub struct Engine {
 }
 
 enum Running {
-    Operator { operator: Box<dyn Operator>, gathers: Vec<usize>, every_tick: bool, from_the_past: bool },
-    Estimate { estimate: Option<Estimate>, trigger: Option<usize> },
+    Operator {
+        operator: Box<dyn Operator>,
+        gathers: Vec<usize>,
+        every_tick: bool,
+        closes_loops: bool,
+    },
+    Estimate {
+        estimate: Option<Estimate>,
+        trigger: Option<usize>,
+    },
     Vote(Vote),
 }
 
@@ -58,32 +70,60 @@ impl Engine {
     /// # Errors
     /// When something fitted does not belong to the plan.
     pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
-        let widths: Vec<_> = plan.gathers.iter().map(|gather| gather.entries.len()).collect();
+        let widths: Vec<_> = plan
+            .gathers
+            .iter()
+            .map(|gather| gather.entries.len())
+            .collect();
         let mut nodes = Vec::with_capacity(plan.nodes.len());
         let mut used = 0;
         for node in &plan.nodes {
             nodes.push(match (&node.role, node.spec.role()) {
-                (PlannedRole::Feature { inputs, gathers, wanted, every_tick, from_the_past }, Role::Feature(spec)) => {
-                    Running::Operator {
-                        operator: spec.build(inputs, wanted),
-                        gathers: gathers.clone(),
-                        every_tick: *every_tick,
-                        from_the_past: *from_the_past,
-                    }
-                }
-                (PlannedRole::Estimator { regressors, gathers, every_tick, .. }, Role::Estimator(spec)) => {
+                (
+                    PlannedRole::Feature {
+                        inputs,
+                        gathers,
+                        wanted,
+                        every_tick,
+                        closes_loops,
+                    },
+                    Role::Feature(spec),
+                ) => Running::Operator {
+                    operator: spec.build(inputs, wanted),
+                    gathers: gathers.clone(),
+                    every_tick: *every_tick,
+                    closes_loops: *closes_loops,
+                },
+                (
+                    PlannedRole::Estimator {
+                        regressors,
+                        gathers,
+                        every_tick,
+                        ..
+                    },
+                    Role::Estimator(spec),
+                ) => {
                     let given = fitted.get(&node.instance());
                     used += usize::from(given.is_some());
-                    let names: Vec<_> = regressors.iter().map(|regressor| regressor.name.clone()).collect();
+                    let names: Vec<_> = regressors
+                        .iter()
+                        .map(|regressor| regressor.name.clone())
+                        .collect();
                     let predictor = given.cloned().or_else(|| spec.fixed(&names).map(Arc::from));
                     Running::Estimate {
-                        estimate: predictor.map(|p| Estimate::new(node, p, &widths)).transpose()?,
-                        trigger: if *every_tick { None } else { gathers.first().copied() },
+                        estimate: predictor
+                            .map(|p| Estimate::new(node, p, &widths))
+                            .transpose()?,
+                        trigger: if *every_tick {
+                            None
+                        } else {
+                            gathers.first().copied()
+                        },
                     }
                 }
-                (PlannedRole::Combiner { voters, truth }, Role::Combiner(spec)) => {
-                    Running::Vote(Vote::new(spec.build(widths[*voters]), widths[*voters], *truth))
-                }
+                (PlannedRole::Combiner { voters, truth }, Role::Combiner(spec)) => Running::Vote(
+                    Vote::new(spec.build(widths[*voters]), widths[*voters], *truth),
+                ),
                 _ => unreachable!("a plan gives each node the role of its specification"),
             });
         }
@@ -97,10 +137,19 @@ impl Engine {
             let node = fitted.keys().find(known).cloned().unwrap_or_default();
             return Err(EngineError::NotAnEstimator { node });
         }
+        let votes =
+            |&node: &usize| matches!(&nodes[node], Running::Vote(vote) if vote.truth().is_some());
+        let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
+            recorded: (0..plan.channels.len()).filter(with_history).collect(),
+            voting: (0..nodes.len()).filter(votes).collect(),
             slots: Slots::new(plan.channels.len()),
             gathered: plan.gathers.iter().map(Gathered::new).collect(),
-            histories: plan.channels.iter().map(|channel| channel.history.map(History::new)).collect(),
+            histories: plan
+                .channels
+                .iter()
+                .map(|channel| channel.history.map(History::new))
+                .collect(),
             nodes,
             last: Instant::MIN,
             before_break: None,
@@ -126,11 +175,17 @@ impl Engine {
     /// A time that is not after the last one, or another number of samples: the engine is as it was, and counts it.
     pub fn step(&mut self, time: Instant, samples: &[f64]) -> Result<&[f64], EngineError> {
         if samples.len() != self.plan.sources.len() {
-            return Err(EngineError::WrongWidth { found: samples.len(), expected: self.plan.sources.len() });
+            return Err(EngineError::WrongWidth {
+                found: samples.len(),
+                expected: self.plan.sources.len(),
+            });
         }
         if time <= self.last {
             self.refused += 1;
-            return Err(EngineError::NotAfter { time, last: self.last });
+            return Err(EngineError::NotAfter {
+                time,
+                last: self.last,
+            });
         }
         if let Some(before) = self.before_break.take() {
             self.shift_votes(time - before);
@@ -142,7 +197,12 @@ impl Engine {
         for step in &plan.steps {
             match *step {
                 Step::Gather(gather) => {
-                    self.gathered[gather].read(&plan.gathers[gather], &self.slots, &self.histories, time);
+                    self.gathered[gather].read(
+                        &plan.gathers[gather],
+                        &self.slots,
+                        &self.histories,
+                        time,
+                    );
                 }
                 Step::Run(node) => self.run(&plan, node, time),
                 Step::Capture(node) => self.capture(node, time),
@@ -150,7 +210,11 @@ impl Engine {
         }
         self.remember(time);
         for (value, output) in self.outputs.iter_mut().zip(&plan.outputs) {
-            *value = if self.slots.ran(output.slot) { self.slots.values[output.slot] } else { f64::NAN };
+            *value = if self.slots.ran(output.slot) {
+                self.slots.values[output.slot]
+            } else {
+                f64::NAN
+            };
         }
         Ok(&self.outputs)
     }
@@ -195,7 +259,11 @@ impl Engine {
     /// The value that a slot was given at the present tick; NaN where its node did not run or gave nothing.
     #[must_use]
     pub fn value(&self, slot: usize) -> f64 {
-        if self.slots.ran(slot) { self.slots.values[slot] } else { f64::NAN }
+        if self.slots.ran(slot) {
+            self.slots.values[slot]
+        } else {
+            f64::NAN
+        }
     }
 
     /// The stamp of a slot's last value.
@@ -226,27 +294,48 @@ impl Engine {
     fn run(&mut self, plan: &Plan, index: usize, now: Instant) {
         let node = &plan.nodes[index];
         match &mut self.nodes[index] {
-            Running::Operator { operator, gathers, every_tick, from_the_past } => {
+            Running::Operator {
+                operator,
+                gathers,
+                every_tick,
+                closes_loops,
+            } => {
                 let inputs = &self.gathered;
                 if !*every_tick && !gathers.iter().any(|&gather| inputs[gather].fresh) {
                     return;
                 }
-                let stamps = gathers.iter().filter_map(|&gather| inputs[gather].oldest()).min();
+                let stamps = gathers
+                    .iter()
+                    .filter_map(|&gather| inputs[gather].oldest())
+                    .min();
                 let range = node.slots.clone();
                 let mut outputs = Outputs {
                     values: &mut self.slots.values[range.clone()],
                     stamps: &mut self.slots.stamps[range.clone()],
                     written: &mut self.slots.written[range],
                     tick: self.slots.tick,
-                    default_stamp: if *from_the_past { now } else { stamps.unwrap_or(now) },
+                    default_stamp: if *closes_loops {
+                        now
+                    } else {
+                        stamps.unwrap_or(now)
+                    },
                 };
-                operator.step(&Tick { now, gathered: inputs, ports: gathers }, &mut outputs);
+                operator.step(
+                    &Tick {
+                        now,
+                        gathered: inputs,
+                        ports: gathers,
+                    },
+                    &mut outputs,
+                );
             }
             Running::Estimate { estimate, trigger } => {
                 if trigger.is_some_and(|gather| !self.gathered[gather].fresh) {
                     return;
                 }
-                let prediction = estimate.as_mut().and_then(|estimate| estimate.run(&self.gathered, now));
+                let prediction = estimate
+                    .as_mut()
+                    .and_then(|estimate| estimate.run(&self.gathered, now));
                 let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
                 self.slots.set(node.slots.start, value, stamp);
             }
@@ -264,27 +353,33 @@ impl Engine {
     }
 
     fn capture(&mut self, index: usize, now: Instant) {
-        if let Running::Operator { operator, gathers, .. } = &mut self.nodes[index] {
-            operator.capture(&Tick { now, gathered: &self.gathered, ports: gathers });
+        if let Running::Operator {
+            operator, gathers, ..
+        } = &mut self.nodes[index]
+        {
+            operator.capture(&Tick {
+                now,
+                gathered: &self.gathered,
+                ports: gathers,
+            });
         }
     }
 
     /// Writes down what later ticks will ask for, and tells truths, now that all outputs of the tick are there.
     fn remember(&mut self, now: Instant) {
-        for (slot, history) in self.histories.iter_mut().enumerate() {
-            if let Some(history) = history {
-                if self.slots.ran(slot) {
-                    history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
-                }
+        for &slot in &self.recorded {
+            if let Some(history) = &mut self.histories[slot]
+                && self.slots.ran(slot)
+            {
+                history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
             }
         }
-        for node in &mut self.nodes {
-            if let Running::Vote(vote) = node {
-                if let Some(slot) = vote.truth() {
-                    if self.slots.fresh(slot) {
-                        vote.observe(self.slots.values[slot], now);
-                    }
-                }
+        for &node in &self.voting {
+            if let Running::Vote(vote) = &mut self.nodes[node]
+                && let Some(slot) = vote.truth()
+                && self.slots.fresh(slot)
+            {
+                vote.observe(self.slots.values[slot], now);
             }
         }
     }

@@ -85,7 +85,11 @@ impl Pairing {
             return None;
         }
         let row = &self.rows[self.first * self.width..(self.first + 1) * self.width];
-        Some(Paired { at, number: self.number, row })
+        Some(Paired {
+            at,
+            number: self.number,
+            row,
+        })
     }
 
     /// The run that the last truth was paired with.
@@ -131,7 +135,12 @@ mod tests {
     }
 
     fn link(ahead: i64, limit: i64) -> TruthLink {
-        TruthLink { slot: 0, ahead: d(ahead), span: d(limit), limit: d(limit) }
+        TruthLink {
+            slot: 0,
+            ahead: d(ahead),
+            span: d(limit),
+            limit: d(limit),
+        }
     }
 
     #[test]
@@ -166,7 +175,10 @@ mod tests {
         assert!(pairing.truth(s(0)).is_none());
         pairing.run(s(0), [&[1.0][..], &[2.0][..]]);
         assert!(pairing.truth(s(299)).is_none());
-        assert_eq!(pairing.truth(s(300)).map(|p| p.row.to_vec()), Some(vec![1.0, 2.0]));
+        assert_eq!(
+            pairing.truth(s(300)).map(|p| p.row.to_vec()),
+            Some(vec![1.0, 2.0])
+        );
     }
 
     #[test]

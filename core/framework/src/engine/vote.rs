@@ -60,7 +60,9 @@ impl Vote {
 
     /// Takes a truth that has just been measured.
     pub(crate) fn observe(&mut self, truth: f64, now: Instant) {
-        let Some(learning) = &mut self.learning else { return };
+        let Some(learning) = &mut self.learning else {
+            return;
+        };
         if let Some(paired) = learning.pairing.truth(now) {
             learning.withheld.push_back((now, truth));
             learning.votes.extend(paired.row);
@@ -90,7 +92,10 @@ impl Learning {
             }
             self.withheld.pop_front();
             for vote in &mut self.row {
-                *vote = self.votes.pop_front().expect("as many votes are withheld as truths times voters");
+                *vote = self
+                    .votes
+                    .pop_front()
+                    .expect("as many votes are withheld as truths times voters");
             }
             combine.observe(Votes(&self.row), truth, arrived);
         }

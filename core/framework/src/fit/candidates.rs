@@ -15,7 +15,11 @@ pub(super) struct Validity {
 
 impl Validity {
     pub(super) fn new(candidates: usize) -> Self {
-        Self { rows: 0, present: vec![0; candidates], cold: vec![0; candidates] }
+        Self {
+            rows: 0,
+            present: vec![0; candidates],
+            cold: vec![0; candidates],
+        }
     }
 
     /// Counts one row, given in parts.
@@ -30,12 +34,18 @@ impl Validity {
     /// The share of rows in which a candidate had a value, those with a cold window not counted.
     pub(super) fn share(&self, candidate: usize) -> f64 {
         let warm = self.rows - self.cold[candidate];
-        if warm == 0 { 0.0 } else { self.present[candidate] as f64 / warm as f64 }
+        if warm == 0 {
+            0.0
+        } else {
+            self.present[candidate] as f64 / warm as f64
+        }
     }
 
     /// The candidates that are kept.
     pub(super) fn kept(&self) -> Vec<usize> {
-        (0..self.present.len()).filter(|&candidate| self.share(candidate) >= NEEDED).collect()
+        (0..self.present.len())
+            .filter(|&candidate| self.share(candidate) >= NEEDED)
+            .collect()
     }
 }
 

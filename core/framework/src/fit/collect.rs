@@ -18,7 +18,10 @@ pub(super) struct Share {
 
 impl Share {
     pub(super) fn all() -> Self {
-        Self { within: 0..u64::MAX, without: Vec::new() }
+        Self {
+            within: 0..u64::MAX,
+            without: Vec::new(),
+        }
     }
 
     fn contains(&self, tick: u64) -> bool {
@@ -78,17 +81,34 @@ impl Collector {
         let mut known = BTreeMap::new();
         let mut trainees = Vec::new();
         for &node in nodes {
-            let PlannedRole::Estimator { regressors, gathers, every_tick, truth, training } = &plan.nodes[node].role
+            let PlannedRole::Estimator {
+                regressors,
+                gathers,
+                every_tick,
+                truth,
+                training,
+            } = &plan.nodes[node].role
             else {
                 unreachable!("only estimators are trained")
             };
-            let trigger = if *every_tick { None } else { gathers.first().copied() };
+            let trigger = if *every_tick {
+                None
+            } else {
+                gathers.first().copied()
+            };
             let shared = |&gather: &usize| {
                 let key = (gather, trigger, truth.ahead, truth.limit);
                 *known.entry(key).or_insert_with(|| {
                     let width = plan.gathers[gather].entries.len();
                     let pairing = Pairing::new(truth, width);
-                    taps.push(Tap { gather, trigger, pairing, width, kept: Vec::new(), last_kept: None });
+                    taps.push(Tap {
+                        gather,
+                        trigger,
+                        pairing,
+                        width,
+                        kept: Vec::new(),
+                        last_kept: None,
+                    });
                     taps.len() - 1
                 })
             };
@@ -105,7 +125,14 @@ impl Collector {
                 segment_pending: false,
             });
         }
-        Self { taps, trainees, memory, bytes: 0, overflowed: false, tick: 0 }
+        Self {
+            taps,
+            trainees,
+            memory,
+            bytes: 0,
+            overflowed: false,
+            tick: 0,
+        }
     }
 
     /// Begins another pass over the data, whose examples come after those of the passes before.
@@ -115,7 +142,13 @@ impl Collector {
     }
 
     /// Looks at what a tick did. With `live`, examples go there as they come; otherwise they are kept while they fit.
-    pub(super) fn look<S: Sink>(&mut self, engine: &Engine, event: Event, share: &Share, mut live: Option<&mut [S]>) {
+    pub(super) fn look<S: Sink>(
+        &mut self,
+        engine: &Engine,
+        event: Event,
+        share: &Share,
+        mut live: Option<&mut [S]>,
+    ) {
         let Event::Row(now) = event else {
             self.segment();
             return;
@@ -135,7 +168,11 @@ impl Collector {
             }
             let Self { taps, trainees, .. } = self;
             let trainee = &mut trainees[index];
-            if trainee.taps.iter().any(|&tap| taps[tap].pairing.truth(now).is_none()) {
+            if trainee
+                .taps
+                .iter()
+                .any(|&tap| taps[tap].pairing.truth(now).is_none())
+            {
                 trainee.dropped.without_run += 1;
             } else if !trainee.limits.admits(truth) {
                 trainee.dropped.outside_limits += 1;
@@ -172,7 +209,9 @@ impl Collector {
     fn keep(&mut self, index: usize, truth: f64) {
         let Self { taps, trainees, .. } = self;
         let trainee = &mut trainees[index];
-        trainee.validity.count(trainee.taps.iter().map(|&tap| taps[tap].pairing.last()));
+        trainee
+            .validity
+            .count(trainee.taps.iter().map(|&tap| taps[tap].pairing.last()));
         if self.overflowed {
             return;
         }
@@ -189,7 +228,8 @@ impl Collector {
                 tap.kept.extend_from_slice(tap.pairing.last());
                 self.bytes += tap.width * size_of::<f64>();
             }
-            let row = u32::try_from(tap.kept.len() / tap.width.max(1) - usize::from(tap.width > 0)).unwrap_or(u32::MAX);
+            let row = u32::try_from(tap.kept.len() / tap.width.max(1) - usize::from(tap.width > 0))
+                .unwrap_or(u32::MAX);
             trainee.rows.push(row);
             self.bytes += size_of::<u32>();
         }

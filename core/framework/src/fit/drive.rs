@@ -23,7 +23,10 @@ pub(crate) fn drive(
     let plan = std::sync::Arc::clone(engine.plan());
     let mut values = vec![f64::NAN; plan.sources.len()];
     let mut rows = recording.open(&plan)?;
-    let mut passed = Passed { segments: 1, ..Passed::default() };
+    let mut passed = Passed {
+        segments: 1,
+        ..Passed::default()
+    };
     while let Some(event) = rows.next(&mut values)? {
         match event {
             Event::Segment => {

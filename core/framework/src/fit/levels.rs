@@ -37,7 +37,15 @@ impl<'a> Fitting<'a> {
         progress: &'a mut dyn FnMut(u64),
     ) -> Self {
         let levels = levels(plan);
-        Self { plan, recording, options, progress, levels, stepped: 0, report: FitReport::default() }
+        Self {
+            plan,
+            recording,
+            options,
+            progress,
+            levels,
+            stepped: 0,
+            report: FitReport::default(),
+        }
     }
 
     pub(super) fn run(mut self) -> Result<(Fitted, FitReport), FitError> {
@@ -56,7 +64,11 @@ impl<'a> Fitting<'a> {
     }
 
     /// Fits all levels up to one on a share of the ticks.
-    fn fit_up_to(&mut self, top: usize, share: &Share) -> Result<(Fitted, Vec<(usize, super::EstimatorFit)>), FitError> {
+    fn fit_up_to(
+        &mut self,
+        top: usize,
+        share: &Share,
+    ) -> Result<(Fitted, Vec<(usize, super::EstimatorFit)>), FitError> {
         let mut fitted = Fitted::new();
         let mut reports = Vec::new();
         for level in 0..=top {
@@ -76,7 +88,10 @@ impl<'a> Fitting<'a> {
     /// Estimators below are fitted without the part of the ticks that they predict for those of this level.
     fn parts(&mut self, level: usize, share: &Share) -> Result<Vec<Part>, FitError> {
         if level == 0 {
-            return Ok(vec![Part { fitted: Fitted::new(), share: share.clone() }]);
+            return Ok(vec![Part {
+                fitted: Fitted::new(),
+                share: share.clone(),
+            }]);
         }
         let ticks = self.report.ticks;
         let (first, end) = (share.within.start, share.within.end.min(ticks));
@@ -88,7 +103,13 @@ impl<'a> Fitting<'a> {
             let mut without = share.clone();
             without.without.push(fold.clone());
             let (fitted, _) = self.fit_up_to(level - 1, &without)?;
-            parts.push(Part { fitted, share: Share { within: fold, without: share.without.clone() } });
+            parts.push(Part {
+                fitted,
+                share: Share {
+                    within: fold,
+                    without: share.without.clone(),
+                },
+            });
         }
         Ok(parts)
     }
@@ -100,12 +121,17 @@ impl<'a> Fitting<'a> {
             return Ok(train_kept(self.plan, &collector, self.options));
         }
         let memory = self.options.memory / nodes.len().max(1);
-        let mut makings: Vec<Making> =
-            collector.trainees.iter().map(|trainee| begin(self.plan, trainee, memory)).collect();
+        let mut makings: Vec<Making> = collector
+            .trainees
+            .iter()
+            .map(|trainee| begin(self.plan, trainee, memory))
+            .collect();
         let mut second = Collector::new(self.plan, nodes, 0);
         self.pass(&mut second, parts, Some(&mut makings))?;
         let ended = collector.trainees.iter().zip(makings);
-        Ok(ended.map(|(trainee, making)| end(self.plan, trainee, making, true)).collect())
+        Ok(ended
+            .map(|(trainee, making)| end(self.plan, trainee, making, true))
+            .collect())
     }
 
     fn pass(
@@ -121,7 +147,12 @@ impl<'a> Fitting<'a> {
             let mut engine = Engine::new(Arc::clone(self.plan), &part.fitted)?;
             let (stepped, progress) = (&mut self.stepped, &mut self.progress);
             let passed = drive(&mut engine, self.recording, |engine, event| {
-                collector.look(engine, event, &part.share, live.as_deref_mut().map(Vec::as_mut_slice));
+                collector.look(
+                    engine,
+                    event,
+                    &part.share,
+                    live.as_deref_mut().map(Vec::as_mut_slice),
+                );
                 if matches!(event, Event::Row(_)) {
                     *stepped += 1;
                     if stepped.is_multiple_of(4096) {
@@ -140,8 +171,13 @@ impl<'a> Fitting<'a> {
         self.report.segments = passed.segments;
         self.report.period = passed.period;
         self.report.refused = engine.refused();
-        let counted = sources.iter().zip(engine.rejected()).filter(|&(_, &count)| count > 0);
-        self.report.rejected = counted.map(|(source, &count)| (source.name.clone(), count)).collect();
+        let counted = sources
+            .iter()
+            .zip(engine.rejected())
+            .filter(|&(_, &count)| count > 0);
+        self.report.rejected = counted
+            .map(|(source, &count)| (source.name.clone(), count))
+            .collect();
     }
 }
 
@@ -151,13 +187,22 @@ fn levels(plan: &Plan) -> Vec<Vec<usize>> {
     let mut levels: Vec<Vec<usize>> = Vec::new();
     for (index, node) in plan.nodes.iter().enumerate() {
         let gathers: &[usize] = match &node.role {
-            PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => gathers,
+            PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
+                gathers
+            }
             PlannedRole::Combiner { voters, .. } => std::slice::from_ref(voters),
         };
-        let slots = gathers.iter().flat_map(|&gather| &plan.gathers[gather].entries);
+        let slots = gathers
+            .iter()
+            .flat_map(|&gather| &plan.gathers[gather].entries);
         let mut level = slots.map(|entry| of_slot[entry.slot]).max().unwrap_or(0);
-        if let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) = (&node.role, node.spec.role()) {
-            let names: Vec<_> = regressors.iter().map(|regressor| regressor.name.clone()).collect();
+        if let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
+            (&node.role, node.spec.role())
+        {
+            let names: Vec<_> = regressors
+                .iter()
+                .map(|regressor| regressor.name.clone())
+                .collect();
             if estimator.fixed(&names).is_none() {
                 if levels.len() <= level {
                     levels.resize_with(level + 1, Vec::new);

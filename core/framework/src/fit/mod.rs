@@ -32,7 +32,11 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        Self { memory: 64 << 20, threads, folds: 3 }
+        Self {
+            memory: 64 << 20,
+            threads,
+            folds: 3,
+        }
     }
 }
 

@@ -25,7 +25,8 @@ impl Sink for Making {
             self.all.extend_from_slice(part);
         }
         self.row.clear();
-        self.row.extend(self.kept.iter().map(|&candidate| self.all[candidate]));
+        self.row
+            .extend(self.kept.iter().map(|&candidate| self.all[candidate]));
         if self.row.iter().any(|value| value.is_nan()) {
             self.incomplete += 1;
         } else {
@@ -45,29 +46,48 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 /// Starts the fit of one estimator, now that it is known which candidates have values.
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
     let node = &plan.nodes[trainee.node];
-    let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) = (&node.role, node.spec.role()) else {
+    let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
+        (&node.role, node.spec.role())
+    else {
         unreachable!("only estimators are trained")
     };
     let kept = trainee.validity.kept();
     let setup = TrainingSetup {
-        regressors: kept.iter().map(|&candidate| regressors[candidate].clone()).collect::<Vec<Regressor>>(),
+        regressors: kept
+            .iter()
+            .map(|&candidate| regressors[candidate].clone())
+            .collect::<Vec<Regressor>>(),
         truth_unit: plan.channels[trainee.link.slot].channel.unit.to_string(),
         memory,
     };
     let trainer = estimator.trainer(&setup);
-    Making { trainer, row: Vec::with_capacity(kept.len()), all: Vec::new(), kept, rows: 0, incomplete: 0 }
+    Making {
+        trainer,
+        row: Vec::with_capacity(kept.len()),
+        all: Vec::new(),
+        kept,
+        rows: 0,
+        incomplete: 0,
+    }
 }
 
 /// Ends the fit of one estimator.
 pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
-    let PlannedRole::Estimator { regressors, .. } = &node.role else { unreachable!("only estimators are trained") };
+    let PlannedRole::Estimator { regressors, .. } = &node.role else {
+        unreachable!("only estimators are trained")
+    };
     let mut dropped = trainee.dropped;
     dropped.incomplete = making.incomplete;
     let dropped_candidates = (0..regressors.len())
         .filter(|candidate| !making.kept.contains(candidate))
-        .map(|candidate| (regressors[candidate].name.clone(), trainee.validity.share(candidate)))
+        .map(|candidate| {
+            (
+                regressors[candidate].name.clone(),
+                trainee.validity.share(candidate),
+            )
+        })
         .collect();
     let trained = if making.rows == 0 {
         Err(TrainingError::TooFewRows { rows: 0, needed: 2 })

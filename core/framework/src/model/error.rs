@@ -51,9 +51,15 @@ pub enum ModelError {
 impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unreadable { path, source } => write!(f, "cannot read {}: {source}", path.display()),
+            Self::Unreadable { path, source } => {
+                write!(f, "cannot read {}: {source}", path.display())
+            }
             Self::NotAModel { path, source } => {
-                write!(f, "{} is no model: {source}; a model is what `athermal fit GRAPH --data FILE -o MODEL` writes", path.display())
+                write!(
+                    f,
+                    "{} is no model: {source}; a model is what `athermal fit GRAPH --data FILE -o MODEL` writes",
+                    path.display()
+                )
             }
             Self::TooNew { path, version } => write!(
                 f,
@@ -61,11 +67,18 @@ impl fmt::Display for ModelError {
                 path.display(),
                 super::file::FORMAT
             ),
-            Self::Graph { diagnostics, sources } => write!(f, "{}", diagnostics.render(sources, false, 100)),
+            Self::Graph {
+                diagnostics,
+                sources,
+            } => write!(f, "{}", diagnostics.render(sources, false, 100)),
             Self::NotFitted { path, nodes } => {
                 const MOST: usize = 6;
                 let more = nodes.len().saturating_sub(MOST);
-                let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+                let more = if more > 0 {
+                    format!(" and {more} more")
+                } else {
+                    String::new()
+                };
                 let shown = nodes[..nodes.len().min(MOST)].join(", ");
                 write!(
                     f,

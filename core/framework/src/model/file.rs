@@ -66,41 +66,81 @@ impl Model {
     /// As [`Model::load`].
     pub fn load_for(path: impl AsRef<Path>, wanted: Wanted) -> Result<Self, ModelError> {
         let path = path.as_ref();
-        if path.extension().is_some_and(|extension| extension == "toml") {
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "toml")
+        {
             return Self::load_graph(path, wanted);
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| ModelError::Unreadable { path: path.to_owned(), source })?;
-        let not_a_model = |source| ModelError::NotAModel { path: path.to_owned(), source };
-        let version = serde_json::from_str::<Version>(&text).map_err(not_a_model)?.athermal_model;
+        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
+        let not_a_model = |source| ModelError::NotAModel {
+            path: path.to_owned(),
+            source,
+        };
+        let version = serde_json::from_str::<Version>(&text)
+            .map_err(not_a_model)?
+            .athermal_model;
         if version > FORMAT {
-            return Err(ModelError::TooNew { path: path.to_owned(), version });
+            return Err(ModelError::TooNew {
+                path: path.to_owned(),
+                version,
+            });
         }
         let read: ReadBack = serde_json::from_str(&text).map_err(not_a_model)?;
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
         let source = sources.add(path.display().to_string(), text);
         // A model has no places worth pointing at: all of its graph stands at its beginning.
-        let place = Place { source, start: 0, end: 0 };
-        let tree = Value::from_json(&read.graph, place).map_err(|error| not_a_model(serde::de::Error::custom(error)))?;
-        let graph = document::declare(Document::new(source, tree), &mut diagnostics);
-        let plan = graph.as_ref().and_then(|graph| compile(graph, wanted, &mut diagnostics));
-        let (Some(graph), Some(plan)) = (graph, plan) else {
-            return Err(ModelError::Graph { diagnostics: Box::new(diagnostics), sources: Box::new(sources) });
+        let place = Place {
+            source,
+            start: 0,
+            end: 0,
         };
-        let fitted = read.fitted.into_iter().map(|(node, predictor)| (node, Arc::from(predictor))).collect();
-        Ok(Self { graph, plan: Arc::new(plan), fitted, card: read.card })
+        let tree = Value::from_json(&read.graph, place)
+            .map_err(|error| not_a_model(serde::de::Error::custom(error)))?;
+        let graph = document::declare(Document::new(source, tree), &mut diagnostics);
+        let plan = graph
+            .as_ref()
+            .and_then(|graph| compile(graph, wanted, &mut diagnostics));
+        let (Some(graph), Some(plan)) = (graph, plan) else {
+            return Err(ModelError::Graph {
+                diagnostics: Box::new(diagnostics),
+                sources: Box::new(sources),
+            });
+        };
+        let fitted = read
+            .fitted
+            .into_iter()
+            .map(|(node, predictor)| (node, Arc::from(predictor)))
+            .collect();
+        Ok(Self {
+            graph,
+            plan: Arc::new(plan),
+            fitted,
+            card: read.card,
+        })
     }
 
     fn load_graph(path: &Path, wanted: Wanted) -> Result<Self, ModelError> {
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
         let graph = document::load(path, &Disk, &mut sources, &mut diagnostics)
             .and_then(|read| document::declare(read, &mut diagnostics));
-        let plan = graph.as_ref().and_then(|graph| compile(graph, wanted, &mut diagnostics));
+        let plan = graph
+            .as_ref()
+            .and_then(|graph| compile(graph, wanted, &mut diagnostics));
         match (graph, plan) {
-            (Some(graph), Some(plan)) if !diagnostics.has_errors() => {
-                Ok(Self { graph, plan: Arc::new(plan), fitted: Fitted::new(), card: None })
-            }
-            _ => Err(ModelError::Graph { diagnostics: Box::new(diagnostics), sources: Box::new(sources) }),
+            (Some(graph), Some(plan)) if !diagnostics.has_errors() => Ok(Self {
+                graph,
+                plan: Arc::new(plan),
+                fitted: Fitted::new(),
+                card: None,
+            }),
+            _ => Err(ModelError::Graph {
+                diagnostics: Box::new(diagnostics),
+                sources: Box::new(sources),
+            }),
         }
     }
 
@@ -109,12 +149,20 @@ impl Model {
     pub fn unfitted(&self) -> Vec<String> {
         let needs = |node: &&crate::compile::PlannedNode| match (&node.role, node.spec.role()) {
             (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) => {
-                let names: Vec<_> = regressors.iter().map(|regressor| regressor.name.clone()).collect();
+                let names: Vec<_> = regressors
+                    .iter()
+                    .map(|regressor| regressor.name.clone())
+                    .collect();
                 estimator.fixed(&names).is_none() && !self.fitted.contains_key(&node.instance())
             }
             _ => false,
         };
-        self.plan.nodes.iter().filter(needs).map(crate::compile::PlannedNode::instance).collect()
+        self.plan
+            .nodes
+            .iter()
+            .filter(needs)
+            .map(crate::compile::PlannedNode::instance)
+            .collect()
     }
 
     /// An engine that runs the model, cold.
@@ -130,7 +178,11 @@ impl Model {
     /// # Errors
     /// When something fitted cannot be written.
     pub fn to_text(&self) -> Result<String, serde_json::Error> {
-        let fitted = self.fitted.iter().map(|(node, predictor)| (node.as_str(), &**predictor)).collect();
+        let fitted = self
+            .fitted
+            .iter()
+            .map(|(node, predictor)| (node.as_str(), &**predictor))
+            .collect();
         let written = Written {
             athermal_model: FORMAT,
             card: &self.card,

@@ -17,7 +17,10 @@ pub fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, 
 /// # Errors
 /// When something in the list is no number.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
-    Ok(Vec::<Exact>::deserialize(deserializer)?.into_iter().map(|exact| exact.0).collect())
+    Ok(Vec::<Exact>::deserialize(deserializer)?
+        .into_iter()
+        .map(|exact| exact.0)
+        .collect())
 }
 
 #[cfg(test)]
@@ -41,11 +44,19 @@ mod tests {
     #[test]
     fn a_million_random_doubles_read_back_to_the_last_bit() {
         let mut state = 0x9e37_79b9_7f4a_7c15;
-        let numbers: Vec<f64> = (0..1_000_000).map(|_| f64::from_bits(bits(&mut state))).collect();
-        let text = serde_json::to_string(&Holder { numbers: numbers.clone() }).unwrap();
+        let numbers: Vec<f64> = (0..1_000_000)
+            .map(|_| f64::from_bits(bits(&mut state)))
+            .collect();
+        let text = serde_json::to_string(&Holder {
+            numbers: numbers.clone(),
+        })
+        .unwrap();
         let back: Holder = serde_json::from_str(&text).unwrap();
         for (before, after) in numbers.iter().zip(&back.numbers) {
-            assert!(before.to_bits() == after.to_bits() || (before.is_nan() && after.is_nan()), "{before:e}");
+            assert!(
+                before.to_bits() == after.to_bits() || (before.is_nan() && after.is_nan()),
+                "{before:e}"
+            );
         }
     }
 }

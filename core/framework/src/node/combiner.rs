@@ -83,6 +83,10 @@ pub struct Votes<'a>(pub &'a [f64]);
 impl Votes<'_> {
     /// The votes that are there, each with its voter's index.
     pub fn present(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.0.iter().copied().enumerate().filter(|(_, vote)| !vote.is_nan())
+        self.0
+            .iter()
+            .copied()
+            .enumerate()
+            .filter(|(_, vote)| !vote.is_nan())
     }
 }

@@ -200,10 +200,18 @@ pub struct TrainingReport {
     /// The regressors chosen, in the order in which they were, with the score after each.
     pub selection: Vec<SelectionStep>,
     /// Condition number of the standardised design.
-    #[serde(default, with = "crate::model::number_or_none", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        with = "crate::model::number_or_none",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub condition: Option<f64>,
     /// Root mean square error over the rows of the fit, in the unit of the truth.
-    #[serde(default, with = "crate::model::number_or_none", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        with = "crate::model::number_or_none",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub in_sample_rmse: Option<f64>,
     /// What the user should know, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -91,7 +91,7 @@ pub trait Feature: Debug + Send + Sync {
     /// Whether outputs depend only on inputs of earlier ticks, so that the node may close a loop.
     ///
     /// Such a node gets its inputs through [`Operator::capture`] once all outputs of the tick are there.
-    fn from_the_past(&self) -> bool {
+    fn closes_loops(&self) -> bool {
         false
     }
 }
@@ -101,7 +101,7 @@ pub trait Operator: Send {
     /// Computes the outputs of this tick. An output that is not set keeps its last value, which others may hold on to.
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>);
 
-    /// Takes the inputs of this tick after all outputs are there; only for kinds that say [`Feature::from_the_past`].
+    /// Takes the inputs of this tick after all outputs are there; only for kinds that say [`Feature::closes_loops`].
     fn capture(&mut self, _tick: &Tick<'_>) {}
 
     /// Starts afresh: the next tick belongs to another segment of the data.

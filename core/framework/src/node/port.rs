@@ -30,19 +30,34 @@ impl InputPort {
     /// A port that takes only new values.
     #[must_use]
     pub const fn fresh(name: &'static str, summary: &'static str) -> Self {
-        Self { name, read: Read::Fresh, optional: false, summary }
+        Self {
+            name,
+            read: Read::Fresh,
+            optional: false,
+            summary,
+        }
     }
 
     /// A port that takes the last value up to its maximum age.
     #[must_use]
     pub const fn held(name: &'static str, summary: &'static str) -> Self {
-        Self { name, read: Read::Held, optional: false, summary }
+        Self {
+            name,
+            read: Read::Held,
+            optional: false,
+            summary,
+        }
     }
 
     /// The port of the truth.
     #[must_use]
     pub const fn truth(summary: &'static str) -> Self {
-        Self { name: "truth", read: Read::Truth, optional: false, summary }
+        Self {
+            name: "truth",
+            read: Read::Truth,
+            optional: false,
+            summary,
+        }
     }
 
     /// The same port, which a graph may leave out.
@@ -97,7 +112,11 @@ impl Mistake {
     /// A mistake at a parameter or `inputs.PORT`.
     #[must_use]
     pub fn at(at: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { at: at.into(), message: message.into(), help: None }
+        Self {
+            at: at.into(),
+            message: message.into(),
+            help: None,
+        }
     }
 
     /// Adds the way out.

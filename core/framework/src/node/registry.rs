@@ -84,7 +84,11 @@ impl Kind {
     /// The documentation of the parameters' struct.
     #[must_use]
     pub fn documentation(&self) -> String {
-        (self.schema)().get("description").and_then(|text| text.as_str()).unwrap_or_default().to_owned()
+        (self.schema)()
+            .get("description")
+            .and_then(|text| text.as_str())
+            .unwrap_or_default()
+            .to_owned()
     }
 }
 

@@ -46,5 +46,12 @@ pub fn score(
             progress(stepped);
         }
     })?;
-    Ok(table::table(plan, &watch, &engine, passed.period, passed.ticks, options))
+    Ok(table::table(
+        plan,
+        &watch,
+        &engine,
+        passed.period,
+        passed.ticks,
+        options,
+    ))
 }

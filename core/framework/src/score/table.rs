@@ -84,26 +84,43 @@ pub(super) fn table(
     ticks: u64,
     options: &ScoreOptions,
 ) -> Scores {
-    let rejected = plan.sources.iter().zip(engine.rejected()).filter(|&(_, &count)| count > 0);
+    let rejected = plan
+        .sources
+        .iter()
+        .zip(engine.rejected())
+        .filter(|&(_, &count)| count > 0);
     Scores {
         period,
         ticks,
         refused: engine.refused(),
-        rejected: rejected.map(|(source, &count)| (source.name.clone(), count)).collect(),
-        scores: watch.truths.iter().flat_map(|truth| scores(plan, truth, options)).collect(),
+        rejected: rejected
+            .map(|(source, &count)| (source.name.clone(), count))
+            .collect(),
+        scores: watch
+            .truths
+            .iter()
+            .flat_map(|truth| scores(plan, truth, options))
+            .collect(),
     }
 }
 
 fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
     let of = &plan.channels[truth.slot];
-    let limit = options.abs_truth_below.as_ref().and_then(|limit| limit.in_unit(&of.channel.unit));
-    let counted: Vec<usize> =
-        (0..truth.values.len()).filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit)).collect();
+    let limit = options
+        .abs_truth_below
+        .as_ref()
+        .and_then(|limit| limit.in_unit(&of.channel.unit));
+    let counted: Vec<usize> = (0..truth.values.len())
+        .filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit))
+        .collect();
     let valid: Vec<f64> = truth
         .predictions
         .iter()
         .map(|prediction| {
-            let there = counted.iter().filter(|&&i| !prediction.values[i].is_nan()).count();
+            let there = counted
+                .iter()
+                .filter(|&&i| !prediction.values[i].is_nan())
+                .count();
             there as f64 / counted.len() as f64
         })
         .collect();
@@ -123,17 +140,26 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
         .map(|(nth, prediction)| {
             let own_instants = options.each_on_its_own || !restricting(nth);
             let instants: Vec<usize> = if own_instants {
-                counted.iter().copied().filter(|&i| !prediction.values[i].is_nan()).collect()
+                counted
+                    .iter()
+                    .copied()
+                    .filter(|&i| !prediction.values[i].is_nan())
+                    .collect()
             } else {
                 common.clone()
             };
             let node = &plan.nodes[prediction.node];
-            let errors = || instants.iter().map(|&i| prediction.values[i] - truth.values[i]);
+            let errors = || {
+                instants
+                    .iter()
+                    .map(|&i| prediction.values[i] - truth.values[i])
+            };
             let truths = || instants.iter().map(|&i| truth.values[i]);
             let persistence = &truth.persistences[&prediction.ahead].values;
             let n = instants.len();
             let mean = mean(truths());
-            let about_mean = mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());
+            let about_mean =
+                mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());
             let squared: f64 = errors().map(|e| e * e).sum();
             let about_zero: f64 = truths().map(|y| y * y).sum();
             let share = |of: f64| (of > 0.0).then(|| 1.0 - squared / of);
@@ -153,9 +179,17 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                 valid: (!counted.is_empty()).then_some(valid[nth]),
                 baseline_zero: root_mean_square(truths()),
                 baseline_persistence: root_mean_square(
-                    instants.iter().map(|&i| persistence[i] - truth.values[i]).filter(|e| !e.is_nan()),
+                    instants
+                        .iter()
+                        .map(|&i| persistence[i] - truth.values[i])
+                        .filter(|e| !e.is_nan()),
                 ),
-                truth_noise: root_mean_square(instants.iter().map(|&i| truth.errors[i]).filter(|e| !e.is_nan())),
+                truth_noise: root_mean_square(
+                    instants
+                        .iter()
+                        .map(|&i| truth.errors[i])
+                        .filter(|e| !e.is_nan()),
+                ),
                 own_instants,
             }
         })

@@ -46,16 +46,36 @@ impl Watch {
     pub(super) fn new(plan: &Plan) -> Self {
         let mut truths: BTreeMap<usize, Truth> = BTreeMap::new();
         for (slot, channel) in plan.channels.iter().enumerate() {
-            let (Some(of), Some(node)) = (channel.predicts, channel.node) else { continue };
+            let (Some(of), Some(node)) = (channel.predicts, channel.node) else {
+                continue;
+            };
             let (span, ahead) = (plan.channels[of].channel.span, channel.channel.ahead);
-            let Some(limit) = plan.channels[of].channel.default_max_age() else { continue };
-            let link = TruthLink { slot: of, ahead, span, limit };
+            let Some(limit) = plan.channels[of].channel.default_max_age() else {
+                continue;
+            };
+            let link = TruthLink {
+                slot: of,
+                ahead,
+                span,
+                limit,
+            };
             let truth = truths.entry(of).or_insert_with(|| Truth::new(plan, of));
             let pairing = Pairing::new(&link, 1);
-            truth.predictions.push(Prediction { slot, node, ahead, pairing, values: Vec::new() });
-            truth.persistences.entry(ahead).or_insert_with(|| Persistence::new(&link));
+            truth.predictions.push(Prediction {
+                slot,
+                node,
+                ahead,
+                pairing,
+                values: Vec::new(),
+            });
+            truth
+                .persistences
+                .entry(ahead)
+                .or_insert_with(|| Persistence::new(&link));
         }
-        Self { truths: truths.into_values().collect() }
+        Self {
+            truths: truths.into_values().collect(),
+        }
     }
 
     /// Looks at what a tick did.
@@ -90,16 +110,23 @@ impl Truth {
     fn look(&mut self, engine: &Engine, now: Instant) {
         for prediction in &mut self.predictions {
             if engine.ran(prediction.slot) {
-                prediction.pairing.run(now, [&[engine.value(prediction.slot)][..]]);
+                prediction
+                    .pairing
+                    .run(now, [&[engine.value(prediction.slot)][..]]);
             }
         }
         let measured = engine.ran(self.slot);
         for persistence in self.persistences.values_mut() {
             if measured {
-                persistence.history.push(now, engine.value(self.slot), engine.stamp(self.slot));
+                persistence
+                    .history
+                    .push(now, engine.value(self.slot), engine.stamp(self.slot));
             }
             let asked = now - persistence.lag;
-            let (value, _) = persistence.history.at(asked, persistence.max_age, &mut persistence.cursor);
+            let (value, _) =
+                persistence
+                    .history
+                    .at(asked, persistence.max_age, &mut persistence.cursor);
             persistence.pairing.run(now, [&[value][..]]);
         }
         let value = engine.value(self.slot);
@@ -107,13 +134,20 @@ impl Truth {
             return;
         }
         self.values.push(value);
-        self.errors.push(self.error_slot.map_or(f64::NAN, |slot| engine.value(slot)));
+        self.errors
+            .push(self.error_slot.map_or(f64::NAN, |slot| engine.value(slot)));
         for prediction in &mut self.predictions {
-            let paired = prediction.pairing.truth(now).map_or(f64::NAN, |paired| paired.row[0]);
+            let paired = prediction
+                .pairing
+                .truth(now)
+                .map_or(f64::NAN, |paired| paired.row[0]);
             prediction.values.push(paired);
         }
         for persistence in self.persistences.values_mut() {
-            let paired = persistence.pairing.truth(now).map_or(f64::NAN, |paired| paired.row[0]);
+            let paired = persistence
+                .pairing
+                .truth(now)
+                .map_or(f64::NAN, |paired| paired.row[0]);
             persistence.values.push(paired);
         }
     }

@@ -4,7 +4,9 @@ pub mod kernel;
 mod windows;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
-use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+};
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 use kernel::{Coverage, NoValue, RollingSlope};
@@ -72,37 +74,62 @@ impl Slope {
 
     /// What a slope per second of the channel is multiplied by.
     fn factor(&self, of: &Channel) -> Option<f64> {
-        of.unit.difference().per(&Unit::second()).factor_to(&self.unit(of)?)
+        of.unit
+            .difference()
+            .per(&Unit::second())
+            .factor_to(&self.unit(of)?)
     }
 
     fn mistakes(&self, channels: &[Channel], windows: &[Duration]) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         for channel in channels {
             if self.factor(channel).is_none() {
-                let unit = self.unit.as_ref().map_or_else(String::new, ToString::to_string);
+                let unit = self
+                    .unit
+                    .as_ref()
+                    .map_or_else(String::new, ToString::to_string);
                 let natural = channel.unit.difference().per(&Unit::second());
-                let message = format!("the slope of `{}` ({}) cannot be in {unit}", channel.name, channel.unit);
-                mistakes.push(Mistake::at("unit", message).help(format!("a unit such as {natural}")));
+                let message = format!(
+                    "the slope of `{}` ({}) cannot be in {unit}",
+                    channel.name, channel.unit
+                );
+                mistakes
+                    .push(Mistake::at("unit", message).help(format!("a unit such as {natural}")));
                 break;
             }
         }
         if self.min_samples < 2 {
-            let message = format!("`min_samples` is {} and must be 2 or more", self.min_samples);
+            let message = format!(
+                "`min_samples` is {} and must be 2 or more",
+                self.min_samples
+            );
             mistakes.push(Mistake::at("min_samples", message).help("a slope needs two samples"));
         }
         if !(0.0..=1.0).contains(&self.min_coverage) {
-            let message = format!("`min_coverage` is {} and must be from 0 to 1", self.min_coverage);
+            let message = format!(
+                "`min_coverage` is {} and must be from 0 to 1",
+                self.min_coverage
+            );
             mistakes.push(Mistake::at("min_coverage", message));
         }
         if windows.is_empty() {
-            mistakes.push(Mistake::at("windows", "there is no window").help("give one or more, such as [\"5min\"]"));
+            mistakes.push(
+                Mistake::at("windows", "there is no window")
+                    .help("give one or more, such as [\"5min\"]"),
+            );
         }
         for (i, window) in windows.iter().enumerate() {
             if *window <= Duration::ZERO {
-                mistakes.push(Mistake::at("windows", format!("a window of {window} is no window")));
+                mistakes.push(Mistake::at(
+                    "windows",
+                    format!("a window of {window} is no window"),
+                ));
             }
             if windows[..i].contains(window) {
-                mistakes.push(Mistake::at("windows", format!("the window {window} stands twice")));
+                mistakes.push(Mistake::at(
+                    "windows",
+                    format!("the window {window} stands twice"),
+                ));
             }
         }
         mistakes
@@ -131,11 +158,19 @@ impl Feature for Slope {
             span: window,
             ..channel.clone()
         };
-        let channels: Vec<Channel> =
-            from.iter().flat_map(|channel| windows.iter().map(move |&window| of(channel, window))).collect();
+        let channels: Vec<Channel> = from
+            .iter()
+            .flat_map(|channel| windows.iter().map(move |&window| of(channel, window)))
+            .collect();
         Ok(vec![
-            OutputPort { name: "slope", channels: channels.clone() },
-            OutputPort { name: "stderr", channels },
+            OutputPort {
+                name: "slope",
+                channels: channels.clone(),
+            },
+            OutputPort {
+                name: "stderr",
+                channels,
+            },
         ])
     }
 
@@ -151,8 +186,20 @@ impl Feature for Slope {
         let errors = wanted.get(1).copied().unwrap_or(false);
         let width = from.len() * windows.len();
         Box::new(Sloping {
-            kernel: RollingSlope::new(&lengths, from.len(), coverage, NoValue { absent: ABSENT, cold: COLD }, errors),
-            factors: from.iter().map(|channel| self.factor(channel).unwrap_or(f64::NAN)).collect(),
+            kernel: RollingSlope::new(
+                &lengths,
+                from.len(),
+                coverage,
+                NoValue {
+                    absent: ABSENT,
+                    cold: COLD,
+                },
+                errors,
+            ),
+            factors: from
+                .iter()
+                .map(|channel| self.factor(channel).unwrap_or(f64::NAN))
+                .collect(),
             windows: windows.len(),
             errors,
             results: vec![ABSENT; width],
@@ -186,7 +233,11 @@ impl Sloping {
             for i in channel * self.windows..(channel + 1) * self.windows {
                 let slope = self.results[i];
                 // A NaN says why there is no value, and must stay as it is.
-                let value = if slope.is_nan() { slope } else { slope * factor };
+                let value = if slope.is_nan() {
+                    slope
+                } else {
+                    slope * factor
+                };
                 outputs.set_stamped(offset + i, value, tick.now);
             }
         }

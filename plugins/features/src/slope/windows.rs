@@ -54,11 +54,18 @@ impl DynamicRange {
         let first = drift * root(1) / std::f64::consts::PI;
         let shortest = self.shortest.secs();
         if !(2..=100).contains(&self.steps) || !(1..=100).contains(&self.harmonics) {
-            let message = format!("{} steps and {} harmonics give no range of windows", self.steps, self.harmonics);
-            return Err(Mistake::at("windows", message).help("from 2 to 100 steps and from 1 to 100 harmonics"));
+            let message = format!(
+                "{} steps and {} harmonics give no range of windows",
+                self.steps, self.harmonics
+            );
+            return Err(Mistake::at("windows", message)
+                .help("from 2 to 100 steps and from 1 to 100 harmonics"));
         }
         if !(shortest > 0.0 && shortest < first) {
-            let message = format!("the shortest window is {} and the first harmonic {first:.3} s", self.shortest);
+            let message = format!(
+                "the shortest window is {} and the first harmonic {first:.3} s",
+                self.shortest
+            );
             let help = "the shortest window lies above zero and below 1.43 times the drift window";
             return Err(Mistake::at("windows", message).help(help));
         }
@@ -70,7 +77,9 @@ impl DynamicRange {
         });
         let harmonics = (2..=self.harmonics).map(|nth| drift * root(nth) / std::f64::consts::PI);
         let lengths = spaced.chain(harmonics).map(Duration::from_secs_f64);
-        lengths.collect::<Option<_>>().ok_or_else(|| Mistake::at("windows", "the windows are too long"))
+        lengths
+            .collect::<Option<_>>()
+            .ok_or_else(|| Mistake::at("windows", "the windows are too long"))
     }
 }
 
@@ -95,25 +104,45 @@ mod tests {
     #[test]
     fn the_roots_of_tan_x_equals_x_are_those_of_the_tables() {
         // Abramowitz and Stegun 1964, table 4.19.
-        for (nth, expected) in [(1, 4.493_409_458), (2, 7.725_251_837), (3, 10.904_121_659), (4, 14.066_193_913)] {
+        for (nth, expected) in [
+            (1, 4.493_409_458),
+            (2, 7.725_251_837),
+            (3, 10.904_121_659),
+            (4, 14.066_193_913),
+        ] {
             assert!((root(nth) - expected).abs() < 1e-9, "{nth}: {}", root(nth));
         }
     }
 
     #[test]
     fn four_steps_and_four_harmonics_around_five_minutes_are_seven_windows() {
-        let range = DynamicRange { dynamic_range: s(300.0), shortest: s(150.0), steps: 4, harmonics: 4 };
+        let range = DynamicRange {
+            dynamic_range: s(300.0),
+            shortest: s(150.0),
+            steps: 4,
+            harmonics: 4,
+        };
         let lengths = range.lengths().unwrap();
-        let expected = [150.0, 212.933, 302.270, 429.089, 737.707, 1041.267, 1343.223];
+        let expected = [
+            150.0, 212.933, 302.270, 429.089, 737.707, 1041.267, 1343.223,
+        ];
         assert_eq!(lengths.len(), expected.len());
         for (length, expected) in lengths.iter().zip(expected) {
-            assert!((length.secs() - expected).abs() < 5e-4, "{length} is not {expected} s");
+            assert!(
+                (length.secs() - expected).abs() < 5e-4,
+                "{length} is not {expected} s"
+            );
         }
     }
 
     #[test]
     fn a_shortest_window_above_the_first_harmonic_is_a_mistake() {
-        let range = DynamicRange { dynamic_range: s(300.0), shortest: s(500.0), steps: 4, harmonics: 4 };
+        let range = DynamicRange {
+            dynamic_range: s(300.0),
+            shortest: s(500.0),
+            steps: 4,
+            harmonics: 4,
+        };
         assert!(range.lengths().is_err());
     }
 }

@@ -343,6 +343,10 @@ fn own_parameters(keys: &Table) -> Table {
 
 /// Writes every number of samples as the duration that it stands for.
 fn convert_samples(value: &mut Value, sample: Option<Duration>, diagnostics: &mut Diagnostics) {
+    // Changing a table copies it, and hardly any has samples.
+    if !has_samples(value) {
+        return;
+    }
     let place = value.place;
     match &mut value.data {
         Data::Text(text) => {
@@ -413,6 +417,15 @@ fn has_placeholders(value: &Value) -> bool {
         Data::Table(table) => table
             .iter()
             .any(|(_, entry)| has_placeholders(&entry.value)),
+        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => false,
+    }
+}
+
+fn has_samples(value: &Value) -> bool {
+    match &value.data {
+        Data::Text(text) => samples(text).is_some(),
+        Data::List(values) => values.iter().any(has_samples),
+        Data::Table(table) => table.iter().any(|(_, entry)| has_samples(&entry.value)),
         Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => false,
     }
 }
