@@ -4,6 +4,7 @@
 mod combiner;
 mod estimator;
 mod feature;
+mod identity;
 mod order;
 mod plan;
 mod problem;
