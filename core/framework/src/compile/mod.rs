@@ -2,6 +2,7 @@
 //! not when it runs.
 
 mod combiner;
+mod diff;
 mod estimator;
 mod feature;
 mod identity;
@@ -14,6 +15,9 @@ mod resolver;
 mod scope;
 mod steps;
 
+pub use diff::{
+    Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff,
+};
 pub use plan::{
     Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
     Step, TrainingLimits, TruthLink,
