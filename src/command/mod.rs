@@ -6,6 +6,7 @@ mod evaluate;
 mod fit;
 mod nodes;
 mod run;
+mod simulate;
 
 use clap::Subcommand;
 
@@ -24,6 +25,8 @@ pub enum Command {
     Evaluate(evaluate::Evaluate),
     /// Run a model: rows in, predictions out
     Run(run::Run),
+    /// Write the recording of a simulated machine, or list the machines
+    Simulate(simulate::Simulate),
 }
 
 impl Command {
@@ -38,6 +41,7 @@ impl Command {
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
+            Self::Simulate(command) => command.run(terminal),
         }
     }
 }
