@@ -154,6 +154,20 @@ impl Terminal {
     }
 }
 
+/// Writes to standard output; a reader who has seen enough ends the program quietly.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn print(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(bytes)
+        .and_then(|()| out.flush())
+        .map_err(|error| match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::Told(0),
+            _ => Failure::Outside(format!("cannot write to standard output: {error}")),
+        })
+}
+
 /// A line that says how far the work has come.
 #[derive(Debug)]
 pub struct Progress {
