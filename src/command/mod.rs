@@ -1,11 +1,14 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
 mod check;
+mod completions;
 mod data;
+mod demo;
 mod evaluate;
 mod fit;
 mod nodes;
 mod run;
+mod simulate;
 
 use clap::Subcommand;
 
@@ -14,6 +17,8 @@ use crate::terminal::{Answer, Failure, Terminal};
 /// What the program can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// See what athermal does, on a simulated machine
+    Demo(demo::Demo),
     /// Look for mistakes in a graph file
     Check(check::Check),
     /// List the node types, or explain one
@@ -24,6 +29,10 @@ pub enum Command {
     Evaluate(evaluate::Evaluate),
     /// Run a model: rows in, predictions out
     Run(run::Run),
+    /// Write the recording of a simulated machine, or list the machines
+    Simulate(simulate::Simulate),
+    /// Print a completion script for a shell
+    Completions(completions::Completions),
 }
 
 impl Command {
@@ -33,11 +42,14 @@ impl Command {
     /// When it cannot be done.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
+            Self::Demo(command) => command.run(terminal),
+            Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
+            Self::Simulate(command) => command.run(terminal),
         }
     }
 }
