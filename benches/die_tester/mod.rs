@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::core::fit::{FitOptions, fit};
+use athermal::core::machine::{Machine, Row, Setup, Simulation};
 use athermal::core::recording::Table;
 use athermal::{Instant, Model};
-use athermal_simulation::{Row, Setup, machine};
 
 pub const CHANNELS: usize = 12;
 
@@ -21,15 +21,20 @@ pub fn graph() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/die-tester.toml")
 }
 
-pub fn ticks(days: f64, seed: u64) -> Vec<Tick> {
-    let machine = machine("die-tester").expect("the die tester is a built-in machine");
+const MACHINE: &dyn Machine = &athermal_simulation::DieTester;
+
+fn simulation(days: f64, seed: u64) -> Box<dyn Simulation> {
     let setup = Setup {
         days,
         seed,
         ..Setup::default()
     };
-    let mut simulation = machine.start(&setup).expect("the days are positive");
-    let mut row = Row::empty(machine.channels());
+    MACHINE.start(&setup).expect("the days are positive")
+}
+
+pub fn ticks(days: f64, seed: u64) -> Vec<Tick> {
+    let mut simulation = simulation(days, seed);
+    let mut row = Row::empty(MACHINE.channels());
     let mut ticks = Vec::new();
     while simulation.next(&mut row) {
         let mut values = [f64::NAN; CHANNELS];
@@ -59,16 +64,10 @@ pub fn model() -> Model {
 
 /// Writes a simulated log as a table, and gives its size in bytes.
 pub fn write(path: &Path, days: f64, seed: u64) -> u64 {
-    let machine = machine("die-tester").expect("the die tester is a built-in machine");
-    let setup = Setup {
-        days,
-        seed,
-        ..Setup::default()
-    };
-    let mut simulation = machine.start(&setup).expect("the days are positive");
+    let mut simulation = simulation(days, seed);
     let file = std::fs::File::create(path).expect("the temporary folder can be written");
     let mut out = std::io::BufWriter::new(file);
-    athermal_simulation::write_table(machine.channels(), &mut *simulation, false, &mut out)
+    athermal_simulation::write_table(MACHINE.channels(), &mut *simulation, false, &mut out)
         .and_then(|_| std::io::Write::flush(&mut out))
         .expect("the temporary folder can be written");
     std::fs::metadata(path)
