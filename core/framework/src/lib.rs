@@ -19,6 +19,7 @@
 //! | [`prng`], [`fault`] | seeded random numbers; what can be wrong with a sensor of any recording |
 //! | [`machine`] | what a simulated machine is, and as what recording it serves |
 //! | [`model`], [`fit`], [`score`] | a fitted graph, training it, scoring it |
+//! | [`live`] | replacing a graph while it runs |
 //!
 //! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
 //! [`register!`]; start at [`node::Feature`], [`node::Estimator`] or [`node::Combiner`].
@@ -30,6 +31,7 @@ pub mod document;
 pub mod engine;
 pub mod fault;
 pub mod fit;
+pub mod live;
 pub mod machine;
 pub mod model;
 pub mod node;

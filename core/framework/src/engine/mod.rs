@@ -184,6 +184,12 @@ impl Engine {
         })
     }
 
+    /// What the last tick gave, in the order of [`Plan::outputs`].
+    #[must_use]
+    pub fn outputs(&self) -> &[f64] {
+        &self.outputs
+    }
+
     /// The plan that is stepped.
     #[must_use]
     pub fn plan(&self) -> &Arc<Plan> {
