@@ -6,6 +6,7 @@ mod data;
 mod demo;
 mod evaluate;
 mod fit;
+mod init;
 mod nodes;
 mod run;
 mod simulate;
@@ -19,6 +20,8 @@ use crate::terminal::{Answer, Failure, Terminal};
 pub enum Command {
     /// See what athermal does, on a simulated machine
     Demo(demo::Demo),
+    /// Write a starter graph for a log of yours
+    Init(init::Init),
     /// Look for mistakes in a graph file
     Check(check::Check),
     /// List the node types, or explain one
@@ -43,6 +46,7 @@ impl Command {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
             Self::Demo(command) => command.run(terminal),
+            Self::Init(command) => command.run(terminal),
             Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
