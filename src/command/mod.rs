@@ -1,11 +1,15 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
 mod check;
+mod completions;
 mod data;
+mod demo;
 mod evaluate;
 mod fit;
+mod init;
 mod nodes;
 mod run;
+mod simulate;
 mod swap;
 
 use clap::Subcommand;
@@ -15,6 +19,10 @@ use crate::terminal::{Answer, Failure, Terminal};
 /// What the program can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// See what athermal does, on a simulated machine
+    Demo(demo::Demo),
+    /// Write a starter graph for a log of yours
+    Init(init::Init),
     /// Look for mistakes in a graph file
     Check(check::Check),
     /// List the node types, or explain one
@@ -25,6 +33,10 @@ pub enum Command {
     Evaluate(evaluate::Evaluate),
     /// Run a model: rows in, predictions out
     Run(run::Run),
+    /// Write the recording of a simulated machine, or list the machines
+    Simulate(simulate::Simulate),
+    /// Print a completion script for a shell
+    Completions(completions::Completions),
 }
 
 impl Command {
@@ -34,11 +46,15 @@ impl Command {
     /// When it cannot be done.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
+            Self::Demo(command) => command.run(terminal),
+            Self::Init(command) => command.run(terminal),
+            Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
+            Self::Simulate(command) => command.run(terminal),
         }
     }
 }
