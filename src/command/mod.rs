@@ -2,7 +2,9 @@
 
 mod check;
 mod data;
+mod diff;
 mod evaluate;
+mod explain;
 mod fit;
 mod nodes;
 mod run;
@@ -16,6 +18,10 @@ use crate::terminal::{Answer, Failure, Terminal};
 pub enum Command {
     /// Look for mistakes in a graph file
     Check(check::Check),
+    /// Explain the code of a mistake
+    Explain(explain::Explain),
+    /// Say what differs in meaning between two graphs or models
+    Diff(diff::Diff),
     /// List the node types, or explain one
     Nodes(nodes::Nodes),
     /// Fit a graph's estimators on recorded data
@@ -34,6 +40,8 @@ impl Command {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
             Self::Check(command) => command.run(terminal),
+            Self::Explain(command) => command.run(terminal),
+            Self::Diff(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),

@@ -14,9 +14,7 @@ mod resolver;
 mod scope;
 mod steps;
 
-pub use diff::{
-    Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff,
-};
+pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
 pub use plan::{
     Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
     Step, TrainingLimits, TruthLink,
