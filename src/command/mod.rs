@@ -8,6 +8,7 @@ mod explain;
 mod fit;
 mod nodes;
 mod run;
+mod swap;
 
 use clap::Subcommand;
 

@@ -5,6 +5,7 @@ mod combiner;
 mod diff;
 mod estimator;
 mod feature;
+mod identity;
 mod order;
 mod plan;
 mod problem;
