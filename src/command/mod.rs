@@ -4,7 +4,9 @@ mod check;
 mod completions;
 mod data;
 mod demo;
+mod diff;
 mod evaluate;
+mod explain;
 mod fit;
 mod init;
 mod nodes;
@@ -25,6 +27,10 @@ pub enum Command {
     Init(init::Init),
     /// Look for mistakes in a graph file
     Check(check::Check),
+    /// Explain the code of a mistake
+    Explain(explain::Explain),
+    /// Say what differs in meaning between two graphs or models
+    Diff(diff::Diff),
     /// List the node types, or explain one
     Nodes(nodes::Nodes),
     /// Fit a graph's estimators on recorded data
@@ -50,6 +56,8 @@ impl Command {
             Self::Init(command) => command.run(terminal),
             Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
+            Self::Explain(command) => command.run(terminal),
+            Self::Diff(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),

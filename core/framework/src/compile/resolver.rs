@@ -150,6 +150,15 @@ fn context(node: &NodeDecl, instance: &InstanceDecl) -> String {
     }
 }
 
+/// The name of a channel among those of all members; the only one of an instance has its member's name.
+fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
+    match member {
+        Some(member) if single => member.to_owned(),
+        Some(member) => format!("{member}/{channel}"),
+        None => channel.to_owned(),
+    }
+}
+
 /// One instance on its way into the plan.
 pub(crate) struct Instance<'a> {
     pub(crate) node: &'a NodeDecl,
@@ -502,11 +511,8 @@ impl<'g> Resolver<'g> {
             let first = self.channels.len();
             let single = port.channels.len() == 1;
             for channel in port.channels {
-                let outward = match &instance.decl.member {
-                    Some(member) if single => member.clone(),
-                    Some(member) => format!("{member}/{}", channel.name),
-                    None => channel.name.clone(),
-                };
+                let own = channel.name.clone();
+                let outward = outward_name(instance.decl.member.as_deref(), single, &own);
                 let slot = self.channels.len();
                 let named = if ranges.is_empty() {
                     format!("{}.{outward}", instance.node.name)
@@ -535,6 +541,11 @@ impl<'g> Resolver<'g> {
                     };
                     self.diagnostics.report(instance.node.place, problem);
                     whole = false;
+                }
+                for (scope, member) in &instance.decl.scopes {
+                    let outward = outward_name(member.as_deref(), single, &own);
+                    let ports = &mut self.scopes.get_mut(scope).ports;
+                    ports.entry(port.name).or_default().insert(outward, slot);
                 }
             }
             ranges.push((port.name, first..self.channels.len()));
