@@ -21,7 +21,9 @@ const WORSE: f64 = 1.02;
 
 /// Fits a graph of this project on one recording and scores it on another.
 fn scored(name: &str, train: &Path, test: &Path, below: Option<&str>) -> Vec<Score> {
-    let wanted = Wanted { standard_errors: true };
+    let wanted = Wanted {
+        standard_errors: true,
+    };
     let model = Model::load_for(graph(name), wanted).unwrap();
     let recording = |path: &Path| Dataset::new(vec![path.to_owned()], Options::default());
     let options = FitOptions::default();
@@ -31,7 +33,9 @@ fn scored(name: &str, train: &Path, test: &Path, below: Option<&str>) -> Vec<Sco
         ..ScoreOptions::default()
     };
     let plan = Arc::clone(&model.plan);
-    score(&plan, &fitted, &recording(test), &options, &mut |_| {}).unwrap().scores
+    score(&plan, &fitted, &recording(test), &options, &mut |_| {})
+        .unwrap()
+        .scores
 }
 
 /// A table of the page: figures by row and column.
@@ -39,7 +43,10 @@ type Table = BTreeMap<(String, String), f64>;
 
 /// The table under the heading of a machine and the line that begins with the name of a horizon.
 fn table(page: &str, machine: &str, horizon: &str) -> Table {
-    let section = page.split("\n### ").find(|section| section.starts_with(&format!("{machine}\n"))).unwrap();
+    let section = page
+        .split("\n### ")
+        .find(|section| section.starts_with(&format!("{machine}\n")))
+        .unwrap();
     let after = section.split(&format!("\n{horizon}")).nth(1).unwrap();
     let rows: Vec<Vec<&str>> = after
         .lines()
@@ -50,21 +57,34 @@ fn table(page: &str, machine: &str, horizon: &str) -> Table {
     let mut table = Table::new();
     for row in &rows[2..] {
         for (axis, figure) in rows[0].iter().zip(row).skip(1) {
-            table.insert((row[0].to_owned(), (*axis).to_owned()), figure.parse().unwrap());
+            table.insert(
+                (row[0].to_owned(), (*axis).to_owned()),
+                figure.parse().unwrap(),
+            );
         }
     }
     table
 }
 
 /// What the rows of the page are called in the graphs.
-const ROWS: [(&str, &str); 4] = [("linear", "thermal"), ("AR", "motion"), ("ARX", "both"), ("vote", "vote")];
+const ROWS: [(&str, &str); 4] = [
+    ("linear", "thermal"),
+    ("AR", "motion"),
+    ("ARX", "both"),
+    ("vote", "vote"),
+];
 
 fn compare(machine: &str, name: &str, horizon: &str, axes: usize) {
     let Some(data) = data() else { return };
     let page = std::fs::read_to_string(data.join("README.md")).unwrap();
     let table = table(&page, machine, horizon);
     let folder = data.join(machine);
-    let scores = scored(name, &folder.join("train.csv"), &folder.join("test.csv"), Some("250 nm/min"));
+    let scores = scored(
+        name,
+        &folder.join("train.csv"),
+        &folder.join("test.csv"),
+        Some("250 nm/min"),
+    );
     let mut compared = 0;
     let mut worse = Vec::new();
     for ((row, axis), &reference) in &table {
@@ -80,13 +100,23 @@ fn compare(machine: &str, name: &str, horizon: &str, axes: usize) {
     }
     for score in &scores {
         let axis = score.truth.split('.').nth(1).unwrap().to_owned();
-        for (row, found) in [("no model", score.baseline_zero), ("persistence", score.baseline_persistence)] {
+        for (row, found) in [
+            ("no model", score.baseline_zero),
+            ("persistence", score.baseline_persistence),
+        ] {
             let reference = table[&(row.to_owned(), axis.clone())];
             let found = found.unwrap();
-            assert!((found / reference - 1.0).abs() < 0.02, "{row} {axis}: {found} instead of {reference}");
+            assert!(
+                (found / reference - 1.0).abs() < 0.02,
+                "{row} {axis}: {found} instead of {reference}"
+            );
         }
     }
-    assert_eq!(compared, ROWS.len() * axes, "every row and axis of the page is compared");
+    assert_eq!(
+        compared,
+        ROWS.len() * axes,
+        "every row and axis of the page is compared"
+    );
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 
@@ -124,8 +154,15 @@ fn reference_of_the_linear_axis_as_virtual_sensor() {
 fn reference_of_the_measured_probe_holds_on_its_covered_run() {
     let Some(data) = data() else { return };
     let folder = data.join("z-probe");
-    let scores = scored("z-probe", &folder.join("GX-H12A.csv"), &folder.join("GX-H12A-covered.csv"), None);
-    let [score] = &scores[..] else { panic!("one prediction is scored: {scores:?}") };
+    let scores = scored(
+        "z-probe",
+        &folder.join("GX-H12A.csv"),
+        &folder.join("GX-H12A-covered.csv"),
+        None,
+    );
+    let [score] = &scores[..] else {
+        panic!("one prediction is scored: {scores:?}")
+    };
     // "1 − SSE/SSE₀ = 0.87–0.91" on the page.
     assert!(score.r2_zero.unwrap() >= 0.87, "{score:?}");
 }

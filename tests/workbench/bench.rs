@@ -37,7 +37,10 @@ pub fn secs(seconds: f64) -> Instant {
 
 /// The slot that a reference names.
 pub fn slot(plan: &Plan, name: &str) -> usize {
-    let found = plan.channels.iter().position(|channel| channel.name == name);
+    let found = plan
+        .channels
+        .iter()
+        .position(|channel| channel.name == name);
     found.unwrap_or_else(|| {
         let known: Vec<_> = plan.channels.iter().map(|channel| &channel.name).collect();
         panic!("there is no `{name}` in {known:?}")
@@ -53,7 +56,8 @@ pub fn linear(terms: &[(&str, f64)], intercept: f64) -> Arc<dyn Predictor> {
         "coefficients": coefficients,
         "intercept": intercept,
     });
-    let read: Box<dyn Predictor> = serde_json::from_value(written).expect("a predictor as models hold it");
+    let read: Box<dyn Predictor> =
+        serde_json::from_value(written).expect("a predictor as models hold it");
     Arc::from(read)
 }
 
@@ -74,13 +78,19 @@ impl Bench {
     }
 
     /// Steps to an instant with these samples, or tells that the engine refuses.
-    pub fn try_tick(&mut self, seconds: f64, samples: &[(&str, f64)]) -> Result<Vec<f64>, EngineError> {
+    pub fn try_tick(
+        &mut self,
+        seconds: f64,
+        samples: &[(&str, f64)],
+    ) -> Result<Vec<f64>, EngineError> {
         let plan = Arc::clone(self.engine.plan());
         let mut values = vec![f64::NAN; plan.sources.len()];
         for (name, value) in samples {
             values[slot(&plan, name)] = *value;
         }
-        self.engine.step(secs(seconds), &values).map(<[f64]>::to_vec)
+        self.engine
+            .step(secs(seconds), &values)
+            .map(<[f64]>::to_vec)
     }
 
     /// Steps to an instant with these samples.

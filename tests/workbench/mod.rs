@@ -5,9 +5,11 @@
 
 mod bench;
 mod program;
+mod simulated;
 
 pub use bench::{Bench, linear, plan, problems, secs, slot};
 pub use program::{Finished, Scratch, athermal, athermal_fed};
+pub use simulated::simulated;
 
 use std::path::{Path, PathBuf};
 

@@ -31,7 +31,11 @@ impl Finished {
     #[track_caller]
     pub fn tells(&self, parts: &[&str]) {
         for part in parts {
-            assert!(self.told.contains(part), "`{part}` is not in:\n{}", self.told);
+            assert!(
+                self.told.contains(part),
+                "`{part}` is not in:\n{}",
+                self.told
+            );
         }
     }
 }
