@@ -25,3 +25,4 @@ pub use athermal_files as files;
 use athermal_combiners as _;
 use athermal_estimators as _;
 use athermal_features as _;
+use athermal_simulation as _;

@@ -6,6 +6,7 @@ mod evaluate;
 mod fit;
 mod nodes;
 mod run;
+mod swap;
 
 use clap::Subcommand;
 

@@ -16,7 +16,10 @@
 //! | [`compile`] | references, units, spans, all checks, an order, slots: a plan |
 //! | [`engine`] | stepping a plan: held inputs and their ages, lags, truth alignment |
 //! | [`recording`] | what a data set offers to the layers below |
+//! | [`prng`], [`fault`] | seeded random numbers; what can be wrong with a sensor of any recording |
+//! | [`machine`] | what a simulated machine is, and as what recording it serves |
 //! | [`model`], [`fit`], [`score`] | a fitted graph, training it, scoring it |
+//! | [`live`] | replacing a graph while it runs |
 //!
 //! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
 //! [`register!`]; start at [`node::Feature`], [`node::Estimator`] or [`node::Combiner`].
@@ -26,9 +29,13 @@ pub mod compile;
 pub mod diagnostic;
 pub mod document;
 pub mod engine;
+pub mod fault;
 pub mod fit;
+pub mod live;
+pub mod machine;
 pub mod model;
 pub mod node;
+pub mod prng;
 pub mod quantity;
 pub mod recording;
 mod schema;

@@ -1,6 +1,6 @@
 //! Creep of an axis after it has moved. Decides how far and how fast it settles, not when it moves.
 
-use crate::prng::Prng;
+use athermal_core::prng::Prng;
 
 /// Time constants in s of the fast and the slow part.
 const TAU_S: [f64; 2] = [120.0, 900.0];

@@ -3,14 +3,14 @@
 use crate::bar::{ALUMINIUM, Bar, STAINLESS, STEEL, Shape};
 use crate::chuck::{Chuck, View};
 use crate::creep::Creep;
-use crate::machine::{
-    Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
-};
 use crate::motors::{Duty, Motors};
-use crate::prng::Prng;
 use crate::recorder::{PERIOD_S, Plant, Recorder};
 use crate::room::{Coupling, Room, RoomShape};
-use crate::schedule::{Schedule, Track};
+use athermal_core::machine::schedule::{Schedule, Track};
+use athermal_core::machine::{
+    Channel, Machine, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of,
+};
+use athermal_core::prng::Prng;
 
 /// The machine `die-tester`.
 ///

@@ -1,6 +1,6 @@
 //! When the motors of a stage work. Decides the alignment bursts and their heat, not where the heat goes.
 
-use crate::prng::Prng;
+use athermal_core::prng::Prng;
 
 /// How often and how hard motors work.
 #[derive(Debug, Clone, Copy)]

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::prng::Prng;
 use crate::wander::Wander;
+use athermal_core::prng::Prng;
 
 /// How a room fluctuates. Amplitudes and standard deviations in K.
 #[derive(Debug, Clone, Copy)]

@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use crate::machine::{Channel, Row, SECOND_NS, Simulation};
 use crate::recorder::DRIFT_DECIMALS;
+use athermal_core::machine::{Channel, Row, SECOND_NS, Simulation};
 
 /// Writes the line of names and all rows that are left; gives the number of rows.
 ///

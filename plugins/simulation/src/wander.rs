@@ -1,6 +1,6 @@
 //! A quantity that wanders about zero and forgets where it was. Decides the random process, not what wanders.
 
-use crate::prng::Prng;
+use athermal_core::prng::Prng;
 
 /// An Ornstein–Uhlenbeck process with zero mean, discretised exactly for a fixed step:
 /// `x(t + dt) = μ x(t) + σ √(1 − μ²) n` with `μ = exp(−dt/τ)` (Gillespie, Phys. Rev. E 54, 2084, 1996, eq. 3.1),

@@ -3,10 +3,15 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal_simulation::{
-    Fault, FaultKind, Faults, Faulty, MACHINES, Machine, Row, SECOND_NS, Schedule, Setup,
-    SetupError, Simulation, machine, write_table,
+use athermal_core::fault::{Fault, FaultKind, Faults};
+use athermal_core::machine::{
+    self, Faulty, Machine, Row, SECOND_NS, Schedule, Setup, SetupError, Simulation,
 };
+use athermal_simulation::{MACHINES, write_table};
+
+fn machine(name: &str) -> Option<&'static dyn Machine> {
+    machine::machine(name).ok().map(|known| known.machine)
+}
 
 fn start(machine: &dyn Machine, days: f64, seed: u64) -> Box<dyn Simulation> {
     let setup = Setup {

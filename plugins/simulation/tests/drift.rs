@@ -2,7 +2,12 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal_simulation::{Machine, Row, SECOND_NS, Setup, machine};
+use athermal_core::machine::{self, Machine, Row, SECOND_NS, Setup};
+use athermal_simulation as _;
+
+fn machine(name: &str) -> Option<&'static dyn Machine> {
+    machine::machine(name).ok().map(|known| known.machine)
+}
 
 const DAY_ROWS: usize = 8640;
 const WINDOW_S: f64 = 300.0;

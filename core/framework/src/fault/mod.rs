@@ -1,12 +1,15 @@
-//! What can be wrong with a sensor. Decides how a fault changes the values of a channel, for rows of a simulation or of any other recording.
+//! Decides what can be wrong with a sensor and how a fault changes the values of a channel, in any recording; not which recording.
 
 mod error;
 mod kind;
+mod recording;
+mod spec;
 
 pub use error::FaultError;
 pub use kind::FaultKind;
+pub use recording::WithFaults;
+pub use spec::FaultSpec;
 
-use crate::machine::{Row, Simulation};
 use crate::prng::Prng;
 
 const HOUR_NS: f64 = 3600e9;
@@ -79,6 +82,14 @@ impl Faults {
         })
     }
 
+    /// What follows is another segment: its times may start again, and faults count from its first row.
+    pub fn restart(&mut self) {
+        self.first_ns = None;
+        for (_, _, held) in &mut self.faults {
+            *held = f64::NAN;
+        }
+    }
+
     /// Changes the values of one row, one per channel and NaN where there is none. Rows must come in the order of time; `time_ns` may count from any instant.
     pub fn apply(&mut self, time_ns: i64, values: &mut [f64]) {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
@@ -118,30 +129,6 @@ impl Fault {
             FaultKind::Drift => value + self.size * (inside_ns as f64 / HOUR_NS),
             FaultKind::Noise => value + self.size * prng.normal(),
         }
-    }
-}
-
-/// A simulation whose sensors fail. The true drift is not touched.
-pub struct Faulty {
-    simulation: Box<dyn Simulation>,
-    faults: Faults,
-}
-
-impl Faulty {
-    /// `simulation` with `faults`.
-    #[must_use]
-    pub fn new(simulation: Box<dyn Simulation>, faults: Faults) -> Self {
-        Self { simulation, faults }
-    }
-}
-
-impl Simulation for Faulty {
-    fn next(&mut self, row: &mut Row) -> bool {
-        let more = self.simulation.next(row);
-        if more {
-            self.faults.apply(row.time_ns, &mut row.values);
-        }
-        more
     }
 }
 

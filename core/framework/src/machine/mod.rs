@@ -1,8 +1,71 @@
-//! What a simulated machine is to those who run it. Decides the roles `Machine` and `Simulation`, not any machine's physics.
+//! Decides what a simulated machine is to those who run it, and how it becomes known; not any machine's physics.
+//!
+//! Whoever brings a machine implements [`Machine`] and [`Simulation`], and makes it known with
+//! [`register_machine!`](crate::register_machine). From then on it can be simulated by its name from the command line
+//! and from tests of graph files:
+//!
+//! ```
+//! use athermal_core::machine::{Channel, Machine, Row, SetPoint, Setup, SetupError, Simulation, rows_of};
+//!
+//! const SECOND_NS: i64 = 1_000_000_000;
+//!
+//! /// A plate that warms by 1 mK in each second.
+//! struct Plate;
+//!
+//! impl Machine for Plate {
+//!     fn name(&self) -> &'static str {
+//!         "plate"
+//!     }
+//!     fn summary(&self) -> &'static str {
+//!         "A plate that warms steadily."
+//!     }
+//!     fn channels(&self) -> &[Channel] {
+//!         const { &[Channel::temperature("plate")] }
+//!     }
+//!     fn set_points(&self) -> &[SetPoint] {
+//!         &[]
+//!     }
+//!     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
+//!         let rows = rows_of(self.name(), self.set_points(), setup, SECOND_NS)?;
+//!         Ok(Box::new(Warming { row: 0, rows }))
+//!     }
+//! }
+//!
+//! struct Warming {
+//!     row: u64,
+//!     rows: u64,
+//! }
+//!
+//! impl Simulation for Warming {
+//!     fn next(&mut self, row: &mut Row) -> bool {
+//!         if self.row == self.rows {
+//!             return false;
+//!         }
+//!         row.time_ns = self.row as i64 * SECOND_NS;
+//!         row.values[0] = 20.0 + 0.001 * self.row as f64;
+//!         self.row += 1;
+//!         true
+//!     }
+//! }
+//!
+//! athermal_core::register_machine!(Plate);
+//! # fn main() {
+//! let plate = athermal_core::machine::machine("plate").expect("it has just been registered");
+//! assert_eq!(plate.machine.channels()[0].reference(), "temperature.plate");
+//! # }
+//! ```
+
+mod faulty;
+mod recording;
+mod registry;
+pub mod schedule;
+
+pub use faulty::Faulty;
+pub use recording::{MachineError, Simulated};
+pub use registry::{KnownMachine, UnknownMachine, machine, machines};
+pub use schedule::{Schedule, ScheduleError};
 
 use std::fmt;
-
-use crate::schedule::Schedule;
 
 /// Nanoseconds in a second.
 pub const SECOND_NS: i64 = 1_000_000_000;

@@ -18,7 +18,7 @@ mod reader;
 
 pub use error::{Reason, ScheduleError};
 
-use crate::machine::{SECOND_NS, SetPoint};
+use super::{SECOND_NS, SetPoint};
 
 /// One set point over time: steps at instants, held in between.
 #[derive(Debug, Clone, PartialEq)]

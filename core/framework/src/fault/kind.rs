@@ -1,7 +1,13 @@
 //! The ways in which a sensor fails. Decides their names and usual sizes, not what they do to a value.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::unit::Unit;
+
 /// How a sensor fails. A fault changes the values that there are: where a channel has none, it has none with the fault either.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum FaultKind {
     /// There are no values.
     Missing,
@@ -53,14 +59,14 @@ impl FaultKind {
         !matches!(self, Self::Missing | Self::Stuck)
     }
 
-    /// The size where none is given, in the unit of the channel (per hour for `drift`): in K for a temperature, in nm for a position; other units have none.
+    /// The size where none is given, in the unit of the channel (per hour for `drift`): 1 K for a temperature, 100 nm for a length, and shares and multiples of it; other units have none.
     #[must_use]
-    pub fn usual_size(self, unit: &str) -> Option<f64> {
-        let scale = match unit {
-            "Cel" | "K" => 1.0,
-            "nm" => 100.0,
-            _ => return None,
+    pub fn usual_size(self, unit: &Unit) -> Option<f64> {
+        let of = |text: &str, size: f64| {
+            let usual = Unit::parse(text).ok()?;
+            Some(size * usual.factor_to(unit)?)
         };
+        let scale = of("K", 1.0).or_else(|| of("nm", 100.0))?;
         Some(match self {
             Self::Missing | Self::Stuck => 0.0,
             Self::Offset => scale,
@@ -85,11 +91,13 @@ mod tests {
 
     #[test]
     fn usual_sizes_are_in_the_unit_of_the_channel() {
-        assert_eq!(FaultKind::Offset.usual_size("Cel"), Some(1.0));
-        assert_eq!(FaultKind::Noise.usual_size("nm"), Some(5.0));
-        assert_eq!(FaultKind::Spike.usual_size("V"), None);
+        let size = |kind: FaultKind, unit: &str| kind.usual_size(&Unit::parse(unit).unwrap());
+        assert_eq!(size(FaultKind::Offset, "Cel"), Some(1.0));
+        assert_eq!(size(FaultKind::Noise, "nm"), Some(5.0));
+        assert_eq!(size(FaultKind::Offset, "um"), Some(0.1));
+        assert_eq!(size(FaultKind::Spike, "V"), None);
         for kind in FaultKind::ALL {
-            let size = kind.usual_size("Cel");
+            let size = size(kind, "Cel");
             assert_eq!(kind.has_size(), size.is_some_and(|size| size > 0.0));
         }
     }

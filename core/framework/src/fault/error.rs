@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::FaultKind;
+use crate::unit::Unit;
 
 /// Why faults cannot be applied.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +34,40 @@ pub enum FaultError {
         kind: FaultKind,
         /// Its size.
         size: f64,
+    },
+    /// No channel has the name.
+    UnknownChannel {
+        /// The name.
+        channel: String,
+        /// The channel that may have been meant.
+        nearest: Option<String>,
+        /// The channels that there are.
+        known: Vec<String>,
+    },
+    /// The size is not in a unit of the channel.
+    SizeUnit {
+        /// The channel.
+        channel: String,
+        /// The unit of the size.
+        found: Unit,
+        /// A unit that fits.
+        wanted: Unit,
+    },
+    /// There is no size, and no usual one for the unit.
+    NoSize {
+        /// The channel.
+        channel: String,
+        /// The kind of fault.
+        kind: FaultKind,
+        /// The unit of the channel.
+        unit: Unit,
+    },
+    /// The text is not a fault.
+    Text {
+        /// The part that is not understood.
+        part: String,
+        /// What it should be.
+        reason: String,
     },
 }
 
@@ -70,6 +105,36 @@ impl fmt::Display for FaultError {
                     kind.name()
                 )
             }
+            Self::UnknownChannel {
+                channel,
+                nearest,
+                known,
+            } => {
+                write!(f, "there is no channel `{channel}`")?;
+                match nearest {
+                    Some(nearest) => write!(f, ", did you mean `{nearest}`?"),
+                    None => write!(f, "; there are {}", known.join(", ")),
+                }
+            }
+            Self::SizeUnit {
+                channel,
+                found,
+                wanted,
+            } => write!(
+                f,
+                "the size of a fault of `{channel}` is in {found}; it must be in {wanted}"
+            ),
+            Self::NoSize {
+                channel,
+                kind,
+                unit,
+            } => write!(
+                f,
+                "a `{}` of `{channel}` needs a size in {}",
+                kind.name(),
+                unit.difference()
+            ),
+            Self::Text { part, reason } => write!(f, "fault `{part}`: {reason}"),
         }
     }
 }
