@@ -93,7 +93,7 @@ fn a_feature_made_of_the_truths_own_signal_is_held_to_the_same_rule() {
     plan(&through("150s", "150s", "past"));
     let told = problems(&through("5min", "0s", "drift"));
     assert!(
-        told.contains("`drift.Z` contains part of the answer"),
+        told.contains("`drift.Z lag 0s` contains part of the answer"),
         "{told}"
     );
     plan(&through("5min", "5min", "drift"));

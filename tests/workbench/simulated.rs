@@ -2,16 +2,19 @@
 
 use std::path::PathBuf;
 
+use athermal::core::{self, machine::Setup};
+
 use super::Scratch;
 
 /// Writes so many days of a machine as a CSV file.
 pub fn simulated(scratch: &Scratch, name: &str, machine: &str, days: f64, seed: u64) -> PathBuf {
-    let machine =
-        athermal_simulation::machine(machine).expect("a machine of that name is built in");
-    let setup = athermal_simulation::Setup {
+    let machine = core::machine::machine(machine)
+        .expect("a machine of that name is built in")
+        .machine;
+    let setup = Setup {
         days,
         seed,
-        ..athermal_simulation::Setup::default()
+        ..Setup::default()
     };
     let mut text = Vec::new();
     let mut simulation = machine.start(&setup).unwrap();
