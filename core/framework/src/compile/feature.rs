@@ -49,11 +49,13 @@ impl Resolver<'_> {
                 return None;
             }
         };
-        let behind = self.behind(
-            &slots,
-            outputs.iter().map(|port| port.channels.len()),
-            feature.delay(),
-        );
+        let channels = outputs.iter().map(|port| port.channels.len());
+        let behind = if closes {
+            let known = self.looped.get(&instance.name());
+            vec![known.cloned().unwrap_or_default(); channels.sum()]
+        } else {
+            self.behind(&slots, channels, feature.delay())
+        };
         let role = PlannedRole::Feature {
             inputs,
             gathers,

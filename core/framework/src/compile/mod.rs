@@ -38,6 +38,9 @@ pub struct Wanted {
 pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
     let nodes = resolver::read_kinds(graph, diagnostics);
     let order = order::order(graph, &nodes, diagnostics);
-    let resolved = resolver::Resolver::new(graph, diagnostics).resolve(&nodes, &order, wanted);
+    let looped = resolver::Resolver::loops(graph, &nodes, &order);
+    let mut resolver = resolver::Resolver::new(graph, diagnostics);
+    resolver.looped = looped;
+    let resolved = resolver.resolve(&nodes, &order, wanted);
     (!diagnostics.has_errors()).then_some(resolved)
 }

@@ -1,6 +1,6 @@
 //! Decides what each declaration of a graph stands for, in order: kinds read, inputs looked up, outputs given slots.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -168,6 +168,14 @@ pub(crate) struct Instance<'a> {
 }
 
 impl Instance<'_> {
+    /// The name of this instance: `thermal.Z1`.
+    pub(crate) fn name(&self) -> String {
+        match &self.decl.member {
+            Some(member) => format!("{}.{member}", self.node.name),
+            None => self.node.name.clone(),
+        }
+    }
+
     /// The place of an input, or of the node where the input is not given.
     pub(crate) fn input_place(&self, port: &str) -> Place {
         self.input(port)
@@ -221,7 +229,13 @@ pub(crate) struct Resolver<'g> {
     nodes: Vec<PlannedNode>,
     /// Slots that somebody refers to.
     read: BTreeSet<usize>,
+    /// What is behind the nodes that close a loop, as far as it was known before, and as it turned out.
+    pub(crate) looped: Looped,
+    closed: Looped,
 }
+
+/// What is behind each instance that closes a loop, by its name.
+pub(crate) type Looped = BTreeMap<String, Provenance>;
 
 impl<'g> Resolver<'g> {
     pub(crate) fn new(graph: &'g GraphFile, diagnostics: &'g mut Diagnostics) -> Self {
@@ -235,12 +249,42 @@ impl<'g> Resolver<'g> {
             gathers: IndexSet::new(),
             nodes: Vec::new(),
             read: BTreeSet::new(),
+            looped: Looped::new(),
+            closed: Looped::new(),
         };
         resolver.take_signals();
         resolver
     }
 
+    /// What is behind the nodes that close a loop. It can be told only once the nodes after them are known, so rounds are
+    /// made until nothing new comes back; each shortest path takes at most one round for every loop that it passes.
+    pub(crate) fn loops(graph: &GraphFile, read: &[ReadNode], order: &Order) -> Looped {
+        let mut known = Looped::new();
+        while !order.closing.is_empty() {
+            let mut untold = Diagnostics::new();
+            let mut round = Resolver::new(graph, &mut untold);
+            round.looped.clone_from(&known);
+            round.instances(read, order);
+            let before = known.clone();
+            for (instance, found) in round.closed {
+                // A round in which something fails tells less than those before, and takes nothing back.
+                let known = known.entry(instance).or_default();
+                *known = Provenance::of([(&*known, Duration::ZERO), (&found, Duration::ZERO)]);
+            }
+            if known == before {
+                break;
+            }
+        }
+        known
+    }
+
     pub(crate) fn resolve(mut self, read: &[ReadNode], order: &Order, wanted: Wanted) -> Plan {
+        self.instances(read, order);
+        let outputs = self.outputs();
+        self.finish(outputs, wanted)
+    }
+
+    fn instances(&mut self, read: &[ReadNode], order: &Order) {
         for node in &self.graph.nodes {
             self.scopes.declare(&node.name);
         }
@@ -277,8 +321,6 @@ impl<'g> Resolver<'g> {
         for (index, instance) in closing {
             self.close(index, &instance);
         }
-        let outputs = self.outputs();
-        self.finish(outputs, wanted)
     }
 
     fn take_signals(&mut self) {
@@ -599,6 +641,12 @@ impl<'g> Resolver<'g> {
                     .report(instance.input_place(port.name), problem);
             }
             gathers.push(gather);
+            if let Role::Feature(feature) = instance.read.spec.role() {
+                let delay = feature.delay();
+                let behind =
+                    Provenance::of(slots.iter().map(|&slot| (&self.provenance[slot], delay)));
+                self.closed.insert(self.nodes[index].instance(), behind);
+            }
         }
         if let PlannedRole::Feature {
             gathers: planned, ..
