@@ -6,6 +6,8 @@ mod evaluate;
 mod fit;
 mod nodes;
 mod run;
+mod schema;
+mod test;
 
 use clap::Subcommand;
 
@@ -24,6 +26,10 @@ pub enum Command {
     Evaluate(evaluate::Evaluate),
     /// Run a model: rows in, predictions out
     Run(run::Run),
+    /// Run the tests that graph files carry
+    Test(test::Test),
+    /// Write the JSON Schema of graph files, for editors
+    Schema(schema::Schema),
 }
 
 impl Command {
@@ -38,6 +44,8 @@ impl Command {
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
+            Self::Test(command) => command.run(terminal),
+            Self::Schema(command) => command.run(terminal),
         }
     }
 }

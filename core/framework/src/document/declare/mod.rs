@@ -16,7 +16,9 @@ use super::problem::DocumentProblem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
-use reading::{known_keys, text};
+pub(crate) use reading::known_keys;
+use reading::text;
+pub(crate) use time_base::UNITS as TIME_UNITS;
 
 const SECTIONS: [&str; 14] = [
     "schema",
@@ -68,7 +70,10 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let signals = signals::declare(root.get("signals"), &sets, sample, diagnostics);
     let nodes = nodes::declare(root.get("nodes"), &sets, sample, diagnostics);
     let outputs = outputs::declare(root.get("outputs"), diagnostics);
-    let tests = root.get("tests").cloned();
+    let mut tests = root.get("tests").cloned();
+    if let Some(tests) = &mut tests {
+        nodes::convert_samples_but(tests, "name", sample, diagnostics);
+    }
     if let Some(tests) = &tests
         && tests.as_list().is_none()
     {
