@@ -30,7 +30,7 @@ pub fn graph_schema() -> Value {
     let unit = of::<crate::unit::Unit>(&mut generator);
     let mut definitions = Definitions::default();
     for (name, schema) in generator.take_definitions(true) {
-        definitions.taken.insert(name, schema);
+        definitions.taken.insert(name, as_draft_7(&schema, &str::to_owned));
     }
     let nodes: Vec<Value> = all
         .iter()
@@ -192,10 +192,67 @@ fn as_draft_7(schema: &Value, rename: &dyn Fn(&str) -> String) -> Value {
                 }
                 made.insert("allOf".to_owned(), json!([reference]));
             }
+            if let Some(Value::Array(choices)) = made.get("oneOf")
+                && let Some(decided) = by_name(choices).or_else(|| by_tag(choices))
+            {
+                made.remove("oneOf");
+                made.extend(decided);
+            }
             Value::Object(made)
         }
         other => other.clone(),
     }
+}
+
+/// Choices that are texts, as one list of them.
+fn by_name(choices: &[Value]) -> Option<Map<String, Value>> {
+    let mut names = Vec::new();
+    let mut texts = Vec::new();
+    for choice in choices {
+        let text = choice["description"].as_str().unwrap_or_default();
+        match (choice.get("const"), choice["enum"].as_array()) {
+            (Some(name), _) => {
+                names.push(name.clone());
+                texts.push(text);
+            }
+            (None, Some(several)) => {
+                names.extend(several.iter().cloned());
+                texts.extend(several.iter().map(|_| text));
+            }
+            (None, None) => return None,
+        }
+    }
+    let docs = json!({ "docs": { "enumValues": texts } });
+    Some(Map::from_iter([
+        ("enum".to_owned(), Value::Array(names)),
+        ("x-taplo".to_owned(), docs),
+    ]))
+}
+
+/// Choices that are tables which one key tells apart, as an `if … then …` for each: what is wrong in a table is then told where it
+/// stands, not as "none of these".
+fn by_tag(choices: &[Value]) -> Option<Map<String, Value>> {
+    let first = choices.first()?["properties"].as_object()?;
+    let (tag, _) = first.iter().find(|(_, property)| property.get("const").is_some())?;
+    let mut names = Vec::new();
+    let mut texts = Vec::new();
+    let mut decided = Vec::new();
+    for choice in choices {
+        let name = choice["properties"][tag].get("const")?;
+        names.push(name.clone());
+        texts.push(choice["description"].as_str().unwrap_or_default());
+        decided.push(json!({
+            "if": { "properties": { tag: { "const": name } }, "required": [tag] },
+            "then": choice
+        }));
+    }
+    let names = json!({ tag: { "enum": names, "x-taplo": { "docs": { "enumValues": texts } } } });
+    Some(Map::from_iter([
+        ("type".to_owned(), json!("object")),
+        ("properties".to_owned(), names),
+        ("required".to_owned(), json!([tag])),
+        ("allOf".to_owned(), Value::Array(decided)),
+    ]))
 }
 
 /// The keys of one kind, the framework's included.
