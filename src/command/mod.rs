@@ -7,6 +7,7 @@ mod fit;
 mod nodes;
 mod run;
 mod schema;
+mod swap;
 mod test;
 
 use clap::Subcommand;

@@ -21,6 +21,7 @@
 //! | [`model`], [`fit`], [`score`] | a fitted graph, training it, scoring it |
 //! | [`schema`] | the JSON Schema of graph files, for editors |
 //! | [`trial`] | the tests in a graph file: what they mean, running one, judging it |
+//! | [`live`] | replacing a graph while it runs |
 //!
 //! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
 //! [`register!`]; start at [`node::Feature`], [`node::Estimator`] or [`node::Combiner`].
@@ -32,6 +33,7 @@ pub mod document;
 pub mod engine;
 pub mod fault;
 pub mod fit;
+pub mod live;
 pub mod machine;
 pub mod model;
 pub mod node;

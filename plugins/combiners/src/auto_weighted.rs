@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -75,6 +75,10 @@ impl Combiner for AutoWeighted {
             ));
         }
         mistakes
+    }
+
+    fn memory(&self) -> Duration {
+        self.memory
     }
 
     fn build(&self, voters: usize) -> Box<dyn Combine> {
@@ -208,6 +212,35 @@ impl Combine for Weigher {
             *arrived = *arrived + shift;
         }
     }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(Remembered {
+            errors: self.memories.clone(),
+        }))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        let remembered = match state.known::<Remembered>() {
+            Ok(remembered) => remembered,
+            Err(cold) => return cold,
+        };
+        if remembered.errors.len() != self.memories.len() {
+            return Restored::cold("the number of voters differs");
+        }
+        self.memories = remembered.errors;
+        for voter in 0..self.memories.len() {
+            self.refresh(voter);
+        }
+        Restored::Accepted
+    }
 }
+
+/// What a vote remembers: for each voter the arrival and square of its errors, oldest first.
+#[derive(Debug, Serialize, Deserialize)]
+struct Remembered {
+    errors: Vec<VecDeque<(Instant, f64)>>,
+}
+
+athermal_core::state!(Remembered, "auto_weighted/1");
 
 athermal_core::register!(AutoWeighted, Combiner, "auto_weighted");

@@ -5,7 +5,7 @@ use std::fmt;
 
 use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
@@ -157,6 +157,10 @@ impl Feature for Delay {
         }
     }
 
+    fn memory(&self) -> Duration {
+        self.delay()
+    }
+
     fn closes_loops(&self) -> bool {
         true
     }
@@ -169,7 +173,7 @@ struct Delaying {
     tick: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Waiting {
     tick: u64,
     at: Instant,
@@ -231,6 +235,33 @@ impl Operator for Delaying {
     fn segment(&mut self) {
         self.queues.iter_mut().for_each(VecDeque::clear);
     }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(OnTheWay {
+            queues: self.queues.clone(),
+            tick: self.tick,
+        }))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known::<OnTheWay>() {
+            Ok(state) if state.queues.len() == self.queues.len() => {
+                (self.queues, self.tick) = (state.queues, state.tick);
+                Restored::Accepted
+            }
+            Ok(_) => Restored::cold("the number of channels differs"),
+            Err(cold) => cold,
+        }
+    }
 }
+
+/// The state of a delay.
+#[derive(Debug, Serialize, Deserialize)]
+struct OnTheWay {
+    queues: Vec<VecDeque<Waiting>>,
+    tick: u64,
+}
+
+athermal_core::state!(OnTheWay, "delay/1");
 
 athermal_core::register!(Delay, Feature, "delay");

@@ -2,8 +2,10 @@
 //! not when it runs.
 
 mod combiner;
+mod diff;
 mod estimator;
 mod feature;
+mod identity;
 mod order;
 mod plan;
 mod problem;
@@ -13,6 +15,7 @@ mod resolver;
 mod scope;
 mod steps;
 
+pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
 pub use plan::{
     Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
     Step, TrainingLimits, TruthLink,

@@ -28,6 +28,8 @@ pub struct Plan {
     pub steps: Vec<Step>,
     /// What comes out.
     pub outputs: Vec<PlannedOutput>,
+    /// The time after which the graph, started cold, knows all that it would know had it always run.
+    pub warm_up: Duration,
 }
 
 /// A measured channel and how tabular sources name it.

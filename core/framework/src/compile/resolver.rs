@@ -643,9 +643,11 @@ impl<'g> Resolver<'g> {
             nodes: self.nodes,
             steps: Vec::new(),
             outputs,
+            warm_up: Duration::ZERO,
         };
         steps::mark_wanted(&mut plan, &self.read, wanted);
         plan.steps = steps::steps(&plan);
+        plan.warm_up = steps::warm_up(&plan);
         if !self.diagnostics.has_errors() {
             steps::warn(self.graph, &plan, self.diagnostics);
         }

@@ -7,6 +7,7 @@ use super::plan::{Plan, PlannedRole, Step};
 use super::problem::CompileProblem;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
+use crate::time::Duration;
 
 /// The steps: each gather right before its first reader, each node after those that it reads, captures last.
 ///
@@ -46,6 +47,16 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
         steps.push(Step::Capture(index));
     }
     steps
+}
+
+/// The longest time that a node needs to know all that it would know had it always run.
+pub(super) fn warm_up(plan: &Plan) -> Duration {
+    let mut of_slot = vec![Duration::ZERO; plan.channels.len()];
+    for node in &plan.nodes {
+        let warm_up = plan.warm_up_of(&of_slot, node);
+        of_slot[node.slots.clone()].fill(warm_up);
+    }
+    of_slot.into_iter().max().unwrap_or(Duration::ZERO)
 }
 
 fn gathers(role: &PlannedRole) -> Vec<usize> {

@@ -74,6 +74,11 @@ impl Gathered {
         present.map(|(_, &stamp)| stamp).min()
     }
 
+    /// Looks its places in histories up anew: they are not those that it read from before.
+    pub(crate) fn forget_places(&mut self) {
+        self.cursors.fill(0);
+    }
+
     /// Starts afresh for another segment.
     pub(crate) fn clear(&mut self) {
         self.values.fill(ABSENT);

@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 
 use crate::channel::{ABSENT, COLD};
 use crate::time::{Duration, Instant};
+use serde::{Deserialize, Serialize};
 
 /// The past of one slot, as far back as anybody reads it.
 ///
 /// Readers ask for instants that never go back, each through a cursor of its own, so that an answer costs a step or two.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct History {
     depth: Duration,
     entries: VecDeque<Past>,
@@ -16,7 +17,7 @@ pub(crate) struct History {
     dropped: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Past {
     at: Instant,
     value: f64,
@@ -63,6 +64,18 @@ impl History {
             None if self.entries.is_empty() => (ABSENT, at),
             None => (COLD, at),
         }
+    }
+
+    /// Goes on from another history of the same slot, keeping what it reached back further.
+    pub(crate) fn adopt(&mut self, other: &Self) {
+        let begin = other.entries.front().map_or(Instant::MAX, |past| past.at);
+        self.entries.retain(|past| past.at < begin);
+        if self.depth <= other.depth {
+            self.entries.clear();
+        }
+        self.entries.extend(&other.entries);
+        // Readers find their places anew; all that counts is that numbers go on.
+        self.dropped = other.dropped;
     }
 
     /// Forgets everything.

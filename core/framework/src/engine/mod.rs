@@ -1,20 +1,29 @@
 //! Decides how a plan is stepped: what runs at a tick, in which order, and when truths are told; not where samples come
 //! from or go.
 
+mod blend;
+mod carry;
 mod error;
 mod estimate;
 mod gather;
 mod history;
+mod keep;
 mod pairing;
+mod revision;
 mod slots;
+mod state;
 mod vote;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+pub use carry::{Carry, NodeCarry};
 pub use error::EngineError;
 pub use pairing::{Paired, Pairing};
+pub use revision::{fnv_1a, revision};
+pub use state::{EngineState, RestoreError};
 
+pub(crate) use carry::Untouched;
 pub(crate) use gather::Gathered;
 pub(crate) use history::{Cursor, History};
 pub(crate) use slots::Slots;
@@ -22,6 +31,7 @@ pub(crate) use slots::Slots;
 use crate::compile::{Plan, PlannedRole, Step};
 use crate::node::{Operator, Outputs, Predictor, Role, Tick};
 use crate::time::{Duration, Instant};
+use blend::Blending;
 use estimate::Estimate;
 use vote::Vote;
 
@@ -34,6 +44,7 @@ pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
 /// live running all step one of these.
 pub struct Engine {
     plan: Arc<Plan>,
+    fitted: Fitted,
     slots: Slots,
     gathered: Vec<Gathered>,
     histories: Vec<Option<History>>,
@@ -48,6 +59,8 @@ pub struct Engine {
     rejected: Vec<u64>,
     refused: u64,
     outputs: Vec<f64>,
+    /// For each output its rate of passing over, in its unit per second, and how far it has.
+    blending: Vec<(Option<f64>, Blending)>,
 }
 
 enum Running {
@@ -156,8 +169,25 @@ impl Engine {
             rejected: vec![0; plan.sources.len()],
             refused: 0,
             outputs: vec![f64::NAN; plan.outputs.len()],
+            blending: plan
+                .outputs
+                .iter()
+                .map(|output| {
+                    (
+                        blend::rate(output, &plan.channels[output.slot].channel.unit),
+                        Blending::default(),
+                    )
+                })
+                .collect(),
+            fitted: fitted.clone(),
             plan,
         })
+    }
+
+    /// What the last tick gave, in the order of [`Plan::outputs`].
+    #[must_use]
+    pub fn outputs(&self) -> &[f64] {
+        &self.outputs
     }
 
     /// The plan that is stepped.
@@ -209,14 +239,20 @@ impl Engine {
             }
         }
         self.remember(time);
-        for (value, output) in self.outputs.iter_mut().zip(&plan.outputs) {
-            *value = if self.slots.ran(output.slot) {
-                self.slots.values[output.slot]
-            } else {
-                f64::NAN
-            };
-        }
+        self.put_out(&plan, time);
         Ok(&self.outputs)
+    }
+
+    /// What was fitted.
+    #[must_use]
+    pub fn fitted(&self) -> &Fitted {
+        &self.fitted
+    }
+
+    /// The revision of the graph that runs; see [`revision`].
+    #[must_use]
+    pub fn revision(&self) -> String {
+        revision(&self.plan, &self.fitted)
     }
 
     /// The next tick belongs to another segment: windows, lags and filters start afresh, what was learned stays.
@@ -275,6 +311,25 @@ impl Engine {
     /// What a gather read at the present tick, and whether anything in it was fresh.
     pub(crate) fn gathered(&self, gather: usize) -> (&[f64], bool) {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
+    }
+
+    fn put_out(&mut self, plan: &Plan, now: Instant) {
+        let shown = self
+            .outputs
+            .iter_mut()
+            .zip(&plan.outputs)
+            .zip(&mut self.blending);
+        for ((shown, output), (rate, blending)) in shown {
+            let value = if self.slots.ran(output.slot) {
+                self.slots.values[output.slot]
+            } else {
+                f64::NAN
+            };
+            *shown = match rate {
+                Some(rate) if !value.is_nan() => blending.pass(now, value, *rate),
+                _ => value,
+            };
+        }
     }
 
     fn take_in(&mut self, time: Instant, samples: &[f64]) {

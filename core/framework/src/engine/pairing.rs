@@ -2,12 +2,13 @@
 
 use crate::compile::TruthLink;
 use crate::time::{Duration, Instant};
+use serde::{Deserialize, Serialize};
 
 /// The runs that truths may still be paired with.
 ///
 /// A truth at `τ` belongs to the last run at or before `τ − ahead`, and to none where that run lies longer before
 /// `τ − ahead` than the truth's span. Fitting, scoring and learning all pair through here.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Pairing {
     ahead: Duration,
     limit: Duration,

@@ -4,9 +4,11 @@ use std::collections::VecDeque;
 
 use super::gather::Gathered;
 use super::pairing::Pairing;
+use super::state::NodeState;
 use crate::compile::TruthLink;
-use crate::node::{Combine, Votes};
+use crate::node::{Combine, Restored, Votes};
 use crate::time::{Duration, Instant};
+use serde::{Deserialize, Serialize};
 
 /// A combiner in a running plan, with the truths that the embargo still withholds from it.
 pub(crate) struct Vote {
@@ -78,10 +80,46 @@ impl Vote {
         }
     }
 
+    /// What the combiner knows, and what is still withheld from it.
+    pub(crate) fn snapshot(&self) -> NodeState {
+        let mut state = NodeState::pack(self.combine.snapshot());
+        state.learning = self.learning.as_ref().map(|learning| LearningState {
+            pairing: learning.pairing.clone(),
+            withheld: learning.withheld.clone(),
+            votes: learning.votes.clone(),
+        });
+        state
+    }
+
+    /// Goes on from the state of a combiner of the same voters.
+    pub(crate) fn restore(&mut self, state: &NodeState) -> Restored {
+        let answer = match state.unpack() {
+            Ok(Some(own)) => self.combine.restore(own),
+            Ok(None) => Restored::Accepted,
+            Err(cold) => cold,
+        };
+        if let (Some(learning), Some(from)) = (&mut self.learning, &state.learning)
+            && !matches!(answer, Restored::Cold { .. })
+        {
+            learning.pairing.clone_from(&from.pairing);
+            learning.withheld.clone_from(&from.withheld);
+            learning.votes.clone_from(&from.votes);
+        }
+        answer
+    }
+
     /// Moves what is remembered to the clock of the segment that begins.
     pub(crate) fn shift(&mut self, shift: Duration) {
         self.combine.segment(shift);
     }
+}
+
+/// The truths that are withheld from a combiner, and the runs that later ones may be paired with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct LearningState {
+    pairing: Pairing,
+    withheld: VecDeque<(Instant, f64)>,
+    votes: VecDeque<f64>,
 }
 
 impl Learning {

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::{InputPort, Mistake};
+use super::{InputPort, Mistake, Restored, State};
 use crate::time::{Duration, Instant};
 
 /// A node that makes one prediction of several for the same instant.
@@ -55,6 +55,11 @@ pub trait Combiner: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// How long what was learned counts; the engine keeps so much of the past for warming up.
+    fn memory(&self) -> Duration {
+        Duration::ZERO
+    }
+
     /// What runs, for this many voters.
     fn build(&self, voters: usize) -> Box<dyn Combine>;
 }
@@ -74,6 +79,16 @@ pub trait Combine: Send {
     ///
     /// What was learned stays; instants that are kept move by `shift`.
     fn segment(&mut self, _shift: Duration) {}
+
+    /// All that was learned; none for a combiner that learns nothing.
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        None
+    }
+
+    /// Goes on from what a combiner of this kind learned of the same voters, maybe with other parameters or in an older form.
+    fn restore(&mut self, _state: Box<dyn State>) -> Restored {
+        Restored::cold("the combiner learns nothing")
+    }
 }
 
 /// The votes for one instant, in the order of the `voters` port; NaN where a voter has none.

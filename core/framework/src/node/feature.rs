@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use super::{InputPort, Inputs, Mistake, OutputPort};
+use super::{InputPort, Inputs, Mistake, OutputPort, Restored, State};
 use crate::engine::Gathered;
 use crate::time::{Duration, Instant};
 
@@ -88,6 +88,11 @@ pub trait Feature: Debug + Send + Sync {
         Duration::ZERO
     }
 
+    /// How far back the inputs reach that the outputs depend on; the engine keeps so much of the past for warming up.
+    fn memory(&self) -> Duration {
+        Duration::ZERO
+    }
+
     /// Whether outputs depend only on inputs of earlier ticks, so that the node may close a loop.
     ///
     /// Such a node gets its inputs through [`Operator::capture`] once all outputs of the tick are there.
@@ -106,6 +111,16 @@ pub trait Operator: Send {
 
     /// Starts afresh: the next tick belongs to another segment of the data.
     fn segment(&mut self);
+
+    /// All that the next outputs depend on, beside the inputs; none for a node that keeps nothing.
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        None
+    }
+
+    /// Goes on from a state that this kind of node gave, maybe with other parameters or in an older form.
+    fn restore(&mut self, _state: Box<dyn State>) -> Restored {
+        Restored::cold("the node keeps no state")
+    }
 }
 
 /// What an operator sees of the present tick.

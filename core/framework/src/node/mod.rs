@@ -9,6 +9,7 @@ mod estimator;
 mod feature;
 mod port;
 mod registry;
+mod state;
 
 pub use combiner::{Combine, Combiner, Votes};
 pub use estimator::{
@@ -20,3 +21,4 @@ pub use port::{InputPort, Inputs, Mistake, OutputPort, Read};
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{Kind, NodeSpec, Role, RoleName, kind, kinds};
+pub use state::{Restored, State};

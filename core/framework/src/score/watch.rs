@@ -8,11 +8,13 @@ use crate::recording::Event;
 use crate::time::{Duration, Instant};
 
 /// Everything scored of one plan.
+#[derive(Debug)]
 pub(crate) struct Watch {
     pub(crate) truths: Vec<Truth>,
 }
 
 /// A truth and all predictions of it.
+#[derive(Debug)]
 pub(crate) struct Truth {
     pub(crate) slot: usize,
     /// The slot of its standard error, where its node gives one.
@@ -24,6 +26,7 @@ pub(crate) struct Truth {
 }
 
 /// A predicted channel.
+#[derive(Debug)]
 pub(crate) struct Prediction {
     pub(crate) slot: usize,
     pub(crate) node: usize,
@@ -33,6 +36,7 @@ pub(crate) struct Prediction {
 }
 
 /// The truth at the smallest lag that sees nothing of the answer, for one horizon.
+#[derive(Debug)]
 pub(crate) struct Persistence {
     lag: Duration,
     max_age: Duration,
@@ -76,6 +80,17 @@ impl Watch {
         Self {
             truths: truths.into_values().collect(),
         }
+    }
+
+    /// The truth that a slot predicts, and its predictions so far, one for each of the truth's values.
+    pub(crate) fn prediction(&self, slot: usize) -> Option<(&Truth, &[f64])> {
+        self.truths.iter().find_map(|truth| {
+            let prediction = truth
+                .predictions
+                .iter()
+                .find(|prediction| prediction.slot == slot)?;
+            Some((truth, prediction.values.as_slice()))
+        })
     }
 
     /// Looks at what a tick did.

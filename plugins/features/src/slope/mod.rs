@@ -5,7 +5,7 @@ mod windows;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -174,6 +174,11 @@ impl Feature for Slope {
         ])
     }
 
+    fn memory(&self) -> Duration {
+        let lengths = self.windows.lengths().unwrap_or_default();
+        lengths.into_iter().max().unwrap_or(Duration::ZERO)
+    }
+
     fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator> {
         let from = inputs.port("signal");
         let windows = self.windows.lengths().unwrap_or_default();
@@ -186,6 +191,8 @@ impl Feature for Slope {
         let errors = wanted.get(1).copied().unwrap_or(false);
         let width = from.len() * windows.len();
         Box::new(Sloping {
+            lengths: lengths.clone(),
+            coverage,
             kernel: RollingSlope::new(
                 &lengths,
                 from.len(),
@@ -216,6 +223,9 @@ fn seconds(window: Duration) -> String {
 /// Running slopes.
 struct Sloping {
     kernel: RollingSlope,
+    /// What the kernel was made for; a state of another kernel is of no use.
+    lengths: Vec<i64>,
+    coverage: Coverage,
     /// What a slope per second of each channel is multiplied by.
     factors: Vec<f64>,
     windows: usize,
@@ -258,6 +268,43 @@ impl Operator for Sloping {
     fn segment(&mut self) {
         self.kernel.reset();
     }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(Windowed {
+            lengths: self.lengths.clone(),
+            coverage: self.coverage,
+            errors: self.errors,
+            kernel: self.kernel.clone(),
+        }))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        let state = match state.known::<Windowed>() {
+            Ok(state) => state,
+            Err(cold) => return cold,
+        };
+        if state.kernel.channels() != self.kernel.channels() {
+            return Restored::cold("the number of channels differs");
+        }
+        if (&state.lengths, state.coverage, state.errors)
+            != (&self.lengths, self.coverage, self.errors)
+        {
+            return Restored::cold("the windows or what they must hold differ");
+        }
+        self.kernel = state.kernel;
+        Restored::Accepted
+    }
 }
+
+/// The state of slopes: the kernel, and what it was made for.
+#[derive(Debug, Serialize, Deserialize)]
+struct Windowed {
+    lengths: Vec<i64>,
+    coverage: Coverage,
+    errors: bool,
+    kernel: RollingSlope,
+}
+
+athermal_core::state!(Windowed, "slope/1");
 
 athermal_core::register!(Slope, Feature, "slope");

@@ -1,0 +1,296 @@
+//! Decides which properties of a plan count, and when two of them mean the same.
+
+use std::collections::HashMap;
+
+use indexmap::IndexMap;
+use serde_json::Value;
+
+use super::ParameterChange;
+use crate::compile::plan::{Plan, PlannedNode, PlannedRole, TruthLink};
+use crate::document::{TimeBase, TimeForm};
+use crate::node::{Read, Role, TruthLags};
+use crate::quantity::Quantity;
+use crate::time::Duration;
+use crate::unit::Unit;
+
+/// The properties of one thing, by path.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Facts(IndexMap<String, Fact>);
+
+/// A property.
+#[derive(Debug, Clone)]
+enum Fact {
+    /// Data, equal when written alike.
+    Plain(Value),
+    /// Data whose texts may be units or quantities, equal when they mean the same.
+    Measured(Value),
+}
+
+impl Facts {
+    fn plain(&mut self, path: impl Into<String>, value: impl Into<Value>) {
+        self.0.insert(path.into(), Fact::Plain(value.into()));
+    }
+
+    fn measured(&mut self, path: impl Into<String>, value: impl Into<Value>) {
+        self.0.insert(path.into(), Fact::Measured(value.into()));
+    }
+
+    /// Takes the leaves of a tree of parameters; lists stay whole, and null is the absence of a value.
+    fn parameters(&mut self, path: &str, value: Value, measured: bool) {
+        match value {
+            Value::Null => {}
+            Value::Object(entries) => {
+                for (key, value) in entries {
+                    self.parameters(&format!("{path}.{key}"), value, measured);
+                }
+            }
+            value if measured => self.measured(path, value),
+            value => self.plain(path, value),
+        }
+    }
+
+    /// What differs, in the order of what there is now, then what is gone.
+    pub(super) fn changes_to(&self, to: &Self) -> Vec<ParameterChange> {
+        let change = |path: &String, from: Option<&Fact>, to: Option<&Fact>| ParameterChange {
+            path: path.clone(),
+            from: from.map(|fact| fact.value().clone()),
+            to: to.map(|fact| fact.value().clone()),
+        };
+        // The parameters of one kind mean nothing to another.
+        if let (Some(before), Some(after)) = (self.0.get("type"), to.0.get("type"))
+            && !before.means(after)
+        {
+            return vec![change(&"type".to_owned(), Some(before), Some(after))];
+        }
+        let mut changes = Vec::new();
+        for (path, after) in &to.0 {
+            let before = self.0.get(path);
+            if !before.is_some_and(|before| before.means(after)) {
+                changes.push(change(path, before, Some(after)));
+            }
+        }
+        for (path, before) in self.0.iter().filter(|(path, _)| !to.0.contains_key(*path)) {
+            changes.push(change(path, Some(before), None));
+        }
+        changes
+    }
+}
+
+impl Fact {
+    fn value(&self) -> &Value {
+        match self {
+            Self::Plain(value) | Self::Measured(value) => value,
+        }
+    }
+
+    fn means(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Measured(a), Self::Measured(b)) => measures(a, b),
+            _ => self.value() == other.value(),
+        }
+    }
+}
+
+/// Whether two texts are the same unit or quantity, or two lists hold the same ones.
+fn measures(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Array(a), Value::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| measures(a, b))
+        }
+        (Value::String(a), Value::String(b)) if a != b => match (a.parse(), b.parse()) {
+            (Ok(a), Ok(b)) => same_quantity(&a, &b),
+            _ => matches!((Unit::parse(a), Unit::parse(b)), (Ok(a), Ok(b)) if a == b),
+        },
+        _ => a == b,
+    }
+}
+
+/// Converting may cost a rounding on either side.
+fn same_quantity(a: &Quantity, b: &Quantity) -> bool {
+    a.in_unit(&b.unit)
+        .is_some_and(|a| a == b.value || (a - b.value).abs() <= 2.0 * f64::EPSILON * b.value.abs())
+}
+
+pub(super) fn time(plan: &Plan) -> Facts {
+    let mut facts = Facts::default();
+    let TimeBase::Column { column, form } = &plan.time;
+    facts.plain("column", column.as_str());
+    match form {
+        TimeForm::Numbers { unit } => facts.plain("unit", unit.to_string()),
+        TimeForm::Rfc3339 => facts.plain("unit", "RFC 3339"),
+        TimeForm::Samples { step } => {
+            facts.plain("unit", "sample");
+            if let Some(step) = step {
+                facts.plain("step", step.to_string());
+            }
+        }
+    }
+    facts
+}
+
+pub(super) fn signals(plan: &Plan) -> IndexMap<String, Facts> {
+    let channels = plan.sources.iter().zip(&plan.channels);
+    let signals = channels.map(|(source, planned)| {
+        let mut facts = Facts::default();
+        let unit = &planned.channel.unit;
+        facts.measured("unit", unit.to_string());
+        facts.plain("column", source.column.as_str());
+        if source.optional {
+            facts.plain("optional", true);
+        }
+        let (low, high) = source.range;
+        for (path, end) in [("range.low", low), ("range.high", high)] {
+            if end.is_finite() {
+                facts.measured(path, format!("{end} {unit}"));
+            }
+        }
+        if let Some(age) = planned.channel.max_age {
+            facts.plain("max_age", age.to_string());
+        }
+        (source.name.clone(), facts)
+    });
+    signals.collect()
+}
+
+pub(super) fn outputs(plan: &Plan) -> IndexMap<String, Facts> {
+    let outputs = plan.outputs.iter().map(|output| {
+        let mut facts = Facts::default();
+        let from = &plan.channels[output.slot];
+        facts.plain("from", from.name.as_str());
+        facts.measured("unit", from.channel.unit.to_string());
+        if let Some(blend) = &output.blend {
+            facts.measured("blend", blend.to_string());
+        }
+        (output.name.clone(), facts)
+    });
+    outputs.collect()
+}
+
+pub(super) fn nodes(plan: &Plan) -> IndexMap<String, Facts> {
+    let mut schemas = HashMap::new();
+    let nodes = plan.nodes.iter().map(|node| {
+        let schema = schemas
+            .entry(node.kind.name)
+            .or_insert_with(|| Value::from((node.kind.schema)()));
+        (node.instance(), node_facts(plan, node, schema))
+    });
+    nodes.collect()
+}
+
+fn node_facts(plan: &Plan, node: &PlannedNode, schema: &Value) -> Facts {
+    let mut facts = Facts::default();
+    facts.plain("type", node.kind.name);
+    if let PlannedRole::Estimator {
+        truth, training, ..
+    } = &node.role
+    {
+        facts.plain("ahead", truth.ahead.to_string());
+        let unit = &plan.channels[truth.slot].channel.unit;
+        for (path, limit, none) in [
+            ("train.abs_truth.below", training.below, f64::INFINITY),
+            ("train.abs_truth.above", training.above, 0.0),
+        ] {
+            if limit != none {
+                facts.measured(path, format!("{limit} {unit}"));
+            }
+        }
+    }
+    if let Value::Object(parameters) = node.spec.parameters() {
+        for (key, value) in parameters {
+            let measured = is_measured(&schema["properties"][&key]);
+            facts.parameters(&key, value, measured);
+        }
+    }
+    inputs(plan, node, &mut facts);
+    if let PlannedRole::Feature { wanted, .. } = &node.role {
+        // The first port is always computed; whether another is decides what state there is.
+        for ((port, _), _) in node.ports.iter().zip(wanted).skip(1).filter(|(_, w)| **w) {
+            facts.plain(format!("outputs.{port}"), "computed");
+        }
+    }
+    facts
+}
+
+/// Whether a parameter has units or quantities anywhere in it.
+fn is_measured(schema: &Value) -> bool {
+    match schema {
+        Value::String(text) => text == "#/$defs/Unit" || text == "#/$defs/Quantity",
+        Value::Array(parts) => parts.iter().any(is_measured),
+        Value::Object(parts) => parts.values().any(is_measured),
+        _ => false,
+    }
+}
+
+fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
+    let (gathers, link) = match &node.role {
+        PlannedRole::Feature { gathers, .. } => (gathers.clone(), None),
+        PlannedRole::Estimator { gathers, truth, .. } => {
+            // The gathers after the first read the same channels at other lags, which are parameters.
+            let first = gathers.first().filter(|_| reads_features(node));
+            (first.copied().into_iter().collect(), Some(*truth))
+        }
+        PlannedRole::Combiner { voters, truth } => (vec![*voters], *truth),
+    };
+    let ports = (node.kind.inputs)();
+    let data = ports.iter().filter(|port| port.read != Read::Truth);
+    for (port, gather) in data.zip(gathers) {
+        let gather = &plan.gathers[gather];
+        let slots: Vec<usize> = gather.entries.iter().map(|entry| entry.slot).collect();
+        let ages = (gather.read != Read::Fresh)
+            .then(|| gather.entries.iter().map(|entry| entry.max_age).collect());
+        input(plan, port.name, &slots, ages, facts);
+    }
+    if let Some(TruthLink { slot, limit, .. }) = link {
+        let age = held_truth(plan, node).unwrap_or(limit);
+        input(plan, "truth", &[slot], Some(vec![age]), facts);
+    }
+}
+
+fn reads_features(node: &PlannedNode) -> bool {
+    match node.spec.role() {
+        Role::Estimator(estimator) => !estimator.regressors().feature_lags.is_empty(),
+        Role::Feature(_) | Role::Combiner(_) => false,
+    }
+}
+
+/// How long a held truth counts where it is a regressor.
+fn held_truth(plan: &Plan, node: &PlannedNode) -> Option<Duration> {
+    let (PlannedRole::Estimator { gathers, .. }, Role::Estimator(estimator)) =
+        (&node.role, node.spec.role())
+    else {
+        return None;
+    };
+    let is_regressor = estimator.regressors().truth_lags != TruthLags::None;
+    // Its lags are the last of a row.
+    let last = gathers.last().filter(|_| is_regressor)?;
+    Some(plan.gathers[*last].entries.first()?.max_age)
+}
+
+/// What an input reads: which channels, what they carry, and how long a held value counts.
+fn input(plan: &Plan, port: &str, slots: &[usize], ages: Option<Vec<Duration>>, facts: &mut Facts) {
+    if slots.is_empty() {
+        return;
+    }
+    let path = format!("inputs.{port}");
+    let channels = || slots.iter().map(|&slot| &plan.channels[slot]);
+    let names: Vec<Value> = channels().map(|from| from.name.as_str().into()).collect();
+    let carried = |of: &dyn Fn(&crate::channel::Channel) -> String| {
+        one_or_all(channels().map(|from| of(&from.channel)).collect())
+    };
+    facts.plain(path.as_str(), names);
+    facts.measured(format!("{path}.unit"), carried(&|c| c.unit.to_string()));
+    facts.plain(format!("{path}.span"), carried(&|c| c.span.to_string()));
+    facts.plain(format!("{path}.ahead"), carried(&|c| c.ahead.to_string()));
+    if let Some(ages) = ages {
+        let ages = ages.iter().map(ToString::to_string).collect();
+        facts.plain(format!("{path}.max_age"), one_or_all(ages));
+    }
+}
+
+/// One text where all are the same, else each.
+fn one_or_all(texts: Vec<String>) -> Value {
+    match texts.first() {
+        Some(first) if texts.iter().all(|text| text == first) => first.as_str().into(),
+        _ => texts.into(),
+    }
+}

@@ -1,0 +1,70 @@
+//! Decides how a running node tells what it knows and takes it back; how states are kept is decided by the engine.
+
+use std::any::Any;
+use std::fmt;
+
+/// What a running node knows: all that its next outputs depend on, beside its inputs.
+///
+/// A state is a serde struct whose registered name ends in the version of its form, `"slope/1"`. A form that has been
+/// replaced stays registered, so that what was written by an older program can be read and migrated. [`state!`](crate::state)
+/// makes a struct a state.
+#[typetag::serde(tag = "state")]
+pub trait State: fmt::Debug + Send + Sync {
+    /// The state as any value, so that a node can ask whether it is one of its own.
+    fn into_any(self: Box<Self>) -> Box<dyn Any>;
+}
+
+impl dyn State {
+    /// The state as one of type `T`.
+    ///
+    /// # Errors
+    /// When it is of another type: the answer of a node that cannot make use of it.
+    pub fn known<T: State + 'static>(self: Box<Self>) -> Result<T, Restored> {
+        match self.into_any().downcast() {
+            Ok(state) => Ok(*state),
+            Err(_) => Err(Restored::cold("the state belongs to another kind of node")),
+        }
+    }
+}
+
+/// What a node answers when it is given a state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Restored {
+    /// It goes on from there, with the same bits as if it had never stopped.
+    Accepted,
+    /// It goes on from a state of an older form.
+    Migrated {
+        /// The name of that form.
+        from: String,
+    },
+    /// It starts afresh.
+    Cold {
+        /// Why, as a sentence without its full stop.
+        reason: String,
+    },
+}
+
+impl Restored {
+    /// The answer of a node that starts afresh.
+    #[must_use]
+    pub fn cold(reason: impl Into<String>) -> Self {
+        Self::Cold {
+            reason: reason.into(),
+        }
+    }
+}
+
+/// Makes a serde struct the state of a node, under a name that ends in its version: `state!(Memory, "vote/1")`.
+///
+/// The crate that uses it depends on `typetag`.
+#[macro_export]
+macro_rules! state {
+    ($state:ty, $name:literal) => {
+        #[typetag::serde(name = $name)]
+        impl $crate::node::State for $state {
+            fn into_any(self: Box<Self>) -> Box<dyn std::any::Any> {
+                self
+            }
+        }
+    };
+}
