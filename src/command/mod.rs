@@ -11,8 +11,10 @@ mod fit;
 mod init;
 mod nodes;
 mod run;
+mod schema;
 mod simulate;
 mod swap;
+mod test;
 
 use clap::Subcommand;
 
@@ -43,6 +45,10 @@ pub enum Command {
     Simulate(simulate::Simulate),
     /// Print a completion script for a shell
     Completions(completions::Completions),
+    /// Run the tests that graph files carry
+    Test(test::Test),
+    /// Write the JSON Schema of graph files, for editors
+    Schema(schema::Schema),
 }
 
 impl Command {
@@ -63,6 +69,8 @@ impl Command {
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),
+            Self::Test(command) => command.run(terminal),
+            Self::Schema(command) => command.run(terminal),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use indexmap::IndexSet;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::order::Order;
@@ -38,25 +39,30 @@ pub(crate) struct ReadInstance {
 }
 
 /// What the framework reads of an estimator's table.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct EstimatorKeys {
+    /// How far ahead of now the truth is predicted: `"5min"` is a forecast, `"0s"` a virtual sensor.
     pub(crate) ahead: Option<Duration>,
+    /// Which truths it is fitted on.
     pub(crate) train: Train,
 }
 
 /// Which rows an estimator is trained on.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Train {
+    /// Those whose absolute value is within these limits.
     pub(crate) abs_truth: Limits,
 }
 
 /// Limits of an absolute value.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Limits {
+    /// Only those below.
     pub(crate) below: Option<Quantity>,
+    /// Only those at or above.
     pub(crate) above: Option<Quantity>,
 }
 

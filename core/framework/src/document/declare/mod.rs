@@ -17,7 +17,9 @@ use super::problem::DocumentProblem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
-use reading::{known_keys, text};
+pub(crate) use reading::known_keys;
+use reading::text;
+pub(crate) use time_base::UNITS as TIME_UNITS;
 
 const SECTIONS: [&str; 14] = [
     "schema",
@@ -68,7 +70,10 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let expanded = modules::expand(root, &sets, diagnostics);
     let nodes = nodes::declare(&expanded.nodes, &sets, sample, diagnostics);
     let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
-    let tests = root.get("tests").cloned();
+    let mut tests = root.get("tests").cloned();
+    if let Some(tests) = &mut tests {
+        nodes::convert_samples_but(tests, "name", sample, diagnostics);
+    }
     if let Some(tests) = &tests
         && tests.as_list().is_none()
     {

@@ -420,6 +420,23 @@ fn convert_samples(value: &mut Value, sample: Option<Duration>, diagnostics: &mu
     }
 }
 
+/// The same for the tables of a list, except for the text under a key that is for people.
+pub(super) fn convert_samples_but(
+    tables: &mut Value,
+    key: &str,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) {
+    let Data::List(list) = &mut tables.data else {
+        return;
+    };
+    for table in list.iter_mut().filter_map(Value::as_table_mut) {
+        for (_, entry) in table.iter_mut().filter(|(name, _)| *name != key) {
+            convert_samples(&mut entry.value, sample, diagnostics);
+        }
+    }
+}
+
 fn filled_input(input: &InputDecl, members: &[(&str, &str)]) -> InputDecl {
     let references = input
         .references
