@@ -572,7 +572,8 @@ impl<'g> Resolver<'g> {
                     channel,
                     node: Some(index),
                     history: None,
-                    predicts,
+                    // Only what a node gives first is a prediction; the other ports tell of it.
+                    predicts: predicts.filter(|_| ranges.is_empty()),
                 });
                 self.provenance.push(behind.next().unwrap_or_default());
                 let scope = self.scopes.get_mut(&instance.node.name);
