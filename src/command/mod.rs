@@ -1,11 +1,14 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
 mod check;
+mod completions;
 mod data;
+mod demo;
 mod evaluate;
 mod fit;
 mod nodes;
 mod run;
+mod simulate;
 mod swap;
 
 use clap::Subcommand;
@@ -15,6 +18,8 @@ use crate::terminal::{Answer, Failure, Terminal};
 /// What the program can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// See what athermal does, on a simulated machine
+    Demo(demo::Demo),
     /// Look for mistakes in a graph file
     Check(check::Check),
     /// List the node types, or explain one
@@ -25,6 +30,10 @@ pub enum Command {
     Evaluate(evaluate::Evaluate),
     /// Run a model: rows in, predictions out
     Run(run::Run),
+    /// Write the recording of a simulated machine, or list the machines
+    Simulate(simulate::Simulate),
+    /// Print a completion script for a shell
+    Completions(completions::Completions),
 }
 
 impl Command {
@@ -34,11 +43,14 @@ impl Command {
     /// When it cannot be done.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
+            Self::Demo(command) => command.run(terminal),
+            Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
+            Self::Simulate(command) => command.run(terminal),
         }
     }
 }
