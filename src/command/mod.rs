@@ -13,6 +13,8 @@ mod nodes;
 mod run;
 mod schema;
 mod simulate;
+mod simulate;
+mod swap;
 mod swap;
 mod test;
 
