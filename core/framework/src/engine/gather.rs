@@ -62,6 +62,13 @@ impl Gathered {
             self.values[i] = value;
             self.stamps[i] = stamp;
         }
+        for conversion in &gather.conversions {
+            let value = &mut self.values[conversion.entry];
+            // A NaN says why there is no value, and must stay as it is.
+            if !value.is_nan() {
+                *value *= conversion.factor();
+            }
+        }
     }
 
     /// The oldest stamp among the values that are there.
