@@ -3,6 +3,7 @@
 mod command;
 mod figures;
 mod invocation;
+mod starter;
 mod terminal;
 
 use std::process::ExitCode;

@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
-use athermal::Instant;
 use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
+use athermal::core::live::{LiveOptions, pair};
 use athermal::files::{Flush, Options, Reader, Row, Writer, layout};
+use athermal::{Engine, Instant, Model};
 use clap::Args;
 
 use super::data;
 use super::evaluate::load_fitted;
+use super::swap;
 use crate::terminal::{Answer, Failure, Terminal};
 
 /// Run a model: rows in, predictions out
@@ -33,6 +35,8 @@ pub struct Run {
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
+    #[command(flatten)]
+    swap: swap::Options,
 }
 
 impl Run {
@@ -42,6 +46,9 @@ impl Run {
     /// When the model or the input cannot be used, or the output not written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let model = load_fitted(&self.model, Wanted::default())?;
+        if self.swap.any() {
+            return self.run_replaceable(terminal, model);
+        }
         let mut engine = model.engine()?;
         let plan = std::sync::Arc::clone(engine.plan());
         let options = Options {
@@ -55,12 +62,7 @@ impl Run {
             .iter()
             .map(|output| output.name.clone())
             .collect();
-        let flush = if self.input.as_os_str() == "-" {
-            Flush::EachRow
-        } else {
-            Flush::Buffered
-        };
-        let mut writer = Writer::create(&self.output, column, &columns, flush)?;
+        let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
         let mut row = Row::default();
         while reader.next_into(&mut row)? {
             match engine.step(Instant::from_ns(row.time_ns), &row.values) {
@@ -70,16 +72,87 @@ impl Run {
             }
         }
         writer.finish()?;
+        self.tell(terminal, &engine, &reader);
+        Ok(Answer::Fine)
+    }
+
+    /// Runs so that the graph can be replaced; the rows say which revision made them.
+    fn run_replaceable(&self, terminal: &Terminal, model: Model) -> Result<Answer, Failure> {
+        let swaps = self.swap.schedule(&model)?;
+        let (feed, mut columns) = swap::union(&model, &swaps);
+        let options = Options {
+            lenient: self.lenient,
+            ..Options::default()
+        };
+        let layout = layout(&swap::reading(&model, &swaps, &feed));
+        let mut reader = Reader::open(&self.input, layout, options)?;
+        let live = LiveOptions {
+            channels: feed,
+            ..LiveOptions::default()
+        };
+        let (mut stepper, mut control) =
+            pair(&model, live).map_err(|error| Failure::Request(error.to_string()))?;
+        let TimeBase::Column { column, .. } = &model.plan.time;
+        let column = column.clone();
+        let mut course = swap::Course::new(
+            terminal,
+            &self.swap,
+            &self.model,
+            model,
+            swaps,
+            columns.clone(),
+        );
+        let mut shown = vec![f64::NAN; columns.len()];
+        let names = columns.clone();
+        columns.push("revision".to_owned());
+        let mut writer = Writer::create(&self.output, &column, &columns, self.flush())?;
+        let mut row = Row::default();
+        let mut places = (String::new(), Vec::new());
+        while reader.next_into(&mut row)? {
+            let now = Instant::from_ns(row.time_ns);
+            course.before(&mut control, now)?;
+            let stepped = match stepper.step(now, &row.values) {
+                Ok(stepped) => stepped,
+                Err(athermal::EngineError::NotAfter { .. }) => continue,
+                Err(error) => return Err(Failure::Request(error.to_string())),
+            };
+            if places.0 != stepped.revision {
+                let place = |name: &String| {
+                    let mut outputs = stepped.plan.outputs.iter();
+                    outputs.position(|output| output.name == *name)
+                };
+                places = (
+                    stepped.revision.to_owned(),
+                    names.iter().map(place).collect(),
+                );
+            }
+            for (shown, place) in shown.iter_mut().zip(&places.1) {
+                *shown = place.map_or(f64::NAN, |place| stepped.outputs[place]);
+            }
+            writer.write_labelled_row(&row.time_text, row.time_ns, &shown, stepped.revision)?;
+        }
+        writer.finish()?;
+        course.tell(control.pump());
+        let engine = stepper.engine();
+        self.tell(terminal, engine, &reader);
+        Ok(Answer::Fine)
+    }
+
+    fn flush(&self) -> Flush {
+        if self.input.as_os_str() == "-" {
+            Flush::EachRow
+        } else {
+            Flush::Buffered
+        }
+    }
+
+    fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader) {
         let reports = [(self.input.display().to_string(), reader.report().clone())];
-        let counted = plan
-            .sources
-            .iter()
-            .zip(engine.rejected())
-            .filter(|&(_, &count)| count > 0);
+        let counted = engine.plan().sources.iter().zip(engine.rejected());
         let rejected: Vec<_> = counted
+            .filter(|&(_, &count)| count > 0)
             .map(|(source, &count)| (source.name.clone(), count))
             .collect();
         data::tell(terminal, &reports, engine.refused(), &rejected);
-        Ok(Answer::Fine)
     }
 }

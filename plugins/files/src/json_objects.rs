@@ -27,6 +27,7 @@ impl JsonObjects {
         number: &mut zmij::Buffer,
         time_text: &str,
         values: &[f64],
+        label: Option<&str>,
     ) -> io::Result<()> {
         self.line.clear();
         let (time_key, keys) = self
@@ -46,6 +47,10 @@ impl JsonObjects {
                 text if value.is_finite() => self.line.extend_from_slice(text.as_bytes()),
                 text => serde_json::to_writer(&mut self.line, text)?,
             }
+        }
+        if let (Some(key), Some(label)) = (keys.last(), label) {
+            self.line.extend_from_slice(key.as_bytes());
+            serde_json::to_writer(&mut self.line, label)?;
         }
         self.line.extend_from_slice(b"}\n");
         self.output.write_all(&self.line)

@@ -114,11 +114,36 @@ impl Writer {
         time_ns: i64,
         values: &[f64],
     ) -> Result<(), FileError> {
-        if values.len() != self.columns {
+        self.write(time_text, time_ns, values, None)
+    }
+
+    /// Writes one row whose last column is a text: one value less than there are columns, and the text.
+    ///
+    /// # Errors
+    /// As [`write_row`](Self::write_row).
+    pub fn write_labelled_row(
+        &mut self,
+        time_text: &str,
+        time_ns: i64,
+        values: &[f64],
+        label: &str,
+    ) -> Result<(), FileError> {
+        self.write(time_text, time_ns, values, Some(label))
+    }
+
+    fn write(
+        &mut self,
+        time_text: &str,
+        time_ns: i64,
+        values: &[f64],
+        label: Option<&str>,
+    ) -> Result<(), FileError> {
+        let found = values.len() + usize::from(label.is_some());
+        if found != self.columns {
             return Err(FileError::ValueCount {
                 file: self.file.clone(),
                 expected: self.columns,
-                found: values.len(),
+                found,
             });
         }
         let time_text = match time_text {
@@ -129,8 +154,8 @@ impl Writer {
             text => text,
         };
         let written = match &mut self.rows {
-            Rows::Csv(csv) => write_cells(csv, &mut self.number, time_text, values),
-            Rows::Json(json) => json.write(&mut self.number, time_text, values),
+            Rows::Csv(csv) => write_cells(csv, &mut self.number, time_text, values, label),
+            Rows::Json(json) => json.write(&mut self.number, time_text, values, label),
         };
         written
             .and_then(|()| self.flush_when(self.flush == Flush::EachRow))
@@ -174,10 +199,14 @@ fn write_cells<W: Write>(
     number: &mut zmij::Buffer,
     time_text: &str,
     values: &[f64],
+    label: Option<&str>,
 ) -> io::Result<()> {
     csv.write_field(time_text).map_err(io_error)?;
     for &value in values {
         csv.write_field(text_of(value, number)).map_err(io_error)?;
+    }
+    if let Some(label) = label {
+        csv.write_field(label).map_err(io_error)?;
     }
     csv.write_record(None::<&[u8]>).map_err(io_error)
 }

@@ -2,10 +2,12 @@
 //! not when it runs.
 
 mod combiner;
+mod conversion;
 mod diff;
 mod estimator;
 mod feature;
 mod identity;
+mod leak;
 mod order;
 mod plan;
 mod problem;
@@ -15,16 +17,16 @@ mod resolver;
 mod scope;
 mod steps;
 
-pub use diff::{
-    Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff,
-};
+pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
 pub use plan::{
-    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
-    Step, TrainingLimits, TruthLink,
+    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
+    SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
 pub use provenance::smallest_lag;
+pub(crate) use reference::{Reference, is_pattern, matches};
+pub(crate) use resolver::EstimatorKeys;
 
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;

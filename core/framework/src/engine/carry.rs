@@ -5,18 +5,19 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use super::{Engine, Fitted};
-use crate::compile::{Plan, PlannedNode, PlannedRole};
+use crate::compile::{Change, Plan, PlanDiff, PlannedNode, PlannedRole, diff};
 
 /// The one change after which an old state is offered to a node.
 const PARAMETERS: &str = "its parameters changed";
 
 /// What of an old graph goes on in a new one, as is: everything downstream of nothing that changed.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub(crate) struct Untouched {
     /// Instances.
     pub(crate) nodes: BTreeSet<String>,
     /// Channels, those of the signals with them.
     pub(crate) channels: BTreeSet<String>,
+    diff: PlanDiff,
 }
 
 /// What became of a node in a swap.
@@ -58,30 +59,45 @@ pub enum Carry {
 }
 
 impl Untouched {
+    /// All of a plan, in itself.
+    pub(crate) fn all(plan: &Plan) -> Self {
+        Self {
+            nodes: plan.nodes.iter().map(PlannedNode::instance).collect(),
+            channels: plan
+                .channels
+                .iter()
+                .map(|channel| channel.name.clone())
+                .collect(),
+            diff: diff(plan, plan),
+        }
+    }
+
     /// Compares two fitted plans. With `learned`, a new fit upstream leaves untouched what was learned of it.
     pub(crate) fn between(old: (&Plan, &Fitted), new: (&Plan, &Fitted), learned: bool) -> Self {
-        let mut untouched = Self::default();
-        for slot in 0..new.0.sources.len() {
-            let name = &new.0.channels[slot].name;
-            let before = old.0.sources.iter().position(|source| source.name == *name);
-            if before.is_some_and(|before| old.0.describe(before) == new.0.describe(slot)) {
-                untouched.channels.insert(name.clone());
-            }
-        }
-        let before: std::collections::BTreeMap<String, &PlannedNode> = old
-            .0
+        let mut untouched = Self {
+            nodes: BTreeSet::new(),
+            channels: BTreeSet::new(),
+            diff: diff(old.0, new.0),
+        };
+        let unchanged = |change: &Change| *change == Change::Unchanged;
+        let signals = untouched
+            .diff
+            .signals
+            .iter()
+            .filter(|signal| unchanged(&signal.change));
+        untouched.channels = signals.map(|signal| signal.channel.clone()).collect();
+        let same: BTreeSet<String> = untouched
+            .diff
             .nodes
             .iter()
-            .map(|node| (node.instance(), node))
+            .filter(|node| unchanged(&node.change))
+            .filter(|node| learned || same_fit(old.1, new.1, &node.instance))
+            .map(|node| node.instance.clone())
             .collect();
         // A node that closes a loop is asked before what it reads; a second round lets its answer count.
         for _ in 0..2 {
             for node in &new.0.nodes {
                 let instance = node.instance();
-                let same = before.get(&instance).is_some_and(|was| {
-                    old.0.identity(was) == new.0.identity(node)
-                        && (learned || same_fit(old.1, new.1, &instance))
-                });
                 let closing = matches!(
                     node.role,
                     PlannedRole::Feature {
@@ -92,7 +108,7 @@ impl Untouched {
                 let reads_untouched = closing
                     || reads(new.0, node)
                         .all(|slot| untouched.channels.contains(&new.0.channels[slot].name));
-                if same && reads_untouched {
+                if same.contains(&instance) && reads_untouched {
                     untouched.channels.extend(
                         node.slots
                             .clone()
@@ -159,28 +175,21 @@ impl Untouched {
 
     fn reason(&self, old: &Engine, new: &Engine, node: &PlannedNode) -> String {
         let instance = node.instance();
-        let Some(was) = old
-            .plan()
-            .nodes
-            .iter()
-            .find(|was| was.instance() == instance)
-        else {
-            return "it is new".to_owned();
-        };
-        let (before, now) = (old.plan().identity(was), new.plan().identity(node));
-        if before["type"] != now["type"] {
-            return format!("its type was `{}`", was.kind.name);
-        }
-        if before["parameters"] != now["parameters"] {
-            return if before["role"] == now["role"] {
-                PARAMETERS
-            } else {
-                "its parameters and inputs changed"
+        match self.diff.node(&instance) {
+            None | Some(Change::Added | Change::Removed) => return "it is new".to_owned(),
+            Some(Change::Changed(changes)) => {
+                let inputs = changes
+                    .iter()
+                    .any(|change| change.path.starts_with("inputs"));
+                let kind = changes.iter().any(|change| change.path == "type");
+                return match (kind, inputs) {
+                    (true, _) => "its type changed",
+                    (false, true) => "its inputs changed",
+                    (false, false) => PARAMETERS,
+                }
+                .to_owned();
             }
-            .to_owned();
-        }
-        if before["role"] != now["role"] {
-            return "its inputs changed".to_owned();
+            Some(Change::Unchanged) => {}
         }
         if !same_fit(old.fitted(), new.fitted(), &instance) {
             return "it was fitted anew".to_owned();
@@ -209,7 +218,7 @@ fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usiz
     let (gathers, truth): (&[usize], Option<usize>) = match &node.role {
         PlannedRole::Feature { gathers, .. } => (gathers, None),
         PlannedRole::Estimator { gathers, truth, .. } => (gathers, Some(truth.slot)),
-        PlannedRole::Combiner { voters, truth } => {
+        PlannedRole::Combiner { voters, truth, .. } => {
             (std::slice::from_ref(voters), truth.map(|truth| truth.slot))
         }
     };

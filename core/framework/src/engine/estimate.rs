@@ -83,8 +83,6 @@ impl Estimate {
             oldest = oldest.min(from.stamps[place]);
         }
         let prediction = self.predictor.predict(&self.row);
-        prediction
-            .is_finite()
-            .then_some((prediction, oldest))
+        prediction.is_finite().then_some((prediction, oldest))
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::carry::{Carry, NodeCarry, Untouched};
 use super::state::{NodeState, SlotState};
-use super::{Engine, EngineState, RestoreError, Running};
+use super::{Engine, EngineError, EngineState, RestoreError, Running};
 use crate::node::Restored;
 
 impl Engine {
@@ -35,20 +35,7 @@ impl Engine {
                 reason: error.to_string(),
             }
         })?;
-        let all = Untouched {
-            nodes: self
-                .plan
-                .nodes
-                .iter()
-                .map(crate::compile::PlannedNode::instance)
-                .collect(),
-            channels: self
-                .plan
-                .channels
-                .iter()
-                .map(|channel| channel.name.clone())
-                .collect(),
-        };
+        let all = Untouched::all(&self.plan);
         for node in fresh.adopt(&state, &all, |_| (String::new(), false), false) {
             if let Carry::Cold { reason } | Carry::Warmed { reason } = node.outcome {
                 return Err(RestoreError::Refused {
@@ -66,6 +53,30 @@ impl Engine {
         }
         *self = fresh;
         Ok(())
+    }
+
+    /// An engine that knows the same and goes on with the same bits.
+    pub(crate) fn twin(&self) -> Result<Self, EngineError> {
+        let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)?;
+        twin.adopt(
+            &self.state(),
+            &Untouched::all(&self.plan),
+            |_| (String::new(), false),
+            false,
+        );
+        for ((_, own), (_, blending)) in twin.blending.iter_mut().zip(&self.blending) {
+            *own = *blending;
+        }
+        Ok(twin)
+    }
+
+    /// Lets outputs pass over from what another engine put out last; `from` says which of its outputs each follows.
+    pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
+        for ((_, blending), from) in self.blending.iter_mut().zip(from) {
+            if let Some((_, last)) = from.and_then(|from| before.blending.get(from)) {
+                blending.hand_over(last);
+            }
+        }
     }
 
     /// All that the engine knows, by name.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Card, ModelError};
-use crate::compile::{Plan, PlannedRole, Wanted, compile};
+use crate::compile::{Change, Plan, PlannedRole, Wanted, compile, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
 use crate::engine::{Engine, Fitted};
@@ -163,6 +163,22 @@ impl Model {
             .filter(needs)
             .map(crate::compile::PlannedNode::instance)
             .collect()
+    }
+
+    /// Takes from another model the fits of estimators that mean the same in both.
+    pub fn take_fits_of(&mut self, other: &Self) {
+        let diff = diff(&other.plan, &self.plan);
+        for node in diff
+            .nodes
+            .iter()
+            .filter(|node| node.change == Change::Unchanged)
+        {
+            if let Some(fit) = other.fitted.get(&node.instance)
+                && !self.fitted.contains_key(&node.instance)
+            {
+                self.fitted.insert(node.instance.clone(), Arc::clone(fit));
+            }
+        }
     }
 
     /// An engine that runs the model, cold.

@@ -6,6 +6,7 @@ mod watch;
 use std::sync::Arc;
 
 pub use table::{Score, Scores};
+pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};
@@ -37,7 +38,7 @@ pub fn score(
     progress: &mut dyn FnMut(u64),
 ) -> Result<Scores, FitError> {
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
-    let mut watch = watch::Watch::new(plan);
+    let mut watch = Watch::new(plan);
     let mut stepped = 0;
     let passed = drive(&mut engine, recording, |engine, event| {
         watch.look(engine, event);

@@ -8,42 +8,46 @@ use crate::recording::Event;
 use crate::time::{Duration, Instant};
 
 /// Everything scored of one plan.
-pub(super) struct Watch {
-    pub(super) truths: Vec<Truth>,
+#[derive(Debug)]
+pub(crate) struct Watch {
+    pub(crate) truths: Vec<Truth>,
 }
 
 /// A truth and all predictions of it.
-pub(super) struct Truth {
-    pub(super) slot: usize,
+#[derive(Debug)]
+pub(crate) struct Truth {
+    pub(crate) slot: usize,
     /// The slot of its standard error, where its node gives one.
     error_slot: Option<usize>,
-    pub(super) values: Vec<f64>,
-    pub(super) errors: Vec<f64>,
-    pub(super) predictions: Vec<Prediction>,
-    pub(super) persistences: BTreeMap<Duration, Persistence>,
+    pub(crate) values: Vec<f64>,
+    pub(crate) errors: Vec<f64>,
+    pub(crate) predictions: Vec<Prediction>,
+    pub(crate) persistences: BTreeMap<Duration, Persistence>,
 }
 
 /// A predicted channel.
-pub(super) struct Prediction {
-    pub(super) slot: usize,
-    pub(super) node: usize,
-    pub(super) ahead: Duration,
+#[derive(Debug)]
+pub(crate) struct Prediction {
+    pub(crate) slot: usize,
+    pub(crate) node: usize,
+    pub(crate) ahead: Duration,
     pairing: Pairing,
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// The truth at the smallest lag that sees nothing of the answer, for one horizon.
-pub(super) struct Persistence {
+#[derive(Debug)]
+pub(crate) struct Persistence {
     lag: Duration,
     max_age: Duration,
     history: History,
     cursor: Cursor,
     pairing: Pairing,
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 impl Watch {
-    pub(super) fn new(plan: &Plan) -> Self {
+    pub(crate) fn new(plan: &Plan) -> Self {
         let mut truths: BTreeMap<usize, Truth> = BTreeMap::new();
         for (slot, channel) in plan.channels.iter().enumerate() {
             let (Some(of), Some(node)) = (channel.predicts, channel.node) else {
@@ -78,8 +82,19 @@ impl Watch {
         }
     }
 
+    /// The truth that a slot predicts, and its predictions so far, one for each of the truth's values.
+    pub(crate) fn prediction(&self, slot: usize) -> Option<(&Truth, &[f64])> {
+        self.truths.iter().find_map(|truth| {
+            let prediction = truth
+                .predictions
+                .iter()
+                .find(|prediction| prediction.slot == slot)?;
+            Some((truth, prediction.values.as_slice()))
+        })
+    }
+
     /// Looks at what a tick did.
-    pub(super) fn look(&mut self, engine: &Engine, event: Event) {
+    pub(crate) fn look(&mut self, engine: &Engine, event: Event) {
         for truth in &mut self.truths {
             match event {
                 Event::Row(now) => truth.look(engine, now),

@@ -7,7 +7,7 @@ use crate::quantity::Quantity;
 use crate::time::Duration;
 
 /// Reports every key of `table` that is not `known`.
-pub(super) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut Diagnostics) {
+pub(crate) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut Diagnostics) {
     for (key, entry) in table.iter().filter(|(key, _)| !known.contains(key)) {
         let known = known.iter().map(|key| (*key).to_owned()).collect();
         diagnostics.report(
@@ -126,6 +126,21 @@ pub(super) fn duration(
     };
     read.map_err(|problem| diagnostics.report(value.place, problem))
         .ok()
+}
+
+/// A duration that is longer than nothing.
+pub(super) fn length(
+    value: &Value,
+    key: &'static str,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Option<Duration> {
+    let length = duration(value, key, sample, diagnostics)?;
+    if length > Duration::ZERO {
+        return Some(length);
+    }
+    diagnostics.report(value.place, DocumentProblem::NoLength { key });
+    None
 }
 
 pub(super) fn quantity(

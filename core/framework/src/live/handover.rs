@@ -1,0 +1,165 @@
+//! Decides what passes between the engine thread and the control thread: ticks one way, engines both ways.
+
+use crate::compile::Plan;
+use crate::engine::Engine;
+use crate::time::Instant;
+
+/// A channel that samples are given for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Feed {
+    /// Signal and channel: `temperature.plate1`.
+    pub name: String,
+    /// Its column in tables.
+    pub column: String,
+}
+
+impl Feed {
+    /// What a plan reads.
+    #[must_use]
+    pub fn of(plan: &Plan) -> Vec<Self> {
+        let feed = |source: &crate::compile::SourceChannel| Self {
+            name: source.name.clone(),
+            column: source.column.clone(),
+        };
+        plan.sources.iter().map(feed).collect()
+    }
+}
+
+/// An engine with all that it needs to take over, made off the engine thread.
+#[derive(Debug)]
+pub(super) struct Seated {
+    pub(super) engine: Engine,
+    pub(super) revision: String,
+    /// For each channel that the engine reads, where its sample stands among those given.
+    pub(super) places: Vec<usize>,
+    /// The samples in the engine's own order.
+    pub(super) samples: Vec<f64>,
+    /// For each output, that of the engine before which it passes over from.
+    pub(super) outputs: Vec<Option<usize>>,
+    /// The number of the tick up to which the engine has been stepped.
+    pub(super) tick: u64,
+    /// Whether it was sent back without having taken over.
+    pub(super) refused: bool,
+}
+
+impl Seated {
+    /// An engine that reads its channels among `feed`; the names of those that are not there otherwise.
+    pub(super) fn new(engine: Engine, feed: &[Feed], tick: u64) -> Result<Self, Vec<String>> {
+        let wanted = Feed::of(engine.plan());
+        let place = |channel: &Feed| feed.iter().position(|fed| fed == channel);
+        let places: Vec<_> = wanted.iter().map(place).collect();
+        let unplaced = wanted
+            .iter()
+            .zip(&places)
+            .filter(|(_, place)| place.is_none());
+        let missing: Vec<_> = unplaced.map(|(channel, _)| channel.name.clone()).collect();
+        if !missing.is_empty() {
+            return Err(missing);
+        }
+        Ok(Self {
+            revision: engine.revision(),
+            samples: vec![f64::NAN; wanted.len()],
+            places: places.into_iter().flatten().collect(),
+            outputs: vec![None; engine.plan().outputs.len()],
+            tick,
+            refused: false,
+            engine,
+        })
+    }
+
+    /// Steps the engine with samples in the order of the feed.
+    pub(super) fn step(
+        &mut self,
+        time: Instant,
+        fed: &[f64],
+    ) -> Result<(), crate::engine::EngineError> {
+        for (sample, &place) in self.samples.iter_mut().zip(&self.places) {
+            *sample = fed[place];
+        }
+        self.engine.step(time, &self.samples)?;
+        self.tick += 1;
+        Ok(())
+    }
+
+    /// Notes which outputs of another plan those of this one pass over from.
+    pub(super) fn follow(&mut self, before: &Plan) {
+        let old = &before.outputs;
+        let place = |name: &String| old.iter().position(|output| output.name == *name);
+        self.outputs = self
+            .engine
+            .plan()
+            .outputs
+            .iter()
+            .map(|output| place(&output.name))
+            .collect();
+    }
+
+    /// Lets outputs pass over from what another engine put out last, as [`follow`](Self::follow) noted.
+    pub(super) fn take_over(&mut self, before: &Engine) {
+        self.engine.pass_over(before, &self.outputs);
+    }
+}
+
+/// What stands in the ring for a segment break, in the place of a time.
+const BREAK: f64 = f64::INFINITY;
+
+/// What is mirrored of a tick beside its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Mark {
+    /// The instant; none for a segment break.
+    pub(super) time: Option<Instant>,
+    /// The number of the tick.
+    pub(super) tick: u64,
+    /// How many hand-overs there have been.
+    pub(super) generation: u64,
+}
+
+impl Mark {
+    /// How many numbers a mark takes.
+    pub(super) const WIDTH: usize = 3;
+
+    /// The mark as numbers: their bits carry integers, none of which is rounded.
+    pub(super) fn write(self) -> [f64; Self::WIDTH] {
+        let time = self
+            .time
+            .map_or(BREAK.to_bits(), |time| time.as_ns().cast_unsigned());
+        [
+            f64::from_bits(time),
+            f64::from_bits(self.tick),
+            f64::from_bits(self.generation),
+        ]
+    }
+
+    pub(super) fn read(numbers: [f64; Self::WIDTH]) -> Self {
+        let [time, tick, generation] = numbers.map(f64::to_bits);
+        let time = (time != BREAK.to_bits()).then(|| Instant::from_ns(time.cast_signed()));
+        Self {
+            time,
+            tick,
+            generation,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_go_through_the_ring_to_the_last_bit() {
+        for time in [
+            None,
+            Some(i64::MIN + 1),
+            Some(-1),
+            Some(0),
+            Some(1_760_000_000_000_000_001),
+        ] {
+            let mark = Mark {
+                time: time.map(Instant::from_ns),
+                tick: u64::MAX,
+                generation: 7,
+            };
+            assert_eq!(Mark::read(mark.write()), mark);
+        }
+    }
+}

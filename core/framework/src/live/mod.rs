@@ -1,0 +1,67 @@
+//! Decides how a running graph is replaced: staged, watched in the shadow, handed over between two ticks, taken back; not
+//! where samples come from or go.
+//!
+//! [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
+//! a hand-over. The **control thread** (or the same one, for recorded data) owns a [`Control`], to which every tick is
+//! mirrored through a bounded ring. It steps a replica of what runs, to the same bits, so that states are copied, candidates
+//! warmed and compared, and old graphs kept warm without the engine thread noticing.
+//!
+//! ```text
+//!  engine thread                              control thread
+//!  ┌──────────┐   ticks (bounded ring)   ┌──────────────────────────────┐
+//!  │ Stepper  │ ───────────────────────▶ │ replica · candidate · retained│
+//!  │  engine  │ ◀─────────────────────── │ stage → shadow → commit       │
+//!  └──────────┘   engines, both ways     └──────────────────────────────┘
+//! ```
+
+mod control;
+mod handover;
+mod refit;
+mod retained;
+mod shadow;
+mod stepper;
+
+pub use control::{Control, Notice, StageError, Staged};
+pub use handover::Feed;
+pub use refit::Refit;
+pub use shadow::{Compared, Shadow, Verdict};
+pub use stepper::{Stepped, Stepper};
+
+use crate::engine::EngineError;
+use crate::model::Model;
+use crate::time::Duration;
+
+/// How a graph is run so that it can be replaced.
+#[derive(Debug, Clone)]
+pub struct LiveOptions {
+    /// How many ticks may wait for the control thread; beyond, the replica is lost and states are no longer carried.
+    pub mirrored: usize,
+    /// How much of the past is kept at least, beyond what the running graph needs to warm up.
+    pub retain: Duration,
+    /// How many bytes of the past are kept at most.
+    pub memory: usize,
+    /// How long a replaced graph is kept warm, so that it can be taken back.
+    pub keep_warm: Duration,
+    /// Channels that samples are given for, beyond those that the graph reads: what later graphs may read.
+    pub channels: Vec<Feed>,
+}
+
+impl Default for LiveOptions {
+    fn default() -> Self {
+        Self {
+            mirrored: 4096,
+            retain: Duration::from_ns(3_600_000_000_000),
+            memory: 256 << 20,
+            keep_warm: Duration::from_ns(3_600_000_000_000),
+            channels: Vec::new(),
+        }
+    }
+}
+
+/// The two ends of a running graph.
+///
+/// # Errors
+/// When what was fitted does not belong to the graph.
+pub fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Control), EngineError> {
+    control::pair(model, options)
+}

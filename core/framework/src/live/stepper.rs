@@ -1,0 +1,207 @@
+//! Decides what the engine thread does at a tick: step, mirror, and take over a new engine when one has come.
+
+use std::sync::Arc;
+
+use rtrb::{Consumer, Producer};
+
+use super::handover::{Feed, Mark, Seated};
+use crate::compile::Plan;
+use crate::engine::EngineError;
+use crate::time::Instant;
+
+/// Ticks that are kept for an engine that comes a little late.
+const RECENT: usize = 256;
+/// Ticks by which a new engine catches up at each tick, so that no tick becomes long.
+const CATCH_UP: usize = 4;
+
+/// The end of a running graph that the engine thread owns.
+pub struct Stepper {
+    pub(super) seated: Box<Seated>,
+    feed: Arc<[Feed]>,
+    ticks: Producer<f64>,
+    arriving: Consumer<Box<Seated>>,
+    leaving: Producer<Box<Seated>>,
+    next: Option<Box<Seated>>,
+    recent: Vec<f64>,
+    tick: u64,
+    generation: u64,
+    missed: u64,
+}
+
+/// What came of a tick.
+#[derive(Debug)]
+pub struct Stepped<'a> {
+    /// The revision of the graph that made the outputs.
+    pub revision: &'a str,
+    /// Its plan, in whose order the outputs are.
+    pub plan: &'a Plan,
+    /// The outputs; NaN where a node did not run or gave nothing.
+    pub outputs: &'a [f64],
+}
+
+impl Stepper {
+    pub(super) fn new(
+        seated: Seated,
+        feed: Arc<[Feed]>,
+        ticks: Producer<f64>,
+        arriving: Consumer<Box<Seated>>,
+        leaving: Producer<Box<Seated>>,
+    ) -> Self {
+        let width = feed.len() + 1;
+        Self {
+            seated: Box::new(seated),
+            feed,
+            ticks,
+            arriving,
+            leaving,
+            next: None,
+            recent: vec![f64::NAN; RECENT * width],
+            tick: 0,
+            generation: 0,
+            missed: 0,
+        }
+    }
+
+    /// The channels that samples are given for, in this order.
+    #[must_use]
+    pub fn feed(&self) -> &[Feed] {
+        &self.feed
+    }
+
+    /// How many ticks could not be mirrored because the control thread was behind.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.missed
+    }
+
+    /// How often a channel's sample was rejected, by the graph that runs.
+    #[must_use]
+    pub fn engine(&self) -> &crate::engine::Engine {
+        &self.seated.engine
+    }
+
+    /// Takes the measurements of one instant, in the order of [`feed`](Self::feed), NaN where there is no new value.
+    ///
+    /// A new graph that has been committed takes over before the tick.
+    ///
+    /// # Errors
+    /// A time that is not after the last one, or another number of samples: the engine is as it was.
+    pub fn step(&mut self, time: Instant, samples: &[f64]) -> Result<Stepped<'_>, EngineError> {
+        if samples.len() != self.feed.len() {
+            return Err(EngineError::WrongWidth {
+                found: samples.len(),
+                expected: self.feed.len(),
+            });
+        }
+        self.take_over();
+        self.seated.step(time, samples)?;
+        self.tick += 1;
+        self.keep(time, samples);
+        self.mirror(Some(time), samples);
+        let Seated {
+            engine, revision, ..
+        } = &*self.seated;
+        Ok(Stepped {
+            revision,
+            plan: engine.plan(),
+            outputs: engine.outputs(),
+        })
+    }
+
+    /// The next tick belongs to another segment.
+    pub fn segment(&mut self) {
+        // An engine on its way has not seen the break; it is sent back and made anew.
+        if self.next.is_none() {
+            self.next = self.arriving.pop().ok();
+        }
+        self.send_back();
+        self.seated.engine.segment();
+        self.mirror(None, &[]);
+    }
+
+    /// Lets a committed engine catch up, and take over once it has.
+    fn take_over(&mut self) {
+        if self.next.is_none() {
+            self.next = self.arriving.pop().ok();
+        }
+        let Some(next) = &mut self.next else { return };
+        let behind = self.tick - next.tick;
+        if behind > RECENT as u64 {
+            self.send_back();
+            return;
+        }
+        for _ in 0..CATCH_UP.min(usize::try_from(behind).unwrap_or(CATCH_UP)) {
+            let width = self.feed.len() + 1;
+            let row = usize::try_from(next.tick % RECENT as u64).unwrap_or(0) * width;
+            let row = &self.recent[row..row + width];
+            let time = Instant::from_ns(row[0].to_bits().cast_signed());
+            if next.step(time, &row[1..]).is_err() {
+                self.send_back();
+                return;
+            }
+        }
+        if next.tick < self.tick || self.leaving.is_full() {
+            return;
+        }
+        next.take_over(&self.seated.engine);
+        std::mem::swap(&mut self.seated, next);
+        self.generation += 1;
+        self.release();
+    }
+
+    /// Sends an engine back that did not take over.
+    fn send_back(&mut self) {
+        if let Some(next) = &mut self.next {
+            next.refused = true;
+        }
+        self.release();
+    }
+
+    /// Lets the engine beside the one that runs go; it is freed on the other side.
+    fn release(&mut self) {
+        if let Some(engine) = self.next.take()
+            && let Err(rtrb::PushError::Full(engine)) = self.leaving.push(engine)
+        {
+            self.next = Some(engine);
+        }
+    }
+
+    fn keep(&mut self, time: Instant, samples: &[f64]) {
+        let width = self.feed.len() + 1;
+        let row = usize::try_from((self.tick - 1) % RECENT as u64).unwrap_or(0) * width;
+        self.recent[row] = f64::from_bits(time.as_ns().cast_unsigned());
+        self.recent[row + 1..row + width].copy_from_slice(samples);
+    }
+
+    fn mirror(&mut self, time: Option<Instant>, samples: &[f64]) {
+        let width = self.feed.len() + Mark::WIDTH;
+        let mark = Mark {
+            time,
+            tick: self.tick,
+            generation: self.generation,
+        }
+        .write();
+        match self.ticks.write_chunk(width) {
+            Ok(mut chunk) => {
+                let (first, second) = chunk.as_mut_slices();
+                let places = first.iter_mut().chain(second);
+                let nothing = std::iter::repeat(&f64::NAN);
+                for (place, number) in places.zip(mark.iter().chain(samples).chain(nothing)) {
+                    *place = *number;
+                }
+                chunk.commit_all();
+            }
+            Err(_) => self.missed += 1,
+        }
+    }
+}
+
+impl std::fmt::Debug for Stepper {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Stepper")
+            .field("revision", &self.seated.revision)
+            .field("tick", &self.tick)
+            .field("generation", &self.generation)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,395 @@
+//! Decides when a graph is replaced while recorded data run through it, and tells what becomes of it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use athermal::core::document::{TimeBase, TimeForm};
+use athermal::core::engine::Carry;
+use athermal::core::live::{Control, Feed, Notice, StageError, Staged, Verdict};
+use athermal::{Duration, Instant, Model};
+use clap::Args;
+
+use crate::figures::{count, number};
+use crate::terminal::{Failure, Terminal};
+
+/// When and how the graph is replaced.
+#[derive(Debug, Args)]
+pub struct Options {
+    /// Replace the graph at this time of the data, by another model or a graph whose estimators mean the same
+    #[arg(long, value_name = "TIME=GRAPH")]
+    swap_at: Vec<String>,
+    /// Compare a new graph with the running one for so long before it takes over
+    #[arg(long, value_name = "DURATION")]
+    shadow: Option<Duration>,
+    /// By how much the error of a new graph may be larger, such as "5%"
+    #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = percent)]
+    margin: f64,
+    /// Replace the graph whenever its file changes
+    #[arg(long)]
+    watch: bool,
+}
+
+/// How often a watched file is looked at, in rows.
+const LOOK_EVERY: u64 = 256;
+
+fn percent(text: &str) -> Result<f64, String> {
+    let digits = text
+        .trim()
+        .strip_suffix('%')
+        .ok_or_else(|| format!("expected a percentage such as \"5%\", found {text:?}"))?;
+    match digits.trim().parse::<f64>() {
+        Ok(percent) if percent.is_finite() && percent >= 0.0 => Ok(percent / 100.0),
+        _ => Err(format!(
+            "expected a percentage such as \"5%\", found {text:?}"
+        )),
+    }
+}
+
+impl Options {
+    /// Whether the graph may be replaced at all.
+    #[must_use]
+    pub fn any(&self) -> bool {
+        self.watch || !self.swap_at.is_empty()
+    }
+
+    /// The graphs named at the start, each with the time at which it takes over.
+    ///
+    /// # Errors
+    /// When a time cannot be read, or a graph not be used.
+    pub fn schedule(&self, running: &Model) -> Result<Vec<Swap>, Failure> {
+        let mut swaps = Vec::new();
+        let mut before = running.clone();
+        for text in &self.swap_at {
+            let (time, path) = text.split_once('=').ok_or_else(|| {
+                Failure::Request(format!("--swap-at takes TIME=GRAPH, such as 3600=new.toml or 1h=new.toml, found {text:?}"))
+            })?;
+            let model = load(Path::new(path), &before)?;
+            before = model.clone();
+            swaps.push(Swap {
+                at: instant(time, &running.plan.time)?,
+                path: path.into(),
+                model,
+            });
+        }
+        swaps.sort_by_key(|swap| swap.at);
+        Ok(swaps)
+    }
+}
+
+/// A graph that takes over at a time.
+#[derive(Debug)]
+pub struct Swap {
+    at: Instant,
+    path: PathBuf,
+    /// The graph, with fits.
+    pub model: Model,
+}
+
+/// A graph or model, with the fits of what has not changed since `before`.
+fn load(path: &Path, before: &Model) -> Result<Model, Failure> {
+    let mut model = Model::load(path)?;
+    model.take_fits_of(before);
+    let nodes = model.unfitted();
+    if model.card.is_none() && !nodes.is_empty() {
+        let error = athermal::core::model::ModelError::NotFitted {
+            path: path.to_owned(),
+            nodes,
+        };
+        return Err(error.into());
+    }
+    Ok(model)
+}
+
+/// A time as the data give it, or a duration since their zero.
+fn instant(text: &str, base: &TimeBase) -> Result<Instant, Failure> {
+    let TimeBase::Column { form, .. } = base;
+    let unit = match form {
+        TimeForm::Numbers { unit } => Some(*unit),
+        TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
+        TimeForm::Rfc3339 => None,
+    };
+    let plain = text
+        .parse::<f64>()
+        .ok()
+        .zip(unit)
+        .and_then(|(number, unit)| {
+            let ns = (number * unit.as_ns() as f64).round();
+            (ns.abs() < 9e18).then_some(Instant::from_ns(ns as i64))
+        });
+    let written = || {
+        text.parse::<jiff::Timestamp>()
+            .ok()
+            .map(|time| i64::try_from(time.as_nanosecond()))
+    };
+    let dated = || written()?.ok().map(Instant::from_ns);
+    let since = || {
+        text.parse::<Duration>()
+            .ok()
+            .map(|since| Instant::from_ns(since.as_ns()))
+    };
+    plain.or_else(dated).or_else(since).ok_or_else(|| {
+        Failure::Request(format!("--swap-at: {text:?} is no time of these data: write it as they do, or as a duration such as 6h"))
+    })
+}
+
+/// The course of replacements during a run.
+pub struct Course<'a> {
+    terminal: &'a Terminal,
+    options: &'a Options,
+    waiting: std::vec::IntoIter<Swap>,
+    next: Option<Swap>,
+    running: Model,
+    staged: Option<(Model, PathBuf)>,
+    watched: Option<(PathBuf, Option<SystemTime>)>,
+    columns: Vec<String>,
+    rows: u64,
+}
+
+impl<'a> Course<'a> {
+    /// The course that the options ask for.
+    pub fn new(
+        terminal: &'a Terminal,
+        options: &'a Options,
+        path: &Path,
+        running: Model,
+        swaps: Vec<Swap>,
+        columns: Vec<String>,
+    ) -> Self {
+        let mut waiting = swaps.into_iter();
+        let next = waiting.next();
+        let watched = options.watch.then(|| (path.to_owned(), changed(path)));
+        Self {
+            terminal,
+            options,
+            waiting,
+            next,
+            running,
+            staged: None,
+            watched,
+            columns,
+            rows: 0,
+        }
+    }
+
+    /// Does what is due before the row at `now`.
+    ///
+    /// # Errors
+    /// When a graph named at the start cannot take over.
+    pub fn before(&mut self, control: &mut Control, now: Instant) -> Result<(), Failure> {
+        self.rows += 1;
+        let due = self.next.as_ref().is_some_and(|swap| swap.at <= now);
+        let look = self.watched.is_some() && self.rows.is_multiple_of(LOOK_EVERY);
+        if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(1024)) {
+            return Ok(());
+        }
+        self.tell(control.pump());
+        if self.staged.is_some() {
+            self.judge(control)?;
+        }
+        if due && self.staged.is_none() {
+            let swap = self.next.take();
+            self.next = self.waiting.next();
+            if let Some(Swap {
+                path, mut model, ..
+            }) = swap
+            {
+                model.take_fits_of(&self.running);
+                self.stage(control, model, path)?;
+            }
+        }
+        if look && self.staged.is_none() {
+            self.look(control);
+        }
+        Ok(())
+    }
+
+    /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
+    fn look(&mut self, control: &mut Control) {
+        let Some((path, seen)) = &mut self.watched else {
+            return;
+        };
+        let now = changed(path);
+        if now.is_none() || now == *seen {
+            return;
+        }
+        *seen = now;
+        let path = path.clone();
+        let model = match load(&path, &self.running) {
+            Ok(model) => model,
+            Err(failure) => {
+                self.terminal.error(&failure);
+                self.terminal.warning(format_args!(
+                    "{} is not taken over; what runs goes on",
+                    path.display()
+                ));
+                return;
+            }
+        };
+        let outputs = &model.plan.outputs;
+        if let Some(new) = outputs
+            .iter()
+            .find(|output| !self.columns.contains(&output.name))
+        {
+            self.terminal.warning(format_args!(
+                "{} has the output `{}`, for which there is no column; what runs goes on",
+                path.display(),
+                new.name
+            ));
+        } else if let Err(failure) = self.stage(control, model, path) {
+            self.terminal.error(&failure);
+        }
+    }
+
+    fn stage(&mut self, control: &mut Control, model: Model, path: PathBuf) -> Result<(), Failure> {
+        let staged = control.stage(&model, false).map_err(refused)?;
+        self.terminal.note(report(&path, staged));
+        self.staged = Some((model, path));
+        match self.options.shadow {
+            Some(duration) => control
+                .shadow(duration, self.options.margin)
+                .map_err(refused),
+            None => self.commit(control),
+        }
+    }
+
+    fn judge(&mut self, control: &mut Control) -> Result<(), Failure> {
+        let Some(verdict) = control.verdict().filter(|verdict| verdict.over) else {
+            return Ok(());
+        };
+        self.terminal.note(figures(&verdict));
+        if verdict.passes == Some(true) {
+            return self.commit(control);
+        }
+        let why = if verdict.passes.is_none() {
+            "there was nothing to compare"
+        } else {
+            "its error is larger"
+        };
+        if let Some((_, path)) = self.staged.take() {
+            self.terminal
+                .warning(format_args!("{} does not take over: {why}", path.display()));
+        }
+        control.discard();
+        Ok(())
+    }
+
+    fn commit(&mut self, control: &mut Control) -> Result<(), Failure> {
+        control.commit().map_err(refused)?;
+        if let Some((model, _)) = self.staged.take() {
+            self.running = model;
+        }
+        Ok(())
+    }
+
+    /// Tells what has happened.
+    pub fn tell(&self, notices: Vec<Notice>) {
+        for notice in notices {
+            match notice {
+                Notice::TookOver { revision, tick, .. } => {
+                    self.terminal.note(format_args!(
+                        "revision {revision} took over before tick {}",
+                        count(tick)
+                    ));
+                }
+                Notice::SentBack => self
+                    .terminal
+                    .warning("the new graph came too late and was sent back"),
+                Notice::Missed { ticks } => {
+                    self.terminal
+                        .warning(format_args!("{} ticks were missed", count(ticks)));
+                }
+            }
+        }
+    }
+}
+
+/// All channels that some graph reads, and all columns that some graph gives.
+#[must_use]
+pub fn union(running: &Model, swaps: &[Swap]) -> (Vec<Feed>, Vec<String>) {
+    let mut feed = Vec::new();
+    let mut columns = Vec::new();
+    for model in std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model)) {
+        for channel in Feed::of(&model.plan) {
+            if !feed.contains(&channel) {
+                feed.push(channel);
+            }
+        }
+        for output in &model.plan.outputs {
+            if !columns.contains(&output.name) {
+                columns.push(output.name.clone());
+            }
+        }
+    }
+    (feed, columns)
+}
+
+/// The plan whose sources are all channels of a feed, for laying out the columns that are read.
+#[must_use]
+pub fn reading(running: &Model, swaps: &[Swap], feed: &[Feed]) -> athermal::core::compile::Plan {
+    let mut plan = (*Arc::clone(&running.plan)).clone();
+    let models = || std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
+    let source = |channel: &Feed| {
+        let mut sources = models().flat_map(|model| &model.plan.sources);
+        sources
+            .find(|source| source.name == channel.name && source.column == channel.column)
+            .cloned()
+    };
+    plan.sources = feed.iter().filter_map(source).collect();
+    plan
+}
+
+fn changed(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path)
+        .and_then(|facts| facts.modified())
+        .ok()
+}
+
+fn refused(error: StageError) -> Failure {
+    Failure::Request(error.to_string())
+}
+
+fn report(path: &Path, staged: &Staged) -> String {
+    use std::fmt::Write as _;
+    let all = staged.carry();
+    let carried = all
+        .iter()
+        .filter(|node| node.outcome == Carry::Carried)
+        .count();
+    let mut text = format!(
+        "{} (revision {}): {carried} of {} nodes go on as they were",
+        path.display(),
+        staged.revision(),
+        all.len()
+    );
+    for node in all {
+        let (word, why) = match &node.outcome {
+            Carry::Carried => continue,
+            Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
+            Carry::Migrated { from } => ("goes on", format!("from a state of the form {from}")),
+            Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
+            Carry::Cold { reason } => ("cold", reason.clone()),
+        };
+        let _ = write!(text, "\n  {}: {word}, {why}", node.node);
+    }
+    text
+}
+
+fn figures(verdict: &Verdict) -> String {
+    use std::fmt::Write as _;
+    let mut text = "in the shadow:".to_owned();
+    for output in &verdict.outputs {
+        let _ = write!(
+            text,
+            "\n  {}: RMSE {} running, {} new, over {} instants",
+            output.output,
+            number(output.running_rmse),
+            number(output.candidate_rmse),
+            count(output.n as u64)
+        );
+    }
+    if let Some(ratio) = verdict.ratio {
+        let _ = write!(text, "\n  new to running: {ratio:.3}");
+    }
+    text
+}
