@@ -199,6 +199,8 @@ fn describe(scores: &Scores) -> String {
 
 /// Two sentences on what the figures mean.
 fn meaning(axes: &[Axis]) -> String {
+    let noise = axes.iter().filter_map(|axis| axis.vote.truth_noise);
+    let noise = noise.reduce(f64::min);
     let gains = || axes.iter().filter_map(|axis| Some((axis, axis.gain()?)));
     let by_gain = |a: &(&Axis, f64), b: &(&Axis, f64)| a.1.total_cmp(&b.1);
     let (Some((_, least)), Some((best, most))) = (gains().min_by(by_gain), gains().max_by(by_gain))
@@ -210,18 +212,17 @@ fn meaning(axes: &[Axis]) -> String {
         best.vote.baseline_zero.unwrap_or(f64::NAN),
     );
     format!(
-        "The vote knows the drift of the next five minutes with {:.0} to {:.0} % less error\n\
-         than no model; on {} a machine that corrects by it would be off by {:.0} nm after\n\
-         five minutes where it is off by {:.0} nm today.\n\
-         What is left comes mostly from what cannot be known five minutes before, such as\n\
-         the next step of the chuck; nothing can score below the noise of the truth,\n\
-         {} nm/min here, since positions are measured with 12 nm of noise.\n",
+        "The vote foresees the drift of the next five minutes with {:.0} to {:.0} % less error\n\
+         than no model: on {}, {:.0} nm in five minutes are left of {:.0} nm.\n\
+         What is left comes mostly from what cannot be known five minutes before, such\n\
+         as the next step of the chuck; no model can score below about {} nm/min here,\n\
+         the noise of the truth itself, since positions are measured to 12 nm.\n",
         100.0 * least,
         100.0 * most,
         best.name,
         5.0 * with,
         5.0 * without,
-        or_dash(best.vote.truth_noise),
+        or_dash(noise),
     )
 }
 
@@ -235,7 +236,7 @@ fn next(folder: &Path) -> String {
   {program} nodes slope
   {program} run {folder}/model.json --input {folder}/test.csv | tail -3
   {program} simulate {MACHINE} --days 2 --seed 2 -o {faulty} \\
-      --fault temperature.plate1=stuck,from=6h
+      --fault temperature.plate1=missing,from=6h
   {program} evaluate {folder}/model.json --data {faulty} \\
       --abs-truth-below \"{LIMIT}\"
 and with a log of a machine of yours:
@@ -282,8 +283,8 @@ mod tests {
         ];
         let text = meaning(&axes);
         assert!(text.contains("with 20 to 50 % less error"), "{text}");
-        assert!(text.contains("on Z1 a machine that corrects by it would be off by 125 nm"));
-        assert!(text.contains("it is off by 250 nm today"), "{text}");
+        let left = "on Z1, 125 nm in five minutes are left of 250 nm";
+        assert!(text.contains(left), "{text}");
         assert!(text.contains(&number(3.85)), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 80));
     }

@@ -9,6 +9,7 @@ mod fit;
 mod init;
 mod nodes;
 mod run;
+mod show;
 mod simulate;
 
 use clap::Subcommand;
@@ -22,6 +23,8 @@ pub enum Command {
     Demo(demo::Demo),
     /// Write a starter graph for a log of yours
     Init(init::Init),
+    /// Show a graph: its plan, or a picture of it
+    Show(show::Show),
     /// Look for mistakes in a graph file
     Check(check::Check),
     /// List the node types, or explain one
@@ -46,6 +49,7 @@ impl Command {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
             Self::Demo(command) => command.run(terminal),
+            Self::Show(command) => command.run(terminal),
             Self::Init(command) => command.run(terminal),
             Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
