@@ -17,7 +17,7 @@ use super::data::Data;
 use super::fit::fit_on;
 use super::simulate::write_recording;
 use crate::figures::{count, or_dash, table};
-use crate::invocation::{program, quoted};
+use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 const GRAPH: &str = include_str!("../../graphs/die-tester.toml");
@@ -228,20 +228,42 @@ fn meaning(axes: &[Axis]) -> String {
 
 /// What to try next.
 fn next(folder: &Path) -> String {
-    let (program, folder) = (program(), quoted(&folder.display().to_string()));
-    let faulty = format!("{folder}/faulty.csv");
-    format!(
-        "Try next:
-  {program} show {folder}/die-tester.toml --format svg > graph.svg
-  {program} nodes slope
-  {program} run {folder}/model.json --input {folder}/test.csv | tail -3
-  {program} simulate {MACHINE} --days 2 --seed 2 -o {faulty} \\
-      --fault temperature.plate1=missing,from=6h
-  {program} evaluate {folder}/model.json --data {faulty} \\
-      --abs-truth-below \"{LIMIT}\"
-and with a log of a machine of yours:
-  {program} init LOG.csv -o graph.toml"
-    )
+    let program = program();
+    let [graph, test, model, faulty, picture] = [
+        "die-tester.toml",
+        "test.csv",
+        "model.json",
+        "faulty.csv",
+        "graph.svg",
+    ]
+    .map(|file| quoted(&folder.join(file).display().to_string()));
+    let limit = format!("\"{LIMIT}\"");
+    let lines = [
+        command(&[&program, "show", &graph, "--format svg", ">", &picture]),
+        command(&[&program, "nodes slope"]),
+        command(&[&program, "run", &model, "--input", &test, "| tail -3"]),
+        command(&[
+            &program,
+            "simulate",
+            MACHINE,
+            "--days 2 --seed 2",
+            "-o",
+            &faulty,
+            "--fault temperature.plate1=missing,from=6h",
+        ]),
+        command(&[
+            &program,
+            "evaluate",
+            &model,
+            "--data",
+            &faulty,
+            "--abs-truth-below",
+            &limit,
+        ]),
+        "and with a log of a machine of yours:".to_owned(),
+        command(&[&program, "init LOG.csv -o graph.toml"]),
+    ];
+    format!("Try next:\n{}", lines.join("\n"))
 }
 
 #[cfg(test)]

@@ -149,7 +149,10 @@ fn steps(plan: &Plan, expand: bool) -> String {
         } else {
             format!("{}-{last}", at + 1)
         };
-        let _ = writeln!(text, "  {range:>9}  {}{times_text}", lines.join(", then "));
+        let _ = writeln!(text, "  {range:>9}  {}{times_text}", lines[0]);
+        for line in &lines[1..] {
+            let _ = writeln!(text, "  {:>9}    then {line}", "");
+        }
         at = last;
     }
     text
