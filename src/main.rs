@@ -1,6 +1,7 @@
 //! The command line of athermal.
 
 mod command;
+mod drawing;
 mod figures;
 mod invocation;
 mod starter;
