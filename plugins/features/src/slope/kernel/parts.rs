@@ -90,18 +90,16 @@ impl Parts<'_> {
                 let head_now = ht.n[i] * nt.n[i] * from_head;
                 let whole_now = wt.n[i] * nt.n[i] * from_whole;
                 let head_whole = ht.n[i] * wt.n[i] * between;
-                let rise_head = hy.mean[i] - ny.mean[i];
-                let rise_whole = wy.mean[i] - ny.mean[i];
                 let samples = ht.n[i] + wt.n[i] + nt.n[i];
                 let sxx = samples * (ht.sxx[i] + wt.sxx[i] + nt.sxx[i])
                     + head_now * from_head
                     + whole_now * from_whole
                     + head_whole * between;
-                let sxy = samples * (hy.sxy[i] + wy.sxy[i] + ny.sxy[i])
-                    + head_now * rise_head
-                    + whole_now * rise_whole
-                    + head_whole * (rise_head - rise_whole);
-                sxy / sxx * NS_PER_S
+                // The very operations of `slopes` and `weigh`, so that a channel keeps its bits while another is absent.
+                let scale = NS_PER_S / sxx;
+                samples * scale * (hy.sxy[i] + wy.sxy[i] + ny.sxy[i])
+                    + (head_now + head_whole) * scale * (hy.mean[i] - ny.mean[i])
+                    + (whole_now - head_whole) * scale * (wy.mean[i] - ny.mean[i])
             });
         }
     }
