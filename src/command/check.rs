@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use athermal::core::compile::{Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk};
+use athermal::core::trial;
 use clap::Args;
 
 use crate::figures::count;
@@ -39,7 +40,11 @@ impl Check {
             let mut of_file = Diagnostics::new();
             let graph = document::load(path, &Disk, &mut sources, &mut of_file)
                 .and_then(|read| document::declare(read, &mut of_file));
-            let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut of_file));
+            let plan = graph.and_then(|graph| {
+                let plan = compile(&graph, Wanted::default(), &mut of_file)?;
+                trial::declare(&graph, &plan, &sources, &mut of_file)?;
+                Some(plan)
+            });
             diagnostics.extend(of_file);
             if let Some(plan) = plan.filter(|_| diagnostics.error_count() == before) {
                 fine.push((path, plan));

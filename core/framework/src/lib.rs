@@ -19,6 +19,8 @@
 //! | [`prng`], [`fault`] | seeded random numbers; what can be wrong with a sensor of any recording |
 //! | [`machine`] | what a simulated machine is, and as what recording it serves |
 //! | [`model`], [`fit`], [`score`] | a fitted graph, training it, scoring it |
+//! | [`schema`] | the JSON Schema of graph files, for editors |
+//! | [`trial`] | the tests in a graph file: what they mean, running one, judging it |
 //! | [`live`] | replacing a graph while it runs |
 //!
 //! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
@@ -38,9 +40,10 @@ pub mod node;
 pub mod prng;
 pub mod quantity;
 pub mod recording;
-mod schema;
+pub mod schema;
 pub mod score;
 pub mod time;
+pub mod trial;
 pub mod unit;
 
 #[doc(hidden)]

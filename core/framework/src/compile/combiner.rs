@@ -7,6 +7,7 @@ use super::resolver::{Instance, Resolver};
 use crate::channel::Channel;
 use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;
+use crate::unit::Unit;
 
 impl Resolver<'_> {
     pub(super) fn combiner(
@@ -69,15 +70,51 @@ impl Resolver<'_> {
                 .iter()
                 .map(|&slot| (&self.provenance[slot], Duration::ZERO)),
         );
-        let outputs = vec![OutputPort {
+        let mut outputs = vec![OutputPort {
             name: "prediction",
             channels: vec![combined],
         }];
+        let mut behind = vec![behind];
+        if combiner.weighs() {
+            outputs.push(OutputPort {
+                name: "weights",
+                channels: self.weights(&voters),
+            });
+            behind.extend(std::iter::repeat_n(behind[0].clone(), voters.len()));
+        }
         let role = PlannedRole::Combiner {
             voters: gather,
             truth: link,
+            weights: false,
         };
-        self.add(instance, outputs, role, vec![behind], predicts)
+        self.add(instance, outputs, role, behind, predicts)
+    }
+
+    /// A channel for the weight of each voter, named after the voter's node, or after the voter where that is not enough.
+    fn weights(&self, voters: &[usize]) -> Vec<Channel> {
+        let node = |slot: usize| {
+            self.channels[slot]
+                .name
+                .split(['.', ':'])
+                .next()
+                .unwrap_or_default()
+        };
+        let nodes: std::collections::BTreeSet<_> = voters.iter().map(|&slot| node(slot)).collect();
+        let name = |slot: usize| {
+            if nodes.len() == voters.len() {
+                node(slot)
+            } else {
+                &self.channels[slot].name
+            }
+        };
+        let weight = |&slot: &usize| Channel {
+            name: format!("weight-{}", name(slot)),
+            unit: Unit::one(),
+            span: Duration::ZERO,
+            ahead: Duration::ZERO,
+            max_age: self.channels[slot].channel.default_max_age(),
+        };
+        voters.iter().map(weight).collect()
     }
 
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.

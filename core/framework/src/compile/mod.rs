@@ -23,6 +23,8 @@ pub use plan::{
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
 pub use provenance::smallest_lag;
+pub(crate) use reference::{Reference, is_pattern, matches};
+pub(crate) use resolver::EstimatorKeys;
 
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;

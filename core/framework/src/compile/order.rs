@@ -73,8 +73,8 @@ fn edges(graph: &GraphFile) -> DiGraph<(), ()> {
             let heads = input
                 .references
                 .iter()
-                .map(|(text, _)| Reference::parse(text).node);
-            from.extend(heads.filter_map(|head| position.get(head).copied()));
+                .map(|(text, _)| Reference::parse(text).whole_node());
+            from.extend(heads.filter_map(|head| position.get(&*head).copied()));
         }
         for from in from {
             edges.add_edge(NodeIndex::new(from), NodeIndex::new(to), ());

@@ -145,6 +145,8 @@ pub enum PlannedRole {
         voters: usize,
         /// What is predicted, where it learns from errors.
         truth: Option<TruthLink>,
+        /// Whether somebody reads its weights.
+        weights: bool,
     },
 }
 

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use indexmap::IndexSet;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::order::Order;
@@ -38,25 +39,30 @@ pub(crate) struct ReadInstance {
 }
 
 /// What the framework reads of an estimator's table.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct EstimatorKeys {
+    /// How far ahead of now the truth is predicted: `"5min"` is a forecast, `"0s"` a virtual sensor.
     pub(crate) ahead: Option<Duration>,
+    /// Which truths it is fitted on.
     pub(crate) train: Train,
 }
 
 /// Which rows an estimator is trained on.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Train {
+    /// Those whose absolute value is within these limits.
     pub(crate) abs_truth: Limits,
 }
 
 /// Limits of an absolute value.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Limits {
+    /// Only those below.
     pub(crate) below: Option<Quantity>,
+    /// Only those at or above.
     pub(crate) above: Option<Quantity>,
 }
 
@@ -147,6 +153,15 @@ fn context(node: &NodeDecl, instance: &InstanceDecl) -> String {
     match &instance.member {
         Some(member) => format!("node `{}`, member `{member}`", node.name),
         None => format!("node `{}`", node.name),
+    }
+}
+
+/// The name of a channel among those of all members; the only one of an instance has its member's name.
+fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
+    match member {
+        Some(member) if single => member.to_owned(),
+        Some(member) => format!("{member}/{channel}"),
+        None => channel.to_owned(),
     }
 }
 
@@ -544,11 +559,8 @@ impl<'g> Resolver<'g> {
             let first = self.channels.len();
             let single = port.channels.len() == 1;
             for channel in port.channels {
-                let outward = match &instance.decl.member {
-                    Some(member) if single => member.clone(),
-                    Some(member) => format!("{member}/{}", channel.name),
-                    None => channel.name.clone(),
-                };
+                let own = channel.name.clone();
+                let outward = outward_name(instance.decl.member.as_deref(), single, &own);
                 let slot = self.channels.len();
                 let named = if ranges.is_empty() {
                     format!("{}.{outward}", instance.node.name)
@@ -560,7 +572,8 @@ impl<'g> Resolver<'g> {
                     channel,
                     node: Some(index),
                     history: None,
-                    predicts,
+                    // Only what a node gives first is a prediction; the other ports tell of it.
+                    predicts: predicts.filter(|_| ranges.is_empty()),
                 });
                 self.provenance.push(behind.next().unwrap_or_default());
                 let scope = self.scopes.get_mut(&instance.node.name);
@@ -577,6 +590,11 @@ impl<'g> Resolver<'g> {
                     };
                     self.diagnostics.report(instance.node.place, problem);
                     whole = false;
+                }
+                for (scope, member) in &instance.decl.scopes {
+                    let outward = outward_name(member.as_deref(), single, &own);
+                    let ports = &mut self.scopes.get_mut(scope).ports;
+                    ports.entry(port.name).or_default().insert(outward, slot);
                 }
             }
             ranges.push((port.name, first..self.channels.len()));

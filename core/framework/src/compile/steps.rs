@@ -77,6 +77,10 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wante
         .collect();
     for node in &mut plan.nodes {
         let is_truth = truths.range(node.slots.clone()).next().is_some();
+        if let PlannedRole::Combiner { weights, .. } = &mut node.role {
+            let ports = node.ports.get(1);
+            *weights = ports.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
+        }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
                 let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";

@@ -19,7 +19,7 @@ const fn code(code: &'static str, title: &'static str, explanation: &'static str
     }
 }
 
-/// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them.
+/// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 for their tests.
 pub const CODES: &[Code] = &[
     code(
         "A001",
@@ -145,6 +145,71 @@ pub const CODES: &[Code] = &[
         "A025",
         "modules",
         "`[modules]` and `module = ...` are reserved for a later version.",
+    ),
+    code(
+        "A070",
+        "nothing to run over",
+        "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them.",
+    ),
+    code(
+        "A071",
+        "nothing expected",
+        "A test without expectations, and an expectation without checks, could not fail.",
+    ),
+    code(
+        "A072",
+        "two tests of one name",
+        "Tests are told apart by their names.",
+    ),
+    code(
+        "A073",
+        "unknown machine",
+        "`simulate` names a machine that no linked crate brings.",
+    ),
+    code(
+        "A074",
+        "machine without the channel",
+        "The simulated machine does not measure what the graph measures.",
+    ),
+    code(
+        "A075",
+        "unit in a test",
+        "A quantity in a test does not convert to the unit of the channel that it is about.",
+    ),
+    code(
+        "A076",
+        "not a prediction",
+        "Errors, R² and comparisons are about predictions of a measured truth; those compared predict the same one, as far ahead.",
+    ),
+    code(
+        "A077",
+        "keys of a test",
+        "Keys of a test exclude one another, or one needs another.",
+    ),
+    code(
+        "A078",
+        "out of range in a test",
+        "A number or duration in a test is out of its range.",
+    ),
+    code(
+        "A079",
+        "fault that does not fit",
+        "The size of a fault does not fit its channel, or it needs one and there is no usual one.",
+    ),
+    code(
+        "A080",
+        "not measured",
+        "Only measured channels can be given measurements or faults.",
+    ),
+    code(
+        "A081",
+        "channel given twice",
+        "Two inputs of a test give measurements of the same channel.",
+    ),
+    code(
+        "A082",
+        "sample without a unit",
+        "Samples are quantities; only `nan`, for no value, stands without a unit.",
     ),
 ];
 

@@ -14,6 +14,7 @@ mod toml_text;
 mod tree;
 
 pub use declare::declare;
+pub(crate) use declare::{TIME_UNITS, known_keys};
 pub use decode::decode;
 pub use graph_file::{
     GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,

@@ -6,7 +6,7 @@ mod watch;
 use std::sync::Arc;
 
 pub use table::{Score, Scores};
-pub(crate) use watch::Watch;
+pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};

@@ -1,5 +1,6 @@
 //! From the merged tree to declarations: which sections there are and in which order they are read; each section has a file of its own.
 
+mod modules;
 mod names;
 mod nodes;
 mod outputs;
@@ -16,7 +17,9 @@ use super::problem::DocumentProblem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
-use reading::{known_keys, text};
+pub(crate) use reading::known_keys;
+use reading::text;
+pub(crate) use time_base::UNITS as TIME_UNITS;
 
 const SECTIONS: [&str; 14] = [
     "schema",
@@ -56,9 +59,6 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     };
     let known: Vec<&str> = SECTIONS.into_iter().chain([MODEL]).collect();
     known_keys(root, &known, "a graph file", diagnostics);
-    if let Some(modules) = root.entry("modules") {
-        diagnostics.report(modules.key, DocumentProblem::Modules);
-    }
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
     names::check(root, diagnostics);
@@ -66,9 +66,14 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let time = time_base::declare(root.get("time"), diagnostics);
     let sample = time.sample();
     let signals = signals::declare(root.get("signals"), &sets, sample, diagnostics);
-    let nodes = nodes::declare(root.get("nodes"), &sets, sample, diagnostics);
-    let outputs = outputs::declare(root.get("outputs"), diagnostics);
-    let tests = root.get("tests").cloned();
+    modules::check(root.get("modules"), diagnostics);
+    let expanded = modules::expand(root, &sets, diagnostics);
+    let nodes = nodes::declare(&expanded.nodes, &sets, sample, diagnostics);
+    let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
+    let mut tests = root.get("tests").cloned();
+    if let Some(tests) = &mut tests {
+        nodes::convert_samples_but(tests, "name", sample, diagnostics);
+    }
     if let Some(tests) = &tests
         && tests.as_list().is_none()
     {

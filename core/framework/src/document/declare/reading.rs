@@ -7,7 +7,7 @@ use crate::quantity::Quantity;
 use crate::time::Duration;
 
 /// Reports every key of `table` that is not `known`.
-pub(super) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut Diagnostics) {
+pub(crate) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics: &mut Diagnostics) {
     for (key, entry) in table.iter().filter(|(key, _)| !known.contains(key)) {
         let known = known.iter().map(|key| (*key).to_owned()).collect();
         diagnostics.report(

@@ -1,4 +1,8 @@
-//! Decides how durations, units and quantities describe themselves in a JSON Schema; what they mean is decided with them.
+//! Decides the JSON Schema of graph files, and how durations, units and quantities describe themselves in it; what they mean is decided with them.
+
+mod graph;
+
+pub use graph::graph_schema;
 
 use std::borrow::Cow;
 

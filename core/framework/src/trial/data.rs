@@ -1,0 +1,49 @@
+//! Decides which data a test names; how files are read is left to who runs it.
+
+use std::path::PathBuf;
+
+use crate::machine::{Setup, Simulated, UnknownMachine, machine};
+use crate::recording::Recording;
+
+/// Data that can be read as often as needed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DataSet {
+    /// Files, with their paths resolved.
+    Files(Vec<PathBuf>),
+    /// A simulated machine.
+    Simulated(Simulation),
+}
+
+/// A simulated machine and how much of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulation {
+    /// The machine's name, which is known.
+    pub machine: &'static str,
+    /// How many days.
+    pub days: f64,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl DataSet {
+    /// The data as a recording; `files` reads files.
+    ///
+    /// # Errors
+    /// There is no such machine, which declaring a test has made sure of.
+    pub fn recording(
+        &self,
+        files: impl FnOnce(&[PathBuf]) -> Box<dyn Recording>,
+    ) -> Result<Box<dyn Recording>, UnknownMachine> {
+        Ok(match self {
+            Self::Files(paths) => files(paths),
+            Self::Simulated(simulation) => {
+                let setup = Setup {
+                    days: simulation.days,
+                    seed: simulation.seed,
+                    schedule: None,
+                };
+                Box::new(Simulated::new(machine(simulation.machine)?.machine, setup))
+            }
+        })
+    }
+}

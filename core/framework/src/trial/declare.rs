@@ -1,0 +1,631 @@
+//! Decides what `[[tests]]` mean for a graph: channels looked up, units checked, mistakes told where they stand.
+
+use super::channels::{look_up, look_up_measured};
+use super::data::{DataSet, Simulation};
+use super::expectation::{Check, Expectation, Period, Rival, Tolerance};
+use super::problem::TrialProblem;
+use super::series::{Series, Synthetic};
+use super::shape;
+use super::table::{ExpectTable, SimulationTable, Within};
+use crate::compile::{Plan, PlannedRole};
+use crate::diagnostic::{Diagnostics, Place, Sources};
+use crate::document::{Data, DocumentProblem, GraphFile, Table, Value, decode, known_keys};
+use crate::fault::{FaultSpec, Faults};
+use crate::machine::{LONGEST_DAYS, machines};
+use crate::quantity::Quantity;
+use crate::time::Duration;
+use crate::unit::Unit;
+
+const KEYS: [&str; 6] = ["name", "fit", "on", "inputs", "faults", "expect"];
+
+/// A test of a graph.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// What it shows.
+    pub name: String,
+    /// Where it stands.
+    pub place: Place,
+    /// The data that estimators are fitted on.
+    pub fit: Option<DataSet>,
+    /// What the graph is run over.
+    pub on: On,
+    /// What is wrong with the sensors during the run.
+    pub faults: Vec<FaultSpec>,
+    /// What must come out.
+    pub expect: Vec<Expectation>,
+}
+
+/// What a graph is run over.
+#[derive(Debug, Clone)]
+pub enum On {
+    /// Recorded or simulated data.
+    Data(DataSet),
+    /// Made-up measurements.
+    Synthetic(Synthetic),
+}
+
+/// What the tests of a graph are; `None` after any mistake, all of which are told.
+pub fn declare(
+    graph: &GraphFile,
+    plan: &Plan,
+    sources: &Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<Vec<Trial>> {
+    let Some(tests) = graph.tests.as_ref().and_then(Value::as_list) else {
+        return Some(Vec::new());
+    };
+    let before = diagnostics.error_count();
+    let mut trials: Vec<Trial> = Vec::new();
+    let mut names: Vec<(&str, Place)> = Vec::new();
+    for test in tests {
+        let Some(table) = test.as_table() else {
+            diagnostics.report(test.place, wrong_type("tests", "a table", test));
+            continue;
+        };
+        let name = table.get("name");
+        let text = name.and_then(Value::as_text);
+        if let (Some(name), Some(text)) = (name, text) {
+            match names.iter().find(|(taken, _)| *taken == text) {
+                Some(&(_, first)) => {
+                    let name_twice = TrialProblem::DuplicateName {
+                        name: text.to_owned(),
+                        first,
+                    };
+                    diagnostics.report(name.place, name_twice);
+                }
+                None => names.push((text, name.place)),
+            }
+        }
+        let context = text.map_or_else(|| "a test".to_owned(), |name| format!("test \"{name}\""));
+        let trial = diagnostics.within(context, |diagnostics| {
+            Declaring {
+                plan,
+                sources,
+                diagnostics,
+            }
+            .trial(test, table)
+        });
+        trials.extend(trial);
+    }
+    (diagnostics.error_count() == before).then_some(trials)
+}
+
+/// Makes the plan compute every port that its tests look at, whether another node reads it or not.
+pub fn observe(plan: &mut Plan, trials: &[Trial]) {
+    let slots = trials
+        .iter()
+        .flat_map(|trial| &trial.expect)
+        .flat_map(|expectation| &expectation.slots);
+    for &slot in slots {
+        let Some(node) = plan.channels[slot].node else {
+            continue;
+        };
+        let node = &mut plan.nodes[node];
+        let port = node
+            .ports
+            .iter()
+            .position(|(_, range)| range.contains(&slot));
+        if let (PlannedRole::Feature { wanted, .. }, Some(port)) = (&mut node.role, port)
+            && let Some(wanted) = wanted.get_mut(port)
+        {
+            *wanted = true;
+        }
+    }
+}
+
+struct Declaring<'a> {
+    plan: &'a Plan,
+    sources: &'a Sources,
+    diagnostics: &'a mut Diagnostics,
+}
+
+impl Declaring<'_> {
+    fn trial(&mut self, test: &Value, table: &Table) -> Option<Trial> {
+        known_keys(table, &KEYS, "a test", self.diagnostics);
+        let name = match table.get("name") {
+            Some(value) => {
+                if value.as_text().is_none() {
+                    let problem = wrong_type("name", "a text in quotes", value);
+                    self.diagnostics.report(value.place, problem);
+                }
+                value.as_text()
+            }
+            None => {
+                let problem = DocumentProblem::MissingKey {
+                    key: "name".to_owned(),
+                    what: "a test".to_owned(),
+                    advice: Some("say in a sentence what it shows: name = \"…\"".to_owned()),
+                };
+                self.diagnostics.report(test.place, problem);
+                None
+            }
+        };
+        let fit = table.get("fit").map(|value| self.data("fit", value));
+        let on = match (table.entry("on"), table.entry("inputs")) {
+            (Some(on), None) => self.data("on", &on.value).map(On::Data),
+            (None, Some(inputs)) => self.inputs(&inputs.value).map(On::Synthetic),
+            (Some(on), Some(inputs)) => {
+                let problem = TrialProblem::TwoData { inputs: inputs.key };
+                self.diagnostics.report(on.key, problem);
+                None
+            }
+            (None, None) => {
+                self.diagnostics.report(test.place, TrialProblem::NoData);
+                None
+            }
+        };
+        let faults = match table.get("faults") {
+            Some(value) => self.list("faults", value, Self::fault)?.concat(),
+            None => Vec::new(),
+        };
+        let expect = match table.get("expect") {
+            Some(value) => self.list("expect", value, Self::expectation)?,
+            None => Vec::new(),
+        };
+        if expect.is_empty() {
+            let place = table.get("expect").map_or(test.place, |value| value.place);
+            let problem = TrialProblem::NothingExpected { what: "the test" };
+            self.diagnostics.report(place, problem);
+        }
+        Some(Trial {
+            name: name?.to_owned(),
+            place: test.place,
+            fit: fit.map_or(Some(None), |fit| fit.map(Some))?,
+            on: on?,
+            faults,
+            expect,
+        })
+    }
+
+    /// The entries of a list that have no mistakes.
+    fn list<T>(
+        &mut self,
+        key: &str,
+        value: &Value,
+        read: impl Fn(&mut Self, &Value) -> Option<T>,
+    ) -> Option<Vec<T>> {
+        let Some(list) = value.as_list() else {
+            let problem = wrong_type(key, "a list of tables", value);
+            self.diagnostics.report(value.place, problem);
+            return None;
+        };
+        let before = self.diagnostics.error_count();
+        let read: Vec<T> = list.iter().filter_map(|value| read(self, value)).collect();
+        (self.diagnostics.error_count() == before).then_some(read)
+    }
+
+    fn data(&mut self, key: &'static str, value: &Value) -> Option<DataSet> {
+        let resolve = |value: &Value| {
+            let path = value.as_text()?;
+            Some(self.sources.resolve(value.place, path))
+        };
+        match &value.data {
+            Data::Text(_) => Some(DataSet::Files(vec![resolve(value)?])),
+            Data::List(files) if files.iter().all(|file| file.as_text().is_some()) => {
+                if files.is_empty() {
+                    let what = format!("the list of files for \"{key}\"");
+                    let problem = DocumentProblem::EmptyList { what };
+                    self.diagnostics.report(value.place, problem);
+                    return None;
+                }
+                Some(DataSet::Files(files.iter().filter_map(resolve).collect()))
+            }
+            Data::Table(_) => self.simulation(key, value),
+            _ => {
+                let expected = "a file, a list of files, or { simulate = \"MACHINE\" }";
+                let problem = wrong_type(key, expected, value);
+                self.diagnostics.report(value.place, problem);
+                None
+            }
+        }
+    }
+
+    fn simulation(&mut self, key: &'static str, value: &Value) -> Option<DataSet> {
+        let what = format!("\"{key}\"");
+        let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
+        let place = place_of(value, "simulate");
+        let Some(known) = machines().get(table.simulate.as_str()) else {
+            let problem = TrialProblem::UnknownMachine {
+                machine: table.simulate,
+                known: machines().keys().copied().collect(),
+            };
+            self.diagnostics.report(place, problem);
+            return None;
+        };
+        let channels = known.machine.channels();
+        let measures = |name: &str| channels.iter().find(|channel| channel.reference() == name);
+        let needed = self.plan.sources.iter().filter(|source| !source.optional);
+        let missing: Vec<String> = needed
+            .filter(|source| measures(&source.name).is_none())
+            .map(|source| source.name.clone())
+            .collect();
+        if !missing.is_empty() {
+            let problem = TrialProblem::MachineLacks {
+                machine: known.machine.name(),
+                channels: missing,
+                has: channels.iter().map(|channel| channel.reference()).collect(),
+            };
+            self.diagnostics.report(place, problem);
+        }
+        for (source, planned) in self.plan.sources.iter().zip(&self.plan.channels) {
+            let unit = measures(&source.name).and_then(|channel| Unit::parse(channel.unit).ok());
+            if let Some(unit) = unit.filter(|unit| !unit.measures_same(&planned.channel.unit)) {
+                let problem = TrialProblem::Units {
+                    key: "simulate",
+                    found: unit,
+                    channel: source.name.clone(),
+                    expected: planned.channel.unit.clone(),
+                };
+                self.diagnostics.report(place, problem);
+            }
+        }
+        if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
+            let found = table.days.to_string();
+            self.range(value, "days", found, "above 0 and at most 3653");
+        }
+        Some(DataSet::Simulated(Simulation {
+            machine: known.machine.name(),
+            days: table.days,
+            seed: table.seed,
+        }))
+    }
+
+    fn inputs(&mut self, value: &Value) -> Option<Synthetic> {
+        let Some(table) = value.as_table() else {
+            let expected = "a table with a key for each channel";
+            let problem = wrong_type("inputs", expected, value);
+            self.diagnostics.report(value.place, problem);
+            return None;
+        };
+        let mut channels: Vec<(usize, Series)> = Vec::new();
+        if table.is_empty() {
+            self.diagnostics.report(value.place, TrialProblem::NoData);
+        }
+        for (reference, entry) in table.iter() {
+            let Some(slots) = self.measured(reference, entry.key) else {
+                continue;
+            };
+            for slot in slots {
+                if channels.iter().any(|(taken, _)| *taken == slot) {
+                    let channel = self.plan.sources[slot].name.clone();
+                    let problem = TrialProblem::ChannelTwice { channel };
+                    self.diagnostics.report(entry.key, problem);
+                    continue;
+                }
+                let planned = &self.plan.channels[slot];
+                let series = shape::read(
+                    &entry.value,
+                    &planned.name,
+                    &planned.channel.unit,
+                    self.diagnostics,
+                );
+                channels.extend(series.map(|series| (slot, series)));
+            }
+        }
+        (!channels.is_empty()).then_some(Synthetic { channels })
+    }
+
+    fn fault(&mut self, value: &Value) -> Option<Vec<FaultSpec>> {
+        let spec = decode::<FaultSpec>(value, "the fault", self.diagnostics)?;
+        if spec.from < Duration::ZERO {
+            self.range(value, "from", spec.from.to_string(), "0 or later");
+        }
+        if let Some(lasting) = spec.lasting.filter(|lasting| *lasting <= Duration::ZERO) {
+            self.range(value, "for", lasting.to_string(), "longer than 0");
+        }
+        if spec.size.is_some() && !spec.kind.has_size() {
+            let problem = TrialProblem::Keys {
+                key: "size",
+                with: "kind",
+                excluded: true,
+            };
+            self.diagnostics.report(place_of(value, "size"), problem);
+        }
+        let slots = self.measured(&spec.channel, place_of(value, "channel"))?;
+        let one = |slot: usize| {
+            let name = self.plan.sources[slot].name.as_str();
+            let unit = &self.plan.channels[slot].channel.unit;
+            let named = FaultSpec {
+                channel: name.to_owned(),
+                ..spec.clone()
+            };
+            named
+                .resolve(&[(name, unit)])
+                .and_then(|fault| {
+                    Faults::new(
+                        vec![crate::fault::Fault {
+                            from_ns: 0,
+                            for_ns: 1,
+                            ..fault
+                        }],
+                        1,
+                        1,
+                    )
+                })
+                .map(|_| named)
+        };
+        let made: Result<Vec<_>, _> = slots.into_iter().map(one).collect();
+        made.map_err(|error| {
+            let key = if spec.size.is_some() { "size" } else { "kind" };
+            let problem = TrialProblem::Fault(error);
+            self.diagnostics.report(place_of(value, key), problem);
+        })
+        .ok()
+    }
+
+    fn expectation(&mut self, value: &Value) -> Option<Expectation> {
+        let table = decode::<ExpectTable>(value, "the expectation", self.diagnostics)?;
+        self.check_keys(value, &table);
+        let slots = self.channels(&table.of, place_of(value, "of"))?;
+        let checks = self.checks(value, &table);
+        if checks.is_empty() {
+            let what = "the expectation";
+            let problem = TrialProblem::NothingExpected { what };
+            self.diagnostics.report(value.place, problem);
+        }
+        for &slot in &slots {
+            self.check_channel(value, &table, &checks, slot);
+        }
+        Some(Expectation {
+            slots,
+            abs_truth_below: table.abs_truth_below,
+            period: Period {
+                from: table.from.unwrap_or(Duration::ZERO),
+                to: table.to.unwrap_or(Duration::MAX),
+            },
+            at: table.at,
+            checks,
+        })
+    }
+
+    fn checks(&mut self, value: &Value, table: &ExpectTable) -> Vec<Check> {
+        let mut checks = Vec::new();
+        checks.extend(table.rmse_below.clone().map(Check::RmseBelow));
+        checks.extend(table.r2_above.map(Check::R2Above));
+        if let Some(beats) = &table.beats {
+            let places = place_list(value, "beats");
+            let rivals = beats.iter().zip(places).filter_map(|(name, place)| {
+                Some(match name.as_str() {
+                    "zero" => Rival::Zero,
+                    "persistence" => Rival::Persistence,
+                    _ => Rival::Channels(name.clone(), self.channels(name, place)?),
+                })
+            });
+            let rivals: Vec<Rival> = rivals.collect();
+            if !rivals.is_empty() {
+                checks.push(Check::Beats(rivals));
+            }
+        }
+        checks.extend(table.valid_above.map(Check::ValidAbove));
+        checks.extend(table.given_above.map(Check::GivenAbove));
+        let tolerance = match &table.within {
+            None => Tolerance::Number(0.0),
+            Some(Within::Number(number)) => Tolerance::Number(*number),
+            Some(Within::Quantity(quantity)) => Tolerance::Quantity(quantity.clone()),
+        };
+        let equals = table.equals.clone();
+        checks.extend(equals.map(|equals| Check::Equals(equals, tolerance)));
+        let between = table.between.clone();
+        checks.extend(between.map(|(low, high)| Check::Between(low, high)));
+        checks.extend(table.max_step_below.clone().map(Check::MaxStepBelow));
+        checks
+    }
+
+    /// Keys that need or exclude each other, and numbers out of their range.
+    fn check_keys(&mut self, value: &Value, table: &ExpectTable) {
+        let at = table.at.is_some();
+        let one_value = table.equals.is_some() || table.between.is_some();
+        let period = table.from.is_some() || table.to.is_some();
+        let of_truths = table.rmse_below.is_some()
+            || table.r2_above.is_some()
+            || table.beats.is_some()
+            || table.valid_above.is_some();
+        let wrong = [
+            (
+                table.within.is_some() && table.equals.is_none(),
+                "within",
+                "equals",
+                false,
+            ),
+            (at && !one_value, "at", "equals", false),
+            (
+                at && period,
+                "at",
+                if table.from.is_some() { "from" } else { "to" },
+                true,
+            ),
+            (
+                table.abs_truth_below.is_some() && !of_truths,
+                "abs_truth_below",
+                "rmse_below",
+                false,
+            ),
+        ];
+        for (_, key, with, excluded) in wrong.into_iter().filter(|(wrong, ..)| *wrong) {
+            let problem = TrialProblem::Keys {
+                key,
+                with,
+                excluded,
+            };
+            self.diagnostics.report(place_of(value, key), problem);
+        }
+        for (key, share) in [
+            ("valid_above", table.valid_above),
+            ("given_above", table.given_above),
+        ] {
+            if let Some(share) = share.filter(|share| !(0.0..1.0).contains(share)) {
+                self.range(value, key, share.to_string(), "0 or more and below 1");
+            }
+        }
+        if let Some(r2) = table.r2_above.filter(|r2| !(*r2 < 1.0)) {
+            self.range(value, "r2_above", r2.to_string(), "below 1");
+        }
+        if let (Some(from), Some(to)) = (table.from, table.to)
+            && from > to
+        {
+            self.range(value, "from", from.to_string(), "not after `to`");
+        }
+        let sizes = [
+            ("rmse_below", &table.rmse_below),
+            ("abs_truth_below", &table.abs_truth_below),
+            ("max_step_below", &table.max_step_below),
+        ];
+        for (key, size) in sizes {
+            if let Some(size) = size.as_ref().filter(|size| !(size.value > 0.0)) {
+                self.range(value, key, size.to_string(), "above 0");
+            }
+        }
+        let off = match &table.within {
+            Some(Within::Number(number)) => Some((*number, number.to_string())),
+            Some(Within::Quantity(quantity)) => Some((quantity.value, quantity.to_string())),
+            None => None,
+        };
+        if let Some((_, found)) = off.filter(|(off, _)| !(*off >= 0.0 && off.is_finite())) {
+            self.range(value, "within", found, "0 or more");
+        }
+        if let Some((low, high)) = &table.between
+            && low.unit.measures_same(&high.unit)
+            && !high
+                .in_unit(&low.unit)
+                .is_some_and(|high| low.value <= high)
+        {
+            let found = format!("from {low} to {high}");
+            self.range(value, "between", found, "given with the lower end first");
+        }
+    }
+
+    /// What a channel must be for the checks to make sense.
+    fn check_channel(&mut self, value: &Value, table: &ExpectTable, checks: &[Check], slot: usize) {
+        let planned = &self.plan.channels[slot];
+        let (unit, name) = (&planned.channel.unit, &planned.name);
+        let truth = planned.predicts;
+        let prediction_keys = checks.iter().filter(|check| check.is_of_predictions());
+        let limit = table.abs_truth_below.as_ref().map(|_| "abs_truth_below");
+        let first = prediction_keys.map(Check::key).chain(limit).next();
+        if let Some(key) = first.filter(|_| truth.is_none()) {
+            let channel = name.clone();
+            let problem = TrialProblem::NotAPrediction { key, channel };
+            self.diagnostics.report(place_of(value, key), problem);
+        }
+        let mut quantities: Vec<(&'static str, &Quantity, Unit)> = Vec::new();
+        for check in checks {
+            match check {
+                Check::RmseBelow(size) | Check::MaxStepBelow(size) => {
+                    quantities.push((check.key(), size, unit.difference()));
+                }
+                Check::Equals(wanted, tolerance) => {
+                    quantities.push(("equals", wanted, unit.clone()));
+                    if let Tolerance::Quantity(within) = tolerance {
+                        quantities.push(("within", within, unit.difference()));
+                    }
+                }
+                Check::Between(low, high) => {
+                    quantities.push(("between", low, unit.clone()));
+                    quantities.push(("between", high, unit.clone()));
+                }
+                Check::Beats(rivals) => self.check_rivals(value, rivals, slot),
+                Check::R2Above(_) | Check::ValidAbove(_) | Check::GivenAbove(_) => {}
+            }
+        }
+        if let (Some(limit), Some(truth)) = (&table.abs_truth_below, truth) {
+            let unit = self.plan.channels[truth].channel.unit.clone();
+            quantities.push(("abs_truth_below", limit, unit));
+        }
+        for (key, quantity, unit) in quantities {
+            if !quantity.unit.measures_same(&unit) {
+                let problem = TrialProblem::Units {
+                    key,
+                    found: quantity.unit.clone(),
+                    channel: name.clone(),
+                    expected: unit,
+                };
+                self.diagnostics.report(place_of(value, key), problem);
+            }
+        }
+    }
+
+    fn check_rivals(&mut self, value: &Value, rivals: &[Rival], slot: usize) {
+        let Some(truth) = self.plan.channels[slot].predicts else {
+            return;
+        };
+        for rival in rivals {
+            if let Rival::Channels(name, slots) = rival
+                && rival_of(self.plan, slot, slots).is_none()
+            {
+                let problem = TrialProblem::NoRival {
+                    rival: name.clone(),
+                    channel: self.plan.channels[slot].name.clone(),
+                    truth: self.plan.channels[truth].name.clone(),
+                };
+                self.diagnostics.report(place_of(value, "beats"), problem);
+            }
+        }
+    }
+
+    fn channels(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
+        look_up(self.plan, reference)
+            .map_err(|problem| self.diagnostics.report(place, problem))
+            .ok()
+    }
+
+    fn measured(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
+        match look_up_measured(self.plan, reference) {
+            Ok(Ok(slots)) => Some(slots),
+            Ok(Err(channel)) => {
+                let known = self.plan.sources.iter().map(|source| source.name.clone());
+                let problem = TrialProblem::NotMeasured {
+                    channel,
+                    known: known.collect(),
+                };
+                self.diagnostics.report(place, problem);
+                None
+            }
+            Err(problem) => {
+                self.diagnostics.report(place, problem);
+                None
+            }
+        }
+    }
+
+    fn range(&mut self, value: &Value, key: &'static str, found: String, allowed: &'static str) {
+        let problem = TrialProblem::Range {
+            key,
+            found,
+            allowed,
+        };
+        self.diagnostics.report(place_of(value, key), problem);
+    }
+}
+
+/// The one of `slots` that predicts what `slot` does, as far ahead.
+pub(super) fn rival_of(plan: &Plan, slot: usize, slots: &[usize]) -> Option<usize> {
+    let of = &plan.channels[slot];
+    slots.iter().copied().find(|&rival| {
+        let rival = &plan.channels[rival];
+        rival.predicts.is_some()
+            && rival.predicts == of.predicts
+            && rival.channel.ahead == of.channel.ahead
+    })
+}
+
+/// Where the value of a key stands, or the table without it.
+pub(super) fn place_of(table: &Value, key: &str) -> Place {
+    let value = table.as_table().and_then(|keys| keys.get(key));
+    value.map_or(table.place, |value| value.place)
+}
+
+fn place_list(table: &Value, key: &str) -> Vec<Place> {
+    let list = table.as_table().and_then(|keys| keys.get(key)?.as_list());
+    list.unwrap_or_default()
+        .iter()
+        .map(|value| value.place)
+        .collect()
+}
+
+fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {
+    DocumentProblem::WrongType {
+        key: Some(key.to_owned()),
+        expected: expected.to_owned(),
+        found: value.found(),
+    }
+}

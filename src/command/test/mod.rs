@@ -1,0 +1,92 @@
+//! `athermal test`: runs the tests that graph files carry.
+
+mod report;
+mod suite;
+mod work;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use crate::terminal::{Answer, Failure, Format, Terminal};
+use report::Summary;
+use work::Status;
+
+/// Run the tests that graph files carry
+///
+/// Each `[[tests]]` of a graph names data (files, a simulated machine, or made-up measurements), faults of sensors and what must
+/// come out; the graph is fitted and run over the data by the engine that runs live. One line is printed per test, in the order of
+/// the files, and the figures of those that fail. The exit status is 1 if any fails, 2 if a file has mistakes, 3 if data are missing.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  athermal test graphs/die-tester.toml\n  \
+                        athermal test graphs/*.toml --junit tests.xml\n  \
+                        athermal test machine.toml --filter \"dead sensor\" --format json")]
+pub struct Test {
+    /// Graph files
+    #[arg(required = true, value_name = "GRAPH")]
+    graphs: Vec<PathBuf>,
+    /// Only tests whose name contains this text, in upper or lower case
+    #[arg(long, value_name = "TEXT")]
+    filter: Option<String>,
+    /// Also write the results as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Threads that fit graphs and run tests; the results do not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+}
+
+impl Test {
+    /// Runs the tests and tells their results.
+    ///
+    /// # Errors
+    /// When a file has mistakes, data cannot be read, or the results not be written.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let began = Instant::now();
+        let mut suites = suite::load(&self.graphs, terminal)?;
+        if let Some(text) = &self.filter {
+            let text = text.to_lowercase();
+            for suite in &mut suites {
+                let matches = |name: &str| name.to_lowercase().contains(&text);
+                suite.trials.retain(|trial| matches(&trial.name));
+            }
+            if suites.iter().all(|suite| suite.trials.is_empty()) {
+                let message = format!("no test has a name that contains `{text}`");
+                return Err(Failure::Request(message));
+            }
+        } else {
+            for suite in suites.iter().filter(|suite| suite.trials.is_empty()) {
+                terminal.warning(format_args!("{} has no tests", suite.path));
+            }
+        }
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        let threads = self.threads.unwrap_or(cores).max(1);
+        let people = terminal.format != Format::Json;
+        let mut told = None;
+        let results = work::run(&suites, threads, &mut |result| {
+            if people {
+                let suite = &suites[result.suite];
+                if told != Some(result.suite) && !terminal.quiet {
+                    println!("{}", suite.path);
+                    told = Some(result.suite);
+                }
+                if !(terminal.quiet && matches!(result.status, Status::Passed)) {
+                    print!("{}", report::lines(suite, result));
+                }
+            }
+        });
+        let summary = Summary::of(&suites, &results, began.elapsed());
+        if let Some(path) = &self.junit {
+            std::fs::write(path, summary.junit()).map_err(|error| {
+                Failure::Outside(format!("cannot write {}: {error}", path.display()))
+            })?;
+        }
+        if people {
+            terminal.note(summary.line());
+        } else {
+            println!("{:#}", summary.json());
+        }
+        summary.answer()
+    }
+}

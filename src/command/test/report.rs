@@ -1,0 +1,261 @@
+//! Decides how results of tests look: for people, as JSON, and as JUnit XML.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use athermal::core::trial::{Finding, Wanted};
+use serde_json::{Value, json};
+
+use super::suite::Suite;
+use super::work::{Ran, Status};
+use crate::figures::count;
+use crate::terminal::{Answer, Failure};
+
+/// The line of a test and, unless it passed, the figures that say why.
+pub(super) fn lines(suite: &Suite, ran: &Ran) -> String {
+    let name = &suite.trials[ran.trial].name;
+    let mark = match ran.status {
+        Status::Passed => '✓',
+        Status::Failed | Status::Broken(_) => '✗',
+    };
+    let mut text = format!("  {mark} {name} ({})\n", seconds(ran.took));
+    for reason in reasons(ran) {
+        let _ = writeln!(text, "      {reason}");
+    }
+    text
+}
+
+/// Why a test did not pass; nothing for one that did.
+fn reasons(ran: &Ran) -> Vec<String> {
+    match &ran.status {
+        Status::Passed => Vec::new(),
+        Status::Broken(broken) => vec![format!("could not be run: {}", broken.message)],
+        Status::Failed => {
+            let off = ran.findings.iter().filter(|finding| !finding.holds());
+            let notes = ran.notes.iter().map(|note| format!("note: {note}"));
+            off.map(ToString::to_string).chain(notes).collect()
+        }
+    }
+}
+
+fn seconds(took: Duration) -> String {
+    format!("{:.2} s", took.as_secs_f64())
+}
+
+/// All results together.
+pub(super) struct Summary<'a> {
+    suites: &'a [Suite],
+    results: &'a [Ran],
+    took: Duration,
+}
+
+impl<'a> Summary<'a> {
+    pub(super) fn of(suites: &'a [Suite], results: &'a [Ran], took: Duration) -> Self {
+        Self {
+            suites,
+            results,
+            took,
+        }
+    }
+
+    fn count(&self, which: impl Fn(&Status) -> bool) -> usize {
+        let statuses = self.results.iter().map(|ran| &ran.status);
+        statuses.filter(|status| which(status)).count()
+    }
+
+    fn failed(&self) -> usize {
+        self.count(|status| matches!(status, Status::Failed))
+    }
+
+    fn broken(&self) -> usize {
+        self.count(|status| matches!(status, Status::Broken(_)))
+    }
+
+    /// One line for people.
+    pub(super) fn line(&self) -> String {
+        let all = self.results.len();
+        let parts = [
+            (all - self.failed() - self.broken(), "passed"),
+            (self.failed(), "failed"),
+            (self.broken(), "could not be run"),
+        ];
+        let parts = parts.iter().filter(|(n, _)| *n > 0);
+        let parts: Vec<String> = parts
+            .map(|(n, what)| format!("{} {what}", count(*n as u64)))
+            .collect();
+        let tests = if all == 1 { "test" } else { "tests" };
+        let parts = if parts.is_empty() {
+            "nothing to do".to_owned()
+        } else {
+            parts.join(", ")
+        };
+        format!("{all} {tests}: {parts}, in {}", seconds(self.took))
+    }
+
+    /// What the command answers.
+    pub(super) fn answer(&self) -> Result<Answer, Failure> {
+        let broken = self.results.iter().filter_map(|ran| match &ran.status {
+            Status::Broken(broken) => Some(broken.status),
+            Status::Passed | Status::Failed => None,
+        });
+        match broken.max() {
+            Some(status) => Err(Failure::Told(status)),
+            None if self.failed() > 0 => Ok(Answer::No),
+            None => Ok(Answer::Fine),
+        }
+    }
+
+    /// The facts for programs.
+    pub(super) fn json(&self) -> Value {
+        let tests: Vec<Value> = self.results.iter().map(|ran| self.test(ran)).collect();
+        json!({
+            "tests": tests,
+            "passed": self.results.len() - self.failed() - self.broken(),
+            "failed": self.failed(),
+            "errors": self.broken(),
+            "seconds": self.took.as_secs_f64(),
+        })
+    }
+
+    fn test(&self, ran: &Ran) -> Value {
+        let suite = &self.suites[ran.suite];
+        let trial = &suite.trials[ran.trial];
+        let findings: Vec<Value> = ran.findings.iter().map(finding).collect();
+        let (status, error) = match &ran.status {
+            Status::Passed => ("passed", None),
+            Status::Failed => ("failed", None),
+            Status::Broken(broken) => ("error", Some(&broken.message)),
+        };
+        json!({
+            "file": suite.path,
+            "line": suite.line(trial),
+            "name": trial.name,
+            "status": status,
+            "error": error,
+            "seconds": ran.took.as_secs_f64(),
+            "findings": findings,
+            "notes": ran.notes,
+        })
+    }
+
+    /// The results in the form that continuous integration reads.
+    pub(super) fn junit(&self) -> String {
+        let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+        let _ = writeln!(
+            xml,
+            "<testsuites name=\"athermal\" tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3}\">",
+            self.results.len(),
+            self.failed(),
+            self.broken(),
+            self.took.as_secs_f64()
+        );
+        for (number, suite) in self.suites.iter().enumerate() {
+            let results = self.results.iter().filter(|ran| ran.suite == number);
+            let results: Vec<&Ran> = results.collect();
+            let is = |which: fn(&Status) -> bool| {
+                results.iter().filter(|ran| which(&ran.status)).count()
+            };
+            let _ = writeln!(
+                xml,
+                "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3}\">",
+                escaped(&suite.path),
+                results.len(),
+                is(|status| matches!(status, Status::Failed)),
+                is(|status| matches!(status, Status::Broken(_))),
+                results
+                    .iter()
+                    .map(|ran| ran.took.as_secs_f64())
+                    .sum::<f64>()
+            );
+            for ran in results {
+                case(&mut xml, suite, ran);
+            }
+            xml.push_str("  </testsuite>\n");
+        }
+        xml.push_str("</testsuites>\n");
+        xml
+    }
+}
+
+fn case(xml: &mut String, suite: &Suite, ran: &Ran) {
+    let trial = &suite.trials[ran.trial];
+    let _ = write!(
+        xml,
+        "    <testcase name=\"{}\" classname=\"{}\" file=\"{}\" line=\"{}\" time=\"{:.3}\"",
+        escaped(&trial.name),
+        escaped(&suite.name),
+        escaped(&suite.path),
+        suite.line(trial),
+        ran.took.as_secs_f64()
+    );
+    let reasons = reasons(ran);
+    let element = match ran.status {
+        Status::Passed => {
+            xml.push_str("/>\n");
+            return;
+        }
+        Status::Failed => "failure",
+        Status::Broken(_) => "error",
+    };
+    let first = reasons.first().map_or("", String::as_str);
+    let _ = writeln!(
+        xml,
+        ">\n      <{element} message=\"{}\">{}</{element}>\n    </testcase>",
+        escaped(first),
+        escaped(&reasons.join("\n"))
+    );
+}
+
+/// Text as XML has it; characters that XML cannot have are replaced.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\n' | '\t' => escaped.push(character),
+            character if character < ' ' => escaped.push('\u{fffd}'),
+            character => escaped.push(character),
+        }
+    }
+    escaped
+}
+
+fn finding(finding: &Finding) -> Value {
+    let number = |value: f64| value.is_finite().then_some(value);
+    let wanted = match finding.wanted {
+        Wanted::Below(limit) => json!({ "below": number(limit) }),
+        Wanted::Above(limit) => json!({ "above": number(limit) }),
+        Wanted::Equal { value, within } => json!({ "equals": value, "within": within }),
+        Wanted::Between(low, high) => json!({ "from": low, "to": high }),
+    };
+    let first = finding
+        .first
+        .map(|(time, value)| json!({ "at_s": time.secs(), "value": number(value) }));
+    json!({
+        "of": finding.of,
+        "check": finding.check,
+        "rival": finding.rival,
+        "holds": finding.holds(),
+        "found": finding.found.and_then(number),
+        "wanted": wanted,
+        "unit": finding.unit,
+        "instants": finding.instants,
+        "first": first,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn xml_is_escaped_and_has_no_control_characters() {
+        assert_eq!(
+            escaped("a < \"b\" & c > d\u{1b}"),
+            "a &lt; &quot;b&quot; &amp; c &gt; d\u{fffd}"
+        );
+    }
+}

@@ -1,0 +1,73 @@
+//! Decides how graph files become plans with tests; all mistakes of all files are told together.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use athermal::core::compile::{Plan, Wanted, compile};
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{self, Disk};
+use athermal::core::trial::{self, Trial};
+
+use crate::terminal::{Failure, Terminal};
+
+/// A graph file and its tests.
+pub(super) struct Suite {
+    /// The path as it was given.
+    pub(super) path: String,
+    /// The graph's name, or its path.
+    pub(super) name: String,
+    /// The graph, with every port that a test looks at.
+    pub(super) plan: Arc<Plan>,
+    /// The tests, in the order of the file.
+    pub(super) trials: Vec<Trial>,
+    /// The line on which each test begins, by its name.
+    lines: Vec<(String, usize)>,
+}
+
+impl Suite {
+    /// The line on which a test begins.
+    pub(super) fn line(&self, trial: &Trial) -> usize {
+        let found = self.lines.iter().find(|(name, _)| *name == trial.name);
+        found.map_or(1, |(_, line)| *line)
+    }
+}
+
+/// Reads and compiles the files.
+///
+/// # Errors
+/// When any has a mistake.
+pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>, Failure> {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let mut suites = Vec::new();
+    for path in graphs {
+        let mut of_file = Diagnostics::new();
+        let read = document::load(path, &Disk, &mut sources, &mut of_file);
+        let graph = read.and_then(|read| document::declare(read, &mut of_file));
+        let planned = graph.and_then(|graph| {
+            let mut plan = compile(&graph, Wanted::default(), &mut of_file)?;
+            let trials = trial::declare(&graph, &plan, &sources, &mut of_file)?;
+            trial::observe(&mut plan, &trials);
+            Some((plan, trials))
+        });
+        let broken = of_file.has_errors();
+        if broken {
+            diagnostics.extend(of_file);
+        }
+        if let Some((plan, trials)) = planned.filter(|_| !broken) {
+            let line = |trial: &Trial| (trial.name.clone(), sources.line_column(trial.place).0);
+            let path = path.display().to_string();
+            suites.push(Suite {
+                name: plan.name.clone().unwrap_or_else(|| path.clone()),
+                path,
+                lines: trials.iter().map(line).collect(),
+                plan: Arc::new(plan),
+                trials,
+            });
+        }
+    }
+    if diagnostics.has_errors() {
+        terminal.diagnostics(&diagnostics, &sources);
+        return Err(Failure::Told(2));
+    }
+    Ok(suites)
+}

@@ -1,0 +1,198 @@
+//! Decides which thread fits what and runs which test, and that results come in the order of the files; a fit that several tests
+//! of a graph share is made once.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{OnceLock, mpsc};
+use std::time::{Duration, Instant};
+
+use athermal::core::engine::Fitted;
+use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::recording::Recording;
+use athermal::core::trial::{self, DataSet, Finding, On};
+use athermal::files::{Dataset, Options};
+
+use super::suite::Suite;
+use crate::terminal::Failure;
+
+/// What came of a test.
+pub(super) struct Ran {
+    /// The number of its file.
+    pub(super) suite: usize,
+    /// Its number in the file.
+    pub(super) trial: usize,
+    /// How it went.
+    pub(super) status: Status,
+    /// All that was checked.
+    pub(super) findings: Vec<Finding>,
+    /// What else there is to know, e.g. of the fit.
+    pub(super) notes: Vec<String>,
+    /// How long it took, without the fit.
+    pub(super) took: Duration,
+}
+
+/// How a test went.
+#[derive(Debug, Clone)]
+pub(super) enum Status {
+    /// All is as expected.
+    Passed,
+    /// Something is not.
+    Failed,
+    /// It could not be run.
+    Broken(Broken),
+}
+
+/// Why something could not be run.
+#[derive(Debug, Clone)]
+pub(super) struct Broken {
+    /// What and why.
+    pub(super) message: String,
+    /// The exit status that says so.
+    pub(super) status: u8,
+}
+
+impl Broken {
+    fn of(failure: impl Into<Failure>) -> Self {
+        match failure.into() {
+            Failure::Outside(message) => Self { message, status: 3 },
+            Failure::Request(message) => Self { message, status: 2 },
+            Failure::Graph { .. } | Failure::Told(_) => Self {
+                message: "the graph has mistakes".to_owned(),
+                status: 2,
+            },
+        }
+    }
+}
+
+/// A fit that some tests need.
+struct Fit<'a> {
+    suite: usize,
+    data: &'a DataSet,
+    made: OnceLock<Result<(Fitted, Vec<String>), Broken>>,
+}
+
+/// Runs all tests; `tell` is called for each as soon as it and all before it are done.
+pub(super) fn run(suites: &[Suite], threads: usize, tell: &mut dyn FnMut(&Ran)) -> Vec<Ran> {
+    let tests: Vec<(usize, usize)> = suites
+        .iter()
+        .enumerate()
+        .flat_map(|(suite, of)| (0..of.trials.len()).map(move |trial| (suite, trial)))
+        .collect();
+    let mut fits: Vec<Fit<'_>> = Vec::new();
+    for (suite, of) in suites.iter().enumerate() {
+        for data in of.trials.iter().filter_map(|trial| trial.fit.as_ref()) {
+            let known = |fit: &Fit<'_>| fit.suite == suite && fit.data == data;
+            if !fits.iter().any(known) {
+                fits.push(Fit {
+                    suite,
+                    data,
+                    made: OnceLock::new(),
+                });
+            }
+        }
+    }
+    let options = FitOptions {
+        threads: if fits.len() > 1 { 1 } else { threads },
+        ..FitOptions::default()
+    };
+    let next = AtomicUsize::new(0);
+    let (done, results) = mpsc::channel();
+    let mut waiting: Vec<Option<Ran>> = tests.iter().map(|_| None).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(fits.len() + tests.len()).max(1) {
+            let (done, next, fits, tests, options) = (done.clone(), &next, &fits, &tests, &options);
+            scope.spawn(move || {
+                // All fits are begun before any test, so that a test never waits for one that nobody makes.
+                loop {
+                    let job = next.fetch_add(1, Ordering::Relaxed);
+                    if let Some(fit) = fits.get(job) {
+                        let made = make(&suites[fit.suite], fit.data, options);
+                        let _ = fit.made.set(made);
+                        continue;
+                    }
+                    let Some(&(suite, trial)) = tests.get(job - fits.len()) else {
+                        break;
+                    };
+                    let ran = test(suites, fits, suite, trial);
+                    if done.send((job - fits.len(), ran)).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(done);
+        let mut told = 0;
+        for (number, ran) in results {
+            waiting[number] = Some(ran);
+            while let Some(Some(ran)) = waiting.get(told) {
+                tell(ran);
+                told += 1;
+            }
+        }
+    });
+    waiting.into_iter().flatten().collect()
+}
+
+fn files(paths: &[PathBuf]) -> Box<dyn Recording> {
+    Box::new(Dataset::new(paths.to_vec(), Options::default()))
+}
+
+fn open(data: &DataSet) -> Result<Box<dyn Recording>, Broken> {
+    let recording = data.recording(files);
+    recording.map_err(|error| Broken::of(Failure::Request(error.to_string())))
+}
+
+fn make(
+    suite: &Suite,
+    data: &DataSet,
+    options: &FitOptions,
+) -> Result<(Fitted, Vec<String>), Broken> {
+    let recording = open(data)?;
+    let (fitted, report) =
+        fit(&suite.plan, &*recording, options, &mut |_| {}).map_err(Broken::of)?;
+    let failed = report
+        .estimators
+        .iter()
+        .filter_map(|fit| match &fit.outcome {
+            Outcome::Failed(error) => Some(format!("{} could not be fitted: {error}", fit.node)),
+            Outcome::Fitted(_) => None,
+        });
+    Ok((fitted, failed.collect()))
+}
+
+fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
+    let of = &suites[suite];
+    let declared = &of.trials[trial];
+    let none = (Fitted::new(), Vec::new());
+    let fit = declared.fit.as_ref().and_then(|data| {
+        let same = |fit: &&Fit<'_>| fit.suite == suite && fit.data == data;
+        fits.iter().find(same)
+    });
+    let made = fit.map_or(Ok(&none), |fit| fit.made.wait().as_ref());
+    let began = Instant::now();
+    let verdict = made.map_err(Clone::clone).and_then(|(fitted, notes)| {
+        let data;
+        let recording: &dyn Recording = match &declared.on {
+            On::Data(set) => {
+                data = open(set)?;
+                &*data
+            }
+            On::Synthetic(synthetic) => synthetic,
+        };
+        let verdict = trial::run(&of.plan, declared, fitted, recording).map_err(Broken::of)?;
+        Ok((verdict, notes.clone()))
+    });
+    let (status, findings, notes) = match verdict {
+        Err(broken) => (Status::Broken(broken), Vec::new(), Vec::new()),
+        Ok((verdict, notes)) if verdict.passes() => (Status::Passed, verdict.findings, notes),
+        Ok((verdict, notes)) => (Status::Failed, verdict.findings, notes),
+    };
+    Ran {
+        suite,
+        trial,
+        status,
+        findings,
+        notes,
+        took: began.elapsed(),
+    }
+}
