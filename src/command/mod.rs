@@ -13,8 +13,6 @@ mod nodes;
 mod run;
 mod schema;
 mod simulate;
-mod simulate;
-mod swap;
 mod swap;
 mod test;
 

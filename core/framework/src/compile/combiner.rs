@@ -1,5 +1,6 @@
 //! Decides which predictions a combiner may put together.
 
+use super::conversion::{factor, mismatch};
 use super::plan::{PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
@@ -51,10 +52,12 @@ impl Resolver<'_> {
             }
             None => None,
         };
-        let gather = self.gather(instance, &port, &voters, &[Duration::ZERO])?;
         if !agree {
             return None;
         }
+        let unit = truth.map_or(first, |truth| truth);
+        let unit = self.channels[unit].channel.unit.clone();
+        let gather = self.gather(instance, &port, &voters, &[Duration::ZERO], Some(&unit))?;
         let predicts = truth.or(self.channels[first].predicts);
         let name = predicts
             .map_or(&self.channels[first].channel.name, |slot| {
@@ -63,6 +66,7 @@ impl Resolver<'_> {
             .clone();
         let combined = Channel {
             name,
+            unit,
             ..self.channels[first].channel.clone()
         };
         let behind = Provenance::of(
@@ -127,13 +131,8 @@ impl Resolver<'_> {
         votes: bool,
     ) -> bool {
         let (a, b) = (&self.channels[first], &self.channels[second]);
-        let problem = if a.channel.unit != b.channel.unit {
-            CompileProblem::Units {
-                first: a.name.clone(),
-                first_unit: a.channel.unit.clone(),
-                second: b.name.clone(),
-                second_unit: b.channel.unit.clone(),
-            }
+        let problem = if factor(&b.channel.unit, &a.channel.unit).is_none() {
+            mismatch(&b.name, &b.channel.unit, &a.name, &a.channel.unit)
         } else if a.channel.span != b.channel.span {
             CompileProblem::Spans {
                 first: a.name.clone(),

@@ -82,7 +82,7 @@ impl Plan {
     }
 
     fn read(&self, gather: usize) -> Value {
-        let Gather { read, entries } = &self.gathers[gather];
+        let Gather { read, entries, .. } = &self.gathers[gather];
         let entries: Vec<_> = entries
             .iter()
             .map(|entry| {

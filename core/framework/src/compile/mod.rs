@@ -2,10 +2,12 @@
 //! not when it runs.
 
 mod combiner;
+mod conversion;
 mod diff;
 mod estimator;
 mod feature;
 mod identity;
+mod leak;
 mod order;
 mod plan;
 mod problem;
@@ -17,8 +19,8 @@ mod steps;
 
 pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
 pub use plan::{
-    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
-    Step, TrainingLimits, TruthLink,
+    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
+    SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
@@ -40,9 +42,6 @@ pub struct Wanted {
 pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
     let nodes = resolver::read_kinds(graph, diagnostics);
     let order = order::order(graph, &nodes, diagnostics);
-    let looped = resolver::Resolver::loops(graph, &nodes, &order);
-    let mut resolver = resolver::Resolver::new(graph, diagnostics);
-    resolver.looped = looped;
-    let resolved = resolver.resolve(&nodes, &order, wanted);
+    let resolved = resolver::Resolver::new(graph, diagnostics).resolve(&nodes, &order, wanted);
     (!diagnostics.has_errors()).then_some(resolved)
 }

@@ -1,6 +1,6 @@
 //! Decides what each declaration of a graph stands for, in order: kinds read, inputs looked up, outputs given slots.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,14 +8,16 @@ use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::leak::Suspect;
 use super::order::Order;
 use super::plan::{
-    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
+    SourceChannel,
 };
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::scope::{Found, Scopes};
-use super::{Wanted, steps};
+use super::{Wanted, conversion, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
@@ -24,6 +26,7 @@ use crate::node::{
 };
 use crate::quantity::Quantity;
 use crate::time::Duration;
+use crate::unit::Unit;
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -174,18 +177,15 @@ pub(crate) struct Instance<'a> {
 }
 
 impl Instance<'_> {
-    /// The name of this instance: `thermal.Z1`.
-    pub(crate) fn name(&self) -> String {
-        match &self.decl.member {
-            Some(member) => format!("{}.{member}", self.node.name),
-            None => self.node.name.clone(),
-        }
-    }
-
     /// The place of an input, or of the node where the input is not given.
     pub(crate) fn input_place(&self, port: &str) -> Place {
         self.input(port)
             .map_or(self.node.place, |input| input.place)
+    }
+
+    /// How diagnostics say which instance they speak of.
+    pub(crate) fn context(&self) -> String {
+        context(self.node, self.decl)
     }
 
     pub(crate) fn input(&self, port: &str) -> Option<&InputDecl> {
@@ -208,16 +208,18 @@ impl Instance<'_> {
         }
     }
 
-    /// The place of a parameter such as `selection.folds`, as near as the file has it.
+    /// The place of a parameter such as `selection.folds` or `lags.0`, as near as the file has it.
     pub(crate) fn parameter_place(&self, path: &str) -> Place {
         let mut place = self.node.place;
         let mut value = &self.decl.parameters;
         for key in path.split('.') {
-            let Data::Table(table) = &value.data else {
-                break;
+            let inner = match &value.data {
+                Data::Table(table) => table.get(key),
+                Data::List(values) => key.parse::<usize>().ok().and_then(|nth| values.get(nth)),
+                _ => None,
             };
-            let Some(entry) = table.get(key) else { break };
-            (place, value) = (entry.place, entry);
+            let Some(inner) = inner else { break };
+            (place, value) = (inner.place, inner);
         }
         place
     }
@@ -231,17 +233,13 @@ pub(crate) struct Resolver<'g> {
     pub(crate) provenance: Vec<Provenance>,
     scopes: Scopes,
     sources: Vec<SourceChannel>,
-    gathers: IndexSet<Gather>,
-    nodes: Vec<PlannedNode>,
+    pub(super) gathers: IndexSet<Gather>,
+    pub(super) nodes: Vec<PlannedNode>,
+    /// Features whose leaks are looked for once all is known.
+    pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
     read: BTreeSet<usize>,
-    /// What is behind the nodes that close a loop, as far as it was known before, and as it turned out.
-    pub(crate) looped: Looped,
-    closed: Looped,
 }
-
-/// What is behind each instance that closes a loop, by its name.
-pub(crate) type Looped = BTreeMap<String, Provenance>;
 
 impl<'g> Resolver<'g> {
     pub(crate) fn new(graph: &'g GraphFile, diagnostics: &'g mut Diagnostics) -> Self {
@@ -254,43 +252,14 @@ impl<'g> Resolver<'g> {
             sources: Vec::new(),
             gathers: IndexSet::new(),
             nodes: Vec::new(),
+            suspects: Vec::new(),
             read: BTreeSet::new(),
-            looped: Looped::new(),
-            closed: Looped::new(),
         };
         resolver.take_signals();
         resolver
     }
 
-    /// What is behind the nodes that close a loop. It can be told only once the nodes after them are known, so rounds are
-    /// made until nothing new comes back; each shortest path takes at most one round for every loop that it passes.
-    pub(crate) fn loops(graph: &GraphFile, read: &[ReadNode], order: &Order) -> Looped {
-        let mut known = Looped::new();
-        while !order.closing.is_empty() {
-            let mut untold = Diagnostics::new();
-            let mut round = Resolver::new(graph, &mut untold);
-            round.looped.clone_from(&known);
-            round.instances(read, order);
-            let before = known.clone();
-            for (instance, found) in round.closed {
-                // A round in which something fails tells less than those before, and takes nothing back.
-                let known = known.entry(instance).or_default();
-                *known = Provenance::of([(&*known, Duration::ZERO), (&found, Duration::ZERO)]);
-            }
-            if known == before {
-                break;
-            }
-        }
-        known
-    }
-
     pub(crate) fn resolve(mut self, read: &[ReadNode], order: &Order, wanted: Wanted) -> Plan {
-        self.instances(read, order);
-        let outputs = self.outputs();
-        self.finish(outputs, wanted)
-    }
-
-    fn instances(&mut self, read: &[ReadNode], order: &Order) {
         for node in &self.graph.nodes {
             self.scopes.declare(&node.name);
         }
@@ -324,9 +293,16 @@ impl<'g> Resolver<'g> {
                 }
             }
         }
+        let has_loops = !closing.is_empty();
         for (index, instance) in closing {
             self.close(index, &instance);
         }
+        if has_loops {
+            self.follow_loops();
+        }
+        self.find_leaks();
+        let outputs = self.outputs();
+        self.finish(outputs, wanted)
     }
 
     fn take_signals(&mut self) {
@@ -479,7 +455,9 @@ impl<'g> Resolver<'g> {
         port: &InputPort,
         slots: &[usize],
         lags: &[Duration],
+        unit: Option<&Unit>,
     ) -> Option<usize> {
+        let conversions = self.conversions(instance, port, slots, lags.len(), unit)?;
         let mut entries = Vec::with_capacity(slots.len() * lags.len());
         for &lag in lags {
             for &slot in slots {
@@ -503,7 +481,53 @@ impl<'g> Resolver<'g> {
         } else {
             Read::Held
         };
-        Some(self.gathers.insert_full(Gather { read, entries }).0)
+        let gather = Gather {
+            read,
+            entries,
+            conversions,
+        };
+        Some(self.gathers.insert_full(gather).0)
+    }
+
+    /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been told.
+    fn conversions(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+        slots: &[usize],
+        lags: usize,
+        unit: Option<&Unit>,
+    ) -> Option<Vec<Conversion>> {
+        let Some(unit) = unit else {
+            return Some(Vec::new());
+        };
+        let channels = slots.iter().map(|&slot| &self.channels[slot]);
+        let channels = channels.map(|from| (from.name.as_str(), &from.channel.unit));
+        let wanted_by = format!("inputs.{}", port.name);
+        match conversion::conversions(channels, unit, &wanted_by) {
+            Ok(conversions) => {
+                let at_lag = |lag: usize| {
+                    conversions.iter().map(move |conversion| {
+                        Conversion::new(lag * slots.len() + conversion.entry, conversion.factor())
+                    })
+                };
+                Some((0..lags).flat_map(at_lag).collect())
+            }
+            Err(problems) => {
+                for problem in problems {
+                    let place = instance.input_place(port.name);
+                    self.diagnostics.report(place, problem);
+                }
+                None
+            }
+        }
+    }
+
+    /// The unit that an input port declares.
+    pub(crate) fn port_unit(port: &InputPort) -> Option<Unit> {
+        let unit = port.unit.and_then(|unit| unit.parse().ok());
+        debug_assert_eq!(unit.is_some(), port.unit.is_some(), "a kind declares units");
+        unit
     }
 
     /// The channels of slots, as kinds see them.
@@ -512,16 +536,19 @@ impl<'g> Resolver<'g> {
         instance: &Instance<'_>,
         ports: Vec<(InputPort, Vec<usize>)>,
     ) -> Inputs {
-        let channels = |slots: Vec<usize>| {
-            slots
-                .into_iter()
-                .map(|slot| self.channels[slot].channel.clone())
-                .collect()
+        let channels = |port: InputPort, slots: Vec<usize>| {
+            let unit = Self::port_unit(&port);
+            let channels = slots.into_iter().map(|slot| {
+                let channel = self.channels[slot].channel.clone();
+                let unit = unit.clone().unwrap_or_else(|| channel.unit.clone());
+                Channel { unit, ..channel }
+            });
+            (port, channels.collect())
         };
         Inputs {
             ports: ports
                 .into_iter()
-                .map(|(port, slots)| (port, channels(slots)))
+                .map(|(port, slots)| channels(port, slots))
                 .collect(),
             member: instance.decl.member.clone(),
         }
@@ -618,22 +645,13 @@ impl<'g> Resolver<'g> {
             let Some(slots) = self.slots(instance, port) else {
                 return;
             };
-            let Some(gather) = self.gather(instance, port, &slots, &[Duration::ZERO]) else {
+            // What it gives was described before what it reads was known.
+            let own = self.nodes[index].slots.clone().next();
+            let unit = own.map(|slot| self.channels[slot].channel.unit.clone());
+            let lags = [Duration::ZERO];
+            let Some(gather) = self.gather(instance, port, &slots, &lags, unit.as_ref()) else {
                 return;
             };
-            for (&from, to) in slots.iter().zip(self.nodes[index].slots.clone()) {
-                let (from, to) = (&self.channels[from], &self.channels[to]);
-                if from.channel.unit != to.channel.unit {
-                    let problem = CompileProblem::Units {
-                        first: from.name.clone(),
-                        first_unit: from.channel.unit.clone(),
-                        second: to.name.clone(),
-                        second_unit: to.channel.unit.clone(),
-                    };
-                    self.diagnostics
-                        .report(instance.input_place(port.name), problem);
-                }
-            }
             if slots.len() != self.nodes[index].slots.len() {
                 let found = slots
                     .iter()
@@ -648,12 +666,6 @@ impl<'g> Resolver<'g> {
                     .report(instance.input_place(port.name), problem);
             }
             gathers.push(gather);
-            if let Role::Feature(feature) = instance.read.spec.role() {
-                let delay = feature.delay();
-                let behind =
-                    Provenance::of(slots.iter().map(|&slot| (&self.provenance[slot], delay)));
-                self.closed.insert(self.nodes[index].instance(), behind);
-            }
         }
         if let PlannedRole::Feature {
             gathers: planned, ..

@@ -211,6 +211,11 @@ pub enum DocumentProblem {
         /// The key and value that it contradicts.
         with: String,
     },
+    /// A duration of no length where one is needed.
+    NoLength {
+        /// The key.
+        key: &'static str,
+    },
     /// A step of no length.
     StepNotPositive,
     /// `module = …` names a module that is not declared.
@@ -288,7 +293,10 @@ impl Problem for DocumentProblem {
             Self::MissingKey { .. } => "A007",
             Self::WrongType { .. } => "A008",
             Self::UnknownChoice { .. } => "A009",
-            Self::Refused { .. } | Self::NumberTooLarge { .. } | Self::StepNotPositive => "A010",
+            Self::Refused { .. }
+            | Self::NumberTooLarge { .. }
+            | Self::NoLength { .. }
+            | Self::StepNotPositive => "A010",
             Self::BadName { .. } => "A011",
             Self::DuplicateName { .. } => "A012",
             Self::UnknownSet { .. } => "A013",
@@ -393,6 +401,7 @@ impl Problem for DocumentProblem {
                 format!("signal \"{signal}\" has no channel \"{name}\"")
             }
             Self::TimeContradiction { key, with } => format!("`{key}` has no meaning with {with}"),
+            Self::NoLength { key } => format!("`{key}` must be longer than 0"),
             Self::StepNotPositive => {
                 "the step from one sample to the next is longer than 0".to_owned()
             }

@@ -83,6 +83,13 @@ impl Gathered {
             self.values[i] = seen(gather.read, entry, value, ran, now - stamp);
             self.stamps[i] = stamp;
         }
+        for conversion in &gather.conversions {
+            let value = &mut self.values[conversion.entry];
+            // A NaN says why there is no value, and must stay as it is.
+            if !value.is_nan() {
+                *value *= conversion.factor();
+            }
+        }
     }
 
     fn read_past(&mut self, i: usize, entry: &Entry, histories: &[Option<History>], now: Instant) {

@@ -119,17 +119,15 @@ impl Slope {
             );
         }
         for (i, window) in windows.iter().enumerate() {
+            let at = format!("windows.{i}");
             if *window <= Duration::ZERO {
                 mistakes.push(Mistake::at(
-                    "windows",
+                    at.as_str(),
                     format!("a window of {window} is no window"),
                 ));
             }
             if windows[..i].contains(window) {
-                mistakes.push(Mistake::at(
-                    "windows",
-                    format!("the window {window} stands twice"),
-                ));
+                mistakes.push(Mistake::at(at, format!("the window {window} stands twice")));
             }
         }
         mistakes

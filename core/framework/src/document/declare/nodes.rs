@@ -2,9 +2,7 @@
 
 use super::modules::Placed;
 use super::placeholder;
-use super::reading::{
-    duration, in_samples, known_keys, missing, one_or_more, samples, table, text,
-};
+use super::reading::{in_samples, known_keys, length, missing, one_or_more, samples, table, text};
 use super::sets::{self, Sets};
 use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
@@ -357,10 +355,7 @@ fn input(
         Data::Table(keys) => {
             known_keys(keys, &["from", "max_age"], &input, diagnostics);
             let max_age = keys.get("max_age").and_then(|value| {
-                Some((
-                    duration(value, "max_age", sample, diagnostics)?,
-                    value.place,
-                ))
+                Some((length(value, "max_age", sample, diagnostics)?, value.place))
             });
             match keys.get("from") {
                 Some(from) => (from, max_age),
