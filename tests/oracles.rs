@@ -255,7 +255,7 @@ fn oracle_of_stochastic_gradients_in_the_order_and_schedule_of_scikit_learn() {
         let solver = format!(
             "solver = {{ type = \"sgd\", alpha = {}, eta0 = {}, power = {power}, epochs = {} }}",
             number("alpha"),
-            number("eta0"),
+            number("eta"),
             expected.rows[row][1]
         );
         let plan = graph(
