@@ -1,5 +1,8 @@
 //! The command line of athermal.
 
+#[macro_use]
+mod output;
+
 mod command;
 mod drawing;
 mod figures;
