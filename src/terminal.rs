@@ -9,25 +9,34 @@ use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::fit::FitError;
 use athermal::files::FileError;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+
+use crate::figures::count;
 
 /// Options that every command takes.
 #[derive(Debug, Args)]
 pub struct Options {
     /// Text for people, or the same facts as JSON
-    #[arg(long, global = true, value_enum, default_value_t)]
-    pub format: Format,
+    // A text, so that a command with forms of its own can declare the same option with other values.
+    #[arg(long, global = true, value_parser = formats(), default_value = "table")]
+    pub format: String,
     /// Say only what was asked for and what went wrong
     #[arg(long, short, global = true)]
     pub quiet: bool,
 }
 
+fn formats() -> PossibleValuesParser {
+    PossibleValuesParser::new([
+        PossibleValue::new("table").help("For people").alias("text"),
+        PossibleValue::new("json").help("For programs"),
+    ])
+}
+
 /// The form of what is printed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// For people
-    #[default]
-    #[value(alias = "text")]
     Table,
     /// For programs
     Json,
@@ -50,7 +59,11 @@ impl Terminal {
         let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let colour = std::io::stderr().is_terminal() && !plain;
         Self {
-            format: options.format,
+            format: if options.format == "json" {
+                Format::Json
+            } else {
+                Format::Table
+            },
             quiet: options.quiet,
             colour,
         }
@@ -103,13 +116,25 @@ impl Terminal {
         }
     }
 
-    /// Shows how far a longer piece of work has come, once it has taken a second.
+    /// Shows how many ticks a longer piece of work has stepped, once it has taken a second.
     #[must_use]
     pub fn progress(&self, what: &'static str) -> Progress {
-        let shown = std::io::stderr().is_terminal() && !self.quiet;
+        self.progress_to(what, "ticks", None)
+    }
+
+    /// Shows how far a longer piece of work has come, once it has taken a second; as a bar where its end is known.
+    #[must_use]
+    pub fn progress_to(
+        &self,
+        what: &'static str,
+        unit: &'static str,
+        total: Option<u64>,
+    ) -> Progress {
         Progress {
             what,
-            shown,
+            unit,
+            total,
+            shown: std::io::stderr().is_terminal() && !self.quiet,
             began: Instant::now(),
             last: None,
         }
@@ -129,18 +154,34 @@ impl Terminal {
     }
 }
 
-/// A line that says how many ticks have been stepped.
+/// Writes to standard output; a reader who has seen enough ends the program quietly.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn print(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(bytes)
+        .and_then(|()| out.flush())
+        .map_err(|error| match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::Told(0),
+            _ => Failure::Outside(format!("cannot write to standard output: {error}")),
+        })
+}
+
+/// A line that says how far the work has come.
 #[derive(Debug)]
 pub struct Progress {
     what: &'static str,
+    unit: &'static str,
+    total: Option<u64>,
     shown: bool,
     began: Instant,
     last: Option<Instant>,
 }
 
 impl Progress {
-    /// Tells the number of ticks so far.
-    pub fn tell(&mut self, ticks: u64) {
+    /// Tells how many have been done so far.
+    pub fn tell(&mut self, done: u64) {
         if !self.shown || self.began.elapsed() < Duration::from_secs(1) {
             return;
         }
@@ -149,14 +190,23 @@ impl Progress {
             .is_none_or(|last| last.elapsed() > Duration::from_millis(100))
         {
             self.last = Some(Instant::now());
-            let rate = ticks as f64 / self.began.elapsed().as_secs_f64();
-            let _ = write!(
-                std::io::stderr(),
-                "\r{}: {ticks} ticks, {rate:.0} per second ",
-                self.what
-            );
+            let line = line(self, done, self.began.elapsed().as_secs_f64());
+            let _ = write!(std::io::stderr(), "\r{line}\x1b[K");
         }
     }
+}
+
+fn line(progress: &Progress, done: u64, elapsed_s: f64) -> String {
+    let (what, unit) = (progress.what, progress.unit);
+    let Some(total) = progress.total.filter(|total| (1..=*total).contains(&done)) else {
+        let rate = done as f64 / elapsed_s;
+        return format!("{what}: {} {unit}, {rate:.0} per second", count(done));
+    };
+    let share = done as f64 / total as f64;
+    let left_s = elapsed_s * (1.0 - share) / share;
+    let full = (24.0 * share) as usize;
+    let bar = "█".repeat(full) + &"░".repeat(24 - full);
+    format!("{what} {bar} {:3.0} %, {left_s:.0} s left", 100.0 * share)
 }
 
 impl Drop for Progress {
@@ -255,5 +305,33 @@ impl From<FitError> for Failure {
             },
             FitError::Engine(error) => Self::Request(error.to_string()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn progress(total: Option<u64>) -> Progress {
+        Progress {
+            what: "fitting",
+            unit: "ticks",
+            total,
+            shown: true,
+            began: Instant::now(),
+            last: None,
+        }
+    }
+
+    #[test]
+    fn work_whose_end_is_known_has_a_bar_and_a_time_left() {
+        let quarter = line(&progress(Some(4_000)), 1_000, 3.0);
+        assert_eq!(quarter, "fitting ██████░░░░░░░░░░░░░░░░░░  25 %, 9 s left");
+    }
+
+    #[test]
+    fn work_whose_end_is_not_known_has_a_count_and_a_rate() {
+        let line = line(&progress(None), 60_000, 2.0);
+        assert_eq!(line, "fitting: 60,000 ticks, 30000 per second");
     }
 }

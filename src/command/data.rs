@@ -21,6 +21,15 @@ pub struct Data {
 }
 
 impl Data {
+    /// These files.
+    #[must_use]
+    pub fn of(files: Vec<PathBuf>) -> Self {
+        Self {
+            files,
+            lenient: false,
+        }
+    }
+
     /// The data set.
     #[must_use]
     pub fn dataset(&self) -> Dataset {
@@ -106,7 +115,7 @@ pub fn tell(
 }
 
 /// Fowler, Noll and Vo's hash in its variant 1a with 64 bits: for telling files apart, not for guarding them.
-fn fnv_1a(content: &[u8]) -> String {
+pub fn fnv_1a(content: &[u8]) -> String {
     let hash = content
         .iter()
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {

@@ -45,40 +45,17 @@ impl Fit {
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let mut model = Model::load(&self.graph)?;
-        let dataset = self.data.dataset();
         let defaults = FitOptions::default();
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
             threads: self.threads.unwrap_or(defaults.threads),
             ..defaults
         };
-        let mut progress = terminal.progress("fitting");
-        let (fitted, report) = fit(&model.plan, &dataset, &options, &mut |ticks| {
-            progress.tell(ticks)
-        })?;
-        drop(progress);
-        model.fitted = fitted;
-        model.card = Some(Card {
-            athermal: env!("CARGO_PKG_VERSION").to_owned(),
-            created: created(),
-            data: self.data.cards(&dataset)?,
-            period: report.period.map(|(from, to)| Period {
-                from_s: seconds(from),
-                to_s: seconds(to),
-            }),
-            ticks: report.ticks,
-            estimators: report.estimators.iter().filter_map(card).collect(),
-        });
+        let report = fit_on(&mut model, &self.data, &options, terminal)?;
         let text = model.to_text().map_err(|error| {
             Failure::Outside(format!("the model cannot be written as JSON: {error}"))
         })?;
         self.tell(terminal, &report);
-        data::tell(
-            terminal,
-            &dataset.reports(),
-            report.refused,
-            &report.rejected,
-        );
         if self.output.as_os_str() == "-" {
             print!("{text}");
         } else {
@@ -126,6 +103,43 @@ impl Fit {
             }
         }
     }
+}
+
+/// Fits the estimators of a model on data, fills in its card, and tells what was left out of the data.
+///
+/// # Errors
+/// When the data cannot be read.
+pub fn fit_on(
+    model: &mut Model,
+    data: &Data,
+    options: &FitOptions,
+    terminal: &Terminal,
+) -> Result<FitReport, Failure> {
+    let dataset = data.dataset();
+    let mut progress = terminal.progress("fitting");
+    let (fitted, report) = fit(&model.plan, &dataset, options, &mut |ticks| {
+        progress.tell(ticks);
+    })?;
+    drop(progress);
+    model.fitted = fitted;
+    model.card = Some(Card {
+        athermal: env!("CARGO_PKG_VERSION").to_owned(),
+        created: created(),
+        data: data.cards(&dataset)?,
+        period: report.period.map(|(from, to)| Period {
+            from_s: seconds(from),
+            to_s: seconds(to),
+        }),
+        ticks: report.ticks,
+        estimators: report.estimators.iter().filter_map(card).collect(),
+    });
+    data::tell(
+        terminal,
+        &dataset.reports(),
+        report.refused,
+        &report.rejected,
+    );
+    Ok(report)
 }
 
 /// What is told of one estimator.
@@ -229,7 +243,7 @@ fn created() -> Option<String> {
 }
 
 /// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one.
-fn write_aside(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+pub fn write_aside(path: &std::path::Path, text: &str) -> Result<(), Failure> {
     let mut aside = path.as_os_str().to_owned();
     aside.push(".part");
     let aside = PathBuf::from(aside);

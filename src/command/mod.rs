@@ -1,12 +1,18 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
 mod check;
+mod completions;
 mod data;
+mod demo;
+mod diff;
 mod evaluate;
+mod explain;
 mod fit;
+mod init;
 mod nodes;
 mod run;
 mod schema;
+mod simulate;
 mod swap;
 mod test;
 
@@ -17,8 +23,16 @@ use crate::terminal::{Answer, Failure, Terminal};
 /// What the program can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// See what athermal does, on a simulated machine
+    Demo(demo::Demo),
+    /// Write a starter graph for a log of yours
+    Init(init::Init),
     /// Look for mistakes in a graph file
     Check(check::Check),
+    /// Explain the code of a mistake
+    Explain(explain::Explain),
+    /// Say what differs in meaning between two graphs or models
+    Diff(diff::Diff),
     /// List the node types, or explain one
     Nodes(nodes::Nodes),
     /// Fit a graph's estimators on recorded data
@@ -27,6 +41,10 @@ pub enum Command {
     Evaluate(evaluate::Evaluate),
     /// Run a model: rows in, predictions out
     Run(run::Run),
+    /// Write the recording of a simulated machine, or list the machines
+    Simulate(simulate::Simulate),
+    /// Print a completion script for a shell
+    Completions(completions::Completions),
     /// Run the tests that graph files carry
     Test(test::Test),
     /// Write the JSON Schema of graph files, for editors
@@ -40,11 +58,17 @@ impl Command {
     /// When it cannot be done.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
+            Self::Demo(command) => command.run(terminal),
+            Self::Init(command) => command.run(terminal),
+            Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),
+            Self::Explain(command) => command.run(terminal),
+            Self::Diff(command) => command.run(terminal),
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
+            Self::Simulate(command) => command.run(terminal),
             Self::Test(command) => command.run(terminal),
             Self::Schema(command) => command.run(terminal),
         }

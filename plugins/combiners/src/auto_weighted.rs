@@ -1,11 +1,11 @@
 //! The vote that weighs each estimator by its recent error.
 
-use std::collections::VecDeque;
-
 use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::errors::Errors;
 
 /// Auto-weighted voting: each voter counts by its recent root mean square error.
 ///
@@ -77,6 +77,10 @@ impl Combiner for AutoWeighted {
         mistakes
     }
 
+    fn weighs(&self) -> bool {
+        true
+    }
+
     fn memory(&self) -> Duration {
         self.memory
     }
@@ -84,163 +88,120 @@ impl Combiner for AutoWeighted {
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         Box::new(Weigher {
             parameters: self.clone(),
-            memories: vec![VecDeque::new(); voters],
-            mean_squares: vec![None; voters],
+            errors: Errors::new(voters, self.memory),
         })
     }
 }
 
-/// The memory of recent errors.
+/// Weighs votes by the errors in memory.
 struct Weigher {
     parameters: AutoWeighted,
-    /// For each voter the arrival and square of its errors, oldest first.
-    memories: Vec<VecDeque<(Instant, f64)>>,
-    /// For each voter the mean square of what it has in memory.
-    mean_squares: Vec<Option<f64>>,
+    errors: Errors,
 }
 
 impl Weigher {
-    /// The weights of the voters that are there, by the function, which is told of each mean square.
-    ///
-    /// The sum is taken afresh over what is in memory, so that an error of 10⁹ leaves no trace once it is forgotten.
-    fn refresh(&mut self, voter: usize) {
-        let memory = &self.memories[voter];
-        let sum: f64 = memory.iter().map(|(_, squared)| squared).sum();
-        self.mean_squares[voter] = (!memory.is_empty()).then(|| sum / memory.len() as f64);
+    /// The mean squares of the voters that are there and known.
+    fn known<'a>(&'a self, votes: Votes<'a>) -> impl Iterator<Item = f64> + 'a {
+        votes
+            .present()
+            .filter_map(|(voter, _)| self.errors.means()[voter])
     }
 
-    /// Σ w ŷ and Σ w over the votes that are there, with the weight of each known voter given by `weigh`.
-    fn sums(&self, votes: Votes<'_>, weigh: impl Fn(f64) -> f64) -> (f64, f64) {
-        let (mut known, mut weights, mut weighted) = (0.0, 0.0, 0.0);
-        let (mut new, mut sum_of_new) = (0.0, 0.0);
-        for (voter, vote) in votes.present() {
-            if let Some(mean_square) = self.mean_squares[voter] {
-                let weight = weigh(mean_square);
-                known += 1.0;
-                weights += weight;
-                weighted += weight * vote;
-            } else {
-                new += 1.0;
-                sum_of_new += vote;
+    /// Gives each vote that is there its weight, not yet normalised; whether any of the voters is known.
+    fn weigh(&self, votes: Votes<'_>, mut give: impl FnMut(usize, f64, f64)) -> bool {
+        let (power, form) = (self.parameters.power, self.parameters.weights);
+        // Relative to the best voter, so that nothing over- or underflows; an error of exactly zero counts as the smallest
+        // number there is.
+        let best = self
+            .known(votes)
+            .fold(f64::INFINITY, f64::min)
+            .max(f64::MIN_POSITIVE);
+        let total: f64 = match form {
+            Weighting::InversePower => 0.0,
+            Weighting::AsPrinted | Weighting::AsPrintedRaw => {
+                self.known(votes).map(f64::sqrt).sum()
             }
+        };
+        let weight = |mean_square: f64| match form {
+            Weighting::InversePower => {
+                let ratio = best / mean_square.max(f64::MIN_POSITIVE);
+                if power == 2.0 {
+                    ratio
+                } else {
+                    ratio.powf(0.5 * power)
+                }
+            }
+            Weighting::AsPrinted | Weighting::AsPrintedRaw if total > 0.0 => {
+                mean_square / (total * total)
+            }
+            Weighting::AsPrinted | Weighting::AsPrintedRaw => 1.0,
+        };
+        let (sum, count) = self.known(votes).fold((0.0, 0.0), |(sum, count), known| {
+            (sum + weight(known), count + 1.0)
+        });
+        let of_unknown = if count > 0.0 { sum / count } else { 1.0 };
+        for (voter, vote) in votes.present() {
+            give(
+                voter,
+                vote,
+                self.errors.means()[voter].map_or(of_unknown, weight),
+            );
         }
-        let weight_of_new = if known > 0.0 { weights / known } else { 1.0 };
-        (
-            weighted + weight_of_new * sum_of_new,
-            weights + weight_of_new * new,
-        )
+        count > 0.0
     }
 
-    fn present_squares<'a>(&'a self, votes: Votes<'a>) -> impl Iterator<Item = f64> + 'a {
-        self.mean_squares
-            .iter()
-            .zip(votes.0)
-            .filter(|(_, vote)| !vote.is_nan())
-            .filter_map(|(mean_square, _)| *mean_square)
+    /// Whether weights stay as they are rather than add up to one.
+    fn is_raw(&self, any_known: bool) -> bool {
+        self.parameters.weights == Weighting::AsPrintedRaw && any_known
     }
 }
 
 impl Combine for Weigher {
     fn combine(&self, votes: Votes<'_>) -> f64 {
-        let power = self.parameters.power;
-        let (weighted, weights) = match self.parameters.weights {
-            Weighting::InversePower => {
-                // Relative to the best voter, so that nothing over- or underflows; an error of exactly zero counts as
-                // the smallest number there is.
-                let best = self
-                    .present_squares(votes)
-                    .fold(f64::INFINITY, f64::min)
-                    .max(f64::MIN_POSITIVE);
-                self.sums(votes, |mean_square| {
-                    let ratio = best / mean_square.max(f64::MIN_POSITIVE);
-                    if power == 2.0 {
-                        ratio
-                    } else {
-                        ratio.powf(0.5 * power)
-                    }
-                })
-            }
-            Weighting::AsPrinted | Weighting::AsPrintedRaw => {
-                let total: f64 = self.present_squares(votes).map(f64::sqrt).sum();
-                self.sums(votes, |mean_square| {
-                    let share = if total > 0.0 {
-                        mean_square.sqrt() / total
-                    } else {
-                        1.0
-                    };
-                    share * share
-                })
-            }
-        };
+        let (mut weighted, mut weights) = (0.0, 0.0);
+        let any_known = self.weigh(votes, |_, vote, weight| {
+            weighted += weight * vote;
+            weights += weight;
+        });
         if weights == 0.0 {
             f64::NAN
-        } else if self.parameters.weights == Weighting::AsPrintedRaw
-            && self.present_squares(votes).next().is_some()
-        {
+        } else if self.is_raw(any_known) {
             weighted
         } else {
             weighted / weights
         }
     }
 
-    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
-        for (voter, vote) in votes.present() {
-            self.memories[voter].push_back((arrived, (vote - truth) * (vote - truth)));
-            self.refresh(voter);
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        let mut sum = 0.0;
+        let any_known = self.weigh(votes, |voter, _, weight| {
+            weights[voter] = weight;
+            sum += weight;
+        });
+        if !self.is_raw(any_known) {
+            weights.iter_mut().for_each(|weight| *weight /= sum);
         }
+    }
+
+    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        self.errors.observe(votes, truth, arrived);
     }
 
     fn advance(&mut self, newest: Instant) {
-        let forgotten = newest - self.parameters.memory;
-        for voter in 0..self.memories.len() {
-            let memory = &mut self.memories[voter];
-            let before = memory.len();
-            while memory
-                .front()
-                .is_some_and(|&(arrived, _)| arrived <= forgotten)
-            {
-                memory.pop_front();
-            }
-            if memory.len() < before {
-                self.refresh(voter);
-            }
-        }
+        self.errors.advance(newest);
     }
 
     fn segment(&mut self, shift: Duration) {
-        for (arrived, _) in self.memories.iter_mut().flatten() {
-            *arrived = *arrived + shift;
-        }
+        self.errors.shift(shift);
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
-        Some(Box::new(Remembered {
-            errors: self.memories.clone(),
-        }))
+        Some(Box::new(self.errors.clone()))
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let remembered = match state.known::<Remembered>() {
-            Ok(remembered) => remembered,
-            Err(cold) => return cold,
-        };
-        if remembered.errors.len() != self.memories.len() {
-            return Restored::cold("the number of voters differs");
-        }
-        self.memories = remembered.errors;
-        for voter in 0..self.memories.len() {
-            self.refresh(voter);
-        }
-        Restored::Accepted
+        self.errors.restore(state)
     }
 }
-
-/// What a vote remembers: for each voter the arrival and square of its errors, oldest first.
-#[derive(Debug, Serialize, Deserialize)]
-struct Remembered {
-    errors: Vec<VecDeque<(Instant, f64)>>,
-}
-
-athermal_core::state!(Remembered, "auto_weighted/1");
 
 athermal_core::register!(AutoWeighted, Combiner, "auto_weighted");

@@ -194,7 +194,7 @@ pub(crate) fn lag_mistakes(name: &str, lags: &[Duration]) -> Vec<Mistake> {
     for (i, lag) in lags.iter().enumerate() {
         if lags[..i].contains(lag) {
             mistakes.push(Mistake::at(
-                name,
+                format!("{name}.{i}"),
                 format!("the lag {lag} stands twice in `{name}`"),
             ));
         }

@@ -5,10 +5,19 @@ use std::io::{self, Write};
 use crate::recorder::DRIFT_DECIMALS;
 use athermal_core::machine::{Channel, Row, SECOND_NS, Simulation};
 
+/// The names of the columns after the time: one per channel (`plate1_degC`, `Z1_nm`), and with `truth` one per axis with its
+/// true drift (`Z1_drift_true_nm_per_min`).
+#[must_use]
+pub fn table_columns(channels: &[Channel], truth: bool) -> Vec<String> {
+    let axes = channels.iter().filter(|channel| channel.is_axis());
+    let drifts = axes.map(|axis| format!("{}_drift_true_nm_per_min", axis.name));
+    let columns = channels.iter().map(Channel::column);
+    columns.chain(drifts.filter(|_| truth)).collect()
+}
+
 /// Writes the line of names and all rows that are left; gives the number of rows.
 ///
-/// Columns: `time_s`, one per channel (`plate1_degC`, `Z1_nm`), and with `truth` one per axis with its true drift
-/// (`Z1_drift_true_nm_per_min`). An empty cell is no value. What is read back has the same bits.
+/// The first column is `time_s`, the others are [`table_columns`]. An empty cell is no value. What is read back has the same bits.
 ///
 /// # Errors
 /// Those of `out`.
@@ -20,10 +29,7 @@ pub fn write_table(
 ) -> io::Result<u64> {
     let mut line = Vec::with_capacity(256);
     line.extend_from_slice(b"time_s");
-    let axes = channels.iter().filter(|channel| channel.is_axis());
-    let drifts = axes.map(|axis| format!("{}_drift_true_nm_per_min", axis.name));
-    let columns = channels.iter().map(Channel::column);
-    for column in columns.chain(drifts.filter(|_| truth)) {
+    for column in table_columns(channels, truth) {
         line.push(b',');
         line.extend_from_slice(column.as_bytes());
     }

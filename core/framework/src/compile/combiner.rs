@@ -1,5 +1,6 @@
 //! Decides which predictions a combiner may put together.
 
+use super::conversion::{factor, mismatch};
 use super::plan::{PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
@@ -7,6 +8,7 @@ use super::resolver::{Instance, Resolver};
 use crate::channel::Channel;
 use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;
+use crate::unit::Unit;
 
 impl Resolver<'_> {
     pub(super) fn combiner(
@@ -50,10 +52,12 @@ impl Resolver<'_> {
             }
             None => None,
         };
-        let gather = self.gather(instance, &port, &voters, &[Duration::ZERO])?;
         if !agree {
             return None;
         }
+        let unit = truth.map_or(first, |truth| truth);
+        let unit = self.channels[unit].channel.unit.clone();
+        let gather = self.gather(instance, &port, &voters, &[Duration::ZERO], Some(&unit))?;
         let predicts = truth.or(self.channels[first].predicts);
         let name = predicts
             .map_or(&self.channels[first].channel.name, |slot| {
@@ -62,6 +66,7 @@ impl Resolver<'_> {
             .clone();
         let combined = Channel {
             name,
+            unit,
             ..self.channels[first].channel.clone()
         };
         let behind = Provenance::of(
@@ -69,15 +74,51 @@ impl Resolver<'_> {
                 .iter()
                 .map(|&slot| (&self.provenance[slot], Duration::ZERO)),
         );
-        let outputs = vec![OutputPort {
+        let mut outputs = vec![OutputPort {
             name: "prediction",
             channels: vec![combined],
         }];
+        let mut behind = vec![behind];
+        if combiner.weighs() {
+            outputs.push(OutputPort {
+                name: "weights",
+                channels: self.weights(&voters),
+            });
+            behind.extend(std::iter::repeat_n(behind[0].clone(), voters.len()));
+        }
         let role = PlannedRole::Combiner {
             voters: gather,
             truth: link,
+            weights: false,
         };
-        self.add(instance, outputs, role, vec![behind], predicts)
+        self.add(instance, outputs, role, behind, predicts)
+    }
+
+    /// A channel for the weight of each voter, named after the voter's node, or after the voter where that is not enough.
+    fn weights(&self, voters: &[usize]) -> Vec<Channel> {
+        let node = |slot: usize| {
+            self.channels[slot]
+                .name
+                .split(['.', ':'])
+                .next()
+                .unwrap_or_default()
+        };
+        let nodes: std::collections::BTreeSet<_> = voters.iter().map(|&slot| node(slot)).collect();
+        let name = |slot: usize| {
+            if nodes.len() == voters.len() {
+                node(slot)
+            } else {
+                &self.channels[slot].name
+            }
+        };
+        let weight = |&slot: &usize| Channel {
+            name: format!("weight-{}", name(slot)),
+            unit: Unit::one(),
+            span: Duration::ZERO,
+            ahead: Duration::ZERO,
+            max_age: self.channels[slot].channel.default_max_age(),
+        };
+        voters.iter().map(weight).collect()
     }
 
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.
@@ -90,13 +131,8 @@ impl Resolver<'_> {
         votes: bool,
     ) -> bool {
         let (a, b) = (&self.channels[first], &self.channels[second]);
-        let problem = if a.channel.unit != b.channel.unit {
-            CompileProblem::Units {
-                first: a.name.clone(),
-                first_unit: a.channel.unit.clone(),
-                second: b.name.clone(),
-                second_unit: b.channel.unit.clone(),
-            }
+        let problem = if factor(&b.channel.unit, &a.channel.unit).is_none() {
+            mismatch(&b.name, &b.channel.unit, &a.name, &a.channel.unit)
         } else if a.channel.span != b.channel.span {
             CompileProblem::Spans {
                 first: a.name.clone(),

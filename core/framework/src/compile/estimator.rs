@@ -1,5 +1,6 @@
 //! Decides what an estimator's rows are made of, and that none of it sees the future.
 
+use super::leak::Suspect;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
@@ -46,13 +47,24 @@ impl Resolver<'_> {
         let mut behind = Vec::new();
         let mut whole = sound;
         if let Some(port) = features_port {
+            let unit = Self::port_unit(&port);
             for &lag in &wanted.feature_lags {
                 for &slot in &features {
-                    whole &= self.check_feature(instance, slot, lag, &link);
-                    regressors.push(self.regressor(slot, lag, false));
+                    let mut regressor = self.regressor(slot, lag, false);
+                    if let Some(unit) = &unit {
+                        regressor.unit = unit.to_string();
+                    }
+                    regressors.push(regressor);
                     behind.push((slot, lag));
                 }
-                gathers.push(self.gather(instance, &port, &features, &[lag])?);
+                self.suspects.push(Suspect {
+                    place: instance.input_place(port.name),
+                    context: instance.context(),
+                    features: features.clone(),
+                    lag,
+                    link,
+                });
+                gathers.push(self.gather(instance, &port, &features, &[lag], unit.as_ref())?);
             }
         }
         let lags = match wanted.truth_lags {
@@ -63,14 +75,15 @@ impl Resolver<'_> {
         for &lag in &lags {
             if leaks(lag, link.span, link.ahead) {
                 let place = self.lag_place(instance, &lags, lag);
-                self.leak(place, truth, lag, &link);
+                let problem = self.leak(truth, lag, &link, Vec::new());
+                self.diagnostics.report(place, problem);
                 whole = false;
             }
             regressors.push(self.regressor(truth, lag, true));
             behind.push((truth, lag));
         }
         if !lags.is_empty() {
-            gathers.push(self.gather(instance, &truth_port, &[truth], &lags)?);
+            gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
         }
         let training = self.limits(instance, &link);
         if !whole {
@@ -130,7 +143,7 @@ impl Resolver<'_> {
         })
     }
 
-    fn regressor(&self, slot: usize, lag: Duration, of_truth: bool) -> Regressor {
+    pub(super) fn regressor(&self, slot: usize, lag: Duration, of_truth: bool) -> Regressor {
         let from = &self.channels[slot];
         let name = if of_truth && lag == ONE_SAMPLE {
             format!("{} one sample ago", from.name)
@@ -145,43 +158,6 @@ impl Resolver<'_> {
         }
     }
 
-    /// Whether a feature, read at a lag, may know what it knows of the truth's signal.
-    fn check_feature(
-        &mut self,
-        instance: &Instance<'_>,
-        slot: usize,
-        lag: Duration,
-        link: &TruthLink,
-    ) -> bool {
-        let of_truth: Vec<usize> = self.provenance[link.slot]
-            .sources()
-            .map(|(source, _)| source)
-            .collect();
-        let nearest = self.provenance[slot]
-            .sources()
-            .filter(|(source, _)| of_truth.contains(source))
-            .map(|(_, delay)| delay + lag)
-            .min();
-        match nearest {
-            Some(delay) if leaks(delay, link.span, link.ahead) => {
-                self.leak(instance.input_place("features"), slot, delay, link);
-                false
-            }
-            _ => true,
-        }
-    }
-
-    fn leak(&mut self, place: Place, slot: usize, lag: Duration, link: &TruthLink) {
-        let problem = CompileProblem::Leak {
-            regressor: self.regressor(slot, lag, slot == link.slot).name,
-            lag,
-            truth: self.channels[link.slot].name.clone(),
-            span: link.span,
-            ahead: link.ahead,
-        };
-        self.diagnostics.report(place, problem);
-    }
-
     fn lag_place(&self, instance: &Instance<'_>, lags: &[Duration], lag: Duration) -> Place {
         let nth = lags.iter().position(|&l| l == lag).unwrap_or(0);
         instance.element_place("lags", nth)
@@ -191,7 +167,7 @@ impl Resolver<'_> {
         let Limits { below, above } = instance.read.estimator.train.abs_truth.clone();
         let unit = self.channels[link.slot].channel.unit.clone();
         let mut whole = true;
-        let mut size = |limit: Option<Quantity>, default: f64| match limit {
+        let mut size = |limit: Option<Quantity>, default: f64, key: &str| match limit {
             None => default,
             Some(limit) => limit.in_unit(&unit).unwrap_or_else(|| {
                 let problem = CompileProblem::LimitUnit {
@@ -199,16 +175,29 @@ impl Resolver<'_> {
                     expected: unit.clone(),
                 };
                 self.diagnostics
-                    .report(instance.parameter_place("train"), problem);
+                    .report(instance.parameter_place(key), problem);
                 whole = false;
                 default
             }),
         };
         let none = TrainingLimits::NONE;
         let limits = TrainingLimits {
-            below: size(below, none.below),
-            above: size(above, none.above),
+            below: size(below, none.below, "train.abs_truth.below"),
+            above: size(above, none.above, "train.abs_truth.above"),
         };
+        if whole && !(limits.above >= 0.0 && limits.below > limits.above) {
+            let unit = |value| Quantity {
+                value,
+                unit: unit.clone(),
+            };
+            let problem = CompileProblem::NoRows {
+                below: unit(limits.below),
+                above: unit(limits.above),
+            };
+            let place = instance.parameter_place("train.abs_truth");
+            self.diagnostics.report(place, problem);
+            whole = false;
+        }
         whole.then_some(limits)
     }
 }

@@ -27,7 +27,8 @@ impl Resolver<'_> {
                 continue;
             };
             if port.read != Read::Truth {
-                match self.gather(instance, port, &slots, &[Duration::ZERO]) {
+                let unit = Self::port_unit(port);
+                match self.gather(instance, port, &slots, &[Duration::ZERO], unit.as_ref()) {
                     Some(gather) => gathers.push(gather),
                     None => whole = false,
                 }
@@ -49,11 +50,8 @@ impl Resolver<'_> {
                 return None;
             }
         };
-        let behind = self.behind(
-            &slots,
-            outputs.iter().map(|port| port.channels.len()),
-            feature.delay(),
-        );
+        let channels = outputs.iter().map(|port| port.channels.len());
+        let behind = self.behind(&slots, channels, feature.delay());
         let role = PlannedRole::Feature {
             inputs,
             gathers,
@@ -66,7 +64,7 @@ impl Resolver<'_> {
 
     /// What is behind each output. A port with as many channels as there are inputs, or a multiple, is taken to compute
     /// each from its own input, in order; any other mixes all inputs.
-    fn behind(
+    pub(super) fn behind(
         &self,
         slots: &[usize],
         ports: impl Iterator<Item = usize>,

@@ -30,7 +30,7 @@ impl Plan {
                     "below": training.below.to_bits(),
                 })
             }
-            PlannedRole::Combiner { voters, truth } => json!({
+            PlannedRole::Combiner { voters, truth, .. } => json!({
                 "inputs": [self.read(*voters)],
                 "truth": truth.as_ref().map(|truth| self.link(truth)),
             }),
@@ -67,7 +67,10 @@ impl Plan {
             (PlannedRole::Feature { gathers, .. }, crate::node::Role::Feature(feature)) => {
                 feature.memory() + before(gathers)
             }
-            (PlannedRole::Combiner { voters, truth }, crate::node::Role::Combiner(combiner)) => {
+            (
+                PlannedRole::Combiner { voters, truth, .. },
+                crate::node::Role::Combiner(combiner),
+            ) => {
                 let learned = truth.map_or(Duration::ZERO, |truth| {
                     truth.embargo() + truth.ahead + truth.limit
                 });
@@ -79,7 +82,7 @@ impl Plan {
     }
 
     fn read(&self, gather: usize) -> Value {
-        let Gather { read, entries } = &self.gathers[gather];
+        let Gather { read, entries, .. } = &self.gathers[gather];
         let entries: Vec<_> = entries
             .iter()
             .map(|entry| {

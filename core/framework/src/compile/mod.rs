@@ -2,10 +2,12 @@
 //! not when it runs.
 
 mod combiner;
+mod conversion;
 mod diff;
 mod estimator;
 mod feature;
 mod identity;
+mod leak;
 mod order;
 mod plan;
 mod problem;
@@ -17,8 +19,8 @@ mod steps;
 
 pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
 pub use plan::{
-    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
-    Step, TrainingLimits, TruthLink,
+    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
+    SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;

@@ -26,16 +26,23 @@ pub(crate) struct Order {
 pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diagnostics) -> Order {
     let mut edges = edges(graph);
     let mut order = Order::default();
-    for component in loops(&edges) {
-        let inside: BTreeSet<_> = component.iter().map(|n| n.index()).collect();
-        for &node in inside.iter().filter(|&&node| read[node].closes_loops()) {
-            order.closing.insert(node);
-            edges.retain_edges(|edges, edge| {
-                edges
-                    .edge_endpoints(edge)
-                    .is_none_or(|(from, to)| to.index() != node || !inside.contains(&from.index()))
-            });
+    let mut component_of = HashMap::new();
+    for (number, component) in loops(&edges).into_iter().enumerate() {
+        for node in component.iter().map(|node| node.index()) {
+            component_of.insert(node, number);
+            if read[node].closes_loops() {
+                order.closing.insert(node);
+            }
         }
+    }
+    if !order.closing.is_empty() {
+        // A node that closes a loop waits for none of the nodes in it.
+        edges.retain_edges(|edges, edge| {
+            edges.edge_endpoints(edge).is_none_or(|(from, to)| {
+                !order.closing.contains(&to.index())
+                    || component_of.get(&from.index()) != component_of.get(&to.index())
+            })
+        });
     }
     for component in loops(&edges) {
         let path = path(&edges, &component);
@@ -73,8 +80,8 @@ fn edges(graph: &GraphFile) -> DiGraph<(), ()> {
             let heads = input
                 .references
                 .iter()
-                .map(|(text, _)| Reference::parse(text).node);
-            from.extend(heads.filter_map(|head| position.get(head).copied()));
+                .map(|(text, _)| Reference::parse(text).whole_node());
+            from.extend(heads.filter_map(|head| position.get(&*head).copied()));
         }
         for from in from {
             edges.add_edge(NodeIndex::new(from), NodeIndex::new(to), ());

@@ -67,6 +67,34 @@ pub struct Gather {
     pub read: Read,
     /// What is read, in order.
     pub entries: Vec<Entry>,
+    /// The values that are given in another unit than their slots have.
+    pub conversions: Vec<Conversion>,
+}
+
+/// A value of a gather that is given in another unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Conversion {
+    /// The position among the entries.
+    pub entry: usize,
+    /// The bits of the factor, so that gathers can be compared.
+    bits: u64,
+}
+
+impl Conversion {
+    /// A multiplication of an entry's value.
+    #[must_use]
+    pub const fn new(entry: usize, factor: f64) -> Self {
+        Self {
+            entry,
+            bits: factor.to_bits(),
+        }
+    }
+
+    /// What the value is multiplied by.
+    #[must_use]
+    pub const fn factor(self) -> f64 {
+        f64::from_bits(self.bits)
+    }
 }
 
 /// One value of a gather.
@@ -145,6 +173,8 @@ pub enum PlannedRole {
         voters: usize,
         /// What is predicted, where it learns from errors.
         truth: Option<TruthLink>,
+        /// Whether somebody reads its weights.
+        weights: bool,
     },
 }
 

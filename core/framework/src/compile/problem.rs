@@ -1,6 +1,7 @@
 //! Decides what can be wrong with a graph that reads well, and how it is said.
 
 use crate::diagnostic::{Problem, Severity, nearest};
+use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -57,6 +58,15 @@ pub enum CompileProblem {
         second: String,
         second_unit: Unit,
     },
+    /// A point on a temperature scale where a difference is wanted, or the other way round.
+    PointOrDifference {
+        channel: String,
+        unit: Unit,
+        wanted_by: String,
+        wanted: Unit,
+    },
+    /// Limits of a fit that admit no row.
+    NoRows { below: Quantity, above: Quantity },
     /// Two things that must summarise the same length of time.
     Spans {
         first: String,
@@ -80,6 +90,8 @@ pub enum CompileProblem {
         truth: String,
         span: Duration,
         ahead: Duration,
+        /// The channels from the regressor back to what was measured; none where the truth itself is lagged.
+        path: Vec<String>,
     },
     /// A held input whose age nothing bounds.
     NoMaxAge { channel: String, input: String },
@@ -120,9 +132,23 @@ fn names<T: AsRef<str>>(known: &[T]) -> String {
     }
 }
 
+/// A way through the graph; the middle of a long one is left out.
+fn names_in_order(path: &[String]) -> String {
+    const ENDS: usize = 4;
+    let quoted = |names: &[String]| {
+        let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+        names.join(" from ")
+    };
+    if path.len() <= 2 * ENDS {
+        return quoted(path);
+    }
+    let (first, last) = (&path[..ENDS], &path[path.len() - ENDS..]);
+    format!("{} from … from {}", quoted(first), quoted(last))
+}
+
 fn or_known<T: AsRef<str>>(name: &str, known: &[T], what: &str) -> String {
     match nearest(name, known.iter().map(AsRef::as_ref)) {
-        Some(near) => format!("did you mean `{near}`? {what} {}", names(known)),
+        Some(near) => format!("did you mean `{near}`?"),
         None => format!("{what} {}", names(known)),
     }
 }
@@ -153,6 +179,8 @@ impl Problem for CompileProblem {
             Self::UnusedSignal { .. } => "A060",
             Self::Unreachable { .. } => "A061",
             Self::NoOutputs => "A062",
+            Self::PointOrDifference { .. } => "A063",
+            Self::NoRows { .. } => "A064",
         }
     }
 
@@ -245,6 +273,22 @@ impl Problem for CompileProblem {
             }
             Self::Unreachable { output } => format!("no signal reaches the output `{output}`"),
             Self::NoOutputs => "the graph has no outputs".to_owned(),
+            Self::PointOrDifference {
+                channel,
+                unit,
+                wanted_by,
+                wanted,
+            } => {
+                let (is, takes) = if unit.is_temperature_point() {
+                    ("a temperature", "a difference of temperatures")
+                } else {
+                    ("a difference of temperatures", "a temperature")
+                };
+                format!("`{channel}` is {is} ({unit}), and `{wanted_by}` {takes} ({wanted})")
+            }
+            Self::NoRows { below, above } => {
+                format!("no truth lies below {below} and at or above {above}")
+            }
         }
     }
 
@@ -272,6 +316,8 @@ impl Problem for CompileProblem {
             Self::UnusedNode { .. } | Self::UnusedSignal { .. } => "not used",
             Self::Unreachable { .. } => "nothing flows in",
             Self::NoOutputs => "no `[outputs]`",
+            Self::PointOrDifference { .. } => "a point is no difference",
+            Self::NoRows { .. } => "admits no row",
         }
         .to_owned()
     }
@@ -301,7 +347,11 @@ impl Problem for CompileProblem {
             Self::Horizons { .. } => "give both the same `ahead`".to_owned(),
             Self::Cycle { .. } => "let the feedback go through a `delay` node".to_owned(),
             Self::Leak {
-                lag, span, ahead, ..
+                lag,
+                span,
+                ahead,
+                path,
+                ..
             } => {
                 let smallest = super::smallest_lag(*span, *ahead);
                 let smallest = if *span == Duration::ZERO && *ahead == Duration::ZERO {
@@ -309,9 +359,14 @@ impl Problem for CompileProblem {
                 } else {
                     smallest.to_string()
                 };
+                let way = if path.is_empty() {
+                    String::new()
+                } else {
+                    format!("it is made of what the truth is made of: {}; ", names_in_order(path))
+                };
                 format!(
-                    "the truth summarises {span} and is predicted {ahead} ahead, so the smallest lag allowed is {smallest} \
-                     (here it is {lag})"
+                    "{way}the truth summarises {span} and is predicted {ahead} ahead, so the smallest lag allowed is \
+                     {smallest} (here it is {lag})"
                 )
             }
             Self::NoMaxAge { input, .. } => {
@@ -337,6 +392,12 @@ impl Problem for CompileProblem {
             }
             Self::UnusedSignal { .. } => "refer to it or remove it".to_owned(),
             Self::Unreachable { .. } => "check the inputs on the way to it".to_owned(),
+            Self::PointOrDifference { .. } => {
+                "Cel and [degF] are points on a scale, and K is a difference; take a slope or difference of a \
+                 temperature, or read the temperature itself"
+                    .to_owned()
+            }
+            Self::NoRows { .. } => "`above` is 0 or more, and `below` is larger".to_owned(),
             Self::NoOutputs => {
                 "name what the graph is for: `[outputs]` and `predicted = \"NODE\"`".to_owned()
             }

@@ -43,6 +43,12 @@ impl Provenance {
         all
     }
 
+    /// The smallest delay of a measured channel, where it is behind the value.
+    #[must_use]
+    pub fn delay_of(&self, source: usize) -> Option<Duration> {
+        self.0.get(&source).copied()
+    }
+
     /// The measured channels and their smallest delays.
     pub fn sources(&self) -> impl Iterator<Item = (usize, Duration)> + '_ {
         self.0.iter().map(|(&slot, &delay)| (slot, delay))

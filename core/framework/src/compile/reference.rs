@@ -1,5 +1,7 @@
 //! Decides what a reference such as `gradients:stderr.plate?@150s` means as text; not what there is to refer to.
 
+use std::borrow::Cow;
+
 /// A reference, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reference<'a> {
@@ -42,6 +44,28 @@ impl<'a> Reference<'a> {
                 channel: None,
             },
         }
+    }
+}
+
+impl<'a> Reference<'a> {
+    /// The node without the members that are picked out of the modules around it: `axis[Z1]/thermal` is `axis/thermal`.
+    pub(crate) fn whole_node(&self) -> Cow<'a, str> {
+        if !self.is_member() {
+            return Cow::Borrowed(self.node);
+        }
+        let mut whole = String::with_capacity(self.node.len());
+        let mut rest = self.node;
+        while let Some((before, after)) = rest.split_once('[') {
+            whole.push_str(before);
+            rest = after.split_once(']').map_or("", |(_, after)| after);
+        }
+        whole.push_str(rest);
+        Cow::Owned(whole)
+    }
+
+    /// Whether members are picked out of the modules around the node.
+    pub(crate) fn is_member(&self) -> bool {
+        self.node.contains('[')
     }
 }
 

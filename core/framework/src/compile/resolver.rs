@@ -8,14 +8,16 @@ use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::leak::Suspect;
 use super::order::Order;
 use super::plan::{
-    Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
+    SourceChannel,
 };
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::scope::{Found, Scopes};
-use super::{Wanted, steps};
+use super::{Wanted, conversion, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
@@ -24,6 +26,7 @@ use crate::node::{
 };
 use crate::quantity::Quantity;
 use crate::time::Duration;
+use crate::unit::Unit;
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -156,6 +159,15 @@ fn context(node: &NodeDecl, instance: &InstanceDecl) -> String {
     }
 }
 
+/// The name of a channel among those of all members; the only one of an instance has its member's name.
+fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
+    match member {
+        Some(member) if single => member.to_owned(),
+        Some(member) => format!("{member}/{channel}"),
+        None => channel.to_owned(),
+    }
+}
+
 /// One instance on its way into the plan.
 pub(crate) struct Instance<'a> {
     pub(crate) node: &'a NodeDecl,
@@ -169,6 +181,11 @@ impl Instance<'_> {
     pub(crate) fn input_place(&self, port: &str) -> Place {
         self.input(port)
             .map_or(self.node.place, |input| input.place)
+    }
+
+    /// How diagnostics say which instance they speak of.
+    pub(crate) fn context(&self) -> String {
+        context(self.node, self.decl)
     }
 
     pub(crate) fn input(&self, port: &str) -> Option<&InputDecl> {
@@ -191,16 +208,18 @@ impl Instance<'_> {
         }
     }
 
-    /// The place of a parameter such as `selection.folds`, as near as the file has it.
+    /// The place of a parameter such as `selection.folds` or `lags.0`, as near as the file has it.
     pub(crate) fn parameter_place(&self, path: &str) -> Place {
         let mut place = self.node.place;
         let mut value = &self.decl.parameters;
         for key in path.split('.') {
-            let Data::Table(table) = &value.data else {
-                break;
+            let inner = match &value.data {
+                Data::Table(table) => table.get(key),
+                Data::List(values) => key.parse::<usize>().ok().and_then(|nth| values.get(nth)),
+                _ => None,
             };
-            let Some(entry) = table.get(key) else { break };
-            (place, value) = (entry.place, entry);
+            let Some(inner) = inner else { break };
+            (place, value) = (inner.place, inner);
         }
         place
     }
@@ -214,8 +233,10 @@ pub(crate) struct Resolver<'g> {
     pub(crate) provenance: Vec<Provenance>,
     scopes: Scopes,
     sources: Vec<SourceChannel>,
-    gathers: IndexSet<Gather>,
-    nodes: Vec<PlannedNode>,
+    pub(super) gathers: IndexSet<Gather>,
+    pub(super) nodes: Vec<PlannedNode>,
+    /// Features whose leaks are looked for once all is known.
+    pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
     read: BTreeSet<usize>,
 }
@@ -231,6 +252,7 @@ impl<'g> Resolver<'g> {
             sources: Vec::new(),
             gathers: IndexSet::new(),
             nodes: Vec::new(),
+            suspects: Vec::new(),
             read: BTreeSet::new(),
         };
         resolver.take_signals();
@@ -271,9 +293,14 @@ impl<'g> Resolver<'g> {
                 }
             }
         }
+        let has_loops = !closing.is_empty();
         for (index, instance) in closing {
             self.close(index, &instance);
         }
+        if has_loops {
+            self.follow_loops();
+        }
+        self.find_leaks();
         let outputs = self.outputs();
         self.finish(outputs, wanted)
     }
@@ -428,7 +455,9 @@ impl<'g> Resolver<'g> {
         port: &InputPort,
         slots: &[usize],
         lags: &[Duration],
+        unit: Option<&Unit>,
     ) -> Option<usize> {
+        let conversions = self.conversions(instance, port, slots, lags.len(), unit)?;
         let mut entries = Vec::with_capacity(slots.len() * lags.len());
         for &lag in lags {
             for &slot in slots {
@@ -452,7 +481,53 @@ impl<'g> Resolver<'g> {
         } else {
             Read::Held
         };
-        Some(self.gathers.insert_full(Gather { read, entries }).0)
+        let gather = Gather {
+            read,
+            entries,
+            conversions,
+        };
+        Some(self.gathers.insert_full(gather).0)
+    }
+
+    /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been told.
+    fn conversions(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+        slots: &[usize],
+        lags: usize,
+        unit: Option<&Unit>,
+    ) -> Option<Vec<Conversion>> {
+        let Some(unit) = unit else {
+            return Some(Vec::new());
+        };
+        let channels = slots.iter().map(|&slot| &self.channels[slot]);
+        let channels = channels.map(|from| (from.name.as_str(), &from.channel.unit));
+        let wanted_by = format!("inputs.{}", port.name);
+        match conversion::conversions(channels, unit, &wanted_by) {
+            Ok(conversions) => {
+                let at_lag = |lag: usize| {
+                    conversions.iter().map(move |conversion| {
+                        Conversion::new(lag * slots.len() + conversion.entry, conversion.factor())
+                    })
+                };
+                Some((0..lags).flat_map(at_lag).collect())
+            }
+            Err(problems) => {
+                for problem in problems {
+                    let place = instance.input_place(port.name);
+                    self.diagnostics.report(place, problem);
+                }
+                None
+            }
+        }
+    }
+
+    /// The unit that an input port declares.
+    pub(crate) fn port_unit(port: &InputPort) -> Option<Unit> {
+        let unit = port.unit.and_then(|unit| unit.parse().ok());
+        debug_assert_eq!(unit.is_some(), port.unit.is_some(), "a kind declares units");
+        unit
     }
 
     /// The channels of slots, as kinds see them.
@@ -461,16 +536,19 @@ impl<'g> Resolver<'g> {
         instance: &Instance<'_>,
         ports: Vec<(InputPort, Vec<usize>)>,
     ) -> Inputs {
-        let channels = |slots: Vec<usize>| {
-            slots
-                .into_iter()
-                .map(|slot| self.channels[slot].channel.clone())
-                .collect()
+        let channels = |port: InputPort, slots: Vec<usize>| {
+            let unit = Self::port_unit(&port);
+            let channels = slots.into_iter().map(|slot| {
+                let channel = self.channels[slot].channel.clone();
+                let unit = unit.clone().unwrap_or_else(|| channel.unit.clone());
+                Channel { unit, ..channel }
+            });
+            (port, channels.collect())
         };
         Inputs {
             ports: ports
                 .into_iter()
-                .map(|(port, slots)| (port, channels(slots)))
+                .map(|(port, slots)| channels(port, slots))
                 .collect(),
             member: instance.decl.member.clone(),
         }
@@ -508,11 +586,8 @@ impl<'g> Resolver<'g> {
             let first = self.channels.len();
             let single = port.channels.len() == 1;
             for channel in port.channels {
-                let outward = match &instance.decl.member {
-                    Some(member) if single => member.clone(),
-                    Some(member) => format!("{member}/{}", channel.name),
-                    None => channel.name.clone(),
-                };
+                let own = channel.name.clone();
+                let outward = outward_name(instance.decl.member.as_deref(), single, &own);
                 let slot = self.channels.len();
                 let named = if ranges.is_empty() {
                     format!("{}.{outward}", instance.node.name)
@@ -524,7 +599,8 @@ impl<'g> Resolver<'g> {
                     channel,
                     node: Some(index),
                     history: None,
-                    predicts,
+                    // Only what a node gives first is a prediction; the other ports tell of it.
+                    predicts: predicts.filter(|_| ranges.is_empty()),
                 });
                 self.provenance.push(behind.next().unwrap_or_default());
                 let scope = self.scopes.get_mut(&instance.node.name);
@@ -541,6 +617,11 @@ impl<'g> Resolver<'g> {
                     };
                     self.diagnostics.report(instance.node.place, problem);
                     whole = false;
+                }
+                for (scope, member) in &instance.decl.scopes {
+                    let outward = outward_name(member.as_deref(), single, &own);
+                    let ports = &mut self.scopes.get_mut(scope).ports;
+                    ports.entry(port.name).or_default().insert(outward, slot);
                 }
             }
             ranges.push((port.name, first..self.channels.len()));
@@ -564,22 +645,13 @@ impl<'g> Resolver<'g> {
             let Some(slots) = self.slots(instance, port) else {
                 return;
             };
-            let Some(gather) = self.gather(instance, port, &slots, &[Duration::ZERO]) else {
+            // What it gives was described before what it reads was known.
+            let own = self.nodes[index].slots.clone().next();
+            let unit = own.map(|slot| self.channels[slot].channel.unit.clone());
+            let lags = [Duration::ZERO];
+            let Some(gather) = self.gather(instance, port, &slots, &lags, unit.as_ref()) else {
                 return;
             };
-            for (&from, to) in slots.iter().zip(self.nodes[index].slots.clone()) {
-                let (from, to) = (&self.channels[from], &self.channels[to]);
-                if from.channel.unit != to.channel.unit {
-                    let problem = CompileProblem::Units {
-                        first: from.name.clone(),
-                        first_unit: from.channel.unit.clone(),
-                        second: to.name.clone(),
-                        second_unit: to.channel.unit.clone(),
-                    };
-                    self.diagnostics
-                        .report(instance.input_place(port.name), problem);
-                }
-            }
             if slots.len() != self.nodes[index].slots.len() {
                 let found = slots
                     .iter()

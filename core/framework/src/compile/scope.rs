@@ -39,8 +39,16 @@ impl Scopes {
 
     pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
         let reference = Reference::parse(text);
+        if reference.is_member() {
+            // Such a reference was made from one that named a node; a scope that is not there belongs to a broken one.
+            let whole = self.scopes.get(&*reference.whole_node());
+            if whole.is_none_or(|whole| whole.broken) || !self.scopes.contains_key(reference.node) {
+                return Ok(Found::Broken);
+            }
+        }
         let Some(scope) = self.scopes.get(reference.node) else {
-            let known = self.scopes.keys().cloned().collect();
+            let known = self.scopes.keys().filter(|name| !name.contains('['));
+            let known = known.cloned().collect();
             return Err(Box::new(CompileProblem::UnknownNode {
                 node: reference.node.to_owned(),
                 known,

@@ -1,6 +1,6 @@
 //! Decides the steps of a tick, which ports are computed at all, and what nobody uses.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::Wanted;
 use super::plan::{Plan, PlannedRole, Step};
@@ -77,6 +77,10 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wante
         .collect();
     for node in &mut plan.nodes {
         let is_truth = truths.range(node.slots.clone()).next().is_some();
+        if let PlannedRole::Combiner { weights, .. } = &mut node.role {
+            let ports = node.ports.get(1);
+            *weights = ports.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
+        }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
                 let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
@@ -102,16 +106,15 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         return;
     }
     let fed = fed(plan);
+    let owner = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
+    let mut dry = HashMap::new();
+    for column in plan.outputs.iter().filter(|c| !fed.contains(&c.slot)) {
+        dry.entry(owner(&column.name))
+            .or_insert_with(|| column.name.clone());
+    }
     for output in &graph.outputs {
-        let prefix = format!("{}.", output.name);
-        let of_it = plan
-            .outputs
-            .iter()
-            .filter(|column| column.name.starts_with(&prefix));
-        if let Some(dry) = of_it.into_iter().find(|column| !fed.contains(&column.slot)) {
-            let problem = CompileProblem::Unreachable {
-                output: dry.name.clone(),
-            };
+        if let Some(column) = dry.remove(&output.name) {
+            let problem = CompileProblem::Unreachable { output: column };
             diagnostics.report(output.place, problem);
         }
     }
@@ -136,11 +139,12 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
             );
         }
     }
+    let used_signals: HashSet<String> = (0..plan.sources.len())
+        .filter(|slot| used.contains(slot))
+        .map(|slot| owner(&plan.channels[slot].name))
+        .collect();
     for signal in &graph.signals {
-        let prefix = format!("{}.", signal.name);
-        let is_used =
-            |slot: &usize| used.contains(slot) && plan.channels[*slot].name.starts_with(&prefix);
-        if !(0..plan.sources.len()).any(|slot| is_used(&slot)) {
+        if !used_signals.contains(&signal.name) {
             diagnostics.report(
                 signal.place,
                 CompileProblem::UnusedSignal {

@@ -79,10 +79,15 @@ impl Diagnostic {
     /// The context and the number of members that share the mistake, as one phrase.
     pub fn context_phrase(&self) -> Option<String> {
         let context = self.context.as_ref()?;
+        let what = if context.contains("member") {
+            "member"
+        } else {
+            "node"
+        };
         Some(match self.repeats {
             0 => context.clone(),
-            1 => format!("{context}, and 1 more member"),
-            more => format!("{context}, and {more} more members"),
+            1 => format!("{context}, and 1 more {what}"),
+            more => format!("{context}, and {more} more {what}s"),
         })
     }
 }
@@ -92,6 +97,8 @@ impl Diagnostic {
 pub struct Diagnostics {
     found: Vec<Diagnostic>,
     known: HashMap<(&'static str, Option<Place>, String), Known>,
+    /// The first mistake of each code at each place.
+    first: HashMap<(&'static str, Option<Place>), Known>,
     scope: Option<String>,
     errors: usize,
 }
@@ -163,13 +170,25 @@ impl Diagnostics {
             }
             return;
         }
-        self.known.insert(
-            (code, place, message.clone()),
-            Known {
-                index: self.found.len(),
-                context: context.clone(),
-            },
-        );
+        // The same mistake of another member may be worded with that member's names.
+        if let (Some(first), Some(_)) = (self.first.get_mut(&(code, place)), &context) {
+            let told = &mut self.found[first.index];
+            if told.context.is_some() && told.context != context {
+                if first.context != context {
+                    first.context = context;
+                    told.repeats += 1;
+                }
+                return;
+            }
+        }
+        let known = Known {
+            index: self.found.len(),
+            context: context.clone(),
+        };
+        self.first
+            .entry((code, place))
+            .or_insert_with(|| known.clone());
+        self.known.insert((code, place, message.clone()), known);
         if problem.severity() == Severity::Error {
             self.errors += 1;
         }

@@ -99,7 +99,7 @@ pub struct SignalDecl {
 /// A node and its instances.
 #[derive(Debug, Clone)]
 pub struct NodeDecl {
-    /// The node's name.
+    /// The node's name; inside a module, after the names of the instances that it is part of: `axis/thermal`.
     pub name: String,
     /// Where it is declared.
     pub place: Place,
@@ -118,6 +118,8 @@ pub struct NodeDecl {
 pub struct InstanceDecl {
     /// The member of the node's sets: `Z1`, or `1-X` over two sets; none without `each`.
     pub member: Option<String>,
+    /// Inside of modules with `each`: how the nodes beside it name it, as `axis[Z1]/thermal`, and the member that is left.
+    pub scopes: Vec<(String, Option<String>)>,
     /// The inputs, in the order of the file.
     pub inputs: Vec<InputDecl>,
     /// The node's table without `type`, `each` and `inputs`; members substituted, samples turned into durations.

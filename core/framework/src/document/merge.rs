@@ -12,11 +12,40 @@ pub(super) fn merge(base: Option<Table>, over: Table, diagnostics: &mut Diagnost
     for (key, entry) in over {
         if key == "nodes" {
             merge_nodes(&mut merged, key, entry, diagnostics);
+        } else if key == "modules" {
+            merge_modules(&mut merged, key, entry, diagnostics);
         } else {
             lay(&mut merged, key, entry);
         }
     }
     merged
+}
+
+/// The nodes of a module merge as those of a graph do.
+fn merge_modules(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
+    let (Some(Data::Table(below)), Data::Table(above)) = (
+        merged.get_mut(&key).map(|value| &mut value.data),
+        &entry.value.data,
+    ) else {
+        merged.insert(key, entry);
+        return;
+    };
+    for (name, entry) in above.clone() {
+        let inherited = below.get(&name).and_then(Value::as_table).cloned();
+        match (inherited, entry.value.data) {
+            (Some(inherited), Data::Table(over)) => {
+                let laid = Data::Table(merge(Some(inherited), over, diagnostics));
+                let value = Value::new(entry.value.place, laid);
+                let key = entry.key;
+                below.insert(name, Entry { key, value });
+            }
+            (_, data) => {
+                let value = Value::new(entry.value.place, data);
+                let key = entry.key;
+                below.insert(name, Entry { key, value });
+            }
+        }
+    }
 }
 
 fn merge_nodes(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
@@ -80,7 +109,7 @@ fn is_another_kind(old: &Value, new: &Value) -> bool {
     })
 }
 
-fn lay(merged: &mut Table, key: String, entry: Entry) {
+pub(super) fn lay(merged: &mut Table, key: String, entry: Entry) {
     match (merged.get_mut(&key).map(|value| &mut value.data), entry) {
         (
             Some(Data::Table(below)),

@@ -211,10 +211,47 @@ pub enum DocumentProblem {
         /// The key and value that it contradicts.
         with: String,
     },
+    /// A duration of no length where one is needed.
+    NoLength {
+        /// The key.
+        key: &'static str,
+    },
     /// A step of no length.
     StepNotPositive,
-    /// `[modules]` or `module = …`.
-    Modules,
+    /// `module = …` names a module that is not declared.
+    UnknownModule {
+        /// The name.
+        name: String,
+        /// The modules in sight.
+        known: Vec<String>,
+    },
+    /// A module that is part of itself, or modules nested too deeply.
+    ModuleLoop {
+        /// The modules, from the outermost to the one that is too much.
+        path: Vec<String>,
+        /// The greatest depth.
+        limit: usize,
+    },
+    /// A module refers to what is not part of it.
+    OutOfReach {
+        /// The name.
+        name: String,
+        /// The module.
+        module: String,
+        /// The nodes and inputs that the module has.
+        known: Vec<String>,
+    },
+    /// An output that a module does not have.
+    UnknownOutput {
+        /// The instance.
+        node: String,
+        /// The name; empty where the default is meant.
+        output: String,
+        /// The module.
+        module: String,
+        /// Its outputs.
+        known: Vec<String>,
+    },
 }
 
 /// At most twelve names in quotes, for a list of what there is.
@@ -256,7 +293,10 @@ impl Problem for DocumentProblem {
             Self::MissingKey { .. } => "A007",
             Self::WrongType { .. } => "A008",
             Self::UnknownChoice { .. } => "A009",
-            Self::Refused { .. } | Self::NumberTooLarge { .. } | Self::StepNotPositive => "A010",
+            Self::Refused { .. }
+            | Self::NumberTooLarge { .. }
+            | Self::NoLength { .. }
+            | Self::StepNotPositive => "A010",
             Self::BadName { .. } => "A011",
             Self::DuplicateName { .. } => "A012",
             Self::UnknownSet { .. } => "A013",
@@ -271,7 +311,10 @@ impl Problem for DocumentProblem {
             Self::RangeUnit { .. } | Self::RangeOrder { .. } => "A022",
             Self::UnknownChannel { .. } => "A023",
             Self::TimeContradiction { .. } => "A024",
-            Self::Modules => "A025",
+            Self::UnknownModule { .. } => "A025",
+            Self::ModuleLoop { .. } => "A026",
+            Self::OutOfReach { .. } => "A027",
+            Self::UnknownOutput { .. } => "A028",
         }
     }
 
@@ -358,10 +401,31 @@ impl Problem for DocumentProblem {
                 format!("signal \"{signal}\" has no channel \"{name}\"")
             }
             Self::TimeContradiction { key, with } => format!("`{key}` has no meaning with {with}"),
+            Self::NoLength { key } => format!("`{key}` must be longer than 0"),
             Self::StepNotPositive => {
                 "the step from one sample to the next is longer than 0".to_owned()
             }
-            Self::Modules => "modules are not part of this version".to_owned(),
+            Self::UnknownModule { name, .. } => format!("there is no module \"{name}\""),
+            Self::ModuleLoop { path, limit } => {
+                let (last, before) = path.split_last().map_or(("", &[][..]), |(l, b)| (l, b));
+                if before.iter().any(|name| name == last) {
+                    format!("a module is part of itself: {}", path.join(" -> "))
+                } else {
+                    format!("modules are nested more than {limit} deep")
+                }
+            }
+            Self::OutOfReach { name, module, .. } => {
+                format!("\"{name}\" is not a node of module \"{module}\"")
+            }
+            Self::UnknownOutput { output, module, .. } if output.is_empty() => {
+                format!("module \"{module}\" has no outputs")
+            }
+            Self::UnknownOutput {
+                node,
+                output,
+                module,
+                ..
+            } => format!("\"{node}\" has no output \"{output}\": module \"{module}\" has none"),
         }
     }
 
@@ -388,6 +452,10 @@ impl Problem for DocumentProblem {
             Self::Quantity(_) => "not a quantity".to_owned(),
             Self::UnknownChannel { .. } => "not a channel".to_owned(),
             Self::RangeUnit { unit, .. } => format!("does not convert to {unit}"),
+            Self::UnknownModule { .. } => "not a module".to_owned(),
+            Self::ModuleLoop { .. } => "comes back here".to_owned(),
+            Self::OutOfReach { .. } => "out of the module's reach".to_owned(),
+            Self::UnknownOutput { .. } => "no such output".to_owned(),
             _ => String::new(),
         }
     }
@@ -463,6 +531,24 @@ impl Problem for DocumentProblem {
             Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
             Self::UnknownChannel { name, known, .. } => suggestion(name, known, "its channels are"),
             Self::EmptyList { .. } => Some("name at least one".to_owned()),
+            Self::UnknownModule { name, known } => suggestion(name, known, "the modules are")
+                .or_else(|| Some(format!("describe it under `[modules.{name}]`"))),
+            Self::ModuleLoop { .. } => Some("take one of the modules apart".to_owned()),
+            Self::OutOfReach { name, known, .. } => {
+                let near = nearest(name, known.iter().map(String::as_str));
+                Some(match near {
+                    Some(near) => format!("did you mean \"{near}\"?"),
+                    None => format!(
+                        "name it under the module's `inputs`; there it has {}",
+                        listed(known)
+                    ),
+                })
+            }
+            Self::UnknownOutput { output, known, .. } => {
+                suggestion(output, known, "its outputs are").or_else(|| {
+                    Some("say which, e.g. `outputs = { predicted = \"vote\" }`".to_owned())
+                })
+            }
             _ => None,
         }
     }

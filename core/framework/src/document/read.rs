@@ -4,10 +4,10 @@ use std::collections::HashMap;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
-use super::merge::merge;
+use super::merge::{lay, merge};
 use super::problem::DocumentProblem;
 use super::toml_text;
-use super::tree::{Data, Table, Value};
+use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Place, SourceId, Sources};
 
 /// The largest file that is read, in bytes.
@@ -129,6 +129,7 @@ pub fn load_text(
         sources,
         diagnostics,
         paths: Vec::new(),
+        lent: HashMap::new(),
         broken: false,
     };
     let root = SourceId(chain.sources.count());
@@ -150,6 +151,8 @@ struct Chain<'a> {
     sources: &'a mut Sources,
     diagnostics: &'a mut Diagnostics,
     paths: Vec<PathBuf>,
+    /// Files that modules come from, read once.
+    lent: HashMap<PathBuf, Option<Table>>,
     /// Something could not be read, so that checks of the rest would report what follows from it.
     broken: bool,
 }
@@ -198,17 +201,85 @@ impl Chain<'_> {
             Some((place, _, found)) => self.fail(place, DocumentProblem::SchemaUnknown { found }),
         }
         let base = match table.remove("extends") {
-            Some(entry) => self.base(&entry.value),
+            Some(entry) => self.other(&entry.value, "extends"),
             None => None,
         };
+        self.borrow_modules(&mut table);
         Some(merge(base, table, self.diagnostics))
     }
 
-    fn base(&mut self, extends: &Value) -> Option<Table> {
+    /// Puts the modules of other files (`modules.NAME.from`) in the place of their names.
+    fn borrow_modules(&mut self, table: &mut Table) {
+        let borrows = |value: &Value| {
+            let modules = value.as_table().into_iter().flat_map(Table::iter);
+            let mut keys = modules.filter_map(|(_, module)| module.value.as_table());
+            keys.any(|keys| keys.contains("from"))
+        };
+        if !table.get("modules").is_some_and(borrows) {
+            return;
+        }
+        let Some(modules) = table.get_mut("modules").and_then(Value::as_table_mut) else {
+            return;
+        };
+        for (name, entry) in modules.iter_mut() {
+            let Some(from) = entry
+                .value
+                .as_table_mut()
+                .and_then(|keys| keys.remove("from"))
+            else {
+                continue;
+            };
+            let own = entry.value.as_table_mut();
+            let wanted = own.and_then(|keys| keys.remove("module"));
+            let (wanted, place) = match &wanted {
+                Some(Entry { value, .. }) => (value.as_text().unwrap_or(name), value.place),
+                None => (name, from.value.place),
+            };
+            let (wanted, lent) = (wanted.to_owned(), self.lender(&from.value));
+            let Some(lent) = lent else { continue };
+            let empty = Table::new();
+            let of_file = lent.get("modules").and_then(Value::as_table);
+            let of_file = of_file.unwrap_or(&empty);
+            let Some(Data::Table(mut module)) =
+                of_file.get(&wanted).map(|module| module.data.clone())
+            else {
+                let known = of_file.keys().map(str::to_owned).collect();
+                let name = wanted;
+                self.fail(place, DocumentProblem::UnknownModule { name, known });
+                continue;
+            };
+            if let Some(entry) = lent.entry("modules")
+                && !module.contains("modules")
+            {
+                module.insert("modules", entry.clone());
+            }
+            let laid_over = std::mem::replace(&mut entry.value.data, Data::Table(module));
+            if let (Data::Table(over), Some(module)) = (laid_over, entry.value.as_table_mut()) {
+                for (key, entry) in over {
+                    lay(module, key, entry);
+                }
+            }
+        }
+    }
+
+    fn lender(&mut self, from: &Value) -> Option<Table> {
+        let path = from
+            .as_text()
+            .map(|name| normal(&self.sources.resolve(from.place, name)));
+        if let Some(known) = path.as_ref().and_then(|path| self.lent.get(path)) {
+            return known.clone();
+        }
+        let lent = self.other(from, "from");
+        self.lent.extend(path.map(|path| (path, lent.clone())));
+        lent
+    }
+
+    /// The tables of another file that this one names.
+    fn other(&mut self, extends: &Value, key: &str) -> Option<Table> {
         let place = extends.place;
         let Some(name) = extends.as_text() else {
             let (key, expected) = (
-                Some("extends".to_owned()),
+                Some(key.to_owned()),
                 "the path of a file in quotes".to_owned(),
             );
             self.fail(

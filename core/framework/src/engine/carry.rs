@@ -218,7 +218,7 @@ fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usiz
     let (gathers, truth): (&[usize], Option<usize>) = match &node.role {
         PlannedRole::Feature { gathers, .. } => (gathers, None),
         PlannedRole::Estimator { gathers, truth, .. } => (gathers, Some(truth.slot)),
-        PlannedRole::Combiner { voters, truth } => {
+        PlannedRole::Combiner { voters, truth, .. } => {
             (std::slice::from_ref(voters), truth.map(|truth| truth.slot))
         }
     };

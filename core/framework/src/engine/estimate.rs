@@ -69,19 +69,20 @@ impl Estimate {
 
     /// The prediction and its stamp, the oldest among the values used; none where one of them is missing.
     pub(crate) fn run(&mut self, gathered: &[Gathered], now: Instant) -> Option<(f64, Instant)> {
-        let mut oldest = None;
+        let mut oldest = if self.places.is_empty() {
+            now
+        } else {
+            Instant::MAX
+        };
         for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
             let from = &gathered[gather];
             *value = from.values[place];
             if value.is_nan() {
                 return None;
             }
-            let stamp = from.stamps[place];
-            oldest = Some(oldest.map_or(stamp, |o: Instant| o.min(stamp)));
+            oldest = oldest.min(from.stamps[place]);
         }
         let prediction = self.predictor.predict(&self.row);
-        prediction
-            .is_finite()
-            .then_some((prediction, oldest.unwrap_or(now)))
+        prediction.is_finite().then_some((prediction, oldest))
     }
 }

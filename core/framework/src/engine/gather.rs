@@ -1,9 +1,11 @@
 //! Decides what a node sees of the slots that it reads: fresh or held, how old, how far back; not what it does with it.
 
+use std::ops::Range;
+
 use super::Slots;
 use super::history::{Cursor, History};
 use crate::channel::{ABSENT, UNCHANGED};
-use crate::compile::Gather;
+use crate::compile::{Entry, Gather};
 use crate::node::Read;
 use crate::time::{Duration, Instant};
 
@@ -17,6 +19,8 @@ pub(crate) struct Gathered {
     /// Whether any of the slots, read without a lag, has a new value at this tick.
     pub(crate) fresh: bool,
     cursors: Vec<Cursor>,
+    /// The slots, where they lie side by side and none is read with a lag.
+    side_by_side: Option<Range<usize>>,
 }
 
 impl Gathered {
@@ -27,6 +31,7 @@ impl Gathered {
             stamps: vec![Instant::MIN; width],
             fresh: false,
             cursors: vec![0; width],
+            side_by_side: side_by_side(&gather.entries),
         }
     }
 
@@ -38,30 +43,62 @@ impl Gathered {
         histories: &[Option<History>],
         now: Instant,
     ) {
+        match self.side_by_side.clone() {
+            Some(range) => self.read_range(gather, slots, range, now),
+            None => self.read_each(gather, slots, histories, now),
+        }
+    }
+
+    /// A whole port, as it is most often read. It has a loop of its own since it is the widest of a tick.
+    fn read_range(&mut self, gather: &Gather, slots: &Slots, range: Range<usize>, now: Instant) {
+        let tick = slots.tick;
+        let (values, written) = (&slots.values[range.clone()], &slots.written[range.clone()]);
+        self.stamps.copy_from_slice(&slots.stamps[range]);
+        let from = values.iter().zip(written).zip(&self.stamps);
+        let to = self.values.iter_mut().zip(&gather.entries);
+        let mut fresh = false;
+        for ((to, entry), ((&value, &written), &stamp)) in to.zip(from) {
+            fresh |= written == tick && !value.is_nan();
+            *to = seen(gather.read, entry, value, written == tick, now - stamp);
+        }
+        self.fresh = fresh;
+    }
+
+    fn read_each(
+        &mut self,
+        gather: &Gather,
+        slots: &Slots,
+        histories: &[Option<History>],
+        now: Instant,
+    ) {
         self.fresh = false;
         for (i, entry) in gather.entries.iter().enumerate() {
-            let (value, stamp) = if entry.lag > Duration::ZERO {
-                let history = histories[entry.slot]
-                    .as_ref()
-                    .expect("a slot that is read with a lag has a history");
-                let (value, stamp) =
-                    history.at(now - entry.lag, entry.max_age, &mut self.cursors[i]);
-                (value, stamp + entry.lag)
-            } else {
-                let (value, stamp) = (slots.values[entry.slot], slots.stamps[entry.slot]);
-                let new = slots.written[entry.slot] == slots.tick && !value.is_nan();
-                self.fresh |= new;
-                match gather.read {
-                    Read::Fresh if slots.written[entry.slot] != slots.tick => (UNCHANGED, stamp),
-                    Read::Held | Read::Truth if !value.is_nan() && now - stamp > entry.max_age => {
-                        (ABSENT, stamp)
-                    }
-                    _ => (value, stamp),
-                }
-            };
-            self.values[i] = value;
+            if entry.lag > Duration::ZERO {
+                self.read_past(i, entry, histories, now);
+                continue;
+            }
+            let (value, stamp) = (slots.values[entry.slot], slots.stamps[entry.slot]);
+            let ran = slots.ran(entry.slot);
+            self.fresh |= ran && !value.is_nan();
+            self.values[i] = seen(gather.read, entry, value, ran, now - stamp);
             self.stamps[i] = stamp;
         }
+        for conversion in &gather.conversions {
+            let value = &mut self.values[conversion.entry];
+            // A NaN says why there is no value, and must stay as it is.
+            if !value.is_nan() {
+                *value *= conversion.factor();
+            }
+        }
+    }
+
+    fn read_past(&mut self, i: usize, entry: &Entry, histories: &[Option<History>], now: Instant) {
+        let history = histories[entry.slot]
+            .as_ref()
+            .expect("a slot that is read with a lag has a history");
+        let (value, stamp) = history.at(now - entry.lag, entry.max_age, &mut self.cursors[i]);
+        self.values[i] = value;
+        self.stamps[i] = stamp + entry.lag;
     }
 
     /// The oldest stamp among the values that are there.
@@ -84,5 +121,23 @@ impl Gathered {
         self.values.fill(ABSENT);
         self.cursors.fill(0);
         self.fresh = false;
+    }
+}
+
+fn side_by_side(entries: &[Entry]) -> Option<Range<usize>> {
+    let first = entries.first()?.slot;
+    let in_place = |(i, entry): (usize, &Entry)| entry.slot == first + i && entry.lag.is_zero();
+    let all = entries.iter().enumerate().all(in_place);
+    all.then_some(first..first + entries.len())
+}
+
+/// What a reader without a lag sees of a slot.
+#[inline]
+fn seen(read: Read, entry: &Entry, value: f64, ran: bool, age: Duration) -> f64 {
+    match read {
+        Read::Fresh if !ran => UNCHANGED,
+        Read::Fresh => value,
+        Read::Held | Read::Truth if !value.is_nan() && age > entry.max_age => ABSENT,
+        Read::Held | Read::Truth => value,
     }
 }

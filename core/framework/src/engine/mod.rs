@@ -134,9 +134,13 @@ impl Engine {
                         },
                     }
                 }
-                (PlannedRole::Combiner { voters, truth }, Role::Combiner(spec)) => Running::Vote(
-                    Vote::new(spec.build(widths[*voters]), widths[*voters], *truth),
-                ),
+                (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
+                    Running::Vote(Vote::new(
+                        spec.build(widths[*voters]),
+                        widths[*voters],
+                        *truth,
+                    ))
+                }
                 _ => unreachable!("a plan gives each node the role of its specification"),
             });
         }
@@ -396,12 +400,25 @@ impl Engine {
             }
             Running::Vote(vote) => {
                 vote.release(now);
-                let PlannedRole::Combiner { voters, .. } = node.role else {
+                let PlannedRole::Combiner {
+                    voters, weights, ..
+                } = node.role
+                else {
                     unreachable!("a vote is planned as a combiner")
                 };
-                if self.gathered[voters].fresh {
-                    let (value, stamp) = vote.run(&self.gathered[voters], now);
-                    self.slots.set(node.slots.start, value, stamp);
+                if !self.gathered[voters].fresh {
+                    return;
+                }
+                let (value, stamp) = vote.run(&self.gathered[voters], now);
+                self.slots.set(node.slots.start, value, stamp);
+                if weights {
+                    let slots = node.slots.start + 1..node.slots.end;
+                    vote.weights(
+                        &self.gathered[voters],
+                        &mut self.slots.values[slots.clone()],
+                    );
+                    self.slots.stamps[slots.clone()].fill(stamp);
+                    self.slots.written[slots].fill(self.slots.tick);
                 }
             }
         }

@@ -55,6 +55,12 @@ impl Vote {
         (combined, votes.oldest().unwrap_or(now))
     }
 
+    /// The weights by which the votes of this tick are combined.
+    pub(crate) fn weights(&self, votes: &Gathered, weights: &mut [f64]) {
+        weights.fill(f64::NAN);
+        self.combine.weights(Votes(&votes.values), weights);
+    }
+
     /// The truth to look at after all outputs, if any.
     pub(crate) fn truth(&self) -> Option<usize> {
         self.learning.as_ref().map(|learning| learning.link.slot)

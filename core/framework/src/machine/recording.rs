@@ -36,6 +36,12 @@ impl<'a> Simulated<'a> {
         self
     }
 
+    /// What the simulation is asked for.
+    #[must_use]
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
     /// The simulation from its start, faults included.
     ///
     /// # Errors

@@ -55,6 +55,11 @@ pub trait Combiner: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// Whether its answer is a sum of votes by weights, which the port `weights` then shows.
+    fn weighs(&self) -> bool {
+        false
+    }
+
     /// How long what was learned counts; the engine keeps so much of the past for warming up.
     fn memory(&self) -> Duration {
         Duration::ZERO
@@ -68,6 +73,9 @@ pub trait Combiner: Debug + Send + Sync {
 pub trait Combine: Send {
     /// The combined prediction; NaN where none can be given.
     fn combine(&self, votes: Votes<'_>) -> f64;
+
+    /// The weights by which these votes would be combined, for kinds that weigh; NaN for a vote that is not there.
+    fn weights(&self, _votes: Votes<'_>, _weights: &mut [f64]) {}
 
     /// A truth and the votes that were cast for it. `arrived` is when the truth was measured.
     fn observe(&mut self, _votes: Votes<'_>, _truth: f64, _arrived: Instant) {}
@@ -95,9 +103,9 @@ pub trait Combine: Send {
 #[derive(Debug, Clone, Copy)]
 pub struct Votes<'a>(pub &'a [f64]);
 
-impl Votes<'_> {
+impl<'a> Votes<'a> {
     /// The votes that are there, each with its voter's index.
-    pub fn present(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub fn present(self) -> impl Iterator<Item = (usize, f64)> + 'a {
         self.0
             .iter()
             .copied()

@@ -1,6 +1,7 @@
 //! Decides what the author of a feature implements: from inputs at a tick to outputs.
 
 use std::fmt::Debug;
+use std::ops::Range;
 
 use super::{InputPort, Inputs, Mistake, OutputPort, Restored, State};
 use crate::engine::Gathered;
@@ -167,6 +168,13 @@ impl Outputs<'_> {
         self.values[index] = value;
         self.stamps[index] = stamp;
         self.written[index] = self.tick;
+    }
+
+    /// Gives values with one stamp to channels side by side: the answer is to be filled with them.
+    pub fn fill_stamped(&mut self, range: Range<usize>, stamp: Instant) -> &mut [f64] {
+        self.stamps[range.clone()].fill(stamp);
+        self.written[range.clone()].fill(self.tick);
+        &mut self.values[range]
     }
 
     /// The number of output channels, over all ports.

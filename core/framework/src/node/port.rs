@@ -22,6 +22,8 @@ pub struct InputPort {
     pub read: Read,
     /// Whether a graph may leave it out.
     pub optional: bool,
+    /// The unit in which its channels are given; none where it takes any. Channels of another are converted by a factor.
+    pub unit: Option<&'static str>,
     /// One line for people.
     pub summary: &'static str,
 }
@@ -34,6 +36,7 @@ impl InputPort {
             name,
             read: Read::Fresh,
             optional: false,
+            unit: None,
             summary,
         }
     }
@@ -45,6 +48,7 @@ impl InputPort {
             name,
             read: Read::Held,
             optional: false,
+            unit: None,
             summary,
         }
     }
@@ -56,8 +60,16 @@ impl InputPort {
             name: "truth",
             read: Read::Truth,
             optional: false,
+            unit: None,
             summary,
         }
+    }
+
+    /// The same port, its channels given in a unit (UCUM): `mK/min`.
+    #[must_use]
+    pub const fn in_unit(mut self, unit: &'static str) -> Self {
+        self.unit = Some(unit);
+        self
     }
 
     /// The same port, which a graph may leave out.
@@ -100,7 +112,7 @@ impl Inputs {
 /// What a kind finds wrong with its parameters or inputs when a graph is compiled.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mistake {
-    /// The parameter (`windows`, `selection.folds`) or input port (`inputs.signal`) at fault.
+    /// The parameter (`windows`, `selection.folds`, `lags.1` for the second of a list) or input port (`inputs.signal`) at fault.
     pub at: String,
     /// What was found and what is allowed.
     pub message: String,

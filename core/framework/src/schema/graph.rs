@@ -30,7 +30,9 @@ pub fn graph_schema() -> Value {
     let unit = of::<crate::unit::Unit>(&mut generator);
     let mut definitions = Definitions::default();
     for (name, schema) in generator.take_definitions(true) {
-        definitions.taken.insert(name, as_draft_7(&schema, &str::to_owned));
+        definitions
+            .taken
+            .insert(name, as_draft_7(&schema, &str::to_owned));
     }
     let nodes: Vec<Value> = all
         .iter()
@@ -233,7 +235,9 @@ fn by_name(choices: &[Value]) -> Option<Map<String, Value>> {
 /// stands, not as "none of these".
 fn by_tag(choices: &[Value]) -> Option<Map<String, Value>> {
     let first = choices.first()?["properties"].as_object()?;
-    let (tag, _) = first.iter().find(|(_, property)| property.get("const").is_some())?;
+    let (tag, _) = first
+        .iter()
+        .find(|(_, property)| property.get("const").is_some())?;
     let mut names = Vec::new();
     let mut texts = Vec::new();
     let mut decided = Vec::new();

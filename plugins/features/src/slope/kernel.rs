@@ -1,30 +1,29 @@
 //! The least-squares slope over trailing windows: exact sums for many channels and windows at once, row by row.
 //! It decides when a window has a value; it does not decide which windows there are, nor what a caller does with absence.
 //!
-//! Rows are cut into blocks of at most 32, shared by all windows. A window is the end of one block, some whole blocks and the
-//! current block (`kernel/window.rs`), each with centred sums (`kernel/sums.rs`); a slope merges the three (`kernel/parts.rs`). Nothing is ever
-//! subtracted from a sum, so that a sample of 1e9 leaves no trace when it leaves a window, and times are measured from
-//! the block's own origin, so that no precision is lost to the epoch. The longest single step is the turn of a window's stack of
-//! blocks, one merge per block: 42 for 1,343 rows.
+//! Rows are cut into blocks of at most 32, shared by all windows (`kernel/blocks.rs`). A window is the end of one block, all
+//! blocks after it and the current one: three sums (`kernel/sums.rs`) that are kept for all windows at once, added up for each
+//! (`kernel/parts.rs`). Nothing is ever subtracted from a sum, so that a sample of 1e9 leaves no trace when it leaves a window.
+//! Times are measured from an instant within the window and values from one near them, so that no precision is lost to the
+//! epoch or an offset.
 
+mod blocks;
 mod parts;
 mod rows;
 mod saved;
 mod sums;
-mod window;
 
 #[cfg(test)]
 mod tests;
 
+use std::array::from_fn;
+
 use serde::{Deserialize, Serialize};
 
-use parts::{Parts, shift};
-use rows::{Rows, all_present};
-use sums::{Quad, Table, quads};
-use window::Window;
-
-/// Rows of a block at most: a longer block saves merges of blocks and costs a longer step when it closes.
-const BLOCK_ROWS: u64 = 32;
+use blocks::Blocks;
+use parts::{Line, Moments, Parts};
+use rows::Rows;
+use sums::{Quad, quads};
 
 /// Samples of this size or above count as absent, like infinities: their squares would overflow.
 const LIMIT: f64 = 1e100;
@@ -65,22 +64,60 @@ pub struct RollingSlope {
     squares: bool,
     windows: Vec<Window>,
     rows: Rows,
-    /// Sums of the current block, and an empty run.
-    current: Table,
-    /// Times of each channel's first and newest sample since the reset.
-    first: Vec<Option<i64>>,
-    newest: Vec<Option<i64>>,
-    /// Time of the last row in which all were present; `newest` is left as it is there.
-    all_present_at: Option<i64>,
-    /// Latest of the first samples and oldest of the newest ones, once every channel has one.
-    all_begun: Option<i64>,
-    all_seen: Option<i64>,
-    /// Slopes by window, before they are laid out by channel.
-    slopes: Vec<Quad>,
+    blocks: Blocks,
 }
 
-const CURRENT: usize = 0;
-const EMPTY: usize = 1;
+/// One trailing window over the rows.
+#[derive(Clone, Debug)]
+struct Window {
+    width_ns: i64,
+    /// What its samples must span, and how long ago a channel must have begun, in nanoseconds.
+    needed_span: f64,
+    needed_open: f64,
+    /// The oldest row in it, and the block of that row.
+    head: u64,
+    block: usize,
+    parts: Parts,
+    /// Nanoseconds from the oldest row to the newest.
+    span: f64,
+    kind: Kind,
+}
+
+/// What is known of all channels of a window at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// No channel has a value.
+    Absent,
+    /// Every channel has one, and is present in every row.
+    Complete,
+    /// Each is to be looked at.
+    Gaps,
+}
+
+impl Window {
+    fn new(width_ns: i64, coverage: &Coverage) -> Window {
+        let width = width_ns as f64;
+        Window {
+            width_ns,
+            needed_span: (coverage.min_coverage * width).max(1.0),
+            needed_open: if coverage.cold_partial { 0.0 } else { width },
+            head: 0,
+            block: 0,
+            parts: Parts::NONE,
+            span: 0.0,
+            kind: Kind::Absent,
+        }
+    }
+
+    /// Drops the rows that are outside of the window that ends at `t_ns`.
+    #[inline]
+    fn advance(&mut self, rows: &Rows, t_ns: i64) {
+        let limit = t_ns.saturating_sub(self.width_ns);
+        while self.head < rows.next() && rows.time(self.head) <= limit {
+            self.head += 1;
+        }
+    }
+}
 
 impl RollingSlope {
     /// A kernel for windows of the given widths in nanoseconds (at least 1 is assumed) and `channels` channels per row.
@@ -92,38 +129,31 @@ impl RollingSlope {
         no_value: NoValue,
         squares: bool,
     ) -> RollingSlope {
-        let mut kernel = RollingSlope {
+        let rows = Rows::new(channels);
+        let mut blocks = Blocks::new(channels, windows_ns.len(), squares);
+        blocks.rebuild(&rows, 0);
+        RollingSlope {
             channels,
             coverage,
             no_value,
             squares,
             windows: windows_ns
                 .iter()
-                .map(|&width| Window::new(width.max(1), channels, squares))
+                .map(|&width_ns| Window::new(width_ns.max(1), &coverage))
                 .collect(),
-            rows: Rows::new(channels, squares),
-            current: Table::new(channels, squares, 2),
-            first: vec![None; channels],
-            newest: vec![None; channels],
-            all_present_at: None,
-            all_begun: None,
-            all_seen: None,
-            slopes: vec![[0.0; 4]; windows_ns.len() * quads(channels)],
-        };
-        kernel.reset();
-        kernel
+            rows,
+            blocks,
+        }
     }
 
     /// Forgets all samples, as at a segment break. Memory is kept.
     pub fn reset(&mut self) {
         self.rows.reset();
-        self.windows.iter_mut().for_each(Window::reset);
-        self.current.clear(CURRENT);
-        self.first.fill(None);
-        self.newest.fill(None);
-        self.all_present_at = None;
-        self.all_begun = None;
-        self.all_seen = None;
+        self.blocks.reset();
+        for window in &mut self.windows {
+            window.head = 0;
+            window.block = 0;
+        }
     }
 
     /// Number of channels.
@@ -138,14 +168,13 @@ impl RollingSlope {
 
     /// Time of the last row since the reset.
     pub fn last_time(&self) -> Option<i64> {
-        let rows = self.rows.next();
-        (rows > 0).then(|| self.rows.time(rows - 1))
+        self.rows.last_time()
     }
 
     /// Time of the newest sample of a channel since the reset: the stamp of its slopes.
     pub fn newest_ns(&self, channel: usize) -> Option<i64> {
-        let newest = self.newest.get(channel)?;
-        (*newest).max(self.all_present_at)
+        let [_, newest] = self.rows.first_and_newest(channel);
+        newest
     }
 
     /// Adds a row: one sample per channel at time `t_ns`, NaN where absent (missing ones at the end are absent too).
@@ -154,190 +183,144 @@ impl RollingSlope {
         if self.last_time().is_some_and(|last| t_ns <= last) {
             return false;
         }
-        let block = self.rows.current_block();
-        let start = self.rows.current_start();
-        let mut oldest = self.rows.next();
-        let mut close = self.rows.next() - start >= BLOCK_ROWS;
+        let mut newest_head = 0;
         for window in &mut self.windows {
             window.advance(&self.rows, t_ns);
-            close |= window.head() > start;
-            oldest = oldest.min(window.head());
+            newest_head = newest_head.max(window.head);
         }
-        if close {
-            self.close_block();
+        let full = self.blocks.is_full(&self.rows, newest_head);
+        if full {
+            self.blocks.cut(&self.rows);
         }
-        self.append(t_ns, y, oldest);
+        let mut oldest_block = self.blocks.starts().len() - 1;
         for window in &mut self.windows {
-            window.settle(&self.rows);
+            window.block = self.blocks.find(window.head, window.block);
+            oldest_block = oldest_block.min(window.block);
         }
-        if close {
-            let kept = self.windows.iter().map(Window::head_block).min();
-            self.rows.forget_blocks(kept.unwrap_or(block));
+        if full {
+            self.blocks.close(&self.rows, t_ns, oldest_block);
+            let windows = self.windows.iter_mut();
+            windows.for_each(|window| window.block -= oldest_block);
         }
-        self.spread();
+        let oldest = self.blocks.oldest();
+        if self.rows.reserve(oldest) {
+            self.blocks.rebuild(&self.rows, t_ns);
+        }
+        let begun = self.rows.append(t_ns, y, LIMIT, oldest);
+        self.blocks.add_newest(&self.rows, begun);
+        self.find_parts(t_ns);
         true
     }
 
-    fn close_block(&mut self) {
-        let block = self.rows.current_block();
-        self.rows.close_block();
-        for window in &mut self.windows {
-            window.close_block(&self.rows, block);
-        }
-        self.current.clear(CURRENT);
-    }
-
-    fn append(&mut self, t_ns: i64, y: &[f64], oldest: u64) {
-        let present = |&y: &f64| if y.abs() < LIMIT { y } else { f64::NAN };
-        self.rows.append(t_ns, y.iter().map(present), oldest);
-        let row = self.rows.samples(self.rows.next() - 1);
-        let all_present = all_present(row);
-        self.current.add(CURRENT, t_ns, row, all_present);
-        if all_present && self.all_begun.is_some() {
-            self.all_present_at = Some(t_ns);
-            self.all_seen = Some(t_ns);
-        } else {
-            let row = &row.as_flattened()[..self.channels];
-            for (channel, y) in row.iter().enumerate() {
-                if !y.is_nan() {
-                    self.first[channel].get_or_insert(t_ns);
-                    self.newest[channel] = Some(t_ns);
-                }
+    /// Finds the parts of each window, of which the last row, at `t_ns`, is the newest.
+    fn find_parts(&mut self, t_ns: i64) {
+        let min_samples = self.coverage.min_samples as f64;
+        let (current, complete_from) = (self.blocks.current_start(), self.rows.complete_from());
+        for (index, window) in self.windows.iter_mut().enumerate() {
+            if window.head > current {
+                self.blocks.sum_short(&self.rows, index, window.head);
             }
-            self.summarise_times();
-        }
-    }
-
-    fn summarise_times(&mut self) {
-        if self.all_begun.is_none() && self.first.iter().all(Option::is_some) {
-            self.all_begun = self.first.iter().copied().flatten().max();
-        }
-        if self.all_begun.is_some() {
-            let newest = self.newest.iter().copied().flatten().min();
-            self.all_seen = newest.max(self.all_present_at);
-        }
-    }
-
-    /// In windows with gaps all three parts are read per channel.
-    fn spread(&mut self) {
-        for window in &self.windows {
-            let head = self.head_row(window);
-            let complete = self.current.common(CURRENT).complete
-                && window.whole_common().complete
-                && head.is_none_or(|row| self.rows.tail_common(row).complete);
-            if !complete {
-                self.current.spread(CURRENT);
-                if let Some(row) = head {
-                    self.rows.spread(row);
-                }
-            }
-        }
-    }
-
-    /// The row from which the window takes the end of a closed block, if it reaches back beyond the current one.
-    #[inline]
-    fn head_row(&self, window: &Window) -> Option<u64> {
-        (window.head() < self.rows.current_start()).then(|| window.head())
-    }
-
-    /// The three parts of a window, oldest first.
-    #[inline(always)]
-    fn parts<'a>(&'a self, window: &'a Window) -> Parts<'a> {
-        let head = match self.head_row(window) {
-            Some(row) => self.rows.tail(row),
-            None => self.current.run(EMPTY),
-        };
-        let (whole, now) = (window.whole(), self.current.run(CURRENT));
-        Parts {
-            head_shift: shift(head.common(), now.common()),
-            whole_shift: shift(whole.common(), now.common()),
-            head,
-            whole,
-            now,
+            let (head, block) = (window.head, window.block);
+            window.parts = self.blocks.parts(&self.rows, index, head, block);
+            // No more than the width of the window.
+            window.span = t_ns.wrapping_sub(self.rows.time(head)) as f64;
+            let enough = window.span >= window.needed_span && window.parts.rows() >= min_samples;
+            window.kind = match enough {
+                false => Kind::Absent,
+                true if head < complete_from => Kind::Gaps,
+                true => Kind::Complete,
+            };
         }
     }
 
     /// Slopes at the last row, per second: `out[channel * W + window]`, with one of the two NaNs where there is no value.
     /// An `out` of any other length than `C * W` is filled with absence.
-    pub fn slopes(&mut self, out: &mut [f64]) {
+    pub fn slopes(&self, out: &mut [f64]) {
         let wide = self.windows.len();
         if out.len() != self.channels * wide || self.last_time().is_none() {
             out.fill(self.no_value.absent);
             return;
         }
-        let mut slopes = std::mem::take(&mut self.slopes);
-        let quads = quads(self.channels);
-        for (index, window) in self.windows.iter().enumerate() {
-            let slopes = &mut slopes[index * quads..(index + 1) * quads];
-            let parts = self.parts(window);
-            if parts.complete() {
-                parts.slopes(slopes);
-            } else {
-                parts.slopes_with_gaps(slopes);
-            }
-            if !self.all_have_values(window, &parts) {
-                for (channel, slope) in slopes.as_flattened_mut()[..self.channels]
-                    .iter_mut()
-                    .enumerate()
-                {
-                    if let Err(nan) = self.has_value(window, &parts, channel) {
-                        *slope = nan;
+        let tables = self.blocks.tables();
+        for (quad, out) in out.chunks_mut((4 * wide).max(1)).enumerate() {
+            let mut out = channels(out, wide);
+            for (index, window) in self.windows.iter().enumerate() {
+                let mut slopes = match window.kind {
+                    Kind::Complete => window.parts.slopes(tables, quad),
+                    Kind::Gaps => self.slopes_with_gaps(window, quad),
+                    Kind::Absent => [self.no_value.absent; 4],
+                };
+                self.mark_cold(window, quad, &mut slopes);
+                for (out, slope) in out.iter_mut().zip(slopes) {
+                    if let Some(out) = out.get_mut(index) {
+                        *out = slope;
                     }
                 }
             }
         }
-        let by_window = slopes.as_flattened();
-        for channel in 0..self.channels {
-            let out = &mut out[channel * wide..(channel + 1) * wide];
-            let mut place = channel;
-            for out in out {
-                *out = by_window[place];
-                place += 4 * quads;
+    }
+
+    /// Slopes of four channels in a window with rows from which some channel is absent.
+    #[inline(always)]
+    fn slopes_with_gaps(&self, window: &Window, quad: usize) -> Quad {
+        let moments = window.parts.moments(self.blocks.tables(), quad);
+        let mut slopes = moments.slopes();
+        if moments.any_thin() {
+            self.mend(window, quad, &moments, &mut slopes);
+        }
+        self.mark_absent(window, quad, &moments.n, &mut slopes);
+        slopes
+    }
+
+    /// Computes anew, from the samples, the slopes whose sums have lost too many digits.
+    #[cold]
+    fn mend(&self, window: &Window, quad: usize, moments: &Moments, slopes: &mut Quad) {
+        for (i, slope) in slopes.iter_mut().enumerate() {
+            if moments.thin(i) {
+                *slope = self.line(window, 4 * quad + i).slope();
             }
         }
-        self.slopes = slopes;
     }
 
-    /// Whether every channel surely has a value; if not, each is looked at.
-    #[inline]
-    fn all_have_values(&self, window: &Window, parts: &Parts<'_>) -> bool {
-        let (Some(begun), Some(seen), Some(t)) = (self.all_begun, self.all_seen, self.last_time())
-        else {
-            return false;
-        };
-        let (head, whole, now) = (
-            parts.head.common(),
-            parts.whole.common(),
-            parts.now.common(),
-        );
-        let oldest = if head.rows > 0.0 { head } else { now };
-        let span = seen.saturating_sub(oldest.origin) as f64 - oldest.latest_first;
-        oldest.fewest > 0.0
-            && head.fewest + whole.fewest + now.fewest >= self.coverage.min_samples as f64
-            && span >= self.needed_span(window)
-            && (self.coverage.cold_partial || begun <= t.saturating_sub(window.width_ns()))
+    /// Of four channels with `n` samples in a window, marks those with too few or too close together.
+    #[inline(always)]
+    fn mark_absent(&self, window: &Window, quad: usize, n: &Quad, values: &mut Quad) {
+        let (wait, silent) = (self.rows.wait(window.head), self.rows.silent());
+        let (wait, silent) = (&wait[quad], &silent[quad]);
+        let (min_samples, absent) = (self.coverage.min_samples as f64, self.no_value.absent);
+        let span: Quad = from_fn(|i| window.span - silent[i] - wait[i]);
+        let far: Quad = from_fn(|i| {
+            if span[i] >= window.needed_span {
+                values[i]
+            } else {
+                absent
+            }
+        });
+        *values = from_fn(|i| if n[i] >= min_samples { far[i] } else { absent });
     }
 
-    /// Whether a channel has a value, or the NaN that says why not.
-    fn has_value(&self, window: &Window, parts: &Parts<'_>, channel: usize) -> Result<(), f64> {
-        let (begun, newest) = (self.first[channel], self.newest_ns(channel));
-        let (Some(begun), Some(newest), Some(t)) = (begun, newest, self.last_time()) else {
-            return Err(self.no_value.absent);
-        };
-        if !self.coverage.cold_partial && begun > t.saturating_sub(window.width_ns()) {
-            return Err(self.no_value.cold);
-        }
-        let span = newest.saturating_sub(parts.now.common().origin) as f64 - parts.first(channel);
-        if parts.n(channel) >= self.coverage.min_samples as f64 && span >= self.needed_span(window)
-        {
-            Ok(())
-        } else {
-            Err(self.no_value.absent)
+    /// Marks the channels that began within a window.
+    #[inline(always)]
+    fn mark_cold(&self, window: &Window, quad: usize, values: &mut Quad) {
+        if self.rows.least_open() < window.needed_open {
+            for (value, &open) in values.iter_mut().zip(&self.rows.open()[quad]) {
+                if open >= 0.0 && open < window.needed_open {
+                    *value = self.no_value.cold;
+                }
+            }
         }
     }
 
-    fn needed_span(&self, window: &Window) -> f64 {
-        (self.coverage.min_coverage * window.width_ns() as f64).max(1.0)
+    /// Computed from the samples of a channel in a window.
+    #[cold]
+    fn line(&self, window: &Window, channel: usize) -> Line {
+        let origin = self.blocks.origins().as_flattened()[channel];
+        let head_ns = self.rows.time(window.head);
+        let samples = (window.head..self.rows.next()).map(|row| {
+            let t = self.rows.time(row).saturating_sub(head_ns) as f64;
+            (t, self.rows.samples(row).as_flattened()[channel] - origin)
+        });
+        Line::through(samples.filter(|(_, y)| !y.is_nan()))
     }
 
     /// Standard errors of the slopes at the last row, per second, laid out as in [`slopes`](Self::slopes): `sqrt(SSR / (n − 2) / Σ(x − x̄)²)`,
@@ -346,21 +329,47 @@ impl RollingSlope {
     /// `SSR = Σ(y − ȳ)² − slope·Σ(x − x̄)(y − ȳ)` loses digits as `r²` approaches 1: its relative error is about 1e-15 / (1 − r²).
     pub fn stderr(&self, out: &mut [f64]) {
         let wide = self.windows.len();
-        if !self.squares || out.len() != self.channels * wide {
+        let fits = self.squares && out.len() == self.channels * wide;
+        if !fits || self.last_time().is_none() {
             out.fill(self.no_value.absent);
             return;
         }
         for (index, window) in self.windows.iter().enumerate() {
-            let parts = self.parts(window);
-            for channel in 0..self.channels {
-                out[channel * wide + index] = match self.has_value(window, &parts, channel) {
-                    Ok(()) => parts
-                        .moments(channel)
-                        .stderr()
-                        .unwrap_or(self.no_value.absent),
-                    Err(nan) => nan,
+            for quad in 0..quads(self.channels) {
+                let tables = self.blocks.tables();
+                let moments = match window.kind {
+                    Kind::Gaps => window.parts.moments(tables, quad),
+                    _ => window.parts.moments_of_complete(tables, quad),
                 };
+                let mut errors = from_fn(|i| {
+                    let line = match moments.thin(i) {
+                        true => self.line(window, 4 * quad + i),
+                        false => window.parts.line(tables, quad, &moments, i),
+                    };
+                    line.stderr().unwrap_or(self.no_value.absent)
+                });
+                self.mark_absent(window, quad, &moments.n, &mut errors);
+                self.mark_cold(window, quad, &mut errors);
+                for (out, error) in channels(&mut out[4 * quad * wide..], wide)
+                    .into_iter()
+                    .zip(errors)
+                {
+                    if let Some(out) = out.get_mut(index) {
+                        *out = error;
+                    }
+                }
             }
         }
     }
+}
+
+/// The results of four channels, or of those that there are, `wide` each.
+#[inline(always)]
+fn channels(mut out: &mut [f64], wide: usize) -> [&mut [f64]; 4] {
+    from_fn(|_| {
+        let length = wide.min(out.len());
+        let (channel, others) = std::mem::take(&mut out).split_at_mut(length);
+        out = others;
+        channel
+    })
 }

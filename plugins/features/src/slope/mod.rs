@@ -119,17 +119,15 @@ impl Slope {
             );
         }
         for (i, window) in windows.iter().enumerate() {
+            let at = format!("windows.{i}");
             if *window <= Duration::ZERO {
                 mistakes.push(Mistake::at(
-                    "windows",
+                    at.as_str(),
                     format!("a window of {window} is no window"),
                 ));
             }
             if windows[..i].contains(window) {
-                mistakes.push(Mistake::at(
-                    "windows",
-                    format!("the window {window} stands twice"),
-                ));
+                mistakes.push(Mistake::at(at, format!("the window {window} stands twice")));
             }
         }
         mistakes
@@ -240,15 +238,17 @@ impl Sloping {
             if sample.is_nan() {
                 continue;
             }
-            for i in channel * self.windows..(channel + 1) * self.windows {
-                let slope = self.results[i];
+            let windows = channel * self.windows..(channel + 1) * self.windows;
+            let slopes = &self.results[windows.clone()];
+            let given =
+                outputs.fill_stamped(offset + windows.start..offset + windows.end, tick.now);
+            for (given, &slope) in given.iter_mut().zip(slopes) {
                 // A NaN says why there is no value, and must stay as it is.
-                let value = if slope.is_nan() {
+                *given = if slope.is_nan() {
                     slope
                 } else {
                     slope * factor
                 };
-                outputs.set_stamped(offset + i, value, tick.now);
             }
         }
     }

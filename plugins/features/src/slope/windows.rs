@@ -1,12 +1,16 @@
 //! Decides which windows a slope is taken over.
 
+use std::fmt;
+
 use athermal_core::node::Mistake;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// The windows of a slope.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Windows {
     /// These lengths.
@@ -33,6 +37,29 @@ pub struct DynamicRange {
     /// How many harmonics there are; 1 or more.
     #[schemars(range(min = 1, max = 100))]
     pub harmonics: u32,
+}
+
+// Not derived, since an untagged enum forgets what was wrong with either form.
+impl<'de> Deserialize<'de> for Windows {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = Windows;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list of durations or a dynamic range")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, lengths: A) -> Result<Windows, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(lengths)).map(Windows::Lengths)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, range: A) -> Result<Windows, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(range)).map(Windows::Range)
+            }
+        }
+        deserializer.deserialize_any(Form)
+    }
 }
 
 impl Windows {

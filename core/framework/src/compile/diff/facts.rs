@@ -229,7 +229,7 @@ fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
             let first = gathers.first().filter(|_| reads_features(node));
             (first.copied().into_iter().collect(), Some(*truth))
         }
-        PlannedRole::Combiner { voters, truth } => (vec![*voters], *truth),
+        PlannedRole::Combiner { voters, truth, .. } => (vec![*voters], *truth),
     };
     let ports = (node.kind.inputs)();
     let data = ports.iter().filter(|port| port.read != Read::Truth);

@@ -1,5 +1,6 @@
 //! From the merged tree to declarations: which sections there are and in which order they are read; each section has a file of its own.
 
+mod modules;
 mod names;
 mod nodes;
 mod outputs;
@@ -58,9 +59,6 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     };
     let known: Vec<&str> = SECTIONS.into_iter().chain([MODEL]).collect();
     known_keys(root, &known, "a graph file", diagnostics);
-    if let Some(modules) = root.entry("modules") {
-        diagnostics.report(modules.key, DocumentProblem::Modules);
-    }
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
     names::check(root, diagnostics);
@@ -68,8 +66,10 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let time = time_base::declare(root.get("time"), diagnostics);
     let sample = time.sample();
     let signals = signals::declare(root.get("signals"), &sets, sample, diagnostics);
-    let nodes = nodes::declare(root.get("nodes"), &sets, sample, diagnostics);
-    let outputs = outputs::declare(root.get("outputs"), diagnostics);
+    modules::check(root.get("modules"), diagnostics);
+    let expanded = modules::expand(root, &sets, diagnostics);
+    let nodes = nodes::declare(&expanded.nodes, &sets, sample, diagnostics);
+    let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
     let mut tests = root.get("tests").cloned();
     if let Some(tests) = &mut tests {
         nodes::convert_samples_but(tests, "name", sample, diagnostics);

@@ -1,9 +1,8 @@
 //! `[nodes]`: each node expanded into one instance per member; kinds, references and parameters are left to the compiler.
 
+use super::modules::Placed;
 use super::placeholder;
-use super::reading::{
-    duration, in_samples, known_keys, missing, one_or_more, samples, table, text,
-};
+use super::reading::{in_samples, known_keys, length, missing, one_or_more, samples, table, text};
 use super::sets::{self, Sets};
 use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
@@ -12,9 +11,9 @@ use crate::document::tree::{Data, Entry, Table, Value};
 use crate::time::Duration;
 
 /// The most instances that a graph may have.
-const MOST_INSTANCES: usize = 200_000;
+pub(super) const MOST_INSTANCES: usize = 200_000;
 /// The most values in all instances; about 100 bytes each.
-const MOST_VALUES: usize = 4_000_000;
+pub(super) const MOST_VALUES: usize = 4_000_000;
 /// Keys that the framework reads; all others are the node's own.
 const OWN_KEYS: [&str; 3] = ["type", "each", "inputs"];
 
@@ -26,41 +25,40 @@ struct Total {
 }
 
 pub(super) fn declare(
-    nodes: Option<&Value>,
+    nodes: &[Placed],
     sets: &Sets,
     sample: Option<Duration>,
     diagnostics: &mut Diagnostics,
 ) -> Vec<NodeDecl> {
-    let Some(nodes) = nodes.and_then(|nodes| table(nodes, "nodes", diagnostics)) else {
-        return Vec::new();
-    };
     let mut total = Total::default();
     let mut declared = Vec::with_capacity(nodes.len());
-    for (name, entry) in nodes.iter() {
-        declared.extend(node(name, entry, sets, sample, &mut total, diagnostics));
+    for placed in nodes {
+        // Inside a module, one place in a file stands for a node of each instance.
+        let context = (!placed.around.is_empty()).then(|| format!("node `{}`", placed.name));
+        let outer = diagnostics.scope(context);
+        declared.extend(node(placed, sets, sample, &mut total, diagnostics));
+        diagnostics.scope(outer);
     }
     declared
 }
 
 fn node(
-    name: &str,
-    entry: &Entry,
+    placed: &Placed,
     sets: &Sets,
     sample: Option<Duration>,
     total: &mut Total,
     diagnostics: &mut Diagnostics,
 ) -> Option<NodeDecl> {
+    let Placed {
+        name,
+        entry,
+        around,
+    } = placed;
     let keys = table(&entry.value, name, diagnostics)?;
     let what = format!("node \"{name}\"");
-    let kind = match (keys.get("type"), keys.entry("module")) {
-        (Some(value), _) => {
-            text(value, "type", diagnostics).map(|kind| (kind.to_owned(), value.place))
-        }
-        (None, Some(module)) => {
-            diagnostics.report(module.key, DocumentProblem::Modules);
-            None
-        }
-        (None, None) => {
+    let kind = match keys.get("type") {
+        Some(value) => text(value, "type", diagnostics).map(|kind| (kind.to_owned(), value.place)),
+        None => {
             missing(
                 &entry.value,
                 "type",
@@ -71,7 +69,8 @@ fn node(
             None
         }
     };
-    let each = each(keys, sets, diagnostics);
+    let own = each(keys, sets, diagnostics);
+    let each = own.map(|own| around_and_own(placed, own, sets));
     if let Some(each) = &each {
         check_placeholders(&entry.value, each, &what, diagnostics);
     }
@@ -100,12 +99,22 @@ fn node(
                 .map(|input| filled_input(input, &member.pairs))
                 .collect(),
             parameters: filled(&parameters, &member.pairs),
+            scopes: scopes(placed, &member),
             member: (!each.is_empty()).then_some(member.name),
         })
         .collect();
-    let each = each.into_iter().map(|(set, _)| set.to_owned()).collect();
+    let each = around
+        .iter()
+        .flat_map(|around| &around.each)
+        .cloned()
+        .chain(
+            each.iter()
+                .skip(sets_around(placed))
+                .map(|(set, _)| set.clone()),
+        )
+        .collect();
     Some(NodeDecl {
-        name: name.to_owned(),
+        name: name.clone(),
         place: entry.key,
         kind,
         kind_place,
@@ -114,10 +123,51 @@ fn node(
     })
 }
 
-type Each<'a> = Vec<(&'a str, &'a [String])>;
+/// Placeholders and the members that they stand for.
+type Each<'a> = Vec<(String, &'a [String])>;
+
+/// The sets of the modules around a node, then those of its own `each`.
+fn around_and_own<'a>(placed: &Placed, own: Each<'a>, sets: &'a Sets) -> Each<'a> {
+    let around = placed.around.iter().flat_map(|around| {
+        let members = |set: &String| Some((around.placeholder(set), sets.get(set)?.as_slice()));
+        around.each.iter().filter_map(members)
+    });
+    around.chain(own).collect()
+}
+
+fn sets_around(placed: &Placed) -> usize {
+    placed.around.iter().map(|around| around.each.len()).sum()
+}
+
+/// How the nodes beside this one, in each of the modules around it, name this member.
+fn scopes(placed: &Placed, member: &Member<'_>) -> Vec<(String, Option<String>)> {
+    let mut sets = 0;
+    let mut scopes = Vec::new();
+    for around in placed.around.iter() {
+        sets += around.each.len();
+        if sets > 0 {
+            let inside = &placed.name[around.path.len()..];
+            let one = placeholder::fill(&around.one, &member.pairs);
+            let rest: Vec<_> = member.pairs[sets..].iter().map(|(_, name)| *name).collect();
+            let rest = (!rest.is_empty()).then(|| rest.join("-"));
+            scopes.push((one + inside, rest));
+        }
+    }
+    scopes
+}
+
+/// The names of the sets of a node's own `each`; `None` after a mistake.
+pub(super) fn own_sets(
+    keys: &Table,
+    sets: &Sets,
+    diagnostics: &mut Diagnostics,
+) -> Option<Vec<String>> {
+    let each = each(keys, sets, diagnostics)?;
+    Some(each.into_iter().map(|(set, _)| set).collect())
+}
 
 /// The sets of `each` with their members; `None` after a mistake.
-fn each<'a>(keys: &'a Table, sets: &'a Sets, diagnostics: &mut Diagnostics) -> Option<Each<'a>> {
+fn each<'a>(keys: &Table, sets: &'a Sets, diagnostics: &mut Diagnostics) -> Option<Each<'a>> {
     let Some(value) = keys.get("each") else {
         return Some(Vec::new());
     };
@@ -139,7 +189,7 @@ fn each<'a>(keys: &'a Table, sets: &'a Sets, diagnostics: &mut Diagnostics) -> O
                 diagnostics.report(*place, problem);
                 clean = false;
             }
-            (Some((name, _)), Some(members)) => each.push((name, members)),
+            (Some((name, _)), Some(members)) => each.push((name.clone(), members)),
             _ => clean = false,
         }
     }
@@ -156,7 +206,7 @@ struct Member<'a> {
 fn room_for<'a>(
     name: &str,
     entry: &Entry,
-    each: &Each<'a>,
+    each: &'a Each<'_>,
     parameters: &Value,
     inputs: usize,
     total: &mut Total,
@@ -210,7 +260,7 @@ fn room_for<'a>(
                         .pairs
                         .iter()
                         .copied()
-                        .chain([(*set, name.as_str())])
+                        .chain([(set.as_str(), name.as_str())])
                         .collect(),
                 })
             })
@@ -238,7 +288,7 @@ fn room_for<'a>(
 }
 
 /// Number of values in a tree, long texts counted as several.
-fn weight(value: &Value) -> usize {
+pub(super) fn weight(value: &Value) -> usize {
     match &value.data {
         Data::Text(text) | Data::Time(text) => 1 + text.len() / 64,
         Data::List(values) => 1 + values.iter().map(weight).sum::<usize>(),
@@ -258,7 +308,8 @@ fn check_placeholders(value: &Value, each: &Each<'_>, what: &str, diagnostics: &
             for name in
                 placeholder::names(text).filter(|name| !each.iter().any(|(set, _)| set == name))
             {
-                let known = each.iter().map(|(set, _)| (*set).to_owned()).collect();
+                let own = each.iter().filter(|(set, _)| !set.contains('/'));
+                let known = own.map(|(set, _)| set.clone()).collect();
                 let problem = DocumentProblem::UnknownPlaceholder {
                     name: name.to_owned(),
                     known,
@@ -304,10 +355,7 @@ fn input(
         Data::Table(keys) => {
             known_keys(keys, &["from", "max_age"], &input, diagnostics);
             let max_age = keys.get("max_age").and_then(|value| {
-                Some((
-                    duration(value, "max_age", sample, diagnostics)?,
-                    value.place,
-                ))
+                Some((length(value, "max_age", sample, diagnostics)?, value.place))
             });
             match keys.get("from") {
                 Some(from) => (from, max_age),

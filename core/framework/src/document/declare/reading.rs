@@ -128,6 +128,21 @@ pub(super) fn duration(
         .ok()
 }
 
+/// A duration that is longer than nothing.
+pub(super) fn length(
+    value: &Value,
+    key: &'static str,
+    sample: Option<Duration>,
+    diagnostics: &mut Diagnostics,
+) -> Option<Duration> {
+    let length = duration(value, key, sample, diagnostics)?;
+    if length > Duration::ZERO {
+        return Some(length);
+    }
+    diagnostics.report(value.place, DocumentProblem::NoLength { key });
+    None
+}
+
 pub(super) fn quantity(
     value: &Value,
     key: &str,

@@ -2,7 +2,7 @@
 
 use super::names::distinct;
 use super::placeholder;
-use super::reading::{duration, known_keys, missing, quantity, table, text, texts, wrong_type};
+use super::reading::{known_keys, length, missing, quantity, table, text, texts, wrong_type};
 use super::sets::{self, Sets};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::SignalDecl;
@@ -76,7 +76,7 @@ fn signal(
     };
     let max_age = keys
         .get("max_age")
-        .and_then(|value| duration(value, "max_age", sample, diagnostics));
+        .and_then(|value| length(value, "max_age", sample, diagnostics));
     let optional = match (keys.get("optional"), &channels) {
         (Some(value), Some(channels)) => optional(value, name, channels, diagnostics),
         _ => Vec::new(),

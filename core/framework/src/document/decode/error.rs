@@ -7,6 +7,9 @@ use serde::de::{self, Expected, Unexpected};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Value};
+use crate::quantity::Quantity;
+use crate::time::Duration;
+use crate::unit::Unit;
 
 /// One step from a value into it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -92,6 +95,7 @@ impl DecodeError {
         match *self.0 {
             State::Placed(_) => self,
             State::Unplaced(problem) => {
+                let problem = recognised(value, problem);
                 let mut path = path();
                 let place = match only_part_meant(value, &problem) {
                     Some((inner, place)) => {
@@ -126,6 +130,28 @@ impl DecodeError {
             expected: plain(&expected.to_string()),
             found,
         })
+    }
+}
+
+/// A text refused for what the language itself says of durations, quantities and units is told as everywhere else.
+fn recognised(value: &Value, problem: DocumentProblem) -> DocumentProblem {
+    let (Data::Text(text), DocumentProblem::Refused { reason, .. }) = (&value.data, &problem)
+    else {
+        return problem;
+    };
+    if let Err(error) = text.parse::<Duration>()
+        && error.to_string() == *reason
+    {
+        return DocumentProblem::Duration(error);
+    }
+    if let Err(error) = text.parse::<Quantity>()
+        && error.to_string() == *reason
+    {
+        return DocumentProblem::Quantity(error);
+    }
+    match text.parse::<Unit>() {
+        Err(error) if error.to_string() == *reason => DocumentProblem::Unit(error),
+        _ => problem,
     }
 }
 

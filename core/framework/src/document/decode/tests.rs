@@ -164,11 +164,11 @@ error[A006]: node "n" has no key "lgas"
   |
   = help: did you mean "lags"?
 
-error[A010]: "lags" is refused: "mn" is not a unit of time; the units are ns, us, ms, s, min (or m), h and d
+error[A018]: "mn" is not a unit of time; the units are ns, us, ms, s, min (or m), h and d
  --> a.toml:5:17
   |
 5 | lags = ["5min", "5mn", 5]
-  |                 ^^^^^ refused
+  |                 ^^^^^ not a duration
 
 error[A008]: expected a duration like "5min" for "lags", found the number 5
  --> a.toml:5:24
@@ -485,11 +485,11 @@ fn a_value_that_its_type_refuses_says_why() {
     assert_eq!(
         report,
         r#"
-error[A010]: "below" is refused: the number 5 needs a unit, e.g. "5 nm/min" ("5 1" if it has none)
+error[A018]: the number 5 needs a unit, e.g. "5 nm/min" ("5 1" if it has none)
  --> a.toml:7:9
   |
 7 | below = "5"
-  |         ^^^ refused
+  |         ^^^ not a quantity
 "#
     );
 }

@@ -6,6 +6,7 @@ use super::*;
 use crate::diagnostic::{Diagnostics, Sources};
 
 mod extending;
+mod modules;
 mod mutations;
 mod texts;
 

@@ -1,128 +1,208 @@
-//! The three parts of a window and the slope of their union. It does not decide which rows the parts hold.
+//! A window as the sum of its parts, and the slope of the line through it. It does not decide which rows the parts hold.
 
-use super::sums::{Common, Moments, OfY, Quad, Run};
+use std::array::from_fn;
+
+use super::sums::{Common, Quad, Table, Times, Values};
 
 const NS_PER_S: f64 = 1e9;
 
-/// The end of a closed block, the whole blocks after it and the current block. Each may be empty but the last.
-pub(super) struct Parts<'a> {
-    pub(super) head: Run<'a>,
-    pub(super) whole: Run<'a>,
-    pub(super) now: Run<'a>,
-    /// Origins of the first two less that of the current block.
-    pub(super) head_shift: f64,
-    pub(super) whole_shift: f64,
+/// Where Σ(t − t̄)² is a smaller part of Σt² than this, the samples lie closer together than they lie to the origin of time,
+/// and too many digits are lost. Samples that span half of a window are above it up to thousands of samples.
+const THIN: f64 = 1e-4;
+
+/// The end of a closed block, the whole blocks after it and the current block: where their sums lie, and how they are weighed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts {
+    /// The first groups of the three runs in their tables.
+    places: [usize; 3],
+    /// Origin of the first run's time less that of the other two, in nanoseconds.
+    by: f64,
+    /// Sums of the rows' times.
+    times: Times<1>,
+    of_ty: f64,
+    of_y: f64,
+    of_head_y: f64,
 }
 
-/// Origin of `part` less that of `now`; an empty part has none.
-#[inline]
-pub(super) fn shift(part: &Common, now: &Common) -> f64 {
-    if part.rows > 0.0 {
-        part.origin.saturating_sub(now.origin) as f64
-    } else {
-        0.0
-    }
-}
+impl Parts {
+    pub(super) const NONE: Parts = Parts {
+        places: [0; 3],
+        by: 0.0,
+        times: Times::NONE,
+        of_ty: 0.0,
+        of_y: 0.0,
+        of_head_y: 0.0,
+    };
 
-impl Parts<'_> {
-    /// Whether every channel is present in every row of the window.
+    /// For a complete window the weights of the sums are the same for all channels, and there is but one division:
+    /// `slope = (N·Σty − Σt·Σy) / (N·Σt² − (Σt)²)`
     #[inline]
-    pub(super) fn complete(&self) -> bool {
-        self.head.common().complete && self.whole.common().complete && self.now.common().complete
+    pub(super) fn new([head, rest, now]: [&Common; 3], places: [usize; 3]) -> Parts {
+        // Both lie within a window, or the first is empty and its origin is of no meaning.
+        let by = head.origin.wrapping_sub(now.origin) as f64;
+        let times = rest.rows.plus(&now.rows).plus(&head.rows.shifted(by));
+        let [n, t, tt] = [times.n[0], times.t[0], times.tt[0]];
+        let scale = NS_PER_S / (n * tt - t * t);
+        let (of_ty, of_y) = (n * scale, t * scale);
+        Parts {
+            places,
+            by,
+            times,
+            of_ty,
+            of_y,
+            of_head_y: of_y - of_ty * by,
+        }
     }
 
-    pub(super) fn n(&self, channel: usize) -> f64 {
-        self.head.n(channel) + self.whole.n(channel) + self.now.n(channel)
+    /// Rows in the window.
+    pub(super) fn rows(&self) -> f64 {
+        self.times.n[0]
     }
 
-    /// Time of the oldest sample of a channel, after the origin of the current block; infinite without one.
-    pub(super) fn first(&self, channel: usize) -> f64 {
-        let head = self.head.first(channel) + self.head_shift;
-        let whole = self.whole.first(channel) + self.whole_shift;
-        head.min(whole).min(self.now.first(channel))
+    /// Slopes per second of four channels that are present in every row of the window.
+    #[inline(always)]
+    pub(super) fn slopes(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Quad {
+        let head = &head.values[self.places[0] + quad];
+        let rest = &rest.values[self.places[1] + quad];
+        let now = &now.values[self.places[2] + quad];
+        from_fn(|i| {
+            self.of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+                - self.of_y * (rest.y[i] + now.y[i])
+                - self.of_head_y * head.y[i]
+        })
     }
 
-    /// Sums of a channel over the window, times after the origin of the current block.
-    pub(super) fn moments(&self, channel: usize) -> Moments {
-        let now = self.now.moments(channel);
-        now.merged(self.whole.moments(channel), self.whole_shift)
-            .merged(self.head.moments(channel), self.head_shift)
+    /// Sums of four channels that may be absent from some rows.
+    #[inline(always)]
+    pub(super) fn moments(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Moments {
+        let places = self.places.map(|place| place + quad);
+        let (h, r, w) = (
+            &head.times[places[0]],
+            &rest.times[places[1]],
+            &now.times[places[2]],
+        );
+        let times = r.plus(w).plus(&h.shifted(self.by));
+        self.moments_with([head, rest, now], quad, &times)
     }
 
-    /// Slopes per second of a complete window: one division, as time is the same for all channels.
-    ///
-    /// For parts `p`, `q` of `n` samples each with means and centred sums, the union has
-    /// `N·Sxy = N·Σ Sxy_p + Σ_{p<q} n_p n_q (x̄_p − x̄_q)(ȳ_p − ȳ_q)`, and `N·Sxx` likewise: no two large numbers are subtracted.
-    #[inline]
-    pub(super) fn slopes(&self, out: &mut [Quad]) {
-        let (head, whole, now) = (self.head.common(), self.whole.common(), self.now.common());
-        let from_head = head.mean_t + self.head_shift - now.mean_t;
-        let from_whole = whole.mean_t + self.whole_shift - now.mean_t;
-        let between = from_head - from_whole;
-        let head_now = head.rows * now.rows * from_head;
-        let whole_now = whole.rows * now.rows * from_whole;
-        let head_whole = head.rows * whole.rows * between;
-        let rows = head.rows + whole.rows + now.rows;
-        let sxx = rows * (head.sxx + whole.sxx + now.sxx)
-            + head_now * from_head
-            + whole_now * from_whole
-            + head_whole * between;
-        let scale = NS_PER_S / sxx;
-        let of_sums = rows * scale;
-        let of_head = (head_now + head_whole) * scale;
-        let of_whole = (whole_now - head_whole) * scale;
-        let values = [self.head.y(), self.whole.y(), self.now.y()];
-        weigh(values, [of_sums, of_head, of_whole], out);
+    /// The same of channels that are present in every row.
+    pub(super) fn moments_of_complete(&self, tables: [&Table; 3], quad: usize) -> Moments {
+        let Times { n, t, tt } = self.times;
+        let times = Times {
+            n: [n[0]; 4],
+            t: [t[0]; 4],
+            tt: [tt[0]; 4],
+        };
+        self.moments_with(tables, quad, &times)
     }
 
-    /// Slopes per second of a window with gaps, by the same formula with the times of each channel; all parts have been spread.
-    #[inline(never)]
-    pub(super) fn slopes_with_gaps(&self, out: &mut [Quad]) {
-        let y = [self.head.y(), self.whole.y(), self.now.y()];
-        let t = [self.head.t(), self.whole.t(), self.now.t()];
-        for quad in 0..out.len() {
-            let (hy, wy, ny) = (&y[0][quad], &y[1][quad], &y[2][quad]);
-            let (ht, wt, nt) = (&t[0][quad], &t[1][quad], &t[2][quad]);
-            out[quad] = std::array::from_fn(|i| {
-                let from_head = ht.mean[i] + self.head_shift - nt.mean[i];
-                let from_whole = wt.mean[i] + self.whole_shift - nt.mean[i];
-                let between = from_head - from_whole;
-                let head_now = ht.n[i] * nt.n[i] * from_head;
-                let whole_now = wt.n[i] * nt.n[i] * from_whole;
-                let head_whole = ht.n[i] * wt.n[i] * between;
-                let rise_head = hy.mean[i] - ny.mean[i];
-                let rise_whole = wy.mean[i] - ny.mean[i];
-                let samples = ht.n[i] + wt.n[i] + nt.n[i];
-                let sxx = samples * (ht.sxx[i] + wt.sxx[i] + nt.sxx[i])
-                    + head_now * from_head
-                    + whole_now * from_whole
-                    + head_whole * between;
-                let sxy = samples * (hy.sxy[i] + wy.sxy[i] + ny.sxy[i])
-                    + head_now * rise_head
-                    + whole_now * rise_whole
-                    + head_whole * (rise_head - rise_whole);
-                sxy / sxx * NS_PER_S
-            });
+    #[inline(always)]
+    fn moments_with(
+        &self,
+        [head, rest, now]: [&Table; 3],
+        quad: usize,
+        &Times { n, t, tt }: &Times<4>,
+    ) -> Moments {
+        let places = self.places.map(|place| place + quad);
+        let (h, r, w) = (
+            &head.values[places[0]],
+            &rest.values[places[1]],
+            &now.values[places[2]],
+        );
+        let Values { y, ty } = r.plus(w).plus(&h.shifted(self.by));
+        Moments {
+            n,
+            n_tt: from_fn(|i| n[i] * tt[i]),
+            n_sxx: from_fn(|i| n[i] * tt[i] - t[i] * t[i]),
+            n_sxy: from_fn(|i| n[i] * ty[i] - t[i] * y[i]),
+            y,
+        }
+    }
+
+    /// Centred sums of one of four channels, from tables that keep squares.
+    pub(super) fn line(
+        &self,
+        tables: [&Table; 3],
+        quad: usize,
+        moments: &Moments,
+        i: usize,
+    ) -> Line {
+        let place = |part: usize| tables[part].squares[self.places[part] + quad][i];
+        let (n, y) = (moments.n[i], moments.y[i]);
+        Line {
+            n,
+            sxx: moments.n_sxx[i] / n,
+            sxy: moments.n_sxy[i] / n,
+            syy: place(0) + (place(1) + place(2)) - y * y / n,
         }
     }
 }
 
-/// The part of the work that is done for every output. Indexing keeps the compiler from vectorising over groups of
-/// four, which would shuffle more than it computes; within four it then does.
-#[inline(never)]
-fn weigh([head, whole, now]: [&[OfY]; 3], weights: [f64; 3], out: &mut [Quad]) {
-    let [of_sums, of_head, of_whole] = weights;
-    for quad in 0..out.len() {
-        let (h, w, n) = (&head[quad], &whole[quad], &now[quad]);
-        out[quad] = std::array::from_fn(|i| {
-            of_sums * (h.sxy[i] + w.sxy[i] + n.sxy[i])
-                + of_head * (h.mean[i] - n.mean[i])
-                + of_whole * (w.mean[i] - n.mean[i])
-        });
-    }
+/// Sums of products of deviations from the means, times the number of samples, of four channels.
+pub(super) struct Moments {
+    pub(super) n: Quad,
+    /// N·Σt².
+    n_tt: Quad,
+    n_sxx: Quad,
+    n_sxy: Quad,
+    /// Σy.
+    y: Quad,
 }
 
 impl Moments {
+    /// Slopes per second.
+    #[inline(always)]
+    pub(super) fn slopes(&self) -> Quad {
+        from_fn(|i| self.n_sxy[i] / self.n_sxx[i] * NS_PER_S)
+    }
+
+    /// Whether so many digits were lost that the sums must be computed from the samples.
+    #[inline(always)]
+    pub(super) fn thin(&self, i: usize) -> bool {
+        self.n_sxx[i] < THIN * self.n_tt[i]
+    }
+
+    #[inline(always)]
+    pub(super) fn any_thin(&self) -> bool {
+        self.thin(0) | self.thin(1) | self.thin(2) | self.thin(3)
+    }
+}
+
+/// Centred sums of one channel: the samples, Σ(t − t̄)², Σ(t − t̄)(y − ȳ), Σ(y − ȳ)².
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    n: f64,
+    sxx: f64,
+    sxy: f64,
+    syy: f64,
+}
+
+impl Line {
+    /// From the samples themselves, times in nanoseconds.
+    pub(super) fn through(samples: impl Iterator<Item = (f64, f64)> + Clone) -> Line {
+        let n = samples.clone().count() as f64;
+        let mean_t = samples.clone().map(|(t, _)| t).sum::<f64>() / n;
+        let mean_y = samples.clone().map(|(_, y)| y).sum::<f64>() / n;
+        let mut line = Line {
+            n,
+            sxx: 0.0,
+            sxy: 0.0,
+            syy: 0.0,
+        };
+        for (t, y) in samples {
+            let (t, y) = (t - mean_t, y - mean_y);
+            line.sxx += t * t;
+            line.sxy += t * y;
+            line.syy += y * y;
+        }
+        line
+    }
+
+    /// Slope per second.
+    pub(super) fn slope(&self) -> f64 {
+        self.sxy / self.sxx * NS_PER_S
+    }
+
     /// Standard error of the slope per second; nothing for fewer than three samples.
     pub(super) fn stderr(&self) -> Option<f64> {
         let residual = (self.syy - self.sxy / self.sxx * self.sxy).max(0.0);

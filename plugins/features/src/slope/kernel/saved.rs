@@ -3,8 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::rows::all_present;
-use super::{CURRENT, Coverage, NoValue, RollingSlope};
+use super::{Coverage, LIMIT, NoValue, RollingSlope};
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -19,8 +18,9 @@ pub(super) struct Saved {
     samples: Vec<Option<f64>>,
     /// Rows with which a new block begins.
     cuts: Vec<u64>,
-    /// Per window, the block of its turning point.
-    turns: Vec<u64>,
+    /// Per channel, what is subtracted from its samples, and when that is chosen anew.
+    origins: Vec<f64>,
+    rebases: [u64; 2],
     /// Per channel, times of its first and newest sample.
     first_ns: Vec<Option<i64>>,
     newest_ns: Vec<Option<i64>>,
@@ -48,33 +48,28 @@ impl std::fmt::Display for Broken {
 
 impl From<RollingSlope> for Saved {
     fn from(kernel: RollingSlope) -> Saved {
-        let rows = &kernel.rows;
-        let current = rows.current_block();
-        let heads = kernel.windows.iter();
-        let (oldest, block) = heads
-            .map(|window| (window.head(), window.head_block()))
-            .min()
-            .unwrap_or((rows.start(current), current));
+        let (rows, blocks) = (&kernel.rows, &kernel.blocks);
+        let (channels, oldest) = (kernel.channels, blocks.oldest());
+        let times = (0..channels).map(|channel| rows.first_and_newest(channel));
+        let (first_ns, newest_ns) = times.map(|[first, newest]| (first, newest)).unzip();
         Saved {
-            windows_ns: kernel.windows.iter().map(|w| w.width_ns()).collect(),
+            windows_ns: kernel.windows.iter().map(|w| w.width_ns).collect(),
             coverage: kernel.coverage,
             no_value: [kernel.no_value.absent, kernel.no_value.cold].map(f64::to_bits),
             squares: kernel.squares,
             times_ns: (oldest..rows.next()).map(|row| rows.time(row)).collect(),
             samples: (oldest..rows.next())
-                .flat_map(|row| &rows.samples(row).as_flattened()[..kernel.channels])
+                .flat_map(|row| &rows.samples(row).as_flattened()[..channels])
                 .map(|&y| (!y.is_nan()).then_some(y))
                 .collect(),
-            cuts: (block + 1..=current)
-                .map(|block| rows.start(block) - oldest)
-                .collect(),
-            turns: kernel
-                .windows
+            cuts: blocks.starts()[1..]
                 .iter()
-                .map(|window| window.turn().saturating_sub(block))
+                .map(|start| start - oldest)
                 .collect(),
-            first_ns: kernel.first.clone(),
-            newest_ns: (0..kernel.channels).map(|c| kernel.newest_ns(c)).collect(),
+            origins: blocks.origins().as_flattened()[..channels].to_vec(),
+            rebases: blocks.rebases(),
+            first_ns,
+            newest_ns,
         }
     }
 }
@@ -86,7 +81,7 @@ impl TryFrom<Saved> for RollingSlope {
         let channels = saved.first_ns.len();
         let rows = saved.times_ns.len();
         if saved.newest_ns.len() != channels
-            || saved.turns.len() != saved.windows_ns.len()
+            || saved.origins.len() != channels
             || saved.samples.len() != rows * channels
         {
             return Err(Broken::Lengths);
@@ -106,28 +101,26 @@ impl TryFrom<Saved> for RollingSlope {
             NoValue { absent, cold },
             saved.squares,
         );
-        kernel.first = saved.first_ns;
-        kernel.newest = saved.newest_ns;
-        let mut cuts = saved.cuts.iter().peekable();
         for (row, &t_ns) in saved.times_ns.iter().enumerate() {
-            if cuts.next_if(|&&cut| cut == row as u64).is_some() {
-                kernel.rows.close_block();
-                kernel.current.clear(CURRENT);
-            }
             let samples = &saved.samples[row * channels..(row + 1) * channels];
-            let samples = samples.iter().map(|y| y.unwrap_or(f64::NAN));
-            kernel.rows.append(t_ns, samples, 0);
-            let samples = kernel.rows.samples(row as u64);
-            let all_present = all_present(samples);
-            kernel.current.add(CURRENT, t_ns, samples, all_present);
+            let samples: Vec<f64> = samples.iter().map(|y| y.unwrap_or(f64::NAN)).collect();
+            kernel.rows.reserve(0);
+            kernel.rows.append(t_ns, &samples, LIMIT, 0);
         }
-        if let Some(t_ns) = kernel.last_time() {
-            for (window, &turn) in kernel.windows.iter_mut().zip(&saved.turns) {
-                window.rebuild(&kernel.rows, t_ns, turn);
+        for channel in 0..channels {
+            let times = [saved.first_ns[channel], saved.newest_ns[channel]];
+            kernel.rows.set_first_and_newest(channel, times);
+        }
+        let (cuts, origins) = (&saved.cuts, &saved.origins);
+        let blocks = &mut kernel.blocks;
+        blocks.restore(&kernel.rows, cuts, origins, saved.rebases);
+        if let Some(t_ns) = kernel.rows.last_time() {
+            for window in &mut kernel.windows {
+                window.advance(&kernel.rows, t_ns);
+                window.block = kernel.blocks.find(window.head, 0);
             }
+            kernel.find_parts(t_ns);
         }
-        kernel.summarise_times();
-        kernel.spread();
         Ok(kernel)
     }
 }

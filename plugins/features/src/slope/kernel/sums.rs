@@ -1,78 +1,13 @@
-//! Centred sums of a run of samples, for all channels at once: how samples join them and how two runs are merged.
-//! It does not decide which samples belong to a run.
+//! Sums over runs of rows, for all channels at once: how rows join a run and how runs are added up.
+//! It does not decide which rows belong to a run.
 //!
-//! Every run keeps means and sums of products of deviations from them (Chan, Golub and LeVeque 1983, eq. 1.3 to 1.5), never
-//! raw sums, and nothing is ever subtracted: a sample leaves by not being in the runs that remain.
-//! While every channel is present in every row of a run, count and time are the same for all of them and are kept once.
+//! Times are nanoseconds after the run's origin, values lie about an origin that is the same for all runs. Nothing is
+//! ever subtracted from a sum: a sample leaves by not being in the runs that remain.
+//! While no sample is missing, count and times are the same for all channels: sums of them per channel are kept only on demand.
 //! Channels lie in groups of four, so that the loops over them become vector instructions; the last group is filled up
-//! with channels that are always present and zero.
+//! with channels that are always present.
 
-/// What all channels of a run have in common. Times are nanoseconds after `origin`, whole numbers wherever they are of one sample.
-///
-/// The order matters: were `mean_t` and `sxx` neighbours, they would be read as one vector just after having been written
-/// one by one, which stalls the processor.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(super) struct Common {
-    /// Mean of time, of a complete run.
-    pub(super) mean_t: f64,
-    pub(super) origin: i64,
-    /// Squared deviations of time, of a complete run.
-    pub(super) sxx: f64,
-    /// Every channel is present in every row; the sums of time per channel are then not filled.
-    pub(super) complete: bool,
-    /// Rows of the run, 0 for an empty one.
-    pub(super) rows: f64,
-    /// Latest of the channels' first samples.
-    pub(super) latest_first: f64,
-    /// Fewest samples that any channel has.
-    pub(super) fewest: f64,
-}
-
-impl Common {
-    pub(super) const EMPTY: Common = Common {
-        origin: 0,
-        rows: 0.0,
-        complete: true,
-        mean_t: 0.0,
-        sxx: 0.0,
-        fewest: 0.0,
-        latest_first: f64::INFINITY,
-    };
-}
-
-/// Centred sums of one channel over one run. Times are nanoseconds after the origin of the run.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Moments {
-    pub(super) n: f64,
-    pub(super) mean_t: f64,
-    pub(super) mean_y: f64,
-    pub(super) sxx: f64,
-    pub(super) sxy: f64,
-    pub(super) syy: f64,
-}
-
-impl Moments {
-    /// The union of two runs of one channel; `shift` is the origin of `other` less that of `self`.
-    pub(super) fn merged(self, other: Moments, shift: f64) -> Moments {
-        if other.n == 0.0 {
-            return self;
-        }
-        let n = self.n + other.n;
-        let part = other.n / n;
-        let weight = self.n * part;
-        let dt = (other.mean_t + shift) - self.mean_t;
-        let dy = other.mean_y - self.mean_y;
-        Moments {
-            n,
-            mean_t: self.mean_t + dt * part,
-            mean_y: self.mean_y + dy * part,
-            sxx: self.sxx + other.sxx + weight * dt * dt,
-            sxy: self.sxy + other.sxy + weight * dt * dy,
-            syy: self.syy + other.syy + weight * dy * dy,
-        }
-    }
-}
+use std::array::from_fn;
 
 /// One value for each of four channels.
 pub(super) type Quad = [f64; 4];
@@ -82,120 +17,103 @@ pub(super) fn quads(channels: usize) -> usize {
     channels.div_ceil(4)
 }
 
-/// Sums of four channels that concern their values.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct OfY {
-    pub(super) mean: Quad,
-    pub(super) sxy: Quad,
+/// Sums of `L` channels that concern the times of their samples: Σ1, Σt, Σt².
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Times<const L: usize> {
+    pub(super) n: [f64; L],
+    pub(super) t: [f64; L],
+    pub(super) tt: [f64; L],
 }
 
-/// Sums of four channels that concern the times of their samples.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct OfT {
-    pub(super) n: Quad,
-    pub(super) mean: Quad,
-    pub(super) sxx: Quad,
-    pub(super) first: Quad,
-}
+impl<const L: usize> Times<L> {
+    pub(super) const NONE: Times<L> = Times {
+        n: [0.0; L],
+        t: [0.0; L],
+        tt: [0.0; L],
+    };
 
-impl OfT {
-    /// The sums of a complete run.
-    fn of(common: &Common) -> OfT {
-        OfT {
-            n: [common.rows; 4],
-            mean: [common.mean_t; 4],
-            sxx: [common.sxx; 4],
-            first: [common.latest_first; 4],
+    #[inline(always)]
+    pub(super) fn plus(&self, other: &Times<L>) -> Times<L> {
+        Times {
+            n: from_fn(|i| self.n[i] + other.n[i]),
+            t: from_fn(|i| self.t[i] + other.t[i]),
+            tt: from_fn(|i| self.tt[i] + other.tt[i]),
+        }
+    }
+
+    /// The same sums about an origin that lies `by` earlier.
+    #[inline(always)]
+    pub(super) fn shifted(&self, by: f64) -> Times<L> {
+        Times {
+            n: self.n,
+            t: from_fn(|i| self.t[i] + by * self.n[i]),
+            tt: from_fn(|i| self.tt[i] + by * (2.0 * self.t[i] + by * self.n[i])),
         }
     }
 }
 
-/// One run in a [`Table`].
-#[derive(Clone, Copy)]
-pub(super) struct Run<'a> {
-    table: &'a Table,
-    slot: usize,
+/// Sums of four channels that concern their values: Σy, Σty.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Values {
+    pub(super) y: Quad,
+    pub(super) ty: Quad,
 }
 
-impl<'a> Run<'a> {
-    #[inline]
-    pub(super) fn common(&self) -> &'a Common {
-        &self.table.common[self.slot]
-    }
+impl Values {
+    const NONE: Values = Values {
+        y: [0.0; 4],
+        ty: [0.0; 4],
+    };
 
-    #[inline]
-    pub(super) fn y(&self) -> &'a [OfY] {
-        &self.table.y[self.table.range(self.slot)]
-    }
-
-    /// Empty unless the table keeps squares.
-    #[inline]
-    fn syy(&self) -> &'a [Quad] {
-        let range = self.table.range(self.slot);
-        self.table.syy.get(range).unwrap_or_default()
-    }
-
-    #[inline]
-    pub(super) fn t(&self) -> &'a [OfT] {
-        &self.table.t[self.table.range(self.slot)]
-    }
-
-    /// Number of samples of a channel.
-    pub(super) fn n(&self, channel: usize) -> f64 {
-        if self.common().complete {
-            self.common().rows
-        } else {
-            self.t()[channel / 4].n[channel % 4]
+    #[inline(always)]
+    pub(super) fn plus(&self, other: &Values) -> Values {
+        Values {
+            y: from_fn(|i| self.y[i] + other.y[i]),
+            ty: from_fn(|i| self.ty[i] + other.ty[i]),
         }
     }
 
-    /// Time of the oldest sample of a channel, infinite without one.
-    pub(super) fn first(&self, channel: usize) -> f64 {
-        if self.common().complete {
-            self.common().latest_first
-        } else {
-            self.t()[channel / 4].first[channel % 4]
-        }
-    }
-
-    pub(super) fn moments(&self, channel: usize) -> Moments {
-        let (quad, lane) = (channel / 4, channel % 4);
-        let of_t = if self.common().complete {
-            OfT::of(self.common())
-        } else {
-            self.t()[quad]
-        };
-        Moments {
-            n: of_t.n[lane],
-            mean_t: of_t.mean[lane],
-            mean_y: self.y()[quad].mean[lane],
-            sxx: of_t.sxx[lane],
-            sxy: self.y()[quad].sxy[lane],
-            syy: self.syy().get(quad).map_or(0.0, |syy| syy[lane]),
+    #[inline(always)]
+    pub(super) fn shifted(&self, by: f64) -> Values {
+        Values {
+            y: self.y,
+            ty: from_fn(|i| self.ty[i] + by * self.y[i]),
         }
     }
 }
 
-/// Runs in numbered slots; what a slot holds is contiguous over channels.
+/// What all channels of a run have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Common {
+    pub(super) origin: i64,
+    /// Sums of the rows' times, present or not.
+    pub(super) rows: Times<1>,
+}
+
+/// Runs by slot number. Group `slot * quads + quad` belongs to channels `4 * quad` and on.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     quads: usize,
-    squares: bool,
-    common: Vec<Common>,
-    y: Vec<OfY>,
-    syy: Vec<Quad>,
-    t: Vec<OfT>,
+    keeps_squares: bool,
+    /// Whether the sums of time per channel are kept.
+    keeps_times: bool,
+    pub(super) common: Vec<Common>,
+    pub(super) values: Vec<Values>,
+    pub(super) times: Vec<Times<4>>,
+    /// Σy².
+    pub(super) squares: Vec<Quad>,
 }
 
 impl Table {
     pub(super) fn new(channels: usize, squares: bool, slots: usize) -> Table {
         let mut table = Table {
             quads: quads(channels),
-            squares,
+            keeps_squares: squares,
+            keeps_times: false,
             common: Vec::new(),
-            y: Vec::new(),
-            syy: Vec::new(),
-            t: Vec::new(),
+            values: Vec::new(),
+            times: Vec::new(),
+            squares: Vec::new(),
         };
         table.resize(slots);
         table
@@ -205,237 +123,105 @@ impl Table {
         self.common.len()
     }
 
-    /// More slots, empty ones; those there keep their numbers.
+    /// From now on sums of time are kept per channel or not; runs must be computed anew when this is switched on.
+    pub(super) fn keep_times(&mut self, keep: bool) {
+        self.keeps_times = keep;
+    }
+
+    /// Changes the number of slots; the runs must be computed anew.
     pub(super) fn resize(&mut self, slots: usize) {
-        let groups = slots * self.quads;
-        self.common.resize(slots, Common::EMPTY);
-        self.y.resize(groups, OfY::default());
-        self.t.resize(groups, OfT::default());
-        if self.squares {
-            self.syy.resize(groups, Quad::default());
+        let none = Common {
+            origin: 0,
+            rows: Times::NONE,
+        };
+        self.common.resize(slots, none);
+        self.values.resize(slots * self.quads, Values::NONE);
+        self.times.resize(slots * self.quads, Times::NONE);
+        if self.keeps_squares {
+            self.squares.resize(slots * self.quads, [0.0; 4]);
         }
     }
 
+    /// Makes an empty run about an origin.
+    pub(super) fn clear(&mut self, slot: usize, origin: i64) {
+        self.common[slot] = Common {
+            origin,
+            rows: Times::NONE,
+        };
+        let groups = slot * self.quads..(slot + 1) * self.quads;
+        self.values[groups.clone()].fill(Values::NONE);
+        self.times[groups.clone()].fill(Times::NONE);
+        if self.keeps_squares {
+            self.squares[groups].fill([0.0; 4]);
+        }
+    }
+
+    /// Sets run `to` to run `from` and one more row: its time, its samples less the origins of the channels.
     #[inline]
-    fn range(&self, slot: usize) -> std::ops::Range<usize> {
-        slot * self.quads..(slot + 1) * self.quads
-    }
-
-    #[inline]
-    pub(super) fn run(&self, slot: usize) -> Run<'_> {
-        Run { table: self, slot }
-    }
-
-    #[inline]
-    pub(super) fn common(&self, slot: usize) -> &Common {
-        &self.common[slot]
-    }
-
-    pub(super) fn clear(&mut self, slot: usize) {
-        let range = self.range(slot);
-        self.common[slot] = Common::EMPTY;
-        self.y[range.clone()].fill(OfY::default());
-        if let Some(syy) = self.syy.get_mut(range) {
-            syy.fill(Quad::default());
-        }
-    }
-
-    /// Fills the sums of time per channel of a complete run, so that it can be read beside one that is not.
-    #[inline]
-    pub(super) fn spread(&mut self, slot: usize) {
-        if self.common[slot].complete {
-            let of_t = OfT::of(&self.common[slot]);
-            let range = self.range(slot);
-            self.t[range].fill(of_t);
-        }
-    }
-
-    /// Adds one row, NaN where a channel is absent; `all_present` says that none is.
-    pub(super) fn add(&mut self, slot: usize, t_ns: i64, y: &[Quad], all_present: bool) {
-        if self.common[slot].rows == 0.0 {
-            self.clear(slot);
-            self.common[slot].origin = t_ns;
-        }
-        let t = t_ns.saturating_sub(self.common[slot].origin) as f64;
-        if all_present && self.common[slot].complete {
-            self.add_to_complete(slot, t, y);
-        } else {
-            self.add_with_gaps(slot, t, y);
-        }
-    }
-
-    fn add_to_complete(&mut self, slot: usize, t: f64, y: &[Quad]) {
-        let range = self.range(slot);
-        let common = &mut self.common[slot];
-        let before = common.rows;
-        common.rows += 1.0;
-        let part = 1.0 / common.rows;
-        let kept = before * part;
-        let dt = t - common.mean_t;
-        common.mean_t += dt * part;
-        common.sxx += kept * dt * dt;
-        common.fewest = common.rows;
-        common.latest_first = common.latest_first.min(t);
-        let lever = kept * dt;
-        if let Some(syy) = self.syy.get_mut(range.clone()) {
-            for ((syy, own), y) in syy.iter_mut().zip(&self.y[range.clone()]).zip(y) {
-                for i in 0..4 {
-                    let dy = y[i] - own.mean[i];
-                    syy[i] += kept * dy * dy;
-                }
-            }
-        }
-        for (own, y) in self.y[range].iter_mut().zip(y) {
-            for (i, y) in y.iter().enumerate() {
-                let dy = y - own.mean[i];
-                own.mean[i] += dy * part;
-                own.sxy[i] += lever * dy;
-            }
-        }
-    }
-
-    fn add_with_gaps(&mut self, slot: usize, t: f64, y: &[Quad]) {
-        self.spread(slot);
-        let first = self.range(slot).start;
-        for (quad, y) in y.iter().enumerate() {
-            let present = y.map(|y| !y.is_nan());
-            let sample = OfY {
-                mean: std::array::from_fn(|i| if present[i] { y[i] } else { 0.0 }),
-                sxy: [0.0; 4],
+    pub(super) fn add_row(
+        &mut self,
+        [from, to]: [usize; 2],
+        t_ns: i64,
+        row: &[Quad],
+        origins: &[Quad],
+    ) {
+        let before = self.common[from];
+        let t = t_ns.saturating_sub(before.origin) as f64;
+        let this = Times {
+            n: [1.0],
+            t: [t],
+            tt: [t * t],
+        };
+        self.common[to] = Common {
+            origin: before.origin,
+            rows: before.rows.plus(&this),
+        };
+        let (from, to) = (from * self.quads, to * self.quads);
+        for (quad, (y, origin)) in row.iter().zip(origins).enumerate() {
+            let y: Quad = from_fn(|i| if y[i].is_nan() { 0.0 } else { y[i] - origin[i] });
+            let this = Values {
+                y,
+                ty: from_fn(|i| t * y[i]),
             };
-            let at = OfT {
-                n: present.map(|present| if present { 1.0 } else { 0.0 }),
-                mean: [t; 4],
-                sxx: [0.0; 4],
-                first: present.map(|present| if present { t } else { f64::INFINITY }),
-            };
-            self.absorb_quad(first + quad, &sample, &at, &[0.0; 4], 0.0);
-        }
-        self.summarise(slot, 1.0);
-    }
-
-    /// Merges a run, of another table, into `slot`; a run merged into an empty one is that run to the bit.
-    pub(super) fn absorb(&mut self, slot: usize, other: &Run<'_>) {
-        if other.common().rows == 0.0 {
-            return;
-        }
-        if self.common[slot].rows == 0.0 {
-            self.copy_from(slot, other);
-            return;
-        }
-        let origin = self.common[slot].origin;
-        let shift = other.common().origin.saturating_sub(origin) as f64;
-        if self.common[slot].complete && other.common().complete {
-            self.absorb_complete(slot, other, shift);
-            return;
-        }
-        self.spread(slot);
-        let first = self.range(slot).start;
-        let of_all = OfT::of(other.common());
-        for (quad, y) in other.y().iter().enumerate() {
-            let t = if other.common().complete {
-                &of_all
-            } else {
-                &other.t()[quad]
-            };
-            let syy = other.syy().get(quad).unwrap_or(&[0.0; 4]);
-            self.absorb_quad(first + quad, y, t, syy, shift);
-        }
-        self.summarise(slot, other.common().rows);
-    }
-
-    fn absorb_complete(&mut self, slot: usize, other: &Run<'_>, shift: f64) {
-        let range = self.range(slot);
-        let common = &mut self.common[slot];
-        let before = common.rows;
-        common.rows += other.common().rows;
-        let part = other.common().rows / common.rows;
-        let weight = before * part;
-        let dt = (other.common().mean_t + shift) - common.mean_t;
-        common.mean_t += dt * part;
-        common.sxx += other.common().sxx + weight * dt * dt;
-        common.fewest = common.rows;
-        common.latest_first = common.latest_first.min(other.common().latest_first + shift);
-        let lever = weight * dt;
-        if let Some(syy) = self.syy.get_mut(range.clone()) {
-            let values = self.y[range.clone()].iter().zip(other.y());
-            for ((syy, other_syy), (own, y)) in syy.iter_mut().zip(other.syy()).zip(values) {
-                for i in 0..4 {
-                    let dy = y.mean[i] - own.mean[i];
-                    syy[i] += other_syy[i] + weight * dy * dy;
-                }
+            self.values[to + quad] = self.values[from + quad].plus(&this);
+            if self.keeps_squares {
+                let squares = self.squares[from + quad];
+                self.squares[to + quad] = from_fn(|i| squares[i] + y[i] * y[i]);
             }
         }
-        for (own, y) in self.y[range].iter_mut().zip(other.y()) {
-            for i in 0..4 {
-                let dy = y.mean[i] - own.mean[i];
-                own.mean[i] += dy * part;
-                own.sxy[i] += y.sxy[i] + lever * dy;
+        if self.keeps_times {
+            for (quad, y) in row.iter().enumerate() {
+                let present = |sum: f64| from_fn(|i| if y[i].is_nan() { 0.0 } else { sum });
+                let this = Times {
+                    n: present(1.0),
+                    t: present(t),
+                    tt: present(t * t),
+                };
+                self.times[to + quad] = self.times[from + quad].plus(&this);
             }
         }
     }
 
-    /// Merges sums of four channels; a channel without samples on either side changes nothing.
-    #[inline]
-    fn absorb_quad(&mut self, at: usize, y: &OfY, t: &OfT, syy: &Quad, shift: f64) {
-        let (own_y, own_t) = (&mut self.y[at], &mut self.t[at]);
-        let mut unused = [0.0; 4];
-        let own_syy = self.syy.get_mut(at).unwrap_or(&mut unused);
-        for i in 0..4 {
-            let n = own_t.n[i] + t.n[i];
-            let part = t.n[i] / n.max(1.0);
-            let weight = own_t.n[i] * part;
-            let dt = (t.mean[i] + shift) - own_t.mean[i];
-            let dy = y.mean[i] - own_y.mean[i];
-            own_t.n[i] = n;
-            own_t.mean[i] += dt * part;
-            own_t.sxx[i] += t.sxx[i] + weight * dt * dt;
-            own_t.first[i] = own_t.first[i].min(t.first[i] + shift);
-            own_y.mean[i] += dy * part;
-            own_y.sxy[i] += y.sxy[i] + weight * dt * dy;
-            own_syy[i] += syy[i] + weight * dy * dy;
-        }
-    }
-
-    /// The run of `from` becomes that of `to`, in the same table.
-    pub(super) fn copy_within(&mut self, from: usize, to: usize) {
-        self.common[to] = self.common[from];
-        let (range, to) = (self.range(from), self.range(to).start);
-        self.y.copy_within(range.clone(), to);
-        if self.squares {
-            self.syy.copy_within(range.clone(), to);
-        }
-        if !self.common[from].complete {
-            self.t.copy_within(range, to);
-        }
-    }
-
-    /// The run becomes that of `slot`.
-    pub(super) fn copy_from(&mut self, slot: usize, other: &Run<'_>) {
-        let range = self.range(slot);
-        self.common[slot] = *other.common();
-        self.y[range.clone()].copy_from_slice(other.y());
-        if self.squares {
-            self.syy[range.clone()].copy_from_slice(other.syy());
-        }
-        if !other.common().complete {
-            self.t[range].copy_from_slice(other.t());
-        }
-    }
-
-    fn summarise(&mut self, slot: usize, rows: f64) {
-        let mut fewest = [f64::INFINITY; 4];
-        let mut latest_first = [f64::NEG_INFINITY; 4];
-        for t in &self.t[self.range(slot)] {
-            for i in 0..4 {
-                fewest[i] = fewest[i].min(t.n[i]);
-                latest_first[i] = latest_first[i].max(t.first[i]);
+    /// Sets run `to` to run `from` and a run of another table.
+    pub(super) fn add_run(&mut self, [from, to]: [usize; 2], table: &Table, slot: usize) {
+        let (before, common) = (self.common[from], &table.common[slot]);
+        let by = common.origin.saturating_sub(before.origin) as f64;
+        self.common[to] = Common {
+            origin: before.origin,
+            rows: before.rows.plus(&common.rows.shifted(by)),
+        };
+        let [from, to, slot] = [from, to, slot].map(|slot| slot * self.quads);
+        for quad in 0..self.quads {
+            let values = table.values[slot + quad].shifted(by);
+            self.values[to + quad] = self.values[from + quad].plus(&values);
+            if self.keeps_squares {
+                let (a, b) = (self.squares[from + quad], table.squares[slot + quad]);
+                self.squares[to + quad] = from_fn(|i| a[i] + b[i]);
+            }
+            if self.keeps_times {
+                let times = table.times[slot + quad].shifted(by);
+                self.times[to + quad] = self.times[from + quad].plus(&times);
             }
         }
-        let common = &mut self.common[slot];
-        common.rows += rows;
-        common.complete = false;
-        common.fewest = fewest.into_iter().fold(f64::INFINITY, f64::min);
-        common.latest_first = latest_first.into_iter().fold(f64::NEG_INFINITY, f64::max);
     }
 }

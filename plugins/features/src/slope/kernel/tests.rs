@@ -450,7 +450,10 @@ fn a_state_that_does_not_fit_is_refused() {
             .unwrap_or_default()
     };
     assert!(broken("samples", serde_json::json!([1.0])).contains("lengths"));
-    assert!(broken("times_ns", serde_json::json!([3, 2, 1])).contains("increase"));
+    let times = state["times_ns"].as_array().cloned().unwrap_or_default();
+    let backwards = times.into_iter().rev().collect();
+    assert!(broken("times_ns", backwards).contains("increase"));
+    assert!(broken("origins", serde_json::json!([])).contains("lengths"));
     assert!(broken("cuts", serde_json::json!([99])).contains("cuts"));
 }
 

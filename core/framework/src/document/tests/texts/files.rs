@@ -293,33 +293,50 @@ error[A019]: there is no inherited node "themal" to remove
 }
 
 #[test]
-fn modules_are_for_a_later_version() {
+fn a_mistake_inside_a_module_is_told_once_and_names_its_first_instance() {
     let files = [(
         "a.toml",
         r#"schema = 1
 [modules.m]
-[nodes.n]
-module = "m"
+inputs = ["signal"]
+nodes.n = { inputs.a = "{signal}", inputs.b = "p" }
+[nodes]
+x = { module = "m", inputs.signal = "q" }
+y = { module = "m", inputs.signal = "q" }
+z = { module = "n", inputs.signal = "q" }
 "#,
     )];
     assert_eq!(
         rendered(&files),
         r#"
-error[A025]: modules are not part of this version
- --> a.toml:2:2
+error[A007]: node "x/n" needs the key "type"
+ --> a.toml:4:11
   |
-2 | [modules.m]
-  |  ^^^^^^^
+4 | nodes.n = { inputs.a = "{signal}", inputs.b = "p" }
+  |           ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ "type" is missing
+  |
+  = note: node `x/n`, and 1 more node
+  = help: say which kind of node it is, e.g. type = "slope"
 
-error[A025]: modules are not part of this version
- --> a.toml:4:1
+error[A027]: "p" is not a node of module "m"
+ --> a.toml:4:47
   |
-4 | module = "m"
-  | ^^^^^^
+4 | nodes.n = { inputs.a = "{signal}", inputs.b = "p" }
+  |                                               ^^^ out of the module's reach
+  |
+  = note: node `x/n`, and 1 more node
+  = help: name it under the module's `inputs`; there it has "n", "{signal}"
+
+error[A025]: there is no module "n"
+ --> a.toml:8:16
+  |
+8 | z = { module = "n", inputs.signal = "q" }
+  |                ^^^ not a module
+  |
+  = help: there is only "m"
 "#
     );
 }
-
 #[test]
 fn a_mistake_in_an_extended_file_is_shown_there() {
     let files = [

@@ -1,0 +1,206 @@
+//! The figures that the project promises, beside what this machine gives: one run, one table.
+//!
+//! `cargo bench --bench budgets` measures ticks one by one, and the program as a user starts it, on a simulated die tester.
+//! Times of the program are the best of five; a tick's are told with the clock's own cost of some 25 ns in them.
+
+mod die_tester;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant as Clock};
+
+use die_tester::by_hand::ByHand;
+use die_tester::{Tick, model, ticks};
+
+fn main() {
+    println!("{:<52}{:>14}{:>14}", "", "measured", "budget");
+    live();
+    program();
+}
+
+fn tell(work: &str, measured: &str, budget: &str) {
+    println!("{work:<52}{measured:>14}{budget:>14}");
+}
+
+fn live() {
+    let model = model();
+    let mut warm = ticks(9.0, 2);
+    let measured = warm.split_off(17_280);
+    let mut engine = model.engine().expect("the fit belongs to the graph");
+    let mut by_hand = ByHand::new(&model);
+    for tick in &warm {
+        engine.step(tick.0, &tick.1).expect("ticks are in order");
+        by_hand.step(tick);
+    }
+    let start = Clock::now();
+    let engine = times(&measured, |tick| {
+        let outputs = engine.step(tick.0, &tick.1);
+        std::hint::black_box(outputs.expect("ticks are in order"));
+    });
+    let seconds = start.elapsed().as_secs_f64();
+    let by_hand = times(&measured, |tick| {
+        std::hint::black_box(by_hand.step(tick));
+    });
+    for (name, truth, budgets) in [
+        ("a tick that carries truth", true, ["3 µs", "15 µs", "1.5"]),
+        ("a tick without truth", false, ["", "", ""]),
+    ] {
+        let of = |times: &[Duration]| Quantiles::of(times, &measured, truth);
+        let (engine, by_hand) = (of(&engine), of(&by_hand));
+        tell(&format!("{name}, median"), &us(engine.median), budgets[0]);
+        tell(&format!("{name}, 99.9 %"), &us(engine.rare), budgets[1]);
+        tell(&format!("{name}, by hand, median"), &us(by_hand.median), "");
+        let ratio = engine.median.as_secs_f64() / by_hand.median.as_secs_f64();
+        tell(
+            &format!("{name}, engine by hand"),
+            &format!("{ratio:.2}"),
+            budgets[2],
+        );
+    }
+    let rate = measured.len() as f64 / seconds;
+    tell(
+        "ticks from memory per second, each timed",
+        &format!("{rate:.0}"),
+        "500000",
+    );
+}
+
+fn times(ticks: &[Tick], mut step: impl FnMut(&Tick)) -> Vec<Duration> {
+    let mut times = Vec::with_capacity(ticks.len());
+    for tick in ticks {
+        let start = Clock::now();
+        step(tick);
+        times.push(start.elapsed());
+    }
+    times
+}
+
+struct Quantiles {
+    median: Duration,
+    rare: Duration,
+}
+
+impl Quantiles {
+    fn of(times: &[Duration], ticks: &[Tick], truth: bool) -> Self {
+        let chosen = times.iter().zip(ticks);
+        let chosen = chosen.filter(|(_, tick)| tick.1[6].is_nan() != truth);
+        let mut sorted: Vec<_> = chosen.map(|(time, _)| *time).collect();
+        sorted.sort_unstable();
+        Self {
+            median: sorted[sorted.len() / 2],
+            rare: sorted[sorted.len() * 999 / 1000],
+        }
+    }
+}
+
+fn us(time: Duration) -> String {
+    format!("{:.2} µs", time.as_secs_f64() * 1e6)
+}
+
+fn program() {
+    let folder = std::env::temp_dir().join(format!("athermal-budgets-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("there is a temporary folder");
+    let file = |name: &str| folder.join(name);
+    let (train, test, fitted) = (file("train.csv"), file("test.csv"), file("model.json"));
+    die_tester::write(&train, 7.0, 1);
+    die_tester::write(&test, 2.5, 2);
+    let graph = die_tester::graph();
+
+    let run = best(&[
+        "fit",
+        path(&graph),
+        "--data",
+        path(&train),
+        "-o",
+        path(&fitted),
+    ]);
+    tell("fit a week, whole process", &ms(run.time), "400 ms");
+    tell("its memory", &run.memory(), "50 MB");
+    let run = best(&["evaluate", path(&fitted), "--data", path(&test)]);
+    tell(
+        "evaluate two days and a half, whole process",
+        &ms(run.time),
+        "150 ms",
+    );
+    tell("its memory", &run.memory(), "50 MB");
+    let predicted = file("predicted.csv");
+    let week = best(&[
+        "run",
+        path(&fitted),
+        "-i",
+        path(&train),
+        "-o",
+        path(&predicted),
+    ]);
+    let rate = 60_480.0 / week.time.as_secs_f64();
+    tell(
+        "run from CSV to CSV, rows per second",
+        &format!("{rate:.0}"),
+        "150000",
+    );
+    tell("its memory", &week.memory(), "");
+    let start = best(&["--version"]);
+    tell("start to first output", &ms(start.time), "20 ms");
+    std::fs::remove_dir_all(&folder).expect("the folder was made above");
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str()
+        .expect("the temporary folder has a name in UTF-8")
+}
+
+fn ms(time: Duration) -> String {
+    format!("{:.0} ms", time.as_secs_f64() * 1e3)
+}
+
+struct Run {
+    time: Duration,
+    /// The most memory that was seen in use, where the system tells.
+    peak_kb: Option<u64>,
+}
+
+impl Run {
+    fn memory(&self) -> String {
+        self.peak_kb.map_or_else(
+            || "-".to_owned(),
+            |kb| format!("{:.1} MB", kb as f64 / 1024.0),
+        )
+    }
+}
+
+fn best(arguments: &[&str]) -> Run {
+    let time = |_| {
+        let start = Clock::now();
+        let status = program_with(arguments).status();
+        assert!(status.is_ok_and(|status| status.success()), "{arguments:?}");
+        start.elapsed()
+    };
+    Run {
+        time: (0..5).map(time).min().expect("five is more than none"),
+        peak_kb: peak_kb(arguments),
+    }
+}
+
+fn program_with(arguments: &[&str]) -> Command {
+    let mut command = Command::new(PathBuf::from(env!("CARGO_BIN_EXE_athermal")));
+    command
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    command
+}
+
+/// Asks the system for the peak of a running program until it ends.
+fn peak_kb(arguments: &[&str]) -> Option<u64> {
+    let mut child = program_with(arguments).spawn().ok()?;
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = None;
+    while child.try_wait().ok()?.is_none() {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let now = line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok());
+        peak = peak.max(now);
+        std::thread::sleep(Duration::from_micros(500));
+    }
+    peak
+}

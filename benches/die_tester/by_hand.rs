@@ -1,0 +1,255 @@
+//! The arithmetic of the die tester's graph as one would write it for this machine alone: fixed arrays, no absence but
+//! that of positions, no graph. It gives the same bits, and what the engine costs is told by the ratio to it.
+
+use std::collections::VecDeque;
+
+use athermal::Model;
+use athermal::core::channel::{ABSENT, COLD};
+use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
+use serde_json::Value;
+
+use super::Tick;
+
+const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
+const FEATURES: usize = 42;
+const MINUTE: i64 = 60_000_000_000;
+/// The lags of the drift, the horizon, the span of the drift and the memory of the vote.
+const LAGS: [i64; 3] = [0, 5 * MINUTE, 10 * MINUTE];
+const AHEAD: i64 = 5 * MINUTE;
+const SPAN: i64 = 5 * MINUTE;
+const MEMORY: i64 = 15 * MINUTE;
+
+/// A sum of weighted regressors: features first, then the lags of the drift.
+struct Linear {
+    intercept: f64,
+    terms: Vec<(f64, usize)>,
+}
+
+impl Linear {
+    fn read(fitted: &Value, node: &str, features: &[&str]) -> Self {
+        let fit = &fitted[node];
+        let list = |key: &str| fit[key].as_array().expect("a linear fit lists its terms");
+        let place = |name: &Value| {
+            let name = name.as_str().expect("regressors have names");
+            match features.iter().position(|feature| *feature == name) {
+                Some(place) => place,
+                None if name.ends_with("lag 0s") => FEATURES,
+                None if name.ends_with("lag 5min") => FEATURES + 1,
+                None if name.ends_with("lag 10min") => FEATURES + 2,
+                None => panic!("`{name}` is no regressor of the die tester"),
+            }
+        };
+        let number = |value: &Value| value.as_f64().expect("coefficients are finite");
+        let coefficients = list("coefficients").iter().map(number);
+        Self {
+            intercept: number(&fit["intercept"]),
+            terms: coefficients
+                .zip(list("regressors").iter().map(place))
+                .collect(),
+        }
+    }
+
+    /// NaN where a regressor is absent, since NaN travels through sums.
+    fn predict(&self, regressors: &[f64]) -> f64 {
+        let terms = self.terms.iter();
+        terms.fold(self.intercept, |sum, &(b, place)| {
+            sum + b * regressors[place]
+        })
+    }
+}
+
+type Votes = [[f64; 3]; 6];
+
+pub struct ByHand {
+    gradients: RollingSlope,
+    drift: RollingSlope,
+    models: [[Linear; 3]; 6],
+    slopes: [f64; FEATURES],
+    drifts: [f64; 6],
+    /// Drifts as they were measured, newest last, and for each lag the first that is too new for it.
+    past: VecDeque<(i64, [f64; 6])>,
+    next: [usize; 3],
+    /// Votes by tick, newest last.
+    runs: VecDeque<(i64, Votes)>,
+    /// Squared errors by the arrival of their truth, newest last, and those that count from the next tick on.
+    errors: VecDeque<(i64, Votes)>,
+    arrived: bool,
+    mean_squares: Votes,
+}
+
+impl ByHand {
+    pub fn new(model: &Model) -> Self {
+        let text = model.to_text().expect("a model can be written");
+        let json: Value = serde_json::from_str(&text).expect("a model is JSON");
+        let channels = model.plan.channels.iter();
+        let gradients: Vec<_> = channels
+            .filter(|channel| channel.name.starts_with("gradients."))
+            .collect();
+        let names: Vec<_> = gradients.iter().map(|channel| &*channel.name).collect();
+        let windows: Vec<_> = gradients[..7]
+            .iter()
+            .map(|channel| channel.channel.span.as_ns())
+            .collect();
+        let coverage = Coverage {
+            min_samples: 3,
+            min_coverage: 0.5,
+            cold_partial: false,
+        };
+        let no_value = NoValue {
+            absent: ABSENT,
+            cold: COLD,
+        };
+        let read = |node: &str, axis: &str| {
+            Linear::read(
+                &json["fitted"],
+                &format!("{node}.{axis}"),
+                &names[..FEATURES],
+            )
+        };
+        Self {
+            gradients: RollingSlope::new(&windows, 6, coverage, no_value, false),
+            drift: RollingSlope::new(&[SPAN], 6, coverage, no_value, false),
+            models: AXES.map(|axis| ["thermal", "motion", "both"].map(|node| read(node, axis))),
+            slopes: [f64::NAN; FEATURES],
+            drifts: [f64::NAN; 6],
+            past: VecDeque::with_capacity(128),
+            next: [0; 3],
+            runs: VecDeque::with_capacity(128),
+            errors: VecDeque::with_capacity(128),
+            arrived: false,
+            mean_squares: [[f64::NAN; 3]; 6],
+        }
+    }
+
+    /// The predictions of the six axes.
+    pub fn step(&mut self, (time, samples): &Tick) -> [f64; 6] {
+        let now = time.as_ns();
+        let (temperatures, positions) = samples.split_at(6);
+        let mut admitted = [f64::NAN; 6];
+        for (admitted, &temperature) in admitted.iter_mut().zip(temperatures) {
+            if (-20.0..=200.0).contains(&temperature) {
+                *admitted = temperature;
+            }
+        }
+        self.gradients.push(now, &admitted);
+        self.gradients.slopes(&mut self.slopes);
+        let has_truth = !positions[0].is_nan();
+        if has_truth {
+            self.drift.push(now, positions);
+            self.drift.slopes(&mut self.drifts);
+            self.drifts.iter_mut().for_each(|drift| *drift *= 60.0);
+            self.past.push_back((now, self.drifts));
+        }
+
+        let mut regressors = [f64::NAN; FEATURES + 3];
+        for (to, slope) in regressors.iter_mut().zip(&self.slopes) {
+            *to = slope * 60_000.0;
+        }
+        let lagged = [0, 1, 2].map(|lag| self.lagged(now, lag));
+        let mut votes = [[f64::NAN; 3]; 6];
+        for axis in 0..6 {
+            for lag in 0..3 {
+                regressors[FEATURES + lag] = lagged[lag].map_or(f64::NAN, |drifts| drifts[axis]);
+            }
+            votes[axis] = [0, 1, 2].map(|node| self.models[axis][node].predict(&regressors));
+        }
+        self.forget(now);
+        let predicted = [0, 1, 2, 3, 4, 5].map(|axis| self.vote(&votes, axis));
+        self.runs.push_back((now, votes));
+        if has_truth {
+            self.observe(now);
+        }
+        predicted
+    }
+
+    /// The drifts that were held a lag ago, if they were not too old then.
+    fn lagged(&mut self, now: i64, lag: usize) -> Option<[f64; 6]> {
+        let at = now - LAGS[lag];
+        while self
+            .past
+            .get(self.next[lag])
+            .is_some_and(|past| past.0 <= at)
+        {
+            self.next[lag] += 1;
+        }
+        let &(measured, drifts) = self.past.get(self.next[lag].checked_sub(1)?)?;
+        if lag == 2 && self.next[2] > 1 {
+            // Nothing asks for anything older than the longest lag.
+            self.past.pop_front();
+            self.next.iter_mut().for_each(|next| *next -= 1);
+        }
+        (at - measured <= SPAN).then_some(drifts)
+    }
+
+    fn observe(&mut self, now: i64) {
+        let due = now - AHEAD;
+        while self.runs.get(1).is_some_and(|run| run.0 <= due) {
+            self.runs.pop_front();
+        }
+        if let Some(&(at, mut errors)) = self.runs.front()
+            && at <= due
+            && due - at <= SPAN
+        {
+            for (errors, truth) in errors.iter_mut().zip(&self.drifts) {
+                for error in errors {
+                    *error = (*error - truth) * (*error - truth);
+                }
+            }
+            self.errors.push_back((now, errors));
+            self.arrived = true;
+        }
+    }
+
+    /// Forgets what is too old, and takes the means of what is left.
+    fn forget(&mut self, now: i64) {
+        let mut changed = std::mem::take(&mut self.arrived);
+        while self
+            .errors
+            .front()
+            .is_some_and(|error| error.0 <= now - MEMORY)
+        {
+            self.errors.pop_front();
+            changed = true;
+        }
+        if !changed {
+            return;
+        }
+        for axis in 0..6 {
+            for voter in 0..3 {
+                let known = self.errors.iter().map(|(_, errors)| errors[axis][voter]);
+                let known = known.filter(|error| !error.is_nan());
+                let (sum, count) = known.fold((0.0, 0.0), |(sum, n), error| (sum + error, n + 1.0));
+                self.mean_squares[axis][voter] = sum / count;
+            }
+        }
+    }
+
+    fn vote(&self, votes: &Votes, axis: usize) -> f64 {
+        let (votes, squares) = (&votes[axis], &self.mean_squares[axis]);
+        let there = votes.iter().zip(squares).filter(|(vote, _)| !vote.is_nan());
+        let best = there
+            .clone()
+            .filter(|(_, square)| !square.is_nan())
+            .fold(f64::INFINITY, |best, (_, square)| best.min(*square))
+            .max(f64::MIN_POSITIVE);
+        let (mut known, mut weights, mut weighted) = (0.0, 0.0, 0.0);
+        let (mut new, mut sum_of_new) = (0.0, 0.0);
+        for (vote, square) in there {
+            if square.is_nan() {
+                new += 1.0;
+                sum_of_new += vote;
+            } else {
+                let weight = best / square.max(f64::MIN_POSITIVE);
+                known += 1.0;
+                weights += weight;
+                weighted += weight * vote;
+            }
+        }
+        if new > 0.0 {
+            let weight = if known > 0.0 { weights / known } else { 1.0 };
+            weighted += weight * sum_of_new;
+            weights += weight * new;
+        }
+        weighted / weights
+    }
+}

@@ -1,0 +1,173 @@
+//! What a tick costs: the slopes, the die tester's graph, the same arithmetic by hand, and starting an engine.
+
+mod die_tester;
+
+use athermal::core::channel::{ABSENT, COLD};
+use athermal::{Engine, Instant, Model};
+use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
+use die_tester::by_hand::ByHand;
+use die_tester::{Tick, model, ticks};
+use divan::Bencher;
+use divan::counter::ItemsCount;
+
+fn main() {
+    same_bits();
+    divan::main();
+}
+
+/// A comparison with other results would be none.
+fn same_bits() {
+    let model = model();
+    let (mut engine, mut by_hand) = (engine(&model), ByHand::new(&model));
+    let mut predictions = 0;
+    for tick in ticks(2.0, 2) {
+        let engine = engine.step(tick.0, &tick.1).expect("ticks are in order");
+        let by_hand = by_hand.step(&tick);
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
+        assert!(
+            engine.iter().zip(&by_hand).all(same),
+            "{engine:?} and by hand {by_hand:?}"
+        );
+        predictions += by_hand.iter().filter(|value| value.is_finite()).count();
+    }
+    assert!(predictions > 50_000, "only {predictions} predictions");
+}
+
+fn engine(model: &Model) -> Engine {
+    model.engine().expect("the fit belongs to the graph")
+}
+
+/// Two days, after which every window is warm, and the half day that is measured.
+fn warm_and_measured() -> (Vec<Tick>, Vec<Tick>) {
+    let mut warm = ticks(2.5, 2);
+    let measured = warm.split_off(17_280);
+    (warm, measured)
+}
+
+fn has_truth(tick: &Tick) -> bool {
+    !tick.1[6].is_nan()
+}
+
+#[divan::bench(args = [true, false], sample_count = 20)]
+fn live_ticks(bencher: Bencher, learning: bool) {
+    let model = model();
+    let (warm, mut measured) = warm_and_measured();
+    if !learning {
+        measured.retain(|tick| !has_truth(tick));
+    }
+    let with_inputs = || {
+        let mut engine = engine(&model);
+        for tick in &warm {
+            engine.step(tick.0, &tick.1).expect("ticks are in order");
+        }
+        engine
+    };
+    bencher
+        .counter(ItemsCount::new(measured.len()))
+        .with_inputs(with_inputs)
+        .bench_local_values(|mut engine| {
+            for tick in &measured {
+                let outputs = engine.step(tick.0, &tick.1);
+                divan::black_box(outputs.expect("ticks are in order"));
+            }
+            engine
+        });
+}
+
+#[divan::bench(sample_count = 20)]
+fn live_ticks_by_hand(bencher: Bencher) {
+    let model = model();
+    let (warm, measured) = warm_and_measured();
+    let with_inputs = || {
+        let mut by_hand = ByHand::new(&model);
+        for tick in &warm {
+            by_hand.step(tick);
+        }
+        by_hand
+    };
+    bencher
+        .counter(ItemsCount::new(measured.len()))
+        .with_inputs(with_inputs)
+        .bench_local_values(|mut by_hand| {
+            for tick in &measured {
+                divan::black_box(by_hand.step(tick));
+            }
+            by_hand
+        });
+}
+
+#[divan::bench]
+fn start(bencher: Bencher) {
+    let model = model();
+    bencher.bench_local(|| engine(&model));
+}
+
+const SLOPES: usize = 8 * 8;
+const ROWS: i64 = 60_480;
+
+fn windows_s() -> [i64; 8] {
+    [30, 60, 120, 240, 480, 600, 900, 1200]
+}
+
+#[divan::bench(sample_count = 10)]
+fn slopes_in_the_kernel(bencher: Bencher) {
+    let coverage = Coverage {
+        min_samples: 3,
+        min_coverage: 0.5,
+        cold_partial: false,
+    };
+    let no_value = NoValue {
+        absent: ABSENT,
+        cold: COLD,
+    };
+    let windows = windows_s().map(|s| s * 1_000_000_000);
+    bencher
+        .counter(ItemsCount::new(ROWS as usize * SLOPES))
+        .with_inputs(|| RollingSlope::new(&windows, 8, coverage, no_value, false))
+        .bench_local_values(|mut kernel| {
+            let mut out = [0.0; SLOPES];
+            for row in 0..ROWS {
+                kernel.push(row * 1_000_000_000, &temperatures(row));
+                kernel.slopes(&mut out);
+                divan::black_box(&out);
+            }
+            kernel
+        });
+}
+
+/// Times jitter, and each sensor misses a sample now and then.
+#[divan::bench(sample_count = 10)]
+fn slopes_in_the_engine(bencher: Bencher) {
+    let path = std::env::temp_dir().join(format!("athermal-slopes-{}.toml", std::process::id()));
+    let windows = windows_s().map(|s| format!("\"{s}s\"")).join(", ");
+    let graph = format!(
+        r#"schema = 1
+signals.temperature = {{ unit = "Cel", channels = ["a", "b", "c", "d", "e", "f", "g", "h"], max_age = "1min" }}
+nodes.gradients = {{ type = "slope", inputs.signal = "temperature", windows = [{windows}], unit = "mK/min" }}
+outputs.gradients = "gradients"
+"#
+    );
+    std::fs::write(&path, graph).expect("the temporary folder can be written");
+    let model = Model::load(&path).expect("the graph has no mistakes");
+    std::fs::remove_file(&path).expect("the file was just written");
+    bencher
+        .counter(ItemsCount::new(ROWS as usize * SLOPES))
+        .with_inputs(|| engine(&model))
+        .bench_local_values(|mut engine| {
+            for row in 0..ROWS {
+                let mut samples = temperatures(row);
+                if row % 7 == 0 {
+                    samples[(row / 7) as usize % 8] = f64::NAN;
+                }
+                let time = Instant::from_ns(row * 1_000_000_000 + row * 37 % 900 * 1_000_000);
+                let outputs = engine.step(time, &samples);
+                divan::black_box(outputs.expect("ticks are in order"));
+            }
+            engine
+        });
+}
+
+fn temperatures(row: i64) -> [f64; 8] {
+    let t = row as f64;
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0].map(|channel| 21.0 + channel + (t * 1e-3).sin())
+}

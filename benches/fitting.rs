@@ -1,0 +1,136 @@
+//! What fitting costs: forward selection, least squares, whole fits and scores, and reading a table.
+
+mod die_tester;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use athermal::Model;
+use athermal::core::fit::{FitOptions, fit};
+use athermal::core::recording::Recording;
+use athermal::core::score::{ScoreOptions, score};
+use athermal::files::{Dataset, Options};
+use athermal_numerics::{
+    ForwardSelection, GramBlocks, LeastSquares, SelectionScore, Standardization,
+};
+use divan::Bencher;
+use divan::counter::BytesCount;
+
+fn main() {
+    divan::main();
+}
+
+const CANDIDATES: usize = 64;
+
+/// Rows of 64 candidates that hang together in pairs, and a truth of which 20 of them know something.
+fn blocks(rows: usize) -> GramBlocks {
+    let mut blocks = GramBlocks::new(CANDIDATES);
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut row = [0.0; CANDIDATES];
+    for _ in 0..rows {
+        let mut before = 0.0;
+        for value in &mut row {
+            before = uniform() + 0.7 * before;
+            *value = before;
+        }
+        let known = row.iter().step_by(3).enumerate();
+        let truth = known.fold(uniform(), |sum, (i, value)| sum + value / (i + 1) as f64);
+        blocks.push(&row, truth);
+    }
+    blocks
+}
+
+#[divan::bench(args = [8_000, 80_000], sample_count = 10)]
+fn forward_selection(bencher: Bencher, rows: usize) {
+    let blocks = blocks(rows);
+    let scales = Standardization::of(&blocks.total()).scales;
+    let selection = ForwardSelection {
+        alpha: 1.0,
+        tolerance: Some(1e-3),
+        max_features: None,
+        score: SelectionScore::R2,
+    };
+    bencher.bench_local(|| selection.run(&blocks, 3, &scales));
+}
+
+#[divan::bench(args = [8_000, 80_000], sample_count = 10)]
+fn rows_into_blocks(bencher: Bencher, rows: usize) {
+    bencher.bench_local(|| blocks(rows));
+}
+
+#[divan::bench(args = [8_000, 80_000], sample_count = 10)]
+fn least_squares(bencher: Bencher, rows: usize) {
+    let blocks = blocks(rows);
+    let columns: Vec<_> = (0..CANDIDATES).collect();
+    bencher.bench_local(|| {
+        let gram = blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        LeastSquares::ridge(1.0).solve(&gram, &columns, &scales, blocks.rows())
+    });
+}
+
+fn log(name: &str, days: f64, seed: u64) -> (PathBuf, u64) {
+    let path = std::env::temp_dir().join(format!("athermal-{name}-{}.csv", std::process::id()));
+    let bytes = die_tester::write(&path, days, seed);
+    (path, bytes)
+}
+
+fn dataset(path: &PathBuf) -> Dataset {
+    Dataset::new(vec![path.clone()], Options::default())
+}
+
+#[divan::bench(sample_count = 10)]
+fn fit_a_week(bencher: Bencher) {
+    let (path, _) = log("fit", 7.0, 1);
+    let plan = Arc::clone(&Model::load(die_tester::graph()).expect("no mistakes").plan);
+    bencher.bench_local(|| {
+        let fitted = fit(&plan, &dataset(&path), &FitOptions::default(), &mut |_| ());
+        fitted.expect("the file can be read")
+    });
+    std::fs::remove_file(path).expect("the file was written above");
+}
+
+#[divan::bench(sample_count = 10)]
+fn evaluate_two_days(bencher: Bencher) {
+    let (path, _) = log("evaluate", 2.0, 2);
+    let model = die_tester::model();
+    bencher.bench_local(|| {
+        let options = ScoreOptions::default();
+        let scores = score(
+            &model.plan,
+            &model.fitted,
+            &dataset(&path),
+            &options,
+            &mut |_| (),
+        );
+        scores.expect("the file can be read")
+    });
+    std::fs::remove_file(path).expect("the file was written above");
+}
+
+#[divan::bench(sample_count = 10)]
+fn read_csv(bencher: Bencher) {
+    let (path, bytes) = log("read", 7.0, 1);
+    let plan = Arc::clone(&Model::load(die_tester::graph()).expect("no mistakes").plan);
+    bencher.counter(BytesCount::new(bytes)).bench_local(|| {
+        let data = dataset(&path);
+        let mut rows = data.open(&plan).expect("the file can be read");
+        let mut values = vec![f64::NAN; plan.sources.len()];
+        let mut count = 0_u64;
+        while rows
+            .next(&mut values)
+            .expect("the file can be read")
+            .is_some()
+        {
+            count += 1;
+        }
+        count
+    });
+    std::fs::remove_file(path).expect("the file was written above");
+}

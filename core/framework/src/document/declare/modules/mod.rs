@@ -1,0 +1,422 @@
+//! `[modules]`: every node that instantiates a module replaced by the module's nodes; what those nodes are is decided elsewhere.
+//!
+//! A module is a named group of nodes. It says what it reads, what can be set and what it gives:
+//!
+//! ```toml
+//! [modules.axis]
+//! inputs = ["features", "truth"]                   # named as `{features}` and `{truth}` inside
+//! required = ["limit"]                             # parameters without a default
+//! parameters = { ahead = "5min" }                  # parameters with one
+//! outputs = { predicted = "vote", linear = "thermal" }   # a node inside, or a port of one; the first is the default
+//! nodes.thermal = { type = "linear", inputs.features = "{features}", inputs.truth = "{truth}", ahead = "{ahead}", train.abs_truth.below = "{limit}" }
+//! nodes.vote = { type = "mean", inputs.voters = ["thermal"] }
+//!
+//! [nodes.axis-model]
+//! module = "axis"
+//! each = "axis"                                    # as on any node
+//! inputs.features = "gradients"
+//! inputs.truth = "drift.{axis}"
+//! limit = "150 nm/min"
+//! ```
+//!
+//! - An instance gives every input and every required parameter, and stands for its outputs as a node does for its ports:
+//!   `axis-model`, `axis-model.Z1`, `axis-model:linear.Z1`.
+//! - Its nodes are called `axis-model/thermal` in diagnostics, plans and models.
+//! - Inside, a reference names a node of the same module or begins with an input. Anything else of the graph is out of
+//!   reach, so that a module means the same wherever it is used. References among nodes inside stay within one member.
+//! - `{name}` alone in a text is the parameter's value, of whatever type; within a longer text it is the value's text.
+//! - Modules may instantiate modules, sixteen deep. `modules.axis = { from = "axis.toml" }` takes the module of that name
+//!   (or the one that `module = "…"` names) from another file, whose own modules it goes on seeing. Other keys there are
+//!   laid over it. A file that `extends` another inherits its modules.
+
+mod module;
+mod references;
+mod substitution;
+
+use std::sync::Arc;
+
+use indexmap::IndexMap;
+
+use super::nodes::{MOST_INSTANCES, MOST_VALUES, own_sets, weight};
+use super::placeholder;
+use super::reading::{known_keys, missing, table, text};
+use super::sets::Sets;
+use crate::diagnostic::Diagnostics;
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Entry, Table, Value};
+use module::{Module, find};
+
+pub(super) use module::check;
+
+/// How deep modules may nest.
+const DEEPEST: usize = 16;
+
+/// A node of the graph with every module expanded.
+pub(super) struct Placed {
+    /// Its name: `axis-model/thermal` inside a module.
+    pub(super) name: String,
+    /// Its key and table; references lead to nodes of the whole graph.
+    pub(super) entry: Entry,
+    /// The instances of modules that it is inside of, from the outermost.
+    pub(super) around: Arc<[Around]>,
+}
+
+/// An instance of a module, as the nodes inside of it see it.
+#[derive(Debug, Clone)]
+pub(super) struct Around {
+    /// The instance: `axis-model`, or `a/b` for one inside another.
+    pub(super) path: String,
+    /// The same with what picks one member out: `axis-model[{axis-model/axis}]`.
+    pub(super) one: String,
+    /// The sets of its `each`.
+    pub(super) each: Vec<String>,
+}
+
+impl Around {
+    /// The placeholder of one of its sets; no set of the node inside can be meant.
+    pub(super) fn placeholder(&self, set: &str) -> String {
+        format!("{}/{set}", self.path)
+    }
+}
+
+/// A graph with every module expanded.
+pub(super) struct Expanded {
+    pub(super) nodes: Vec<Placed>,
+    /// The section `[outputs]`, its references leading to nodes of the whole graph.
+    pub(super) outputs: Option<Value>,
+}
+
+/// Expands the modules of a graph file.
+pub(super) fn expand(root: &Table, sets: &Sets, diagnostics: &mut Diagnostics) -> Expanded {
+    let mut expanded = Expanded {
+        nodes: Vec::new(),
+        outputs: root.get("outputs").cloned(),
+    };
+    let Some(nodes) = root
+        .get("nodes")
+        .and_then(|nodes| table(nodes, "nodes", diagnostics))
+    else {
+        return expanded;
+    };
+    let modules = root.get("modules").and_then(Value::as_table);
+    let level = Level {
+        around: Arc::new([]),
+        nodes,
+        modules: modules.into_iter().collect(),
+        given: None,
+    };
+    let has_modules = nodes.iter().any(|(_, entry)| is_instance(entry));
+    let mut expansion = Expansion {
+        sets,
+        diagnostics,
+        placed: Vec::with_capacity(nodes.len()),
+        values: 0,
+        path: Vec::new(),
+        full: false,
+    };
+    for (name, entry) in nodes.iter() {
+        if has_modules {
+            expansion.node(name, entry, &level);
+        } else {
+            expansion.place(name, entry.clone(), &level);
+        }
+    }
+    if has_modules && let Some(outputs) = &mut expanded.outputs {
+        expansion.outputs(outputs, &level);
+    }
+    expanded.nodes = expansion.placed;
+    expanded
+}
+
+fn is_instance(entry: &Entry) -> bool {
+    entry
+        .value
+        .as_table()
+        .is_some_and(|keys| keys.contains("module"))
+}
+
+/// The nodes that see each other: those of the graph, or those of one instance of a module.
+struct Level<'a> {
+    around: Arc<[Around]>,
+    nodes: &'a Table,
+    /// The modules in sight, the nearest last.
+    modules: Vec<&'a Table>,
+    /// What the instance was given; none for the graph itself.
+    given: Option<Given>,
+}
+
+/// What an instance of a module was given.
+struct Given {
+    module: String,
+    /// References of the whole graph, by input.
+    inputs: IndexMap<String, Value>,
+    parameters: IndexMap<String, Value>,
+}
+
+impl Level<'_> {
+    /// The name of a node as the whole graph knows it.
+    fn name(&self, node: &str) -> String {
+        match self.around.last() {
+            Some(around) => format!("{}/{node}", around.path),
+            None => node.to_owned(),
+        }
+    }
+
+    /// What stands before a reference from one node to another.
+    fn prefix(&self) -> String {
+        self.around
+            .last()
+            .map_or_else(String::new, |around| format!("{}/", around.one))
+    }
+}
+
+struct Expansion<'a> {
+    sets: &'a Sets,
+    diagnostics: &'a mut Diagnostics,
+    placed: Vec<Placed>,
+    values: usize,
+    /// The modules on the way from the graph to the present level, by name and table.
+    path: Vec<(String, *const Value)>,
+    /// Set when the limit was told, so that nothing more is expanded.
+    full: bool,
+}
+
+impl Expansion<'_> {
+    fn node(&mut self, name: &str, entry: &Entry, level: &Level<'_>) {
+        if self.full {
+            return;
+        }
+        if is_instance(entry) {
+            self.instance(name, entry, level);
+            return;
+        }
+        let mut entry = entry.clone();
+        if let Some(keys) = entry.value.as_table_mut() {
+            for (key, entry) in keys.iter_mut() {
+                if key == "inputs" {
+                    entry.value = self.inputs(&entry.value, level);
+                } else if let Some(given) = &level.given {
+                    entry.value = given.fill(&entry.value, self.diagnostics);
+                }
+            }
+        }
+        self.place(name, entry, level);
+    }
+
+    fn place(&mut self, name: &str, entry: Entry, level: &Level<'_>) {
+        if level.given.is_some() {
+            self.values += weight(&entry.value);
+            let name = || level.name(name);
+            if self.placed.len() >= MOST_INSTANCES {
+                let problem = DocumentProblem::TooManyInstances {
+                    node: name(),
+                    instances: self.placed.len() + 1,
+                    limit: MOST_INSTANCES,
+                };
+                self.diagnostics.report(entry.key, problem);
+                self.full = true;
+            } else if self.values > MOST_VALUES {
+                let problem = DocumentProblem::TooLargeExpanded {
+                    node: name(),
+                    limit: MOST_VALUES,
+                };
+                self.diagnostics.report(entry.key, problem);
+                self.full = true;
+            }
+        }
+        self.placed.push(Placed {
+            name: level.name(name),
+            entry,
+            around: Arc::clone(&level.around),
+        });
+    }
+
+    fn instance(&mut self, name: &str, entry: &Entry, level: &Level<'_>) {
+        let Some(keys) = entry.value.as_table() else {
+            return;
+        };
+        let Some(wanted) = keys.get("module") else {
+            return;
+        };
+        let Some(module_name) = text(wanted, "module", self.diagnostics) else {
+            return;
+        };
+        let Some((found, sight)) = find(module_name, &level.modules) else {
+            let known = level.modules.iter().rev();
+            let known = known.flat_map(|modules| modules.keys().map(str::to_owned));
+            let problem = DocumentProblem::UnknownModule {
+                name: module_name.to_owned(),
+                known: known.collect(),
+            };
+            self.diagnostics.report(wanted.place, problem);
+            return;
+        };
+        let here = (module_name.to_owned(), std::ptr::from_ref(found));
+        if self.path.contains(&here) || self.path.len() >= DEEPEST {
+            let path = self.path.iter().chain([&here]);
+            let problem = DocumentProblem::ModuleLoop {
+                path: path.map(|(name, _)| name.clone()).collect(),
+                limit: DEEPEST,
+            };
+            self.diagnostics.report(wanted.place, problem);
+            return;
+        }
+        // What is wrong with a module itself has been told where it stands.
+        let Some(module) = Module::read(module_name, found, &mut Diagnostics::new()) else {
+            return;
+        };
+        let Some(each) = own_sets(keys, self.sets, self.diagnostics) else {
+            return;
+        };
+        let around = self.around(name, each, level);
+        let Some(given) = self.given(name, entry, keys, &module, &around, level) else {
+            return;
+        };
+        let mut modules = level.modules[..=sight].to_vec();
+        modules.extend(module.modules);
+        let inside = Level {
+            around: level.around.iter().cloned().chain([around]).collect(),
+            nodes: module.nodes,
+            modules,
+            given: Some(given),
+        };
+        self.path.push(here);
+        for (name, entry) in module.nodes.iter() {
+            let context = format!("node `{}`", inside.name(name));
+            let outer = self.diagnostics.scope(Some(context));
+            self.node(name, entry, &inside);
+            self.diagnostics.scope(outer);
+        }
+        self.path.pop();
+    }
+
+    fn around(&self, name: &str, each: Vec<String>, level: &Level<'_>) -> Around {
+        let path = level.name(name);
+        let member: Vec<_> = each.iter().map(|set| format!("{{{path}/{set}}}")).collect();
+        let one = format!("{}{name}", level.prefix());
+        let one = if member.is_empty() {
+            one
+        } else {
+            format!("{one}[{}]", member.join("-"))
+        };
+        Around { path, one, each }
+    }
+
+    /// The inputs and parameters of an instance; `None` where one is missing.
+    fn given(
+        &mut self,
+        name: &str,
+        entry: &Entry,
+        keys: &Table,
+        module: &Module<'_>,
+        around: &Around,
+        level: &Level<'_>,
+    ) -> Option<Given> {
+        let what = format!(
+            "node \"{}\" of module \"{}\"",
+            level.name(name),
+            module.name
+        );
+        let known: Vec<&str> = ["module", "each", "inputs"]
+            .into_iter()
+            .chain(module.parameter_names())
+            .collect();
+        known_keys(keys, &known, &what, self.diagnostics);
+        let mut whole = true;
+        let mut inputs = IndexMap::new();
+        let empty = Table::new();
+        let wired = match keys.get("inputs") {
+            Some(value) => table(value, "inputs", self.diagnostics)?,
+            None => &empty,
+        };
+        let known: Vec<&str> = module.inputs.iter().map(String::as_str).collect();
+        known_keys(
+            wired,
+            &known,
+            &format!("`inputs` of {what}"),
+            self.diagnostics,
+        );
+        for input in &module.inputs {
+            match wired.get(input) {
+                Some(value) => {
+                    let value = self.input(value, level);
+                    inputs.insert(input.clone(), self.outward(value, around, &what));
+                }
+                None => {
+                    whole = false;
+                    let advice = format!("wire it, e.g. inputs.{input} = \"…\"");
+                    let key = format!("inputs.{input}");
+                    missing(&entry.value, &key, &what, Some(&advice), self.diagnostics);
+                }
+            }
+        }
+        let mut parameters: IndexMap<_, _> = module
+            .defaults()
+            .map(|(name, entry)| (name.to_owned(), entry.value.clone()))
+            .collect();
+        for parameter in module.parameter_names() {
+            match keys.get(parameter) {
+                Some(value) => {
+                    let value = match &level.given {
+                        Some(given) => given.fill(value, self.diagnostics),
+                        None => value.clone(),
+                    };
+                    let value = self.outward(value, around, &what);
+                    parameters.insert(parameter.to_owned(), value);
+                }
+                None if parameters.contains_key(parameter) => {}
+                None => {
+                    whole = false;
+                    missing(&entry.value, parameter, &what, None, self.diagnostics);
+                }
+            }
+        }
+        whole.then(|| Given {
+            module: module.name.to_owned(),
+            inputs,
+            parameters,
+        })
+    }
+
+    /// A value given to an instance, its members written so that no set inside the module can be meant.
+    fn outward(&mut self, value: Value, around: &Around, what: &str) -> Value {
+        let place = value.place;
+        let data = match value.data {
+            Data::Text(text) => {
+                let strange =
+                    |name: &&str| !name.contains('/') && !around.each.iter().any(|set| set == name);
+                for name in placeholder::names(&text).filter(strange) {
+                    let problem = DocumentProblem::UnknownPlaceholder {
+                        name: name.to_owned(),
+                        known: around.each.clone(),
+                        what: what.to_owned(),
+                    };
+                    self.diagnostics.report(place, problem);
+                }
+                let open = |set: &String| (set.clone(), format!("{{{}}}", around.placeholder(set)));
+                let open: Vec<_> = around.each.iter().map(open).collect();
+                let open: Vec<_> = open.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
+                Data::Text(placeholder::fill(&text, &open))
+            }
+            Data::List(values) => {
+                let values = values.into_iter();
+                Data::List(values.map(|v| self.outward(v, around, what)).collect())
+            }
+            Data::Table(entries) => {
+                let entries = entries.into_iter().map(|(key, entry)| {
+                    let value = self.outward(entry.value, around, what);
+                    (
+                        key,
+                        Entry {
+                            key: entry.key,
+                            value,
+                        },
+                    )
+                });
+                Data::Table(entries.collect())
+            }
+            other => other,
+        };
+        Value::new(place, data)
+    }
+}

@@ -1,0 +1,163 @@
+//! What a module declares, and which module a name means; what becomes of its nodes is decided by the expansion.
+
+use crate::diagnostic::Diagnostics;
+use crate::document::declare::names::{distinct, name_rule};
+use crate::document::declare::reading::{known_keys, missing, table, text, texts};
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Entry, Table, Value};
+
+const KEYS: [&str; 6] = [
+    "inputs",
+    "required",
+    "parameters",
+    "outputs",
+    "nodes",
+    // What a module of another file sees beside itself.
+    "modules",
+];
+/// Keys that mean something on any node that instantiates a module.
+const TAKEN: [&str; 4] = ["type", "module", "each", "inputs"];
+
+/// A module as declared.
+pub(super) struct Module<'a> {
+    pub(super) name: &'a str,
+    pub(super) inputs: Vec<String>,
+    required: Vec<String>,
+    parameters: Option<&'a Table>,
+    pub(super) outputs: Option<&'a Table>,
+    pub(super) nodes: &'a Table,
+    pub(super) modules: Option<&'a Table>,
+}
+
+impl<'a> Module<'a> {
+    /// Reads a module's declaration; `None` where it has no nodes.
+    pub(super) fn read(
+        name: &'a str,
+        value: &'a Value,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Self> {
+        let keys = table(value, name, diagnostics)?;
+        let what = format!("module \"{name}\"");
+        known_keys(keys, &KEYS, &what, diagnostics);
+        let mut list = |key: &str, role: &'static str| {
+            let names = keys
+                .get(key)
+                .and_then(|value| texts(value, key, "a list of names", diagnostics));
+            let names = names.unwrap_or_default();
+            distinct(&names, role, diagnostics);
+            names
+        };
+        let inputs = list("inputs", "input");
+        let required = list("required", "parameter");
+        let parameters = keys
+            .get("parameters")
+            .and_then(|value| table(value, "parameters", diagnostics));
+        let outputs = keys
+            .get("outputs")
+            .and_then(|value| table(value, "outputs", diagnostics));
+        let advice = "describe its nodes under it, e.g. nodes.slope = { type = \"slope\" }";
+        let nodes = match keys.get("nodes") {
+            Some(nodes) => table(nodes, "nodes", diagnostics)?,
+            None => {
+                missing(value, "nodes", &what, Some(advice), diagnostics);
+                return None;
+            }
+        };
+        let with_default = parameters.into_iter().flat_map(|table| {
+            table
+                .iter()
+                .map(|(name, entry)| (name.to_owned(), entry.key))
+        });
+        let settable: Vec<_> = required.iter().cloned().chain(with_default).collect();
+        for (nth, (name, place)) in settable.iter().enumerate() {
+            let first_role = if TAKEN.contains(&name.as_str()) {
+                "key of every node"
+            } else if inputs.iter().any(|(input, _)| input == name) {
+                "input"
+            } else if nth >= required.len() && required.iter().any(|(other, _)| other == name) {
+                "required parameter"
+            } else {
+                continue;
+            };
+            let problem = DocumentProblem::DuplicateName {
+                role: "parameter",
+                name: name.clone(),
+                first_role,
+                first: None,
+            };
+            diagnostics.report(*place, problem);
+        }
+        let names = |names: Vec<(String, _)>| names.into_iter().map(|(name, _)| name).collect();
+        Some(Self {
+            name,
+            inputs: names(inputs),
+            required: names(required),
+            parameters,
+            outputs,
+            nodes,
+            modules: keys.get("modules").and_then(Value::as_table),
+        })
+    }
+
+    /// The names of its parameters, those without a default first.
+    pub(super) fn parameter_names(&self) -> impl Iterator<Item = &str> {
+        let with_default = self.parameters.into_iter().flat_map(Table::keys);
+        self.required.iter().map(String::as_str).chain(with_default)
+    }
+
+    /// The parameters that have a default.
+    pub(super) fn defaults(&self) -> impl Iterator<Item = (&'a str, &'a Entry)> + use<'a> {
+        self.parameters.into_iter().flat_map(Table::iter)
+    }
+
+    fn check(&self, diagnostics: &mut Diagnostics) {
+        for (name, entry) in self.nodes.iter() {
+            name_rule(name, entry.key, "node", false, diagnostics);
+        }
+        for (name, entry) in self.outputs.into_iter().flat_map(Table::iter) {
+            name_rule(name, entry.key, "output", false, diagnostics);
+            let Some(reference) = text(&entry.value, name, diagnostics) else {
+                continue;
+            };
+            let (node, port) = reference.split_once(':').unwrap_or((reference, ""));
+            if node.contains('.') || port.contains('.') {
+                let reason =
+                    "an output is a node of the module or a port of one, with all its channels";
+                let problem = DocumentProblem::Refused {
+                    key: Some(name.to_owned()),
+                    reason: reason.to_owned(),
+                };
+                diagnostics.report(entry.value.place, problem);
+            } else if !self.nodes.contains(node) {
+                let problem = DocumentProblem::OutOfReach {
+                    name: node.to_owned(),
+                    module: self.name.to_owned(),
+                    known: self.nodes.keys().map(str::to_owned).collect(),
+                };
+                diagnostics.report(entry.value.place, problem);
+            }
+        }
+    }
+}
+
+/// Reports what is wrong with modules as they are declared, used or not.
+pub(in crate::document::declare) fn check(modules: Option<&Value>, diagnostics: &mut Diagnostics) {
+    let Some(modules) = modules.and_then(|modules| table(modules, "modules", diagnostics)) else {
+        return;
+    };
+    for (name, entry) in modules.iter() {
+        name_rule(name, entry.key, "module", false, diagnostics);
+        if let Some(module) = Module::read(name, &entry.value, diagnostics) {
+            module.check(diagnostics);
+        }
+        // A module of another file brings those that it sees there.
+        let seen = entry.value.as_table().and_then(|keys| keys.get("modules"));
+        check(seen, diagnostics);
+    }
+}
+
+/// The module of a name, and at which of the tables in sight it stands.
+pub(super) fn find<'a>(name: &str, modules: &[&'a Table]) -> Option<(&'a Value, usize)> {
+    let mut nearest = modules.iter().enumerate().rev();
+    nearest.find_map(|(sight, table)| Some((table.get(name)?, sight)))
+}

@@ -1,0 +1,227 @@
+//! Which node of the whole graph a reference means that is written beside or inside a module.
+
+use super::module::{Module, find};
+use super::{DEEPEST, Expansion, Level};
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Entry, Table, Value};
+
+impl Expansion<'_> {
+    /// The table `inputs` of a node.
+    pub(super) fn inputs(&mut self, value: &Value, level: &Level<'_>) -> Value {
+        let Data::Table(ports) = &value.data else {
+            return value.clone();
+        };
+        let ports = ports.iter().map(|(port, entry)| {
+            let value = self.input(&entry.value, level);
+            let key = entry.key;
+            (port.to_owned(), Entry { key, value })
+        });
+        Value::new(value.place, Data::Table(ports.collect()))
+    }
+
+    /// What one input reads: a reference, a list of them, or a table that holds either.
+    pub(super) fn input(&mut self, value: &Value, level: &Level<'_>) -> Value {
+        let data = match &value.data {
+            Data::Text(text) => return self.reference(text, value, level),
+            Data::List(values) => {
+                let mut all = Vec::with_capacity(values.len());
+                for value in values {
+                    let value = self.input(value, level);
+                    match value.data {
+                        // An input that was given a list is spliced in.
+                        Data::List(several) => all.extend(several),
+                        _ => all.push(value),
+                    }
+                }
+                Data::List(all)
+            }
+            Data::Table(keys) => {
+                let mut filled = Table::new();
+                for (key, entry) in keys.iter() {
+                    let value = match (&level.given, key) {
+                        (_, "from") => self.input(&entry.value, level),
+                        (Some(given), _) => given.fill(&entry.value, self.diagnostics),
+                        (None, _) => entry.value.clone(),
+                    };
+                    let key_place = entry.key;
+                    match value.data {
+                        // An input that was given with an age keeps it, unless the node says another.
+                        Data::Table(inner) if key == "from" => {
+                            for (key, entry) in inner {
+                                if key == "from" || !keys.contains(&key) {
+                                    filled.insert(key, entry);
+                                }
+                            }
+                        }
+                        _ => {
+                            filled.insert(
+                                key,
+                                Entry {
+                                    key: key_place,
+                                    value,
+                                },
+                            );
+                        }
+                    }
+                }
+                Data::Table(filled)
+            }
+            other => other.clone(),
+        };
+        Value::new(value.place, data)
+    }
+
+    fn reference(&mut self, text: &str, value: &Value, level: &Level<'_>) -> Value {
+        let place = value.place;
+        let mut text = text.to_owned();
+        if let Some(given) = &level.given {
+            if let Some((input, rest)) = leading(&text)
+                && let Some(reads) = given.inputs.get(input)
+            {
+                return match &reads.data {
+                    _ if rest.is_empty() => reads.clone(),
+                    Data::Text(reference) => {
+                        let rest = given.fill_text(rest, place, self.diagnostics);
+                        Value::new(reads.place, Data::Text(reference.clone() + &rest))
+                    }
+                    _ => {
+                        let problem = DocumentProblem::Refused {
+                            key: Some(input.to_owned()),
+                            reason: format!(
+                                "module \"{}\" takes a part of this input, which only a single reference has",
+                                given.module
+                            ),
+                        };
+                        self.diagnostics.report(reads.place, problem);
+                        reads.clone()
+                    }
+                };
+            }
+            text = given.fill_text(&text, place, self.diagnostics);
+        }
+        let text = self.outside(&text, place, level);
+        Value::new(place, Data::Text(text))
+    }
+
+    /// A reference as the whole graph knows it.
+    fn outside(&mut self, text: &str, place: Place, level: &Level<'_>) -> String {
+        let (node, port, channel) = parts(text);
+        let Some(entry) = level.nodes.entry(node) else {
+            if let Some(given) = &level.given {
+                let inputs = given.inputs.keys().map(|input| format!("{{{input}}}"));
+                let problem = DocumentProblem::OutOfReach {
+                    name: node.to_owned(),
+                    module: given.module.clone(),
+                    known: level
+                        .nodes
+                        .keys()
+                        .map(str::to_owned)
+                        .chain(inputs)
+                        .collect(),
+                };
+                self.diagnostics.report(place, problem);
+            }
+            return text.to_owned();
+        };
+        let prefix = level.prefix();
+        let instantiates = entry.value.as_table().and_then(|keys| keys.get("module"));
+        let Some(module) = instantiates.and_then(Value::as_text) else {
+            return format!("{prefix}{text}");
+        };
+        let target = match output(module, port, &level.modules, DEEPEST) {
+            Output::Found(target) => format!("{prefix}{node}/{target}"),
+            Output::Unknown(known) => {
+                let problem = DocumentProblem::UnknownOutput {
+                    node: node.to_owned(),
+                    output: port.unwrap_or_default().to_owned(),
+                    module: module.to_owned(),
+                    known,
+                };
+                self.diagnostics.report(place, problem);
+                text.to_owned()
+            }
+            // What is wrong with the module is told there.
+            Output::Broken => text.to_owned(),
+        };
+        match channel {
+            Some(channel) => format!("{target}.{channel}"),
+            None => target,
+        }
+    }
+
+    /// The section `[outputs]`.
+    pub(super) fn outputs(&mut self, outputs: &mut Value, level: &Level<'_>) {
+        if let Some(outputs) = outputs.as_table_mut() {
+            for (_, entry) in outputs.iter_mut() {
+                entry.value = self.input(&entry.value, level);
+            }
+        }
+    }
+}
+
+/// What an output of a module stands for.
+enum Output {
+    /// A node inside, and its port where one is named.
+    Found(String),
+    /// There is no such output; these there are.
+    Unknown(Vec<String>),
+    /// Something has been told of it already.
+    Broken,
+}
+
+fn output(module: &str, port: Option<&str>, modules: &[&Table], depth: usize) -> Output {
+    let Some((found, sight)) = find(module, modules).filter(|_| depth > 0) else {
+        return Output::Broken;
+    };
+    let Some(module) = Module::read(module, found, &mut Diagnostics::new()) else {
+        return Output::Broken;
+    };
+    let outputs = || module.outputs.into_iter().flat_map(Table::iter);
+    let wanted = match port {
+        None => outputs().next(),
+        Some(port) => outputs().find(|(name, _)| *name == port),
+    };
+    let Some((_, entry)) = wanted else {
+        return Output::Unknown(outputs().map(|(name, _)| name.to_owned()).collect());
+    };
+    let Some(reference) = entry.value.as_text() else {
+        return Output::Broken;
+    };
+    let (node, port, _) = parts(reference);
+    let Some(inner) = module.nodes.get(node) else {
+        return Output::Broken;
+    };
+    let instantiates = inner.as_table().and_then(|keys| keys.get("module"));
+    let Some(inner) = instantiates.and_then(Value::as_text) else {
+        return Output::Found(reference.to_owned());
+    };
+    let mut seen = modules[..=sight].to_vec();
+    seen.extend(module.modules);
+    match output(inner, port, &seen, depth - 1) {
+        Output::Found(target) => Output::Found(format!("{node}/{target}")),
+        // The mistake stands in this module's outputs, not in the reference.
+        Output::Unknown(_) => Output::Broken,
+        Output::Broken => Output::Broken,
+    }
+}
+
+/// The input in braces with which a text begins, and what follows it.
+fn leading(text: &str) -> Option<(&str, &str)> {
+    text.strip_prefix('{')?.split_once('}')
+}
+
+/// Node, port and channel of a reference.
+fn parts(text: &str) -> (&str, Option<&str>, Option<&str>) {
+    let Some(end) = text.find(['.', ':']) else {
+        return (text, None, None);
+    };
+    let (node, rest) = (&text[..end], &text[end + 1..]);
+    if text.as_bytes()[end] == b'.' {
+        return (node, None, Some(rest));
+    }
+    match rest.split_once('.') {
+        Some((port, channel)) => (node, Some(port), Some(channel)),
+        None => (node, Some(rest), None),
+    }
+}

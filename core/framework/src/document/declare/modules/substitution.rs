@@ -1,0 +1,81 @@
+//! Parameters of a module in the place of their names.
+
+use super::Given;
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::declare::placeholder;
+use crate::document::problem::DocumentProblem;
+use crate::document::tree::{Data, Entry, Value};
+
+impl Given {
+    /// A value of the module with the parameters that it names.
+    ///
+    /// A text that is nothing but `{name}` becomes the parameter's value, which stands where it was given.
+    pub(super) fn fill(&self, value: &Value, diagnostics: &mut Diagnostics) -> Value {
+        let data = match &value.data {
+            Data::Text(text) => match self.whole(text) {
+                Some(given) => return given.clone(),
+                None => Data::Text(self.fill_text(text, value.place, diagnostics)),
+            },
+            Data::List(values) => Data::List(
+                values
+                    .iter()
+                    .map(|value| self.fill(value, diagnostics))
+                    .collect(),
+            ),
+            Data::Table(entries) => Data::Table(
+                entries
+                    .iter()
+                    .map(|(key, entry)| {
+                        let value = self.fill(&entry.value, diagnostics);
+                        let key_place = entry.key;
+                        (
+                            key.to_owned(),
+                            Entry {
+                                key: key_place,
+                                value,
+                            },
+                        )
+                    })
+                    .collect(),
+            ),
+            scalar => scalar.clone(),
+        };
+        Value::new(value.place, data)
+    }
+
+    fn whole(&self, text: &str) -> Option<&Value> {
+        let name = text.strip_prefix('{')?.strip_suffix('}')?;
+        self.parameters.get(name)
+    }
+
+    /// A text with the parameters that it names; one without a text of its own is refused.
+    pub(super) fn fill_text(
+        &self,
+        text: &str,
+        place: Place,
+        diagnostics: &mut Diagnostics,
+    ) -> String {
+        let mut texts = Vec::new();
+        for name in placeholder::names(text) {
+            let Some(value) = self.parameters.get(name) else {
+                continue;
+            };
+            match &value.data {
+                Data::Text(text) | Data::Time(text) => texts.push((name, text.clone())),
+                Data::Integer(number) => texts.push((name, number.to_string())),
+                Data::Float(number) => texts.push((name, number.to_string())),
+                Data::Bool(truth) => texts.push((name, truth.to_string())),
+                Data::List(_) | Data::Table(_) => {
+                    let problem = DocumentProblem::WrongType {
+                        key: Some(name.to_owned()),
+                        expected: "a text or a number within a text".to_owned(),
+                        found: value.found(),
+                    };
+                    diagnostics.report(place, problem);
+                }
+            }
+        }
+        let texts: Vec<_> = texts.iter().map(|(name, t)| (*name, t.as_str())).collect();
+        placeholder::fill(text, &texts)
+    }
+}

@@ -1,0 +1,261 @@
+//! Channels computed from channels at the same instant: sums, products, scalings, differences in time.
+
+use athermal_core::channel::Channel;
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+};
+use athermal_core::quantity::Quantity;
+use athermal_core::unit::Unit;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The weighted sum of its inputs: `Σ w_i x_i`, such as the mean of two sensors or what one has more than another.
+///
+/// It exists while all inputs do; each is held up to its maximum age. Of temperatures with weights that add up to zero the
+/// sum is a difference, in kelvin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sum {
+    /// The weight of each input, in order; without it, 1 for all.
+    #[serde(default)]
+    pub weights: Option<Vec<f64>>,
+}
+
+/// The product of its inputs, such as an interaction of two temperatures; in the product of their units.
+///
+/// It exists while all inputs do; each is held up to its maximum age.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Product {
+    /// The unit of the product; its inputs are taken as plain numbers in their own units.
+    pub unit: Unit,
+}
+
+/// Each channel times a factor plus an offset: `y = factor · x + offset`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scale {
+    /// The factor.
+    #[serde(default = "one")]
+    pub factor: f64,
+    /// The offset, in the unit of the result.
+    #[serde(default)]
+    pub offset: Option<Quantity>,
+    /// The unit of the result; without it, that of the input.
+    #[serde(default)]
+    pub unit: Option<Unit>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+const TERMS: InputPort = InputPort::held("signal", "the channels that are put together");
+
+fn same_units(channels: &[Channel]) -> Result<&Channel, Vec<Mistake>> {
+    let Some(first) = channels.first() else {
+        return Err(vec![Mistake::at(
+            "inputs.signal",
+            "there is nothing to put together",
+        )]);
+    };
+    match channels.iter().find(|channel| channel.unit != first.unit) {
+        Some(other) => {
+            let message = format!(
+                "`{}` is in {} and `{}` in {}",
+                first.name, first.unit, other.name, other.unit
+            );
+            let help = "give all in the same unit, with a `scale` node where it is another";
+            Err(vec![Mistake::at("inputs.signal", message).help(help)])
+        }
+        None => Ok(first),
+    }
+}
+
+/// A channel that summarises as much of the past as the longest of several, under one name.
+fn together(inputs: &Inputs, name: &str, unit: Unit) -> Channel {
+    let channels = inputs.port("signal");
+    let spans = channels.iter().map(|channel| channel.span);
+    Channel {
+        name: inputs.member.clone().unwrap_or_else(|| name.to_owned()),
+        unit,
+        span: spans.max().unwrap_or_default(),
+        ahead: channels
+            .iter()
+            .map(|channel| channel.ahead)
+            .max()
+            .unwrap_or_default(),
+        max_age: channels.iter().filter_map(|channel| channel.max_age).min(),
+    }
+}
+
+impl Feature for Sum {
+    fn inputs() -> &'static [InputPort] {
+        const { &[TERMS] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let channels = inputs.port("signal");
+        let first = same_units(channels)?;
+        let mut total = channels.len() as f64;
+        if let Some(weights) = &self.weights {
+            if weights.len() != channels.len() {
+                let message = format!(
+                    "`weights` has {} numbers for {} channels",
+                    weights.len(),
+                    channels.len()
+                );
+                return Err(vec![Mistake::at("weights", message)]);
+            }
+            if let Some(wild) = weights.iter().find(|weight| !weight.is_finite()) {
+                return Err(vec![Mistake::at(
+                    "weights",
+                    format!("a weight is {wild} and must be a number"),
+                )]);
+            }
+            total = weights.iter().sum();
+        }
+        // Weights that add up to one give a point on the scale again, others something counted from zero.
+        let is_point = first.unit.is_temperature_point() && (total - 1.0).abs() < 1e-12;
+        let unit = if is_point {
+            first.unit.clone()
+        } else {
+            first.unit.difference()
+        };
+        Ok(vec![OutputPort {
+            name: "sum",
+            channels: vec![together(inputs, "sum", unit)],
+        }])
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        let ones = || vec![1.0; inputs.port("signal").len()];
+        Box::new(Adding {
+            weights: self.weights.clone().unwrap_or_else(ones),
+        })
+    }
+}
+
+struct Adding {
+    weights: Vec<f64>,
+}
+
+impl Operator for Adding {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        // An absent term is a NaN and makes the sum one.
+        let terms = tick.port(0).iter().zip(&self.weights);
+        outputs.set(0, terms.map(|(value, weight)| weight * value).sum());
+    }
+
+    fn segment(&mut self) {}
+}
+
+impl Feature for Product {
+    fn inputs() -> &'static [InputPort] {
+        const { &[TERMS] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        if inputs.port("signal").is_empty() {
+            return Err(vec![Mistake::at(
+                "inputs.signal",
+                "there is nothing to multiply",
+            )]);
+        }
+        let channel = together(inputs, "product", self.unit.clone());
+        Ok(vec![OutputPort {
+            name: "product",
+            channels: vec![channel],
+        }])
+    }
+
+    fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        Box::new(Multiplying)
+    }
+}
+
+struct Multiplying;
+
+impl Operator for Multiplying {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        outputs.set(0, tick.port(0).iter().product());
+    }
+
+    fn segment(&mut self) {}
+}
+
+impl Scale {
+    fn unit_of(&self, from: &Channel) -> Unit {
+        self.unit.clone().unwrap_or_else(|| from.unit.clone())
+    }
+}
+
+impl Feature for Scale {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what is scaled")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let mut mistakes = Vec::new();
+        if !self.factor.is_finite() {
+            let message = format!("`factor` is {} and must be a number", self.factor);
+            mistakes.push(Mistake::at("factor", message));
+        }
+        let mut channels = inputs.port("signal").to_vec();
+        for channel in &mut channels {
+            let unit = self.unit_of(channel);
+            if let Some(offset) = &self.offset
+                && offset.in_unit(&unit.difference()).is_none()
+                && mistakes.is_empty()
+            {
+                let message = format!("`offset` is in {} and the result in {unit}", offset.unit);
+                mistakes.push(Mistake::at("offset", message));
+            }
+            channel.unit = unit;
+        }
+        if mistakes.is_empty() {
+            Ok(vec![OutputPort {
+                name: "scaled",
+                channels,
+            }])
+        } else {
+            Err(mistakes)
+        }
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        let offset = |channel: &Channel| {
+            let unit = self.unit_of(channel).difference();
+            self.offset
+                .as_ref()
+                .and_then(|offset| offset.in_unit(&unit))
+                .unwrap_or(0.0)
+        };
+        Box::new(Scaling {
+            factor: self.factor,
+            offsets: inputs.port("signal").iter().map(offset).collect(),
+        })
+    }
+}
+
+struct Scaling {
+    factor: f64,
+    offsets: Vec<f64>,
+}
+
+impl Operator for Scaling {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        let inputs = tick.port(0).iter().zip(tick.stamps(0)).zip(&self.offsets);
+        for (i, ((&value, &stamp), offset)) in inputs.enumerate() {
+            if !value.is_nan() {
+                outputs.set_stamped(i, self.factor * value + offset, stamp);
+            }
+        }
+    }
+
+    fn segment(&mut self) {}
+}
+
+athermal_core::register!(Sum, Feature, "sum");
+athermal_core::register!(Product, Feature, "product");
+athermal_core::register!(Scale, Feature, "scale");

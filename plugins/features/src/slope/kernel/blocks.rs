@@ -1,0 +1,293 @@
+//! The sums of which every window is made: how the rows are cut into blocks, and what is summed within and over them.
+//! It does not decide which rows a window holds, nor which blocks are still needed.
+
+use std::array::from_fn;
+
+use super::parts::Parts;
+use super::rows::Rows;
+use super::sums::{Quad, Table, quads};
+
+/// Rows of a block at most. Fewer cost more when a block closes, as all blocks are added up then; more make that step longer.
+const MOST_ROWS: u64 = 64;
+
+/// Rows of a block at least, where windows are shorter than the longest block.
+const FEWEST_ROWS: u64 = 8;
+
+/// Rows between two choices of the channels' origins, at least; and how often the kept rows fit between them.
+const REBASE_ROWS: u64 = 8192;
+const REBASE_TIMES: u64 = 4;
+
+/// Rows from a channel's first sample on at which its origin is chosen each time, so that it is soon a good one.
+const SETTLING_ROWS: u64 = 5;
+
+/// Sums over rows cut into blocks, the last of which is the current one.
+#[derive(Clone, Debug)]
+pub(super) struct Blocks {
+    /// First rows of the blocks.
+    starts: Vec<u64>,
+    /// What is subtracted from the samples of each channel before they are summed.
+    origins: Vec<Quad>,
+    /// Rows until these are chosen anew when a block closes, and rows still to come at which they are chosen anew at once.
+    until_rebase: u64,
+    settling: u64,
+    /// By slot of a row of a closed block: the rows from it to the end of its block, about the time of the last.
+    /// Beyond the slots of rows there is an empty one.
+    tails: Table,
+    /// By block: the closed blocks from it on, about the time of the first row of the current one. That of the current one is empty.
+    rest: Table,
+    /// The current block, about the time of its first row; then the window with number `i` as a whole, at `i + 1`, where it
+    /// begins within the current block.
+    now: Table,
+    /// Whether a sample is missing from a row that is still needed.
+    gaps: bool,
+}
+
+impl Blocks {
+    pub(super) fn new(channels: usize, windows: usize, squares: bool) -> Blocks {
+        Blocks {
+            starts: vec![0],
+            origins: vec![[0.0; 4]; quads(channels)],
+            until_rebase: 0,
+            settling: 0,
+            tails: Table::new(channels, squares, 0),
+            rest: Table::new(channels, squares, 1),
+            now: Table::new(channels, squares, 1 + windows),
+            gaps: false,
+        }
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.origins.fill([0.0; 4]);
+        self.until_rebase = 0;
+        self.settling = 0;
+        self.gaps = false;
+        self.keep_times();
+        self.rest.clear(0, 0);
+    }
+
+    /// First rows of the blocks, without which the sums could not be computed again.
+    pub(super) fn starts(&self) -> &[u64] {
+        &self.starts
+    }
+
+    pub(super) fn origins(&self) -> &[Quad] {
+        &self.origins
+    }
+
+    /// Rows until origins are chosen anew, and rows at which they still are.
+    pub(super) fn rebases(&self) -> [u64; 2] {
+        [self.until_rebase, self.settling]
+    }
+
+    /// The first row that is still needed.
+    pub(super) fn oldest(&self) -> u64 {
+        self.starts[0]
+    }
+
+    /// First row of the current block.
+    #[inline]
+    pub(super) fn current_start(&self) -> u64 {
+        self.starts[self.starts.len() - 1]
+    }
+
+    /// The block of a row, which is not before `block`.
+    #[inline]
+    pub(super) fn find(&self, row: u64, mut block: usize) -> usize {
+        while self
+            .starts
+            .get(block + 1)
+            .is_some_and(|&start| start <= row)
+        {
+            block += 1;
+        }
+        block
+    }
+
+    /// Whether the current block is to be closed before the next row: it is long, or some window begins within it.
+    pub(super) fn is_full(&self, rows: &Rows, newest_head: u64) -> bool {
+        let start = self.current_start();
+        let length = rows.next() - start;
+        length >= MOST_ROWS || (length >= FEWEST_ROWS && newest_head > start)
+    }
+
+    /// Begins a block with the next row.
+    pub(super) fn cut(&mut self, rows: &Rows) {
+        self.starts.push(rows.next());
+    }
+
+    /// Forgets the first `forgotten` blocks and sums the one that was closed; the next row, the first of the current one, is at `t_ns`.
+    pub(super) fn close(&mut self, rows: &Rows, t_ns: i64, forgotten: usize) {
+        self.starts.drain(..forgotten);
+        self.gaps &= rows.complete_from() > self.oldest();
+        self.keep_times();
+        if self.until_rebase == 0 {
+            self.until_rebase = REBASE_ROWS.max(REBASE_TIMES * (rows.next() - self.oldest()));
+            self.choose_origins(rows);
+            self.rebuild(rows, t_ns);
+        } else {
+            if let Some(closed) = self.starts.len().checked_sub(2) {
+                self.sum_tails(rows, closed);
+            }
+            self.sum_rest(rows, t_ns);
+        }
+    }
+
+    fn keep_times(&mut self) {
+        let tables = [&mut self.tails, &mut self.rest, &mut self.now];
+        for table in tables {
+            table.keep_times(self.gaps);
+        }
+    }
+
+    /// Adds the row that was just appended to the current block; `begun` if it holds a channel's first sample.
+    pub(super) fn add_newest(&mut self, rows: &Rows, begun: bool) {
+        let row = rows.next() - 1;
+        self.until_rebase = self.until_rebase.saturating_sub(1);
+        if begun {
+            self.until_rebase = MOST_ROWS;
+            self.settling = SETTLING_ROWS;
+        }
+        let settles = self.settling > 0;
+        if settles {
+            self.settling -= 1;
+            self.choose_origins(rows);
+        }
+        let first_gap = !self.gaps && rows.complete_from() > row;
+        if first_gap {
+            self.gaps = true;
+            self.keep_times();
+        }
+        if settles || first_gap {
+            self.rebuild(rows, 0);
+        } else {
+            if row == self.current_start() {
+                self.now.clear(0, rows.time(row));
+            }
+            let (t_ns, samples) = (rows.time(row), rows.samples(row));
+            self.now.add_row([0, 0], t_ns, samples, &self.origins);
+        }
+    }
+
+    /// Sums all rows of a window that begins within the current block: at most [`FEWEST_ROWS`].
+    pub(super) fn sum_short(&mut self, rows: &Rows, window: usize, head: u64) {
+        self.sum_now(rows, window + 1, head);
+    }
+
+    fn sum_now(&mut self, rows: &Rows, slot: usize, first: u64) {
+        self.now.clear(slot, rows.time(first));
+        for row in first..rows.next() {
+            let (t_ns, samples) = (rows.time(row), rows.samples(row));
+            self.now.add_row([slot, slot], t_ns, samples, &self.origins);
+        }
+    }
+
+    /// Computes all sums anew, with the same bits; `t_ns` is the time of the next row, if the current block is still empty.
+    pub(super) fn rebuild(&mut self, rows: &Rows, t_ns: i64) {
+        if self.tails.slots() != rows.capacity() + 1 {
+            self.tails.resize(rows.capacity() + 1);
+        }
+        self.tails.clear(rows.capacity(), 0);
+        for block in 0..self.starts.len() - 1 {
+            self.sum_tails(rows, block);
+        }
+        let start = self.current_start();
+        if start < rows.next() {
+            self.sum_rest(rows, rows.time(start));
+            self.sum_now(rows, 0, start);
+        } else {
+            self.sum_rest(rows, t_ns);
+        }
+    }
+
+    /// Sets the state that a kernel had, and computes its sums from its rows.
+    pub(super) fn restore(
+        &mut self,
+        rows: &Rows,
+        starts: &[u64],
+        origins: &[f64],
+        rebases: [u64; 2],
+    ) {
+        self.starts.extend_from_slice(starts);
+        self.origins.as_flattened_mut()[..origins.len()].copy_from_slice(origins);
+        self.gaps = rows.complete_from() > self.oldest();
+        self.keep_times();
+        self.rebuild(rows, 0);
+        [self.until_rebase, self.settling] = rebases;
+    }
+
+    /// Newest row first: whatever an older row of the block holds is not in the sums of the later ones.
+    fn sum_tails(&mut self, rows: &Rows, block: usize) {
+        let (first, last) = (self.starts[block], self.starts[block + 1] - 1);
+        self.tails.clear(rows.slot(last), rows.time(last));
+        let mut later = rows.slot(last);
+        for row in (first..=last).rev() {
+            let slot = rows.slot(row);
+            let (t_ns, samples) = (rows.time(row), rows.samples(row));
+            self.tails
+                .add_row([later, slot], t_ns, samples, &self.origins);
+            later = slot;
+        }
+    }
+
+    fn sum_rest(&mut self, rows: &Rows, origin: i64) {
+        let current = self.starts.len() - 1;
+        if current >= self.rest.slots() {
+            self.rest.resize((current + 1).next_power_of_two());
+        }
+        self.rest.clear(current, origin);
+        for block in (0..current).rev() {
+            let slot = rows.slot(self.starts[block]);
+            self.rest.add_run([block + 1, block], &self.tails, slot);
+        }
+    }
+
+    /// The origin of a channel is the median of its newest samples, up to five in the last block's worth of rows, so that it is near them and
+    /// no spike.
+    fn choose_origins(&mut self, rows: &Rows) {
+        let oldest = self.oldest().max(rows.next().saturating_sub(MOST_ROWS));
+        for (quad, origins) in self.origins.iter_mut().enumerate() {
+            *origins = from_fn(|i| {
+                let mut newest = [0.0; 5];
+                let mut found = 0;
+                let samples = (oldest..rows.next())
+                    .rev()
+                    .map(|row| rows.samples(row)[quad][i]);
+                for (kept, y) in newest.iter_mut().zip(samples.filter(|y| !y.is_nan())) {
+                    *kept = y;
+                    found += 1;
+                }
+                newest[..found].sort_unstable_by(f64::total_cmp);
+                newest[..found]
+                    .get(found / 2)
+                    .copied()
+                    .unwrap_or(origins[i])
+            });
+        }
+    }
+
+    /// The parts of window number `window`, which begins with row `head` of block `block`.
+    #[inline]
+    pub(super) fn parts(&self, rows: &Rows, window: usize, head: u64, block: usize) -> Parts {
+        let current = self.starts.len() - 1;
+        let slots = if block < current {
+            [rows.slot(head), block + 1, 0]
+        } else {
+            let whole = head > self.starts[current];
+            [rows.capacity(), current, if whole { window + 1 } else { 0 }]
+        };
+        let [head, rest, now] = slots;
+        let common = [
+            &self.tails.common[head],
+            &self.rest.common[rest],
+            &self.now.common[now],
+        ];
+        Parts::new(common, slots.map(|slot| slot * self.origins.len()))
+    }
+
+    /// The sums within closed blocks, over them and of the current one.
+    pub(super) fn tables(&self) -> [&Table; 3] {
+        [&self.tails, &self.rest, &self.now]
+    }
+}

@@ -1,0 +1,290 @@
+//! `athermal demo`: the whole way from a machine to a scored prediction, on a simulated machine.
+
+mod folder;
+
+use std::path::{Path, PathBuf};
+
+use athermal::Model;
+use athermal::core::compile::Wanted;
+use athermal::core::fit::FitOptions;
+use athermal::core::machine::{Setup, Simulated, machine};
+use athermal::core::score::{Score, ScoreOptions, Scores, score};
+use clap::Args;
+use serde_json::json;
+
+use self::folder::Folder;
+use super::data::Data;
+use super::fit::fit_on;
+use super::simulate::write_recording;
+use crate::figures::{count, or_dash, table};
+use crate::invocation::{program, quoted};
+use crate::terminal::{Answer, Failure, Format, Terminal};
+
+const GRAPH: &str = include_str!("../../graphs/die-tester.toml");
+const MACHINE: &str = "die-tester";
+/// Days and seed of the recording to learn from, and of the one to be tested on.
+const TRAIN: (f64, u64) = (7.0, 1);
+const TEST: (f64, u64) = (2.0, 2);
+/// Beyond it the chuck has just been stepped, and nobody measures.
+const LIMIT: &str = "250 nm/min";
+
+/// See what athermal does, on a simulated machine
+///
+/// Simulates a die tester for nine days, fits a graph on seven of them, and scores its predictions on the other two. Graph,
+/// data and model are left in a folder to play with. It takes a second, and needs nothing but this program.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  athermal demo\n  athermal demo /tmp/die-tester")]
+pub struct Demo {
+    /// The folder; it is made, or was made by an earlier demo
+    #[arg(default_value = "athermal-demo")]
+    folder: PathBuf,
+}
+
+impl Demo {
+    /// Simulates, fits, scores and tells.
+    ///
+    /// # Errors
+    /// When the folder is somebody's, or cannot be written.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let files = ["die-tester.toml", "train.csv", "test.csv", "model.json"];
+        let mut folder = Folder::open(&self.folder, &files)?;
+        let [graph, train, test, model] = files.map(|file| self.folder.join(file));
+        let people = terminal.format == Format::Table;
+        if people {
+            terminal.note("A simulated die tester: two fibre holders about a chip on a heated chuck,\nsix temperatures every 10 s, six positions about every 75 s.\n");
+        }
+        let tell = |path: &Path, text: &str| {
+            if people {
+                terminal.note(format_args!("  {:<30}  {text}", path.display().to_string()));
+            }
+        };
+        std::fs::write(&graph, GRAPH).map_err(|error| failed(&graph, &error))?;
+        tell(&graph, "the graph: what is computed from what");
+        for (path, (days, seed), what) in
+            [(&train, TRAIN, "to fit on"), (&test, TEST, "to test on")]
+        {
+            let rows = simulate(days, seed, path, terminal)?;
+            let rows = count(rows);
+            tell(
+                path,
+                &format!("{days} days {what}, seed {seed}, {rows} rows"),
+            );
+        }
+        let fitted = fit_model(&graph, &train, &model, terminal)?;
+        let estimators = fitted.card.as_ref().map_or(0, |card| card.estimators.len());
+        tell(
+            &model,
+            &format!("the graph and what its {estimators} estimators have learned"),
+        );
+        folder.close()?;
+
+        let scores = evaluate(&model, &test, terminal)?;
+        if people {
+            println!("\n{}", describe(&scores));
+            terminal.note(next(&self.folder));
+        } else {
+            println!(
+                "{:#}",
+                json!({ "folder": self.folder, "files": files, "scores": scores.scores })
+            );
+        }
+        Ok(Answer::Fine)
+    }
+}
+
+fn failed(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::Outside(format!("cannot write {}: {error}", path.display()))
+}
+
+fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u64, Failure> {
+    let known = machine(MACHINE).map_err(|error| Failure::Request(error.to_string()))?;
+    let setup = Setup {
+        days,
+        seed,
+        schedule: None,
+    };
+    let recording = Simulated::new(known.machine, setup);
+    write_recording(&recording, known.machine, false, path, terminal)
+}
+
+fn fit_model(
+    graph: &Path,
+    train: &Path,
+    output: &Path,
+    terminal: &Terminal,
+) -> Result<Model, Failure> {
+    let mut model = Model::load(graph)?;
+    let data = Data::of(vec![train.to_owned()]);
+    fit_on(&mut model, &data, &FitOptions::default(), terminal)?;
+    let text = model.to_text().map_err(|error| {
+        Failure::Outside(format!("the model cannot be written as JSON: {error}"))
+    })?;
+    std::fs::write(output, text).map_err(|error| failed(output, &error))?;
+    Ok(model)
+}
+
+fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Failure> {
+    let standard_errors = true;
+    let model = Model::load_for(model, Wanted { standard_errors })?;
+    let dataset = Data::of(vec![test.to_owned()]).dataset();
+    let options = ScoreOptions {
+        abs_truth_below: LIMIT.parse().ok(),
+        each_on_its_own: false,
+    };
+    let mut progress = terminal.progress("evaluating");
+    let scores = score(
+        &model.plan,
+        &model.fitted,
+        &dataset,
+        &options,
+        &mut |ticks| progress.tell(ticks),
+    )?;
+    Ok(scores)
+}
+
+/// One axis, as it was predicted by the vote.
+struct Axis<'a> {
+    name: &'a str,
+    vote: &'a Score,
+}
+
+impl Axis<'_> {
+    /// By which share the error is smaller than without a model.
+    fn gain(&self) -> Option<f64> {
+        Some(1.0 - self.vote.rmse? / self.vote.baseline_zero?)
+    }
+}
+
+fn describe(scores: &Scores) -> String {
+    let axes: Vec<Axis> = scores
+        .scores
+        .iter()
+        .filter(|score| score.node.starts_with("vote"))
+        .map(|vote| Axis {
+            name: vote.output.rsplit('.').next().unwrap_or(&vote.output),
+            vote,
+        })
+        .collect();
+    let baseline = |name: &str, of: fn(&Score) -> Option<f64>| {
+        let cells = axes.iter().map(|axis| or_dash(of(axis.vote)));
+        std::iter::once(name.to_owned()).chain(cells).collect()
+    };
+    let node = |label: &str, node: &str| {
+        let cells = axes.iter().map(|axis| {
+            let output = format!("{node}.{}", axis.name);
+            let found = scores.scores.iter().find(|score| score.output == output);
+            or_dash(found.and_then(|score| score.rmse))
+        });
+        std::iter::once(label.to_owned()).chain(cells).collect()
+    };
+    let rows: Vec<Vec<String>> = vec![
+        baseline("no model", |score| score.baseline_zero),
+        baseline("persistence", |score| score.baseline_persistence),
+        node("from temperatures (thermal)", "thermal"),
+        node("from past drift (motion)", "motion"),
+        node("from both (both)", "both"),
+        node("vote of the three", "vote"),
+        baseline("noise of the truth itself", |score| score.truth_noise),
+    ];
+    let header: Vec<&str> = std::iter::once("")
+        .chain(axes.iter().map(|axis| axis.name))
+        .collect();
+    format!(
+        "Error (RMSE, nm/min) of the drift predicted 5 min ahead, on days never seen,\n\
+         where it is below {LIMIT}:\n\n{}\n{}",
+        table(&header, &rows),
+        meaning(&axes)
+    )
+}
+
+/// Two sentences on what the figures mean.
+fn meaning(axes: &[Axis]) -> String {
+    let gains = || axes.iter().filter_map(|axis| Some((axis, axis.gain()?)));
+    let by_gain = |a: &(&Axis, f64), b: &(&Axis, f64)| a.1.total_cmp(&b.1);
+    let (Some((_, least)), Some((best, most))) = (gains().min_by(by_gain), gains().max_by(by_gain))
+    else {
+        return "There are too few instants to say anything.\n".to_owned();
+    };
+    let (with, without) = (
+        best.vote.rmse.unwrap_or(f64::NAN),
+        best.vote.baseline_zero.unwrap_or(f64::NAN),
+    );
+    format!(
+        "The vote knows the drift of the next five minutes with {:.0} to {:.0} % less error\n\
+         than no model; on {} a machine that corrects by it would be off by {:.0} nm after\n\
+         five minutes where it is off by {:.0} nm today.\n\
+         What is left comes mostly from what cannot be known five minutes before, such as\n\
+         the next step of the chuck; nothing can score below the noise of the truth,\n\
+         {} nm/min here, since positions are measured with 12 nm of noise.\n",
+        100.0 * least,
+        100.0 * most,
+        best.name,
+        5.0 * with,
+        5.0 * without,
+        or_dash(best.vote.truth_noise),
+    )
+}
+
+/// What to try next.
+fn next(folder: &Path) -> String {
+    let (program, folder) = (program(), quoted(&folder.display().to_string()));
+    let faulty = format!("{folder}/faulty.csv");
+    format!(
+        "Try next:
+  {program} show {folder}/die-tester.toml --format svg > graph.svg
+  {program} nodes slope
+  {program} run {folder}/model.json --input {folder}/test.csv | tail -3
+  {program} simulate {MACHINE} --days 2 --seed 2 -o {faulty} \\
+      --fault temperature.plate1=stuck,from=6h
+  {program} evaluate {folder}/model.json --data {faulty} \\
+      --abs-truth-below \"{LIMIT}\"
+and with a log of a machine of yours:
+  {program} init LOG.csv -o graph.toml"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figures::number;
+
+    #[test]
+    fn the_meaning_is_told_with_the_figures_of_the_best_axis() {
+        let score = |output: &str, rmse, zero| Score {
+            output: output.to_owned(),
+            node: output.to_owned(),
+            kind: "auto_weighted",
+            truth: String::new(),
+            unit: "nm/min".to_owned(),
+            ahead_s: 300.0,
+            n: 100,
+            rmse: Some(rmse),
+            r2_zero: None,
+            r2_mean: None,
+            bias: None,
+            max_abs: None,
+            valid: None,
+            baseline_zero: Some(zero),
+            baseline_persistence: None,
+            truth_noise: Some(3.85),
+            own_instants: false,
+        };
+        let (x1, z1) = (score("vote.X1", 8.0, 10.0), score("vote.Z1", 25.0, 50.0));
+        let axes = [
+            Axis {
+                name: "X1",
+                vote: &x1,
+            },
+            Axis {
+                name: "Z1",
+                vote: &z1,
+            },
+        ];
+        let text = meaning(&axes);
+        assert!(text.contains("with 20 to 50 % less error"), "{text}");
+        assert!(text.contains("on Z1 a machine that corrects by it would be off by 125 nm"));
+        assert!(text.contains("it is off by 250 nm today"), "{text}");
+        assert!(text.contains(&number(3.85)), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 80));
+    }
+}

@@ -1,0 +1,95 @@
+//! `athermal init`: a starter graph for a log.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::fit::write_aside;
+use crate::invocation::{program, quoted};
+use crate::starter::{NoStarter, Told, starter};
+use crate::terminal::{Answer, Failure, Format, Terminal, print};
+
+/// Write a starter graph for a log of yours
+///
+/// Looks at the names and values of a CSV or JSON lines file, guesses what is a temperature, what drifts and in which
+/// units, measures rates and gaps, and sets the drift against its noise to choose the windows. Every guess is told, and
+/// stands in the graph as a comment. The graph checks, fits and evaluates as it is.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  athermal init log.csv
+  athermal init log.csv -o graph.toml
+  athermal init log.csv --time stamp --drifts probe1 probe2 -o -
+
+Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
+pub struct Init {
+    /// The log
+    data: PathBuf,
+    /// Where the graph goes; `-` is standard output
+    #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
+    output: PathBuf,
+    /// The column that gives the time
+    #[arg(long, value_name = "COLUMN")]
+    time: Option<String>,
+    /// The columns that drift
+    #[arg(long, num_args = 1.., value_name = "COLUMN")]
+    drifts: Vec<String>,
+    /// Write over a graph that is there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Init {
+    /// Looks, guesses and writes.
+    ///
+    /// # Errors
+    /// When the log cannot be read, nothing in it drifts, or the graph is there already.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let told = Told {
+            time: self.time.clone(),
+            drifting: self.drifts.clone(),
+        };
+        let to_stdout = self.output == Path::new("-");
+        if !to_stdout && !self.force && self.output.exists() {
+            return Err(Failure::Request(format!(
+                "{} is there already; name another with -o, or write over it with --force",
+                self.output.display()
+            )));
+        }
+        let starter = starter(&self.data, &told).map_err(|error| match error {
+            NoStarter::File(error) => error.into(),
+            NoStarter::Unfit(why) => Failure::Request(format!("{}: {why}", self.data.display())),
+        })?;
+        let people = terminal.format == Format::Table;
+        if people {
+            for remark in &starter.remarks {
+                terminal.note(remark);
+            }
+        }
+        if to_stdout {
+            print(starter.text.as_bytes())?;
+            return Ok(Answer::Fine);
+        }
+        write_aside(&self.output, &starter.text)?;
+        if people {
+            terminal.note(self.next());
+        } else {
+            println!(
+                "{:#}",
+                json!({ "graph": self.output, "remarks": starter.remarks })
+            );
+        }
+        Ok(Answer::Fine)
+    }
+
+    fn next(&self) -> String {
+        let program = program();
+        let [graph, data] =
+            [&self.output, &self.data].map(|path| quoted(&path.display().to_string()));
+        format!(
+            "wrote {graph}; look it over, then
+  {program} fit {graph} --data {data} -o model.json
+  {program} evaluate model.json --data OTHER.csv     (better not the log that it was fitted on)"
+        )
+    }
+}

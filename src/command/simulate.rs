@@ -1,0 +1,257 @@
+//! `athermal simulate`: the recording of a simulated machine, as a file.
+
+use std::fs::File;
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use athermal::core::fault::FaultSpec;
+use athermal::core::machine::{
+    KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation, machine, machines,
+};
+use athermal::files::{Flush, Format as FileFormat, Writer};
+use athermal_simulation::{table_columns, write_table};
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::figures::count;
+use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
+
+/// Write the recording of a simulated machine, or list the machines
+///
+/// The same machine, days, seed, schedule and faults give the same bytes everywhere. A schedule is a CSV file such as
+/// `time_h,chuck_degC` with rows `0,20`, `4,50` and, to start again, `8,repeat`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  athermal simulate
+  athermal simulate die-tester -o train.csv
+  athermal simulate die-tester -o test.csv --days 2 --seed 2 --truth
+  athermal simulate linear-axis -o - --days 0.1 | head
+  athermal simulate die-tester -o faulty.csv --fault temperature.plate1=stuck,from=6h,for=12h \\
+      --fault \"temperature.room=drift,size=0.5 K/h\"
+
+Faults: missing, stuck, offset, spike, drift, noise; `from`, `for` and `size` may be left out.")]
+pub struct Simulate {
+    /// The machine; all are listed when none is named
+    machine: Option<String>,
+    /// CSV, or JSON lines if it ends in .jsonl; `-` is standard output
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Length of the recording in days
+    #[arg(long, default_value_t = 7.0)]
+    days: f64,
+    /// Another seed is another week of weather, motions and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Add the true drift of each axis as a column
+    #[arg(long)]
+    truth: bool,
+    /// Set points over time; the machine has a schedule of its own
+    #[arg(long, value_name = "FILE")]
+    schedule: Option<PathBuf>,
+    /// A sensor fault, CHANNEL=KIND[,from=…][,for=…][,size=…]
+    #[arg(long = "fault", value_name = "SPEC")]
+    faults: Vec<FaultSpec>,
+}
+
+impl Simulate {
+    /// Simulates and writes.
+    ///
+    /// # Errors
+    /// When there is no such machine, the schedule or a fault does not fit it, or the file cannot be written.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let Some(name) = &self.machine else {
+            list(terminal);
+            return Ok(Answer::Fine);
+        };
+        let known = machine(name).map_err(|error| {
+            Failure::Request(format!("{error} (`athermal simulate` lists them all)"))
+        })?;
+        let to_terminal = self.output.is_none() && io::stdout().is_terminal();
+        if to_terminal {
+            return Err(Failure::Request(format!(
+                "a recording is long; name a file for it: athermal simulate {name} -o {name}.csv"
+            )));
+        }
+        let output = self.output.as_deref().unwrap_or(Path::new("-"));
+        let rows = self.write(known.machine, output, terminal)?;
+        if output.as_os_str() != "-" && terminal.format == Format::Table {
+            terminal.note(format_args!(
+                "wrote {}: {} rows, {} days of `{name}`, seed {}",
+                output.display(),
+                count(rows),
+                self.days,
+                self.seed
+            ));
+        }
+        Ok(Answer::Fine)
+    }
+
+    fn write(
+        &self,
+        machine: &dyn Machine,
+        output: &Path,
+        terminal: &Terminal,
+    ) -> Result<u64, Failure> {
+        let setup = Setup {
+            days: self.days,
+            seed: self.seed,
+            schedule: self.schedule(machine)?,
+        };
+        write_recording(
+            &Simulated::new(machine, setup).with_faults(self.faults.clone()),
+            machine,
+            self.truth,
+            output,
+            terminal,
+        )
+    }
+
+    fn schedule(&self, machine: &dyn Machine) -> Result<Option<Schedule>, Failure> {
+        let Some(path) = &self.schedule else {
+            return Ok(None);
+        };
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            Failure::Outside(format!("cannot read {}: {error}", path.display()))
+        })?;
+        let schedule = Schedule::parse(&text, machine.set_points()).map_err(|errors| {
+            let lines: Vec<String> = errors
+                .iter()
+                .map(|error| format!("{}: {error}", path.display()))
+                .collect();
+            Failure::Request(lines.join("\n  "))
+        })?;
+        Ok(Some(schedule))
+    }
+}
+
+/// Writes a simulated recording to a file or standard output, and gives the number of rows.
+///
+/// # Errors
+/// When the simulation cannot start or the file cannot be written.
+pub fn write_recording(
+    recording: &Simulated,
+    machine: &dyn Machine,
+    truth: bool,
+    output: &Path,
+    terminal: &Terminal,
+) -> Result<u64, Failure> {
+    let simulation = recording
+        .start()
+        .map_err(|error| Failure::Request(error.to_string()))?;
+    let days = recording.setup().days;
+    let mut simulation = Watched {
+        simulation,
+        // Days are counted in thousandths, since how many rows there will be is the machine's business.
+        progress: terminal.progress_to("simulating", "", Some((days * 1000.0) as u64)),
+    };
+    let channels = machine.channels();
+    if FileFormat::from_path(output) == Some(FileFormat::JsonLines) {
+        let columns = table_columns(channels, truth);
+        let mut writer = Writer::create(output, "time_s", &columns, Flush::Buffered)?;
+        let mut row = Row::empty(channels);
+        let (mut values, mut rows) = (Vec::new(), 0);
+        while simulation.next(&mut row) {
+            values.clear();
+            values.extend_from_slice(&row.values);
+            values.extend(row.true_drift.iter().filter(|_| truth));
+            writer.write_row("", row.time_ns, &values)?;
+            rows += 1;
+        }
+        writer.finish()?;
+        return Ok(rows);
+    }
+    let failed = |error: io::Error| {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            // Whoever read our output has seen enough.
+            return Failure::Told(0);
+        }
+        Failure::Outside(format!("cannot write {}: {error}", output.display()))
+    };
+    let out: Box<dyn Write> = if output.as_os_str() == "-" {
+        Box::new(io::stdout().lock())
+    } else {
+        Box::new(File::create(output).map_err(failed)?)
+    };
+    let mut out = BufWriter::with_capacity(1 << 16, out);
+    let rows = write_table(channels, &mut simulation, truth, &mut out).map_err(failed)?;
+    out.flush().map_err(failed)?;
+    Ok(rows)
+}
+
+/// A simulation that tells how far it has come.
+struct Watched {
+    simulation: Box<dyn Simulation>,
+    progress: Progress,
+}
+
+impl Simulation for Watched {
+    fn next(&mut self, row: &mut Row) -> bool {
+        let more = self.simulation.next(row);
+        self.progress.tell((row.time_ns as f64 / 86_400e6) as u64);
+        more
+    }
+}
+
+fn list(terminal: &Terminal) {
+    if terminal.format == Format::Json {
+        let all: Vec<Value> = machines().values().map(describe).collect();
+        println!("{:#}", json!({ "machines": all }));
+        return;
+    }
+    for known in machines().values() {
+        let machine = known.machine;
+        println!(
+            "{} (from {} {})\n  {}",
+            machine.name(),
+            known.package,
+            known.version,
+            machine.summary()
+        );
+        let mut signals: Vec<(&str, Vec<&str>)> = Vec::new();
+        for channel in machine.channels() {
+            match signals.last_mut() {
+                Some((signal, names)) if *signal == channel.signal => names.push(channel.name),
+                _ => signals.push((channel.signal, vec![channel.name])),
+            }
+        }
+        for (signal, names) in signals {
+            println!("  {signal}: {}", names.join(", "));
+        }
+        let set_points: Vec<String> = machine
+            .set_points()
+            .iter()
+            .map(|what| {
+                let [low, high] = what.range;
+                format!("{} {low} to {high} °C", what.name)
+            })
+            .collect();
+        println!("  a schedule can set: {}\n", set_points.join(", "));
+    }
+    terminal.note("Next: athermal simulate die-tester -o train.csv");
+}
+
+fn describe(known: &KnownMachine) -> Value {
+    let machine = known.machine;
+    let channels: Vec<Value> = machine
+        .channels()
+        .iter()
+        .map(|channel| {
+            json!({ "channel": channel.reference(), "column": channel.column(), "unit": channel.unit })
+        })
+        .collect();
+    let set_points: Vec<Value> = machine
+        .set_points()
+        .iter()
+        .map(|what| {
+            json!({ "name": what.name, "default_degC": what.default, "range_degC": what.range })
+        })
+        .collect();
+    json!({
+        "name": machine.name(),
+        "summary": machine.summary(),
+        "package": known.package,
+        "version": known.version,
+        "channels": channels,
+        "set_points": set_points,
+    })
+}

@@ -1,0 +1,378 @@
+//! Decides what a column of a log measures, by its name and its values: unit, kind, and whether it is what drifts.
+
+use athermal::core::unit::Unit;
+use athermal::files::Description;
+
+use super::Told;
+use super::clock::words;
+
+/// What a column is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A temperature that may explain a drift.
+    Temperature,
+    /// What drifts.
+    Drifting,
+    /// Something else that may explain a drift, such as the power of a heater.
+    Drive,
+    /// Left out.
+    Unused,
+}
+
+/// A column of a log.
+#[derive(Debug, Clone)]
+pub struct Column {
+    /// Its name in the log.
+    pub name: String,
+    /// Its unit, as UCUM writes it.
+    pub unit: String,
+    /// What it is for.
+    pub kind: Kind,
+    /// Why it was taken so.
+    why: String,
+    unit_known: bool,
+    guess: Guess,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Guess {
+    Temperature,
+    Position,
+    Drive,
+    Other,
+    Unused,
+}
+
+/// Endings of names, and the units that they mean; the case counts for single letters.
+const UNITS: [(&str, &str); 27] = [
+    ("degC", "Cel"),
+    ("°C", "Cel"),
+    ("celsius", "Cel"),
+    ("C", "Cel"),
+    ("degF", "[degF]"),
+    ("°F", "[degF]"),
+    ("fahrenheit", "[degF]"),
+    ("F", "[degF]"),
+    ("K", "K"),
+    ("mK", "mK"),
+    ("nm", "nm"),
+    ("um", "um"),
+    ("µm", "um"),
+    ("μm", "um"),
+    ("mm", "mm"),
+    ("m", "m"),
+    ("V", "V"),
+    ("mV", "mV"),
+    ("A", "A"),
+    ("mA", "mA"),
+    ("W", "W"),
+    ("kW", "kW"),
+    ("Wm2", "W/m2"),
+    ("W/m2", "W/m2"),
+    ("Pa", "Pa"),
+    ("bar", "bar"),
+    ("%", "%"),
+];
+
+const SET_POINTS: [&str; 5] = ["target", "setpoint", "set", "sp", "goal"];
+const TEMPERATURES: [&str; 4] = ["t", "temp", "temperature", "tc"];
+const POSITIONS: [&str; 10] = [
+    "pos",
+    "position",
+    "displacement",
+    "x",
+    "y",
+    "z",
+    "gap",
+    "offset",
+    "probe",
+    "deformation",
+];
+const DRIVES: [&str; 11] = [
+    "drive", "voltage", "heater", "lamp", "power", "current", "duty", "pwm", "input", "speed",
+    "rpm",
+];
+
+impl Column {
+    /// What was guessed, for people.
+    #[must_use]
+    pub fn remark(&self) -> Option<String> {
+        let what = match self.kind {
+            Kind::Temperature => "temperature",
+            Kind::Drifting => "drifts",
+            Kind::Drive => "input",
+            Kind::Unused => return Some(format!("{}: left out, {}", self.name, self.why)),
+        };
+        let unit = if self.unit_known { "" } else { " (a guess)" };
+        Some(format!(
+            "{}: {what}, in {}{unit}; {}",
+            self.name, self.unit, self.why
+        ))
+    }
+
+    /// Whether its unit is stated by its name.
+    #[must_use]
+    pub fn unit_known(&self) -> bool {
+        self.unit_known
+    }
+
+    /// Leaves it out.
+    pub fn leave_out(&mut self, why: impl Into<String>) {
+        self.guess = Guess::Unused;
+        self.kind = Kind::Unused;
+        self.why = why.into();
+    }
+}
+
+/// The columns of a log other than its time, with a first guess of what each is.
+#[must_use]
+pub fn columns(described: &Description, time: &str) -> Vec<Column> {
+    let columns = described.columns.iter().enumerate();
+    columns
+        .filter(|(_, name)| *name != time)
+        .map(|(index, name)| {
+            let mut column = guess(name);
+            let cells = described.rows.iter().filter_map(|row| row.get(index));
+            let mut cells = cells
+                .map(|cell| cell.trim())
+                .filter(|cell| !cell.is_empty());
+            if cells.any(|cell| cell.replace(',', ".").parse::<f64>().is_err()) {
+                column.leave_out("it is text");
+            }
+            column
+        })
+        .collect()
+}
+
+fn guess(name: &str) -> Column {
+    let parts = words(name);
+    let unit = parts.iter().skip(1).rev().find_map(|word| {
+        let same = |known: &str| {
+            known == *word || known.len() > 1 && known.eq_ignore_ascii_case(word) && *word != "MK"
+        };
+        UNITS.iter().find(|(known, _)| same(known))
+    });
+    let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
+    let has = |known: &[&str]| {
+        lower
+            .iter()
+            .any(|word| known.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit())))
+    };
+    let parsed = unit.and_then(|(_, unit)| Unit::parse(unit).ok());
+    let measures = |what: &str| {
+        Unit::parse(what)
+            .ok()
+            .zip(parsed.as_ref())
+            .is_some_and(|(what, unit)| unit.measures_same(&what))
+    };
+    let temp_named = has(&TEMPERATURES) || lower.iter().any(|word| word.contains("temp"));
+    let (guess, why) = if has(&SET_POINTS) {
+        (
+            Guess::Unused,
+            "a set point, which says what was asked for and not what was",
+        )
+    } else if measures("K") {
+        (Guess::Temperature, "by its unit")
+    } else if measures("m") {
+        (Guess::Position, "a length")
+    } else if temp_named {
+        (Guess::Temperature, "by its name")
+    } else if has(&DRIVES) {
+        (Guess::Drive, "by its name")
+    } else if unit.is_none() && has(&POSITIONS) {
+        (Guess::Position, "by its name")
+    } else {
+        (Guess::Other, "neither a temperature nor a length")
+    };
+    let fallback = match guess {
+        Guess::Temperature => "Cel",
+        Guess::Position => "um",
+        _ => "1",
+    };
+    Column {
+        name: name.to_owned(),
+        unit: unit.map_or(fallback, |(_, unit)| unit).to_owned(),
+        kind: Kind::Unused,
+        why: why.to_owned(),
+        unit_known: unit.is_some(),
+        guess,
+    }
+}
+
+/// Settles which columns drift and which may explain it.
+///
+/// # Errors
+/// A text that says what is missing.
+pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
+    for name in &told.drifting {
+        let Some(column) = columns.iter_mut().find(|column| column.name == *name) else {
+            let known: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+            return Err(format!(
+                "there is no column `{name}`; there are {}",
+                known.join(", ")
+            ));
+        };
+        if column.guess == Guess::Unused {
+            return Err(format!("`{name}` cannot drift: {}", column.why));
+        }
+    }
+    let has = |columns: &[Column], guess| columns.iter().any(|column| column.guess == guess);
+    let (drifting, why) = if has(columns, Guess::Position) {
+        (Guess::Position, "")
+    } else if has(columns, Guess::Other) {
+        (Guess::Other, ", so it is taken as what drifts")
+    } else if has(columns, Guess::Drive) {
+        (
+            Guess::Temperature,
+            "; no position is there, so it is taken as what drifts",
+        )
+    } else {
+        (Guess::Position, "")
+    };
+    for column in columns.iter_mut() {
+        let drifts = if told.drifting.is_empty() {
+            column.guess == drifting
+        } else {
+            told.drifting.contains(&column.name)
+        };
+        column.kind = match column.guess {
+            Guess::Unused => Kind::Unused,
+            _ if drifts => Kind::Drifting,
+            Guess::Temperature => Kind::Temperature,
+            Guess::Drive | Guess::Other => Kind::Drive,
+            Guess::Position => Kind::Unused,
+        };
+        if drifts && told.drifting.is_empty() {
+            column.why.push_str(why);
+        } else if drifts {
+            column.why = "as you say".to_owned();
+        } else if column.guess == Guess::Position {
+            column.why = "you say that something else drifts".to_owned();
+        } else if column.kind == Kind::Drive {
+            column.why.push_str(", may explain the drift");
+        }
+    }
+    one_quantity(columns, told)?;
+    let names = |kind| -> Vec<&str> {
+        let of_kind = columns.iter().filter(|column| column.kind == kind);
+        of_kind.map(|column| column.name.as_str()).collect()
+    };
+    let causes = [names(Kind::Temperature), names(Kind::Drive)].concat();
+    match (names(Kind::Drifting).is_empty(), causes.is_empty()) {
+        (false, false) => Ok(()),
+        (true, false) => Err(format!(
+            "nothing in it drifts: {} {} temperature{} and there is no position or other quantity that they could \
+             explain; log a position beside, or name the column that drifts with --drifts",
+            causes.join(", "),
+            if causes.len() == 1 { "is a" } else { "are" },
+            if causes.len() == 1 { "" } else { "s" },
+        )),
+        (false, true) => Err(format!(
+            "nothing in it could explain the drift of {}: there is no temperature",
+            names(Kind::Drifting).join(", ")
+        )),
+        (true, true) => Err(
+            "no column is a temperature or a position; names such as `plate_degC` and `Z_nm` say so"
+                .to_owned(),
+        ),
+    }
+}
+
+/// What drifts must be one quantity, since one node takes its slopes in one unit.
+fn one_quantity(columns: &mut [Column], told: &Told) -> Result<(), String> {
+    let unit = |column: &Column| Unit::parse(&column.unit).ok();
+    let mut drifting = columns
+        .iter_mut()
+        .filter(|column| column.kind == Kind::Drifting);
+    let Some((first, quantity)) = drifting
+        .next()
+        .and_then(|first| Some((first.name.clone(), unit(first)?)))
+    else {
+        return Ok(());
+    };
+    for column in drifting {
+        if unit(column).is_some_and(|unit| unit.measures_same(&quantity)) {
+            continue;
+        }
+        if !told.drifting.is_empty() {
+            return Err(format!(
+                "`{first}` and `{}` are different quantities; write a graph for each",
+                column.name
+            ));
+        }
+        column.kind = Kind::Drive;
+        column.why = format!("another quantity than `{first}`, may explain it");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(header: &'static str) -> Result<Vec<(String, Kind, String)>, String> {
+        let described = Description::of_read("log", header.as_bytes(), None, 10).unwrap();
+        let mut columns = columns(&described, "time_s");
+        assign(&mut columns, &Told::default())?;
+        Ok(columns
+            .into_iter()
+            .map(|column| (column.name, column.kind, column.unit))
+            .collect())
+    }
+
+    #[test]
+    fn names_say_what_columns_are() {
+        for (header, expected) in [
+            (
+                "time_s,plate1_degC,X1_nm\n",
+                [(Kind::Temperature, "Cel"), (Kind::Drifting, "nm")],
+            ),
+            (
+                "time_s,Temp Plate [°F];Pos Z (µm)\n",
+                [(Kind::Unused, ""), (Kind::Unused, "")],
+            ),
+            (
+                "time_s,t_wall_degC,heatflow_y_Wm2\n",
+                [(Kind::Temperature, "Cel"), (Kind::Drifting, "W/m2")],
+            ),
+            (
+                "time_s,lamp_drive_V,t_plate_degC\n",
+                [(Kind::Drive, "V"), (Kind::Drifting, "Cel")],
+            ),
+            (
+                "time_s,heater_voltage_V,t_outlet_air_V\n",
+                [(Kind::Drive, "V"), (Kind::Drifting, "V")],
+            ),
+            (
+                "time_s,temp1,z\n",
+                [(Kind::Temperature, "Cel"), (Kind::Drifting, "um")],
+            ),
+        ] {
+            let Ok(found) = kinds(header) else {
+                continue;
+            };
+            for ((name, kind, unit), expected) in found.iter().zip(expected) {
+                assert_eq!((*kind, unit.as_str()), expected, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn brackets_and_degree_signs_are_units_too() {
+        assert_eq!(guess("Temp Plate [°F]").unit, "[degF]");
+        assert_eq!(guess("Pos Z (µm)").unit, "um");
+        assert_eq!(guess("Probe Z [mm]").guess, Guess::Position);
+    }
+
+    #[test]
+    fn a_log_of_temperatures_alone_is_told_that_nothing_drifts() {
+        let refused = kinds("time_s,t_machine_degF\n").unwrap_err();
+        assert!(refused.starts_with("nothing in it drifts: t_machine_degF is a temperature"));
+    }
+
+    #[test]
+    fn set_points_are_left_out() {
+        let found = kinds("time_s,z_mm,t_bed_degC,bed_target_degC\n").unwrap();
+        assert_eq!(found[2].1, Kind::Unused);
+    }
+}

@@ -1,0 +1,70 @@
+//! Decides what a starter graph for a log looks like: what each column is, which windows fit, and why; not how a graph runs.
+
+mod clock;
+mod column;
+mod group;
+mod survey;
+mod text;
+mod window;
+
+use std::path::Path;
+
+use athermal::files::{Description, FileError};
+
+use survey::Survey;
+use window::Choice;
+
+/// What the user has said, so that it need not be guessed.
+#[derive(Debug, Clone, Default)]
+pub struct Told {
+    /// The column that gives the time.
+    pub time: Option<String>,
+    /// The columns that drift.
+    pub drifting: Vec<String>,
+}
+
+/// A starter graph, and what was found and guessed on the way to it.
+#[derive(Debug)]
+pub struct Starter {
+    /// The graph file.
+    pub text: String,
+    /// What was found and guessed, a line each.
+    pub remarks: Vec<String>,
+}
+
+/// Why there is no starter graph for a log.
+#[derive(Debug)]
+pub enum NoStarter {
+    /// The file cannot be read.
+    File(FileError),
+    /// It does not hold what a graph needs; the text says what, and what to do.
+    Unfit(String),
+}
+
+impl From<FileError> for NoStarter {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
+    }
+}
+
+/// Looks at a log and writes a graph for it.
+///
+/// # Errors
+/// When the file cannot be read, or nothing in it drifts with something that could explain it.
+pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
+    let described = Description::of(path, 500)?;
+    let mut remarks = Vec::new();
+    let clock = clock::find(&described, told.time.as_deref()).map_err(NoStarter::Unfit)?;
+    remarks.push(clock.remark());
+    let mut columns = column::columns(&described, &clock.column);
+    let survey = Survey::of(path, &clock, &columns)?;
+    survey.judge(&mut columns);
+    column::assign(&mut columns, told).map_err(NoStarter::Unfit)?;
+    remarks.extend(columns.iter().filter_map(|column| column.remark()));
+    let choice = Choice::of(&survey, &columns).map_err(NoStarter::Unfit)?;
+    remarks.extend(choice.remarks(&clock, &columns));
+    Ok(Starter {
+        text: text::graph(path, &clock, &columns, &survey, &choice),
+        remarks,
+    })
+}

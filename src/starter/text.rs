@@ -1,0 +1,381 @@
+//! Decides how the starter graph is written: every guess beside its reason, so that it can be corrected.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use athermal::core::time::Duration;
+use athermal::core::unit::Unit;
+
+use super::clock::Clock;
+use super::column::{Column, Kind};
+use super::group::{Group, groups};
+use super::survey::Survey;
+use super::window::Choice;
+use crate::figures::{count, number};
+
+/// The text of the graph.
+pub fn graph(
+    path: &Path,
+    clock: &Clock,
+    columns: &[Column],
+    survey: &Survey,
+    choice: &Choice,
+) -> String {
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let file = file.replace(char::is_control, " ");
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let writer = Writer {
+        clock,
+        columns,
+        survey,
+        choice,
+        temperatures: groups(columns, Kind::Temperature, "temperature"),
+        drives: groups(columns, Kind::Drive, "input"),
+        drifting: groups(columns, Kind::Drifting, drifting_name(columns)),
+    };
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "# A starter graph, written from {file}: {} rows over {}.\n\
+         # Everything in it is a guess from names and values; what each follows from stands beside it.",
+        count(survey.rows),
+        clock.length(survey.duration_s),
+    );
+    text.push_str("\nschema = 1\n");
+    let _ = writeln!(text, "name = {}", toml_string(&stem));
+    writer.sets(&mut text);
+    writer.time(&mut text);
+    writer.signals(&mut text);
+    writer.features(&mut text);
+    writer.estimators(&mut text);
+    text
+}
+
+fn drifting_name(columns: &[Column]) -> &'static str {
+    let length = |column: &Column| {
+        let (unit, metre) = (Unit::parse(&column.unit).ok()?, Unit::parse("m").ok()?);
+        Some(unit.measures_same(&metre))
+    };
+    let mut drifting = columns
+        .iter()
+        .filter(|column| column.kind == Kind::Drifting);
+    if drifting.all(|column| length(column) == Some(true)) {
+        "position"
+    } else {
+        "response"
+    }
+}
+
+struct Writer<'a> {
+    clock: &'a Clock,
+    columns: &'a [Column],
+    survey: &'a Survey,
+    choice: &'a Choice,
+    temperatures: Vec<Group>,
+    drives: Vec<Group>,
+    drifting: Vec<Group>,
+}
+
+impl Writer<'_> {
+    /// The channels that drift, as one node's outputs name them.
+    fn axes(&self) -> Vec<&str> {
+        let channels = self.drifting.iter().flat_map(|group| &group.channels);
+        channels.map(String::as_str).collect()
+    }
+
+    fn many(&self) -> bool {
+        self.axes().len() > 1
+    }
+
+    fn sets(&self, text: &mut String) {
+        if self.many() {
+            let axes: Vec<String> = self.axes().iter().map(|axis| toml_string(axis)).collect();
+            let _ = writeln!(
+                text,
+                "\n[sets]                             # what nodes with `each = \"axis\"` stand for, one by one\n\
+                 axis = [{}]",
+                axes.join(", ")
+            );
+        }
+    }
+
+    fn time(&self, text: &mut String) {
+        let _ = writeln!(
+            text,
+            "\n[time]\ncolumn = {}",
+            toml_string(&self.clock.column)
+        );
+        if let Some(declared) = self.clock.declared {
+            text.push_str(declared);
+            if self.clock.counts_samples() {
+                text.push_str("                        # the log does not say how long a sample takes: state it here");
+            }
+            text.push('\n');
+        }
+    }
+
+    fn signals(&self, text: &mut String) {
+        for group in self
+            .temperatures
+            .iter()
+            .chain(&self.drives)
+            .chain(&self.drifting)
+        {
+            let members = || {
+                group
+                    .columns
+                    .iter()
+                    .map(|&index| &self.survey.series[index])
+            };
+            let interval = members().filter_map(|s| s.interval_s()).fold(0.0, f64::max);
+            let longest = members().filter_map(|s| s.gap(1.0)).fold(0.0, f64::max);
+            let low = members()
+                .map(|s| s.extremes().0)
+                .fold(f64::INFINITY, f64::min);
+            let high = members()
+                .map(|s| s.extremes().1)
+                .fold(f64::NEG_INFINITY, f64::max);
+            let names: Vec<String> = group
+                .channels
+                .iter()
+                .map(|name| toml_string(name))
+                .collect();
+            let known = self.columns[group.columns[0]].unit_known();
+            let _ = writeln!(
+                text,
+                "\n[signals.{}]            # a value every {}; longest gap {}",
+                group.signal,
+                self.clock.length(tidy(interval)),
+                self.clock.length(tidy(longest)),
+            );
+            let _ = writeln!(
+                text,
+                "unit = {}{}",
+                toml_string(&group.unit),
+                if known {
+                    ""
+                } else {
+                    "   # a guess: the names do not say"
+                }
+            );
+            let _ = writeln!(text, "channels = [{}]", names.join(", "));
+            let _ = writeln!(text, "column = {}", toml_string(&group.pattern));
+            let _ = writeln!(
+                text,
+                "max_age = \"{}\"                    # how long a value counts: a few intervals",
+                self.clock.length(self.max_age(group)),
+            );
+            let _ = writeln!(
+                text,
+                "# range = [\"{} {unit}\", \"{} {unit}\"]  # seen: {} to {}; a value outside would be left out",
+                number(low - (high - low)),
+                number(high + (high - low)),
+                number(low),
+                number(high),
+                unit = group.unit,
+            );
+        }
+    }
+
+    /// Long enough for the usual gaps between values: three times what nine in ten do not exceed.
+    fn max_age(&self, group: &Group) -> f64 {
+        let members = group
+            .columns
+            .iter()
+            .map(|&index| &self.survey.series[index]);
+        let gaps = members.filter_map(|series| series.gap(0.9));
+        let age = 3.0 * gaps.fold(0.0, f64::max);
+        if age > 2.0 { age.ceil() } else { tidy(age) }
+    }
+
+    fn features(&self, text: &mut String) {
+        let width = self.clock.length(self.choice.drift_s);
+        let _ = writeln!(
+            text,
+            "\n# Drift window: signal to noise of the slope of {}, by width:",
+            self.axes().join(", ")
+        );
+        for (width_s, ratios) in &self.choice.candidates {
+            let told: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
+            let mark = if *width_s == self.choice.drift_s {
+                "  <- chosen"
+            } else {
+                ""
+            };
+            let _ = writeln!(
+                text,
+                "#   {:>10}  {}{mark}",
+                self.clock.length(*width_s),
+                told.join("  ")
+            );
+        }
+        let _ = writeln!(
+            text,
+            "[nodes.drift]                      # what is predicted: the slope over the last {width}\n\
+             type = \"slope\"\ninputs.signal = {}\nwindows = [\"{width}\"]\nunit = {}",
+            names(&self.drifting),
+            toml_string(&self.drift_unit()),
+        );
+        let causes: Vec<&Group> = self.temperatures.iter().chain(&self.drives).collect();
+        for (number, group) in causes.iter().enumerate() {
+            let why = if number == 0 {
+                "   # short windows see the fast part of the drift, long ones the slow part"
+            } else {
+                ""
+            };
+            let _ = writeln!(
+                text,
+                "\n[nodes.{}]{why}\n\
+                 type = \"slope\"\ninputs.signal = {}\n\
+                 windows = {{ dynamic_range = \"{width}\", shortest = \"{}\", steps = 4, harmonics = {} }}",
+                gradients(group),
+                toml_string(&group.signal),
+                self.clock.length(self.choice.shortest_s),
+                self.choice.harmonics,
+            );
+        }
+    }
+
+    /// The unit of the drift: of the signal by a prefix and a time in which it is neither tiny nor huge.
+    fn drift_unit(&self) -> String {
+        let Some(unit) = self
+            .drifting
+            .first()
+            .and_then(|group| Unit::parse(&group.unit).ok())
+        else {
+            return "1/min".to_owned();
+        };
+        let spread = self.choice.spread.iter().copied().fold(0.0, f64::max);
+        let difference = unit.difference();
+        let smaller = match difference.text() {
+            "m" | "mm" | "um" => &["nm", "um", "mm", "m"][..],
+            "K" => &["mK", "K"],
+            "V" => &["mV", "V"],
+            _ => &[],
+        };
+        let own = [difference.text()];
+        let candidates = if smaller.is_empty() {
+            &own[..]
+        } else {
+            smaller
+        };
+        let period = if self.choice.drift_s >= 3600.0 && !self.clock.counts_samples() {
+            "h"
+        } else {
+            "min"
+        };
+        let per_s = Unit::second();
+        let fits = |name: &&&str| {
+            let to = Unit::parse(&format!("{name}/{period}")).ok()?;
+            let factor = difference.per(&per_s).factor_to(&to)?;
+            Some((1.0..1000.0).contains(&(spread * factor)))
+        };
+        let chosen = candidates.iter().find(|name| fits(name) == Some(true));
+        format!("{}/{period}", chosen.copied().unwrap_or(difference.text()))
+    }
+
+    fn estimators(&self, text: &mut String) {
+        let width = self.clock.length(self.choice.drift_s);
+        let (each, axis) = if self.many() {
+            ("each = \"axis\"\n", "{axis}")
+        } else {
+            ("", *self.axes().first().unwrap_or(&"*"))
+        };
+        let causes = self.temperatures.iter().chain(&self.drives);
+        let mut features: Vec<String> =
+            causes.map(|group| toml_string(&gradients(group))).collect();
+        if !self.drives.is_empty() && self.temperatures.is_empty() {
+            // What a heater does follows from how strong it is and how warm it has become, not only from how they change.
+            let levels = self.drives.iter().chain(&self.drifting);
+            features.extend(levels.map(|group| toml_string(&group.signal)));
+        }
+        let features = list(&features);
+        let lags = format!(
+            "[\"{}\", \"{width}\", \"{}\"]",
+            if self.clock.counts_samples() {
+                "0 samples"
+            } else {
+                "0s"
+            },
+            self.clock.length(2.0 * self.choice.drift_s)
+        );
+        let limit = self.choice.extreme.iter().copied().fold(0.0, f64::max);
+        let limit = self.in_drift_unit(limit);
+        let unit = self.drift_unit();
+        let selection = "selection = { method = \"forward\", folds = 3, tolerance = 1e-3 }";
+        let _ = write!(
+            text,
+            "\n[nodes.thermal]                    # from {causes} alone\n\
+             type = \"linear\"\n{each}inputs.features = {features}\ninputs.truth = \"drift.{axis}\"\n\
+             ahead = \"{width}\"                     # the drift of the next {width}\n{selection}\n\
+             # train.abs_truth = {{ below = \"{} {unit}\" }}   # leave out the wildest rows; 99 % are below\n\
+             \n[nodes.motion]                     # from the drift of the past alone\n\
+             type = \"ar\"\n{each}inputs.truth = \"drift.{axis}\"\nahead = \"{width}\"\nlags = {lags}\n\
+             \n[nodes.both]                       # from both\n\
+             type = \"arx\"\n{each}inputs.features = {features}\ninputs.truth = \"drift.{axis}\"\n\
+             ahead = \"{width}\"\nlags = {lags}\n{selection}\n\
+             \n[nodes.vote]                       # who has been right of late counts more\n\
+             type = \"auto_weighted\"\n{each}\
+             inputs.voters = [\"thermal{member}\", \"motion{member}\", \"both{member}\"]\n\
+             inputs.truth = \"drift.{axis}\"\nmemory = \"{}\"\n\
+             \n[outputs]\npredicted = \"vote\"\n",
+            number(limit),
+            self.clock.length(3.0 * self.choice.drift_s),
+            causes = if self.temperatures.is_empty() {
+                "the inputs"
+            } else {
+                "the temperatures"
+            },
+            member = if self.many() { ".{axis}" } else { "" },
+        );
+    }
+
+    /// A drift per second of the first drifting signal, in the unit of the drift node.
+    fn in_drift_unit(&self, per_s: f64) -> f64 {
+        let factor = || {
+            let unit = Unit::parse(&self.drifting.first()?.unit).ok()?;
+            let to = Unit::parse(&self.drift_unit()).ok()?;
+            unit.difference().per(&Unit::second()).factor_to(&to)
+        };
+        per_s * factor().unwrap_or(1.0)
+    }
+}
+
+/// The name of the node that takes the slopes of a signal.
+fn gradients(group: &Group) -> String {
+    match group.signal.as_str() {
+        "temperature" => "gradients".to_owned(),
+        signal => format!("{signal}-gradients"),
+    }
+}
+
+/// A text as TOML writes it.
+fn toml_string(text: &str) -> String {
+    // What JSON escapes, TOML's basic strings escape alike.
+    serde_json::Value::from(text).to_string()
+}
+
+fn names(groups: &[Group]) -> String {
+    let names: Vec<String> = groups
+        .iter()
+        .map(|group| toml_string(&group.signal))
+        .collect();
+    list(&names)
+}
+
+fn list(names: &[String]) -> String {
+    match names {
+        [one] => one.clone(),
+        many => format!("[{}]", many.join(", ")),
+    }
+}
+
+/// A length of time in s with three digits.
+fn tidy(seconds: f64) -> f64 {
+    if seconds <= 0.0 {
+        return seconds;
+    }
+    let scale = 10_f64.powf(2.0 - seconds.log10().floor());
+    let tidied = (seconds * scale).round() / scale;
+    Duration::from_secs_f64(tidied).map_or(seconds, Duration::secs)
+}

@@ -1,0 +1,221 @@
+//! Same input, same bytes:
+//!
+//! 1. the same run twice gives the same bytes;
+//! 2. in one piece and row by row through a pipe gives the same bytes, each row answered before the next one is sent;
+//! 3. a changed sample changes them, or all of this proves nothing;
+//! 4. any number of threads that fit gives the same model;
+//! 5. a model read back runs with the same bits as the one that was fitted.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::{Arc, OnceLock};
+
+use athermal::core::fit::{FitOptions, fit};
+use athermal::core::recording::{Event, Recording, Table};
+use athermal::files::{Dataset, Options};
+use athermal::{Engine, Model};
+use workbench::{Scratch, athermal, graph, simulated};
+
+/// Two days of a machine, half a day of another, and a model fitted on the former.
+struct Fitted {
+    scratch: Scratch,
+    train: PathBuf,
+    test: PathBuf,
+    model: PathBuf,
+}
+
+fn fitted() -> &'static Fitted {
+    static FITTED: OnceLock<Fitted> = OnceLock::new();
+    FITTED.get_or_init(|| {
+        let scratch = Scratch::new("determinism");
+        let train = simulated(&scratch, "train.csv", "die-tester", 1.5, 1);
+        let test = simulated(&scratch, "test.csv", "die-tester", 0.4, 2);
+        let model = scratch.path("model.json");
+        athermal(&[
+            &"fit",
+            &graph("die-tester"),
+            &"--data",
+            &train,
+            &"-o",
+            &model,
+            &"-q",
+        ])
+        .ended(0);
+        Fitted {
+            scratch,
+            train,
+            test,
+            model,
+        }
+    })
+}
+
+fn predictions(test: &PathBuf) -> String {
+    let run = athermal(&[&"run", &fitted().model, &"--input", test, &"--output", &"-"]).ended(0);
+    assert!(
+        run.out.lines().count() > 3000
+            && run
+                .out
+                .lines()
+                .last()
+                .unwrap()
+                .split(',')
+                .all(|cell| !cell.is_empty())
+    );
+    run.out
+}
+
+#[test]
+fn the_same_run_twice_gives_the_same_bytes() {
+    assert_eq!(predictions(&fitted().test), predictions(&fitted().test));
+}
+
+#[test]
+fn to_a_file_and_to_standard_output_the_bytes_are_the_same() {
+    let file = fitted().scratch.path("predicted.csv");
+    athermal(&[
+        &"run",
+        &fitted().model,
+        &"--input",
+        &fitted().test,
+        &"--output",
+        &file,
+    ])
+    .ended(0);
+    assert_eq!(
+        std::fs::read_to_string(file).unwrap(),
+        predictions(&fitted().test)
+    );
+}
+
+#[test]
+fn a_changed_sample_changes_the_bytes_from_there_on() {
+    let text = std::fs::read_to_string(&fitted().test).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    // The last digit of one temperature, in a row that has one.
+    let at = (2000..)
+        .find(|&at| !lines[at].split(',').nth(1).unwrap().is_empty())
+        .unwrap();
+    let mut cells: Vec<String> = lines[at].split(',').map(str::to_owned).collect();
+    cells[1] = format!("{}", cells[1].parse::<f64>().unwrap() + 1e-4);
+    lines[at] = cells.join(",");
+    let changed = fitted()
+        .scratch
+        .file("changed.csv", lines.join("\n") + "\n");
+    let (before, after) = (predictions(&fitted().test), predictions(&changed));
+    let first = before
+        .lines()
+        .zip(after.lines())
+        .position(|(one, other)| one != other);
+    assert_eq!(
+        first,
+        Some(at),
+        "from the row of the sample on, and not before"
+    );
+}
+
+#[test]
+fn row_by_row_through_a_pipe_gives_the_same_bytes() {
+    let whole = predictions(&fitted().test);
+    let text = std::fs::read_to_string(&fitted().test).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .arg("run")
+        .arg(&fitted().model)
+        .args(["--input", "-", "--output", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let mut output = BufReader::new(child.stdout.take().unwrap());
+    let mut lines = text.lines();
+    writeln!(input, "{}", lines.next().unwrap()).unwrap();
+    let mut answers = String::new();
+    for (nth, line) in lines.enumerate() {
+        writeln!(input, "{line}").unwrap();
+        input.flush().unwrap();
+        // The header of the output comes with the first row, or before it.
+        for _ in 0..=usize::from(nth == 0) {
+            assert!(
+                output.read_line(&mut answers).unwrap() > 0,
+                "row {nth} is answered before the next one is sent"
+            );
+        }
+    }
+    drop(input);
+    assert_eq!(output.read_line(&mut answers).unwrap(), 0);
+    assert!(child.wait().unwrap().success());
+    assert!(
+        answers == whole,
+        "the answers differ from those in one piece"
+    );
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_model() {
+    let one = std::fs::read_to_string(&fitted().model).unwrap();
+    for threads in ["1", "2", "5", "64"] {
+        let model = fitted().scratch.path(&format!("model-{threads}.json"));
+        let (graph, train) = (graph("die-tester"), &fitted().train);
+        athermal(&[
+            &"fit",
+            &graph,
+            &"--data",
+            train,
+            &"-o",
+            &model,
+            &"--threads",
+            &threads,
+            &"-q",
+        ])
+        .ended(0);
+        assert!(
+            std::fs::read_to_string(model).unwrap() == one,
+            "with {threads} threads the model is another"
+        );
+    }
+}
+
+#[test]
+fn a_model_read_back_runs_with_the_same_bits() {
+    let mut model = Model::load(graph("linear-axis")).unwrap();
+    let scratch = Scratch::new("determinism-read-back");
+    let file = simulated(&scratch, "axis.csv", "linear-axis", 1.0, 3);
+    let table = Table::read(&Dataset::new(vec![file], Options::default()), &model.plan).unwrap();
+    let (fits, _) = fit(&model.plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    model.fitted = fits;
+    let path = scratch.file("model.json", model.to_text().unwrap());
+    let read = Model::load(path).unwrap();
+    let bits = |mut engine: Engine| {
+        let plan = Arc::clone(engine.plan());
+        let mut rows = table.open(&plan).unwrap();
+        let mut values = vec![f64::NAN; plan.sources.len()];
+        let mut bits = Vec::new();
+        while let Some(event) = rows.next(&mut values).unwrap() {
+            if let Event::Row(now) = event {
+                bits.extend(
+                    engine
+                        .step(now, &values)
+                        .unwrap()
+                        .iter()
+                        .map(|value| value.to_bits()),
+                );
+            }
+        }
+        bits
+    };
+    let (fitted, read) = (bits(model.engine().unwrap()), bits(read.engine().unwrap()));
+    assert!(
+        fitted
+            .iter()
+            .filter(|&&bits| !f64::from_bits(bits).is_nan())
+            .count()
+            > 10_000
+    );
+    assert!(fitted == read, "the model read back gives other bits");
+}

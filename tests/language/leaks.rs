@@ -1,0 +1,168 @@
+//! What sees the future is a mistake in the file, and the smallest lag allowed is named.
+
+use super::workbench::{plan, problems};
+use super::{SAMPLES, SLOPES};
+
+fn endogenous(truth: &str, ahead: &str, lags: &str) -> String {
+    format!(
+        r#"{SAMPLES}{SLOPES}
+[nodes.motion]
+type = "ar"
+inputs.truth = "{truth}"
+ahead = "{ahead}"
+lags = {lags}
+[outputs]
+out = "motion"
+also = "gradients"
+position = "drift"
+"#
+    )
+}
+
+fn check(truth: &str, ahead: &str, leaks: &str, allowed: &str, named: &str) {
+    let told = problems(&endogenous(truth, ahead, &format!("[\"{leaks}\"]")));
+    assert!(told.contains("contains part of the answer"), "{told}");
+    assert!(
+        told.contains(&format!("the smallest lag allowed is {named}")),
+        "{told}"
+    );
+    plan(&endogenous(truth, ahead, &format!("[\"{allowed}\"]")));
+}
+
+#[test]
+fn a_lag_whose_window_overlaps_the_predicted_one_is_a_leak() {
+    check("drift.Z", "0s", "299999ms", "5min", "5min");
+    check("drift.Z", "150s", "149s", "150s", "150s");
+    check("drift.Z", "150s", "0s", "5min", "150s");
+    plan(&endogenous("drift.Z", "5min", "[\"0s\"]"));
+}
+
+#[test]
+fn a_plain_sample_leaks_only_into_itself() {
+    check("position.Z", "0s", "0s", "1s", "one sample");
+    plan(&endogenous("position.Z", "1s", "[\"0s\"]"));
+}
+
+#[test]
+fn only_the_lag_that_leaks_is_pointed_at() {
+    let told = problems(&endogenous(
+        "drift.Z",
+        "0s",
+        "[\"10min\", \"4min\", \"5min\"]",
+    ));
+    assert_eq!(
+        told.matches("contains part of the answer").count(),
+        1,
+        "{told}"
+    );
+    assert!(told.contains("(here it is 4min)"), "{told}");
+}
+
+fn through(delay: &str, ahead: &str, feature: &str) -> String {
+    format!(
+        r#"{SAMPLES}{SLOPES}
+[nodes.late]
+type = "delay"
+inputs.signal = "position"
+delay = "{delay}"
+[nodes.past]
+type = "slope"
+inputs.signal = "late"
+windows = ["150s"]
+[nodes.warm]
+type = "linear"
+inputs.features = ["gradients", "{feature}"]
+inputs.truth = "drift.Z"
+ahead = "{ahead}"
+[outputs]
+out = "warm"
+past = "past"
+"#
+    )
+}
+
+#[test]
+fn a_feature_made_of_the_truths_own_signal_is_held_to_the_same_rule() {
+    let told = problems(&through("4min", "0s", "past"));
+    assert!(
+        told.contains("`past.Z lag 4min` contains part of the answer"),
+        "{told}"
+    );
+    assert!(told.contains("the smallest lag allowed is 5min"), "{told}");
+    plan(&through("5min", "0s", "past"));
+    plan(&through("150s", "150s", "past"));
+    let told = problems(&through("5min", "0s", "drift"));
+    assert!(
+        told.contains("`drift.Z lag 0s` contains part of the answer"),
+        "{told}"
+    );
+    plan(&through("5min", "5min", "drift"));
+}
+
+#[test]
+fn a_leak_through_another_estimator_is_found_and_its_truth_is_no_path() {
+    let text = |lag: &str| {
+        format!(
+            r#"{SAMPLES}{SLOPES}
+[nodes.motion]
+type = "ar"
+inputs.truth = "drift.Z"
+ahead = "5min"
+lags = ["{lag}"]
+[nodes.warm]
+type = "linear"
+inputs.features = "gradients"
+inputs.truth = "drift.Z"
+ahead = "5min"
+[nodes.second]
+type = "linear"
+inputs.features = ["motion", "warm"]
+inputs.truth = "drift.Z"
+ahead = "0s"
+[outputs]
+out = "second"
+"#
+        )
+    };
+    let told = problems(&text("4min"));
+    assert!(
+        told.contains("`motion.Z lag 4min` contains part of the answer"),
+        "{told}"
+    );
+    assert!(!told.contains("`warm.Z"), "{told}");
+    plan(&text("5min"));
+}
+
+#[test]
+fn a_leak_through_a_loop_is_found() {
+    // One tick later the position is still within the window of the truth.
+    let text = |delay: &str| {
+        format!(
+            r#"{SAMPLES}{SLOPES}
+[nodes.now]
+type = "pick"
+inputs.signal = ["position.Z", "before"]
+names = ["Z", "last"]
+[nodes.before]
+type = "delay"
+inputs.signal = "now.Z"
+delay = "{delay}"
+unit = "nm"
+[nodes.warm]
+type = "linear"
+inputs.features = {{ from = ["before", "gradients"], max_age = "1min" }}
+inputs.truth = "drift.Z"
+ahead = "0s"
+[outputs]
+out = "warm"
+now = "now"
+"#
+        )
+    };
+    let told = problems(&text("1 tick"));
+    assert!(
+        told.contains("`before.value` contains part of the answer"),
+        "{told}"
+    );
+    plan(&text("5min"));
+}

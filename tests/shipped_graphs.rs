@@ -1,0 +1,75 @@
+//! What this program brings: its kinds of nodes, and graphs without a mistake or a warning.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use athermal::core::node::kinds;
+use workbench::{athermal, graph};
+
+#[test]
+fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
+    let found: Vec<(&str, Vec<&str>)> = kinds()
+        .iter()
+        .map(|(name, same)| (*name, same.iter().map(|kind| kind.package).collect()))
+        .collect();
+    let expected = [
+        ("ar", "athermal-estimators"),
+        ("arx", "athermal-estimators"),
+        ("auto_weighted", "athermal-combiners"),
+        ("delay", "athermal-features"),
+        ("linear", "athermal-estimators"),
+        ("mean", "athermal-combiners"),
+        ("persistence", "athermal-estimators"),
+        ("pick", "athermal-features"),
+        ("slope", "athermal-features"),
+        ("zero", "athermal-estimators"),
+    ];
+    let expected: Vec<_> = expected
+        .into_iter()
+        .map(|(name, package)| (name, vec![package]))
+        .collect();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn the_program_knows_the_same_kinds_as_the_library() {
+    let listed = athermal(&[&"nodes", &"--format", &"json"]).ended(0).json();
+    let listed: Vec<&str> = listed["nodes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|node| node["name"].as_str().unwrap())
+        .collect();
+    let linked: Vec<&str> = kinds().keys().copied().collect();
+    assert_eq!(listed, linked);
+}
+
+#[test]
+fn every_kind_explains_itself_and_its_parameters() {
+    for kind in kinds().values().flatten() {
+        assert!(kind.summary().len() > 10, "{}", kind.name);
+        let schema = serde_json::Value::from((kind.schema)());
+        for (name, parameter) in schema["properties"].as_object().into_iter().flatten() {
+            let text = parameter["description"].as_str().unwrap_or_default();
+            assert!(
+                text.len() > 10,
+                "`{name}` of {} is not explained",
+                kind.name
+            );
+        }
+    }
+}
+
+#[test]
+fn every_shipped_graph_checks_without_a_warning() {
+    let folder = graph("x").parent().unwrap().to_owned();
+    let mut checked = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let checks = athermal(&[&"check", &"--strict", &path]).ended(0);
+        assert!(!checks.told.contains("warning"), "{}", checks.told);
+        checked += 1;
+    }
+    assert!(checked >= 8, "{checked}");
+}

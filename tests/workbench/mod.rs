@@ -1,0 +1,32 @@
+//! What the tests share: where recorded data are, a graph from text, an engine stepped by hand, the program as a user calls
+//! it. Decides nothing that is expected.
+
+#![allow(dead_code, unused_imports)] // each test file uses its part
+
+mod bench;
+mod program;
+mod simulated;
+
+pub use bench::{Bench, linear, plan, problems, secs, slot};
+pub use program::{Finished, Scratch, athermal, athermal_fed};
+pub use simulated::simulated;
+
+use std::path::{Path, PathBuf};
+
+/// The folder of recorded data, or nothing, with a remark, where this machine lacks it.
+pub fn data() -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let folder = std::env::var_os("ATHERMAL_SHARED").map_or_else(beside, PathBuf::from);
+    let data = folder.join("data");
+    if data.is_dir() {
+        return Some(data);
+    }
+    eprintln!("skipped: {} is not there", data.display());
+    None
+}
+
+/// A graph file of this project.
+pub fn graph(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");
+    folder.join(name).with_extension("toml")
+}

@@ -1,0 +1,100 @@
+//! The program as a user calls it. Decides nothing that is expected.
+
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What a call of the program left behind.
+#[derive(Debug)]
+pub struct Finished {
+    pub status: i32,
+    pub out: String,
+    pub told: String,
+}
+
+impl Finished {
+    /// The same, if the program ended with this status.
+    #[track_caller]
+    pub fn ended(self, status: i32) -> Self {
+        assert_eq!(self.status, status, "{}\n{}", self.told, self.out);
+        self
+    }
+
+    /// What was printed, as JSON.
+    #[track_caller]
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error} in:\n{}", self.out))
+    }
+
+    /// Whether everything that a message should say is in it.
+    #[track_caller]
+    pub fn tells(&self, parts: &[&str]) {
+        for part in parts {
+            assert!(
+                self.told.contains(part),
+                "`{part}` is not in:\n{}",
+                self.told
+            );
+        }
+    }
+}
+
+fn command(arguments: &[&dyn AsRef<OsStr>]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_athermal"));
+    command.args(arguments.iter().map(|argument| argument.as_ref()));
+    command.env("SOURCE_DATE_EPOCH", "0");
+    command
+}
+
+/// Calls the program.
+pub fn athermal(arguments: &[&dyn AsRef<OsStr>]) -> Finished {
+    athermal_fed(arguments, b"")
+}
+
+/// Calls the program with something on its standard input.
+pub fn athermal_fed(arguments: &[&dyn AsRef<OsStr>], input: &[u8]) -> Finished {
+    let mut child = command(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    let input = input.to_vec();
+    let feeding = std::thread::spawn(move || {
+        // A program that does not read all of its input is right to do so.
+        let _ = stdin.write_all(&input);
+    });
+    let output = child.wait_with_output().unwrap();
+    feeding.join().unwrap();
+    Finished {
+        status: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        told: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// A folder for one test, empty at first.
+pub struct Scratch(PathBuf);
+
+impl Scratch {
+    pub fn new(test: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    /// The path of a file in it.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// Writes a file and gives its path.
+    pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    }
+}
