@@ -49,6 +49,7 @@ impl Resolver<'_> {
                 return None;
             }
         };
+        self.doubts(instance, feature.warnings(&inputs));
         let behind = self.behind(
             &slots,
             outputs.iter().map(|port| port.channels.len()),

@@ -88,6 +88,11 @@ pub enum CompileProblem {
         message: String,
         help: Option<String>,
     },
+    /// Something that the kind can use and doubts to be meant.
+    Doubt {
+        message: String,
+        help: Option<String>,
+    },
     /// An estimator without a horizon.
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
@@ -153,12 +158,15 @@ impl Problem for CompileProblem {
             Self::UnusedSignal { .. } => "A060",
             Self::Unreachable { .. } => "A061",
             Self::NoOutputs => "A062",
+            Self::Doubt { .. } => "A063",
         }
     }
 
     fn severity(&self) -> Severity {
         match self {
-            Self::UnusedNode { .. } | Self::UnusedSignal { .. } => Severity::Warning,
+            Self::UnusedNode { .. } | Self::UnusedSignal { .. } | Self::Doubt { .. } => {
+                Severity::Warning
+            }
             _ => Severity::Error,
         }
     }
@@ -226,7 +234,7 @@ impl Problem for CompileProblem {
             Self::NoMaxAge { channel, .. } => {
                 format!("nothing says how long a value of `{channel}` counts")
             }
-            Self::Parameter { message, .. } => message.clone(),
+            Self::Parameter { message, .. } | Self::Doubt { message, .. } => message.clone(),
             Self::NoHorizon { kind } => {
                 format!("`{kind}` needs to know how far `ahead` it predicts")
             }
@@ -264,7 +272,7 @@ impl Problem for CompileProblem {
             Self::Cycle { .. } => "part of a loop",
             Self::Leak { .. } => "sees the future",
             Self::NoMaxAge { .. } => "held without a maximum age",
-            Self::Parameter { .. } => "here",
+            Self::Parameter { .. } | Self::Doubt { .. } => "here",
             Self::NoHorizon { .. } => "`ahead` is missing",
             Self::PredictedTruth { .. } => "not measured",
             Self::LimitUnit { .. } => "another unit",
@@ -319,7 +327,7 @@ impl Problem for CompileProblem {
                     "say `max_age` on the signal, or `inputs.{input} = {{ from = \"…\", max_age = \"1min\" }}`"
                 )
             }
-            Self::Parameter { help, .. } => return help.clone(),
+            Self::Parameter { help, .. } | Self::Doubt { help, .. } => return help.clone(),
             Self::NoHorizon { .. } => {
                 "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor".to_owned()
             }
