@@ -238,7 +238,7 @@ impl Drawn<'_> {
             PlannedRole::Estimator { gathers, truth, .. } => {
                 (gathers.clone(), Some(truth.slot), Flow::Data)
             }
-            PlannedRole::Combiner { voters, truth } => {
+            PlannedRole::Combiner { voters, truth, .. } => {
                 (vec![*voters], truth.map(|truth| truth.slot), Flow::Data)
             }
         };

@@ -208,6 +208,14 @@ impl Instance<'_> {
         }
     }
 
+    /// The place of what a kind points at: an input or a parameter.
+    pub(crate) fn place_of(&self, mistake: &Mistake) -> Place {
+        match mistake.at.strip_prefix("inputs.") {
+            Some(port) => self.input_place(port),
+            None => self.parameter_place(&mistake.at),
+        }
+    }
+
     /// The place of a parameter such as `selection.folds` or `lags.0`, as near as the file has it.
     pub(crate) fn parameter_place(&self, path: &str) -> Place {
         let mut place = self.node.place;
@@ -556,13 +564,22 @@ impl<'g> Resolver<'g> {
 
     pub(crate) fn mistakes(&mut self, instance: &Instance<'_>, mistakes: Vec<Mistake>) {
         for mistake in mistakes {
-            let place = match mistake.at.strip_prefix("inputs.") {
-                Some(port) => instance.input_place(port),
-                None => instance.parameter_place(&mistake.at),
-            };
+            let place = instance.place_of(&mistake);
             let problem = CompileProblem::Parameter {
                 message: mistake.message,
                 help: mistake.help,
+            };
+            self.diagnostics.report(place, problem);
+        }
+    }
+
+    /// Tells what the kind finds odd and can live with.
+    pub(crate) fn doubts(&mut self, instance: &Instance<'_>, doubts: Vec<Mistake>) {
+        for doubt in doubts {
+            let place = instance.place_of(&doubt);
+            let problem = CompileProblem::Doubt {
+                message: doubt.message,
+                help: doubt.help,
             };
             self.diagnostics.report(place, problem);
         }
