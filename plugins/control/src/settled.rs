@@ -172,7 +172,7 @@ impl Settling {
             .newest
             .is_some_and(|newest| now - newest > self.spec.max_gap);
         // Written so that an absent loss is not low.
-        if !(value < self.below) {
+        if value >= self.below || value.is_nan() {
             known.low_since = None;
         } else if gap || known.low_since.is_none() {
             known.low_since = Some(now);
