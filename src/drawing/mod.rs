@@ -149,7 +149,6 @@ impl Drawn<'_> {
                 self.of_slot[slot] = Some(number);
             }
         }
-        let mut numbers = numbers;
         let mut next = self.diagram.boxes.len() - if expand { self.plan.nodes.len() } else { 0 };
         for node in &self.plan.nodes {
             if expand {
