@@ -202,7 +202,7 @@ fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
         };
         Simulated::new(known.machine, setup)
     };
-    let mut model = Model::load(&graph("linear-axis-sensor.toml")).unwrap();
+    let mut model = Model::load(graph("linear-axis-sensor.toml")).unwrap();
     let (fitted, _) = fit(
         &model.plan,
         &recording(1),
@@ -227,7 +227,7 @@ fn a_machine_is_a_recording_of_any_graph_that_measures_its_channels() {
 #[test]
 fn a_graph_that_measures_something_else_is_told_what_the_machine_has() {
     let known = machine("linear-axis").unwrap();
-    let model = Model::load(&graph("z-probe.toml")).unwrap();
+    let model = Model::load(graph("z-probe.toml")).unwrap();
     let recording = Simulated::new(known.machine, Setup::default());
     let refused = fit(&model.plan, &recording, &FitOptions::default(), &mut |_| {});
     let told = refused.map(|_| ()).unwrap_err().to_string();

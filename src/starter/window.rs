@@ -12,8 +12,8 @@ use super::survey::{Series, Survey};
 
 /// Signal to noise of a drift that is enough: a fifth of its variance is then noise, `1 / (1 + 2²)`.
 const ENOUGH: f64 = 2.0;
-/// Samples in a drift window, and in the shortest window of a temperature.
-const FEWEST: f64 = 4.0;
+/// Samples that a drift window holds on the average, four but for rounding; and in the shortest window of a temperature.
+const FEWEST: f64 = 3.9;
 const FEWEST_OF_FEATURE: f64 = 3.0;
 /// The log must be so many drift windows long.
 const WINDOWS_IN_LOG: f64 = 20.0;
