@@ -112,12 +112,24 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
             None
         }
     };
-    let instances = node
-        .instances
-        .iter()
-        .map(|instance| read_instance(kind?, node, instance, diagnostics))
-        .collect();
+    let mut instances: Vec<Option<ReadInstance>> = Vec::with_capacity(node.instances.len());
+    for (nth, instance) in node.instances.iter().enumerate() {
+        // Members whose parameters do not name them share one table, and so one specification.
+        let before = nth.checked_sub(1).map(|before| &node.instances[before]);
+        let read = match (before, instances.last()) {
+            (Some(before), Some(Some(read))) if is_shared(before, instance) => Some(read.clone()),
+            _ => kind.and_then(|kind| read_instance(kind, node, instance, diagnostics)),
+        };
+        instances.push(read);
+    }
     ReadNode { kind, instances }
+}
+
+fn is_shared(a: &InstanceDecl, b: &InstanceDecl) -> bool {
+    match (&a.parameters.data, &b.parameters.data) {
+        (Data::Table(a), Data::Table(b)) => a.is_copy_of(b),
+        _ => false,
+    }
 }
 
 fn read_instance(
