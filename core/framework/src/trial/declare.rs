@@ -155,14 +155,14 @@ impl Declaring<'_> {
             }
         };
         let faults = match table.get("faults") {
-            Some(value) => self.list("faults", value, Self::fault)?.concat(),
-            None => Vec::new(),
+            Some(value) => self.list("faults", value, Self::fault),
+            None => Some(Vec::new()),
         };
         let expect = match table.get("expect") {
-            Some(value) => self.list("expect", value, Self::expectation)?,
-            None => Vec::new(),
+            Some(value) => self.list("expect", value, Self::expectation),
+            None => Some(Vec::new()),
         };
-        if expect.is_empty() {
+        if expect.as_ref().is_some_and(Vec::is_empty) {
             let place = table.get("expect").map_or(test.place, |value| value.place);
             let problem = TrialProblem::NothingExpected { what: "the test" };
             self.diagnostics.report(place, problem);
@@ -172,8 +172,8 @@ impl Declaring<'_> {
             place: test.place,
             fit: fit.map_or(Some(None), |fit| fit.map(Some))?,
             on: on?,
-            faults,
-            expect,
+            faults: faults?.concat(),
+            expect: expect?,
         })
     }
 

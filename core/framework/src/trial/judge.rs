@@ -347,10 +347,15 @@ impl Judge<'_> {
 /// A number with six significant digits, or with all that it takes to tell it from what was wanted.
 fn figure(value: f64, beside: f64) -> String {
     let rounded = format!("{value:.5e}").parse().unwrap_or(value);
-    if rounded == beside || (rounded - beside).abs() < 1e-4 * beside.abs() {
-        value.to_string()
+    let shown: f64 = if rounded == beside || (rounded - beside).abs() < 1e-4 * beside.abs() {
+        value
     } else {
-        rounded.to_string()
+        rounded
+    };
+    if shown != 0.0 && !(1e-5..1e15).contains(&shown.abs()) {
+        format!("{shown:e}")
+    } else {
+        shown.to_string()
     }
 }
 

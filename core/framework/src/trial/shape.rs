@@ -122,7 +122,10 @@ impl Shaping<'_> {
             Some(length) if length < Duration::ZERO => {
                 self.range("for", length.to_string(), "0 or longer");
             }
-            Some(length) if length.as_ns() / table.every.as_ns().max(1) >= MOST_SAMPLES => {
+            Some(length)
+                if table.every > Duration::ZERO
+                    && length.as_ns() / table.every.as_ns() >= MOST_SAMPLES =>
+            {
                 let found = format!("{length} with a sample every {}", table.every);
                 self.range("for", found, "at most 10,000,000 samples long");
             }

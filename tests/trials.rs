@@ -1,0 +1,297 @@
+//! The tests inside graph files, as `athermal test` runs them: a wrong expectation is told with its figures, in the order of the
+//! file, and the exit status says so. Decides nothing about the figures of the shipped graphs, which their own tests hold.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use workbench::{Scratch, athermal};
+
+/// Two channels of which the slopes are known by hand, and one that is never measured.
+const GRAPH: &str = r#"
+schema = 1
+name = "plain"
+[signals.temperature]
+unit = "Cel"
+channels = ["room", "plate"]
+range = ["-20 Cel", "200 Cel"]
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+max_age = "3min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["30s"]
+unit = "nm/min"
+[nodes.slopes]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["30s"]
+unit = "mK/min"
+[nodes.zero]
+type = "zero"
+inputs.truth = "drift.Z"
+ahead = "30s"
+[nodes.same]
+type = "persistence"
+inputs.truth = "drift.Z"
+ahead = "30s"
+[outputs]
+predicted = ["zero", "same"]
+slopes = "slopes"
+"#;
+
+/// The graph with these tests, without the output columns' clash.
+fn graph(tests: &str) -> String {
+    let graph = GRAPH.replace(
+        "predicted = [\"zero\", \"same\"]",
+        "zero = \"zero\"\nsame = \"same\"",
+    );
+    format!("{graph}\n{tests}")
+}
+
+/// What was printed, with times taken out of it.
+fn without_times(text: &str) -> String {
+    let line = |line: &str| match line.rfind(" (") {
+        Some(at) if line.ends_with(" s)") => line[..at].to_owned(),
+        _ => line.to_owned(),
+    };
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Runs tests and gives what was printed below the name of the file.
+fn told(name: &str, tests: &str, status: i32) -> String {
+    let scratch = Scratch::new(name);
+    let path = scratch.file("graph.toml", graph(tests));
+    let out = athermal(&[&"test", &path]).ended(status).out;
+    let (_, results) = out.split_once('\n').unwrap();
+    without_times(results)
+}
+
+/// A position that moves by 60 nm each minute, 1 nm/s, over ten minutes.
+const EVENLY: &str =
+    r#"inputs = { "position.Z" = { ramp = "1 nm/s", for = "10min", every = "5s" } }"#;
+
+#[test]
+fn what_is_not_as_expected_is_told_with_its_figures() {
+    let tests = format!(
+        r#"
+[[tests]]
+name = "holds"
+{EVENLY}
+expect = [{{ of = "drift.Z", equals = "60 nm/min", within = 1e-6 }}]
+[[tests]]
+name = "does not"
+{EVENLY}
+expect = [
+  {{ of = "drift.Z", at = "1min", equals = "50 nm/min", within = "1 nm/min" }},
+  {{ of = "drift.Z", from = "2min", between = ["61 nm/min", "70 nm/min"] }},
+  {{ of = "zero.Z", rmse_below = "20 nm/min" }},
+  {{ of = "slopes.room", valid_above = 0.5 }},
+  {{ of = "slopes.plate", at = "1min", equals = "0 mK/min" }},
+]
+"#
+    );
+    insta::assert_snapshot!(told("figures", &tests, 1), @r"
+      ✓ holds
+      ✗ does not
+          drift.Z: equals: found 60 nm/min at 1min, wanted 50 ± 1 nm/min
+          drift.Z: between: found 60 nm/min at 2min, wanted between 61 and 70 nm/min
+          zero.Z: rmse_below: found 60 nm/min over 115 instants, wanted below 20 nm/min
+          slopes.room: valid_above: found no value over 0 instants, wanted above 0.5
+          slopes.plate: equals: found no value over 0 instants, wanted exactly 0 mK/min
+    ");
+}
+
+#[test]
+fn made_up_measurements_have_the_shape_that_they_say() {
+    let tests = r#"
+[[tests]]
+name = "a step is in the window for as long as the window is, and then gone"
+inputs = { "temperature.room" = { start = "20 Cel", step = "1 K", delay = "2min", for = "5min", every = "5s" } }
+expect = [
+  { of = "slopes.room", to = "1min55s", equals = "0 mK/min" },
+  { of = "slopes.room", at = "2min15s", between = ["1 K/min", "4 K/min"] },
+  { of = "slopes.room", from = "2min30s", equals = "0 mK/min" },
+  { of = "temperature.room", at = "5min", equals = "294.15 K", within = "1 nK" },
+  { of = "temperature.room", max_step_below = "1001 mK" },
+]
+[[tests]]
+name = "samples are taken one by one, and nan is none"
+inputs = { "temperature.room" = { samples = ["20 Cel", nan, "22 Cel"], every = "5s" } }
+expect = [
+  { of = "temperature.room", at = "9s", equals = "20 Cel" },
+  { of = "temperature.room", at = "10s", equals = "22 Cel" },
+  { of = "temperature.room", given_above = 0.66 },
+]
+[[tests]]
+name = "a sine comes back after its period, and noise has its size"
+inputs = { "position.Z" = { sine = "100 nm", period = "1min", noise = "1 nm", seed = 7, for = "1min", every = "1s" } }
+expect = [
+  { of = "position.Z", at = "15s", equals = "100 nm", within = "4 nm" },
+  { of = "position.Z", at = "1min", equals = "0 nm", within = "4 nm" },
+]
+[[tests]]
+name = "a stuck sensor has no slope, and only while it is stuck"
+inputs = { "temperature.room" = { ramp = "1 mK/s", for = "10min", every = "5s" } }
+faults = [{ channel = "temperature", kind = "stuck", from = "3min", for = "3min" }]
+expect = [
+  { of = "slopes.room", to = "2min55s", equals = "60 mK/min", within = 1e-6 },
+  { of = "slopes.room", from = "3min30s", to = "5min55s", equals = "0 mK/min", within = 1e-9 },
+]
+"#;
+    let told = told("shapes", tests, 0);
+    assert!(!told.contains('✗'), "{told}");
+}
+
+#[test]
+fn a_machine_that_there_is_not_is_told_by_check_and_by_test() {
+    let tests = r#"
+[[tests]]
+name = "no such machine"
+on = { simulate = "plain-machine" }
+expect = [{ of = "zero", valid_above = 0.5 }]
+"#;
+    let scratch = Scratch::new("unknown-machine");
+    let path = scratch.file("graph.toml", graph(tests));
+    for command in ["test", "check"] {
+        let finished = athermal(&[&command, &path]).ended(2);
+        finished.tells(&[
+            "A073",
+            "there is no simulated machine `plain-machine`",
+            "graph.toml:39",
+        ]);
+    }
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let graph = workbench::graph("linear-axis");
+    let run = |threads: &str| {
+        let finished = athermal(&[
+            &"test",
+            &graph,
+            &"--threads",
+            &threads,
+            &"--filter",
+            &"dead",
+            &"--format",
+            &"json",
+        ]);
+        let mut json = finished.ended(0).json();
+        json.as_object_mut().unwrap().remove("seconds");
+        for test in json["tests"].as_array_mut().unwrap() {
+            test.as_object_mut().unwrap().remove("seconds");
+        }
+        json
+    };
+    let alone = run("1");
+    assert_eq!(alone["tests"].as_array().unwrap().len(), 4);
+    assert_eq!(alone, run("3"));
+}
+
+#[test]
+fn data_that_are_not_there_are_named_and_the_other_tests_run() {
+    let tests = format!(
+        r#"
+[[tests]]
+name = "lost"
+on = "lost.csv"
+expect = [{{ of = "drift.Z", given_above = 0.5 }}]
+[[tests]]
+name = "found"
+{EVENLY}
+expect = [{{ of = "drift.Z", at = "1min", equals = "60 nm/min", within = 1e-6 }}]
+"#
+    );
+    let told = told("lost", &tests, 3);
+    let lines: Vec<&str> = told.lines().collect();
+    assert_eq!((lines[0], lines[2]), ("  ✗ lost", "  ✓ found"), "{told}");
+    assert!(lines[1].contains("lost.csv: cannot be opened"), "{told}");
+}
+
+#[test]
+fn a_file_is_read_beside_the_graph_in_which_it_stands() {
+    let tests = r#"
+[[tests]]
+name = "a file"
+on = ["data/a.csv"]
+expect = [{ of = "slopes.room", at = "40s", equals = "60 mK/min", within = 1e-6 }]
+"#;
+    let scratch = Scratch::new("beside");
+    std::fs::create_dir_all(scratch.path("data")).unwrap();
+    let rows: String = (0..10)
+        .map(|row| format!("{},{},20,\n", row * 5, 20.0 + 0.005 * f64::from(row)))
+        .collect();
+    scratch.file("data/a.csv", format!("time_s,room,plate,Z\n{rows}"));
+    let path = scratch.file("graph.toml", graph(tests));
+    athermal(&[&"test", &path]).ended(0);
+}
+
+#[test]
+fn junit_has_each_test_and_why_it_failed() {
+    let tests = format!(
+        r#"
+[[tests]]
+name = "less < more & so on"
+{EVENLY}
+expect = [{{ of = "drift.Z", at = "1min", equals = "50 nm/min" }}]
+"#
+    );
+    let scratch = Scratch::new("junit");
+    let path = scratch.file("graph.toml", graph(&tests));
+    let junit = scratch.path("junit.xml");
+    athermal(&[&"test", &path, &"--junit", &junit]).ended(1);
+    let xml = std::fs::read_to_string(junit).unwrap();
+    for part in [
+        "<testsuites name=\"athermal\" tests=\"1\" failures=\"1\" errors=\"0\"",
+        "<testcase name=\"less &lt; more &amp; so on\" classname=\"plain\"",
+        "<failure message=\"drift.Z: equals: found 60",
+    ] {
+        assert!(xml.contains(part), "`{part}` is not in\n{xml}");
+    }
+}
+
+#[test]
+fn a_filter_that_nothing_fits_is_a_wrong_request() {
+    let graph = workbench::graph("z-probe");
+    let finished = athermal(&[&"test", &graph, &"--filter", &"no such thing"]).ended(2);
+    finished.tells(&["no test has a name that contains `no such thing`"]);
+}
+
+#[test]
+fn all_mistakes_in_tests_are_told_at_once_by_check_already() {
+    let tests = r#"
+[[tests]]
+name = "wrong"
+inputs = { "temperature.room" = { ramp = "1 nm/s", for = "20min", every = "0s" }, "drift.Z" = { constant = "1 nm", for = "1min", every = "1s" } }
+faults = [{ channel = "temperature.rom", kind = "mising" }, { channel = "temperature.room", kind = "offset", size = "1 nm" }]
+expect = [{ of = "drift.Z", rmse_below = "3 nm/min" }, { of = "zero.Z", valid_above = 1.5, beats = ["slopes"] }, { off = "x" }]
+"#;
+    let scratch = Scratch::new("mistakes");
+    let path = scratch.file("graph.toml", graph(tests));
+    let json = athermal(&[&"check", &path, &"--format", &"json"])
+        .ended(2)
+        .json();
+    let mut found: Vec<(&str, u64, u64)> = json["diagnostics"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|of| {
+            let number = |key: &str| of[key].as_u64().unwrap();
+            (
+                of["code"].as_str().unwrap(),
+                number("line"),
+                number("column"),
+            )
+        })
+        .collect();
+    found.sort_by_key(|&(_, line, column)| (line, column));
+    let codes: Vec<&str> = found.iter().map(|(code, ..)| *code).collect();
+    let wanted = [
+        "A075", "A078", "A080", "A009", "A079", "A076", "A078", "A076", "A007", "A006",
+    ];
+    assert_eq!(codes, wanted, "{json:#}");
+}
