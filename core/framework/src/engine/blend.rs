@@ -159,7 +159,11 @@ mod tests {
         new.hand_over(&old);
         assert_eq!(new.pass(s(1), 0.0, None), 0.0);
         new.hand_over(&old);
-        assert_eq!(new.pass(s(2), 0.0, RATE), 190.0, "the new graph's rate counts");
+        assert_eq!(
+            new.pass(s(2), 0.0, RATE),
+            190.0,
+            "the new graph's rate counts"
+        );
     }
 
     #[test]

@@ -370,7 +370,11 @@ impl Control {
         self.last = None;
         self.retained.segment();
         self.for_all(Seated::segment);
-        if let Some(shadow) = self.staged.as_mut().and_then(|staged| staged.shadow.as_mut()) {
+        if let Some(shadow) = self
+            .staged
+            .as_mut()
+            .and_then(|staged| staged.shadow.as_mut())
+        {
             shadow.segment();
         }
     }
@@ -435,8 +439,7 @@ impl Control {
             tick: mark.tick,
             time,
         });
-        self.retained
-            .keep(self.options.retain.max(plan.warm_up));
+        self.retained.keep(self.options.retain.max(plan.warm_up));
         self.running = plan;
         if let (Some(mut seated), Some(old)) = (seated, old) {
             seated.take_over(&old.engine);

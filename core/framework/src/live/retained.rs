@@ -84,7 +84,8 @@ impl Retained {
     fn shorten(&mut self, now: Instant) {
         let begin = self.times.len() - self.since_break;
         // Older segments go once the present one alone is long enough; their clocks say nothing about its own.
-        if begin > 0 && matches!(self.times.get(begin), Some(Some(first)) if now - *first >= self.span)
+        if begin > 0
+            && matches!(self.times.get(begin), Some(Some(first)) if now - *first >= self.span)
         {
             self.drop_first(begin);
         }

@@ -197,6 +197,8 @@ impl Predicted {
 
     /// What had been predicted for a truth that arrives now; NaN for nothing.
     fn at(&mut self, now: Instant) -> f64 {
-        self.pairing.truth(now).map_or(f64::NAN, |paired| paired.row[0])
+        self.pairing
+            .truth(now)
+            .map_or(f64::NAN, |paired| paired.row[0])
     }
 }

@@ -1,0 +1,7 @@
+//! A graph is replaced while it runs: nothing is lost, repeated or reordered, and reports tell the truth.
+
+#![allow(clippy::unwrap_used)]
+
+mod model;
+mod properties;
+mod random_graph;
