@@ -2,6 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod allocation;
+mod blending;
+mod course;
 mod model;
 mod properties;
 mod random_graph;
+mod snapshots;
+mod threads;

@@ -228,6 +228,10 @@ impl Combine for Weigher {
             return Restored::cold("the number of voters differs");
         }
         self.memories = remembered.errors;
+        for memory in &mut self.memories {
+            // The engine thread must not have to make room.
+            memory.reserve(memory.len().max(32));
+        }
         for voter in 0..self.memories.len() {
             self.refresh(voter);
         }

@@ -122,6 +122,14 @@ impl Rows {
         self.next += 1;
     }
 
+    /// Makes room for as many rows and blocks again as there are from `oldest` on.
+    pub(super) fn make_room(&mut self, oldest: u64) {
+        if 2 * (self.next - oldest) >= self.time.len() as u64 {
+            self.grow(oldest);
+        }
+        self.starts.reserve(self.starts.len() + 16);
+    }
+
     fn grow(&mut self, oldest: u64) {
         let (c, old) = (self.quads, self.time.len());
         self.time.resize(2 * old, 0);

@@ -121,6 +121,8 @@ impl TryFrom<Saved> for RollingSlope {
             let all_present = all_present(samples);
             kernel.current.add(CURRENT, t_ns, samples, all_present);
         }
+        // Steps to come must not have to make room.
+        kernel.rows.make_room(0);
         if let Some(t_ns) = kernel.last_time() {
             for (window, &turn) in kernel.windows.iter_mut().zip(&saved.turns) {
                 window.rebuild(&kernel.rows, t_ns, turn);

@@ -164,6 +164,10 @@ impl Window {
         while self.head_block < current && rows.start(self.head_block + 1) <= self.head {
             self.head_block += 1;
         }
+        let blocks = (current - self.head_block) as usize;
+        if 2 * blocks > self.front.slots() {
+            self.front.resize((2 * blocks).next_power_of_two());
+        }
         if self.head_block + 1 < turn {
             self.turn_over(rows, turn.min(current));
             for block in self.turn..current {
