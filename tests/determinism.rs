@@ -56,7 +56,15 @@ fn fitted() -> &'static Fitted {
 }
 
 fn predictions(test: &Path) -> String {
-    let run = athermal(&[&"run", &fitted().model, &"--input", &test, &"--output", &"-"]).ended(0);
+    let run = athermal(&[
+        &"run",
+        &fitted().model,
+        &"--input",
+        &test,
+        &"--output",
+        &"-",
+    ])
+    .ended(0);
     assert!(
         run.out.lines().count() > 3000
             && run

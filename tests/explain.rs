@@ -89,5 +89,5 @@ fn only_what_is_unused_is_a_warning() {
             warnings.insert(entry.code);
         }
     }
-    assert_eq!(warnings, BTreeSet::from(["A059", "A060"]));
+    assert_eq!(warnings, BTreeSet::from(["A059", "A060", "A065"]));
 }

@@ -1,10 +1,11 @@
 //! Decides which predictions a combiner may put together.
 
 use super::conversion::{factor, mismatch};
+use super::instance::Instance;
 use super::plan::{PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
-use super::resolver::{Instance, Resolver};
+use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;

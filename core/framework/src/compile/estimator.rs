@@ -1,10 +1,11 @@
 //! Decides what an estimator's rows are made of, and that none of it sees the future.
 
+use super::instance::{Instance, Limits};
 use super::leak::Suspect;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
-use super::resolver::{Instance, Limits, Resolver};
+use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::diagnostic::Place;
 use crate::node::{Estimator, OutputPort, Regressor, TruthLags};

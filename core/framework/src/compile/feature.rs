@@ -1,8 +1,9 @@
 //! Decides what a feature of a graph is given and what it gives.
 
+use super::instance::Instance;
 use super::plan::PlannedRole;
 use super::provenance::Provenance;
-use super::resolver::{Instance, Resolver};
+use super::resolver::Resolver;
 use crate::node::{Feature, Read};
 use crate::time::Duration;
 

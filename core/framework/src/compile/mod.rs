@@ -7,6 +7,8 @@ mod diff;
 mod estimator;
 mod feature;
 mod identity;
+mod inputs;
+mod instance;
 mod leak;
 mod order;
 mod plan;
@@ -18,6 +20,7 @@ mod scope;
 mod steps;
 
 pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
+pub(crate) use instance::EstimatorKeys;
 pub use plan::{
     Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
     SourceChannel, Step, TrainingLimits, TruthLink,
@@ -26,7 +29,6 @@ pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
 pub use provenance::smallest_lag;
 pub(crate) use reference::{Reference, is_pattern, matches};
-pub(crate) use resolver::EstimatorKeys;
 
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
@@ -40,7 +42,7 @@ pub struct Wanted {
 
 /// Compiles a graph. All mistakes are told; without one there is a plan.
 pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
-    let nodes = resolver::read_kinds(graph, diagnostics);
+    let nodes = instance::read_kinds(graph, diagnostics);
     let order = order::order(graph, &nodes, diagnostics);
     let resolved = resolver::Resolver::new(graph, diagnostics).resolve(&nodes, &order, wanted);
     (!diagnostics.has_errors()).then_some(resolved)

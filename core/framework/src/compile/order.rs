@@ -6,9 +6,9 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 use petgraph::visit::EdgeRef;
 
+use super::instance::ReadNode;
 use super::problem::CompileProblem;
 use super::reference::Reference;
-use super::resolver::ReadNode;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 

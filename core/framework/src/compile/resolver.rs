@@ -5,171 +5,22 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use indexmap::IndexSet;
-use schemars::JsonSchema;
-use serde::Deserialize;
 
+use super::instance::{Instance, ReadNode, context};
 use super::leak::Suspect;
 use super::order::Order;
 use super::plan::{
-    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
-    SourceChannel,
+    Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
 };
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
-use super::scope::{Found, Scopes};
-use super::{Wanted, conversion, steps};
+use super::scope::Scopes;
+use super::{Wanted, steps};
 use crate::channel::Channel;
-use crate::diagnostic::{Diagnostics, Place};
-use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
-use crate::node::{
-    InputPort, Inputs, Kind, Mistake, NodeSpec, OutputPort, Read, Role, RoleName, kinds,
-};
-use crate::quantity::Quantity;
+use crate::diagnostic::Diagnostics;
+use crate::document::GraphFile;
+use crate::node::{Mistake, OutputPort, Role};
 use crate::time::Duration;
-use crate::unit::Unit;
-
-/// A node whose kind and parameters have been read.
-pub(crate) struct ReadNode {
-    kind: Option<&'static Kind>,
-    instances: Vec<Option<ReadInstance>>,
-}
-
-/// The specification of one instance, with the keys that the framework reads itself.
-#[derive(Clone)]
-pub(crate) struct ReadInstance {
-    pub(crate) spec: Arc<dyn NodeSpec>,
-    pub(crate) estimator: EstimatorKeys,
-}
-
-/// What the framework reads of an estimator's table.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct EstimatorKeys {
-    /// How far ahead of now the truth is predicted: `"5min"` is a forecast, `"0s"` a virtual sensor.
-    pub(crate) ahead: Option<Duration>,
-    /// Which truths it is fitted on.
-    pub(crate) train: Train,
-}
-
-/// Which rows an estimator is trained on.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct Train {
-    /// Those whose absolute value is within these limits.
-    pub(crate) abs_truth: Limits,
-}
-
-/// Limits of an absolute value.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct Limits {
-    /// Only those below.
-    pub(crate) below: Option<Quantity>,
-    /// Only those at or above.
-    pub(crate) above: Option<Quantity>,
-}
-
-impl ReadNode {
-    /// Whether the node takes its inputs for later ticks only.
-    pub(crate) fn closes_loops(&self) -> bool {
-        self.instances
-            .iter()
-            .flatten()
-            .any(|instance| match instance.spec.role() {
-                Role::Feature(feature) => feature.closes_loops(),
-                _ => false,
-            })
-    }
-}
-
-/// Looks every node's kind up and reads its parameters.
-pub(crate) fn read_kinds(graph: &GraphFile, diagnostics: &mut Diagnostics) -> Vec<ReadNode> {
-    graph
-        .nodes
-        .iter()
-        .map(|node| read_node(node, diagnostics))
-        .collect()
-}
-
-fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
-    let kind = match kinds().get(node.kind.as_str()).map(Vec::as_slice) {
-        Some([kind]) => Some(*kind),
-        Some(several) => {
-            let packages = several.iter().map(|kind| kind.package).collect();
-            let problem = CompileProblem::KindTwice {
-                kind: node.kind.clone(),
-                packages,
-            };
-            diagnostics.report(node.kind_place, problem);
-            None
-        }
-        None => {
-            let problem = CompileProblem::UnknownKind {
-                kind: node.kind.clone(),
-                known: kinds().keys().copied().collect(),
-            };
-            diagnostics.report(node.kind_place, problem);
-            None
-        }
-    };
-    let mut instances: Vec<Option<ReadInstance>> = Vec::with_capacity(node.instances.len());
-    for (nth, instance) in node.instances.iter().enumerate() {
-        // Members whose parameters do not name them share one table, and so one specification.
-        let before = nth.checked_sub(1).map(|before| &node.instances[before]);
-        let read = match (before, instances.last()) {
-            (Some(before), Some(Some(read))) if is_shared(before, instance) => Some(read.clone()),
-            _ => kind.and_then(|kind| read_instance(kind, node, instance, diagnostics)),
-        };
-        instances.push(read);
-    }
-    ReadNode { kind, instances }
-}
-
-fn is_shared(a: &InstanceDecl, b: &InstanceDecl) -> bool {
-    match (&a.parameters.data, &b.parameters.data) {
-        (Data::Table(a), Data::Table(b)) => a.is_copy_of(b),
-        _ => false,
-    }
-}
-
-fn read_instance(
-    kind: &Kind,
-    node: &NodeDecl,
-    instance: &InstanceDecl,
-    diagnostics: &mut Diagnostics,
-) -> Option<ReadInstance> {
-    let mut parameters = instance.parameters.clone();
-    let mut framework = Value {
-        place: parameters.place,
-        data: Data::Table(Table::new()),
-    };
-    if let (RoleName::Estimator, Data::Table(own), Data::Table(taken)) =
-        (kind.role, &mut parameters.data, &mut framework.data)
-    {
-        for key in ["ahead", "train"] {
-            if let Some(entry) = own.remove(key) {
-                taken.insert(key, entry);
-            }
-        }
-    }
-    let context = context(node, instance);
-    diagnostics.within(context, |diagnostics| {
-        let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
-        let spec = (kind.read)(&parameters, diagnostics);
-        Some(ReadInstance {
-            spec: Arc::from(spec?),
-            estimator: estimator?,
-        })
-    })
-}
-
-/// How diagnostics say which instance they speak of.
-fn context(node: &NodeDecl, instance: &InstanceDecl) -> String {
-    match &instance.member {
-        Some(member) => format!("node `{}`, member `{member}`", node.name),
-        None => format!("node `{}`", node.name),
-    }
-}
 
 /// The name of a channel among those of all members; the only one of an instance has its member's name.
 fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
@@ -180,85 +31,20 @@ fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
     }
 }
 
-/// One instance on its way into the plan.
-pub(crate) struct Instance<'a> {
-    pub(crate) node: &'a NodeDecl,
-    pub(crate) decl: &'a InstanceDecl,
-    pub(crate) kind: &'static Kind,
-    pub(crate) read: ReadInstance,
-}
-
-impl Instance<'_> {
-    /// The place of an input, or of the node where the input is not given.
-    pub(crate) fn input_place(&self, port: &str) -> Place {
-        self.input(port)
-            .map_or(self.node.place, |input| input.place)
-    }
-
-    /// How diagnostics say which instance they speak of.
-    pub(crate) fn context(&self) -> String {
-        context(self.node, self.decl)
-    }
-
-    pub(crate) fn input(&self, port: &str) -> Option<&InputDecl> {
-        self.decl.inputs.iter().find(|input| input.port == port)
-    }
-
-    /// The place of an element of a list among the parameters, or of the list.
-    pub(crate) fn element_place(&self, key: &str, nth: usize) -> Place {
-        let Data::Table(table) = &self.decl.parameters.data else {
-            return self.node.place;
-        };
-        let Some(list) = table.get(key) else {
-            return self.node.place;
-        };
-        match &list.data {
-            Data::List(elements) => elements
-                .get(nth)
-                .map_or(list.place, |element| element.place),
-            _ => list.place,
-        }
-    }
-
-    /// The place of what a kind points at: an input or a parameter.
-    pub(crate) fn place_of(&self, mistake: &Mistake) -> Place {
-        match mistake.at.strip_prefix("inputs.") {
-            Some(port) => self.input_place(port),
-            None => self.parameter_place(&mistake.at),
-        }
-    }
-
-    /// The place of a parameter such as `selection.folds` or `lags.0`, as near as the file has it.
-    pub(crate) fn parameter_place(&self, path: &str) -> Place {
-        let mut place = self.node.place;
-        let mut value = &self.decl.parameters;
-        for key in path.split('.') {
-            let inner = match &value.data {
-                Data::Table(table) => table.get(key),
-                Data::List(values) => key.parse::<usize>().ok().and_then(|nth| values.get(nth)),
-                _ => None,
-            };
-            let Some(inner) = inner else { break };
-            (place, value) = (inner.place, inner);
-        }
-        place
-    }
-}
-
 /// The state of resolving a graph.
 pub(crate) struct Resolver<'g> {
     pub(crate) graph: &'g GraphFile,
     pub(crate) diagnostics: &'g mut Diagnostics,
     pub(crate) channels: Vec<PlannedChannel>,
     pub(crate) provenance: Vec<Provenance>,
-    scopes: Scopes,
+    pub(super) scopes: Scopes,
     sources: Vec<SourceChannel>,
     pub(super) gathers: IndexSet<Gather>,
     pub(super) nodes: Vec<PlannedNode>,
     /// Features whose leaks are looked for once all is known.
     pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
-    read: BTreeSet<usize>,
+    pub(super) read: BTreeSet<usize>,
 }
 
 impl<'g> Resolver<'g> {
@@ -379,198 +165,6 @@ impl<'g> Resolver<'g> {
             Role::Feature(feature) => self.feature(instance, feature, closes),
             Role::Estimator(estimator) => self.estimator(instance, estimator),
             Role::Combiner(combiner) => self.combiner(instance, combiner),
-        }
-    }
-
-    /// Looks up what an input refers to: slots in order, none for an optional input left out.
-    pub(crate) fn slots(
-        &mut self,
-        instance: &Instance<'_>,
-        port: &InputPort,
-    ) -> Option<Vec<usize>> {
-        let Some(input) = instance.input(port.name) else {
-            if port.optional {
-                return Some(Vec::new());
-            }
-            let problem = CompileProblem::MissingInput {
-                kind: instance.kind.name,
-                input: port.name,
-                summary: port.summary,
-            };
-            self.diagnostics.report(instance.node.place, problem);
-            return None;
-        };
-        let mut slots = Vec::new();
-        let mut whole = true;
-        for (text, place) in &input.references {
-            match self.look_up(text, *place) {
-                Some(found) => slots.extend(found),
-                None => whole = false,
-            }
-        }
-        whole.then_some(slots)
-    }
-
-    fn look_up(&mut self, text: &str, place: Place) -> Option<Vec<usize>> {
-        match self.scopes.look_up(text) {
-            Ok(Found::Slots(slots)) => {
-                self.read.extend(&slots);
-                Some(slots)
-            }
-            Ok(Found::Broken) => None,
-            Err(problem) => {
-                self.diagnostics.report(place, *problem);
-                None
-            }
-        }
-    }
-
-    /// The one slot of an input that takes a single channel.
-    pub(crate) fn single(&mut self, instance: &Instance<'_>, port: &InputPort) -> Option<usize> {
-        let slots = self.slots(instance, port)?;
-        if let [slot] = slots[..] {
-            return Some(slot);
-        }
-        let found = slots
-            .iter()
-            .map(|&slot| self.channels[slot].name.clone())
-            .collect();
-        let problem = CompileProblem::ChannelCount {
-            input: port.name,
-            found,
-            expected: "one channel",
-        };
-        self.diagnostics
-            .report(instance.input_place(port.name), problem);
-        None
-    }
-
-    /// How long a held value of each slot counts at an input.
-    pub(crate) fn max_age(
-        &mut self,
-        instance: &Instance<'_>,
-        port: &str,
-        slot: usize,
-    ) -> Option<Duration> {
-        let stated = instance
-            .input(port)
-            .and_then(|input| input.max_age)
-            .map(|(age, _)| age);
-        let age = stated.or_else(|| self.channels[slot].channel.default_max_age());
-        if age.is_none() {
-            let channel = self.channels[slot].name.clone();
-            let problem = CompileProblem::NoMaxAge {
-                channel,
-                input: port.to_owned(),
-            };
-            self.diagnostics.report(instance.input_place(port), problem);
-        }
-        age
-    }
-
-    /// The gather that reads these slots at one lag.
-    pub(crate) fn gather(
-        &mut self,
-        instance: &Instance<'_>,
-        port: &InputPort,
-        slots: &[usize],
-        lags: &[Duration],
-        unit: Option<&Unit>,
-    ) -> Option<usize> {
-        let conversions = self.conversions(instance, port, slots, lags.len(), unit)?;
-        let mut entries = Vec::with_capacity(slots.len() * lags.len());
-        for &lag in lags {
-            for &slot in slots {
-                let max_age = match port.read {
-                    Read::Fresh => Some(Duration::ZERO),
-                    Read::Held | Read::Truth => self.max_age(instance, port.name, slot),
-                };
-                entries.push(Entry {
-                    slot,
-                    lag,
-                    max_age: max_age?,
-                });
-                if lag > Duration::ZERO {
-                    let history = &mut self.channels[slot].history;
-                    *history = Some(history.map_or(lag, |deepest| deepest.max(lag)));
-                }
-            }
-        }
-        let read = if port.read == Read::Fresh {
-            Read::Fresh
-        } else {
-            Read::Held
-        };
-        let gather = Gather {
-            read,
-            entries,
-            conversions,
-        };
-        Some(self.gathers.insert_full(gather).0)
-    }
-
-    /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been told.
-    fn conversions(
-        &mut self,
-        instance: &Instance<'_>,
-        port: &InputPort,
-        slots: &[usize],
-        lags: usize,
-        unit: Option<&Unit>,
-    ) -> Option<Vec<Conversion>> {
-        let Some(unit) = unit else {
-            return Some(Vec::new());
-        };
-        let channels = slots.iter().map(|&slot| &self.channels[slot]);
-        let channels = channels.map(|from| (from.name.as_str(), &from.channel.unit));
-        let wanted_by = format!("inputs.{}", port.name);
-        match conversion::conversions(channels, unit, &wanted_by) {
-            Ok(conversions) => {
-                let at_lag = |lag: usize| {
-                    conversions.iter().map(move |conversion| {
-                        Conversion::new(lag * slots.len() + conversion.entry, conversion.factor())
-                    })
-                };
-                Some((0..lags).flat_map(at_lag).collect())
-            }
-            Err(problems) => {
-                for problem in problems {
-                    let place = instance.input_place(port.name);
-                    self.diagnostics.report(place, problem);
-                }
-                None
-            }
-        }
-    }
-
-    /// The unit that an input port declares.
-    pub(crate) fn port_unit(port: &InputPort) -> Option<Unit> {
-        let unit = port.unit.and_then(|unit| unit.parse().ok());
-        debug_assert_eq!(unit.is_some(), port.unit.is_some(), "a kind declares units");
-        unit
-    }
-
-    /// The channels of slots, as kinds see them.
-    pub(crate) fn inputs(
-        &self,
-        instance: &Instance<'_>,
-        ports: Vec<(InputPort, Vec<usize>)>,
-    ) -> Inputs {
-        let channels = |port: InputPort, slots: Vec<usize>| {
-            let unit = Self::port_unit(&port);
-            let channels = slots.into_iter().map(|slot| {
-                let channel = self.channels[slot].channel.clone();
-                let unit = unit.clone().unwrap_or_else(|| channel.unit.clone());
-                Channel { unit, ..channel }
-            });
-            (port, channels.collect())
-        };
-        Inputs {
-            ports: ports
-                .into_iter()
-                .map(|(port, slots)| channels(port, slots))
-                .collect(),
-            member: instance.decl.member.clone(),
         }
     }
 

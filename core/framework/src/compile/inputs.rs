@@ -1,0 +1,207 @@
+//! Decides which slots the inputs of a node name, how old a held value may be, and what is converted on the way.
+
+use super::conversion;
+use super::instance::Instance;
+use super::plan::{Conversion, Entry, Gather};
+use super::problem::CompileProblem;
+use super::resolver::Resolver;
+use super::scope::Found;
+use crate::channel::Channel;
+use crate::diagnostic::Place;
+use crate::node::{InputPort, Inputs, Read};
+use crate::time::Duration;
+use crate::unit::Unit;
+
+impl Resolver<'_> {
+    /// Looks up what an input refers to: slots in order, none for an optional input left out.
+    pub(crate) fn slots(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+    ) -> Option<Vec<usize>> {
+        let Some(input) = instance.input(port.name) else {
+            if port.optional {
+                return Some(Vec::new());
+            }
+            let problem = CompileProblem::MissingInput {
+                kind: instance.kind.name,
+                input: port.name,
+                summary: port.summary,
+            };
+            self.diagnostics.report(instance.node.place, problem);
+            return None;
+        };
+        let mut slots = Vec::new();
+        let mut whole = true;
+        for (text, place) in &input.references {
+            match self.look_up(text, *place) {
+                Some(found) => slots.extend(found),
+                None => whole = false,
+            }
+        }
+        whole.then_some(slots)
+    }
+
+    pub(super) fn look_up(&mut self, text: &str, place: Place) -> Option<Vec<usize>> {
+        match self.scopes.look_up(text) {
+            Ok(Found::Slots(slots)) => {
+                self.read.extend(&slots);
+                Some(slots)
+            }
+            Ok(Found::Broken) => None,
+            Err(problem) => {
+                self.diagnostics.report(place, *problem);
+                None
+            }
+        }
+    }
+
+    /// The one slot of an input that takes a single channel.
+    pub(crate) fn single(&mut self, instance: &Instance<'_>, port: &InputPort) -> Option<usize> {
+        let slots = self.slots(instance, port)?;
+        if let [slot] = slots[..] {
+            return Some(slot);
+        }
+        let found = slots
+            .iter()
+            .map(|&slot| self.channels[slot].name.clone())
+            .collect();
+        let problem = CompileProblem::ChannelCount {
+            input: port.name,
+            found,
+            expected: "one channel",
+        };
+        self.diagnostics
+            .report(instance.input_place(port.name), problem);
+        None
+    }
+
+    /// How long a held value of each slot counts at an input.
+    pub(crate) fn max_age(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &str,
+        slot: usize,
+    ) -> Option<Duration> {
+        let stated = instance
+            .input(port)
+            .and_then(|input| input.max_age)
+            .map(|(age, _)| age);
+        let age = stated.or_else(|| self.channels[slot].channel.default_max_age());
+        if age.is_none() {
+            let channel = self.channels[slot].name.clone();
+            let problem = CompileProblem::NoMaxAge {
+                channel,
+                input: port.to_owned(),
+            };
+            self.diagnostics.report(instance.input_place(port), problem);
+        }
+        age
+    }
+
+    /// The gather that reads these slots at one lag.
+    pub(crate) fn gather(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+        slots: &[usize],
+        lags: &[Duration],
+        unit: Option<&Unit>,
+    ) -> Option<usize> {
+        let conversions = self.conversions(instance, port, slots, lags.len(), unit)?;
+        let mut entries = Vec::with_capacity(slots.len() * lags.len());
+        for &lag in lags {
+            for &slot in slots {
+                let max_age = match port.read {
+                    Read::Fresh => Some(Duration::ZERO),
+                    Read::Held | Read::Truth => self.max_age(instance, port.name, slot),
+                };
+                entries.push(Entry {
+                    slot,
+                    lag,
+                    max_age: max_age?,
+                });
+                if lag > Duration::ZERO {
+                    let history = &mut self.channels[slot].history;
+                    *history = Some(history.map_or(lag, |deepest| deepest.max(lag)));
+                }
+            }
+        }
+        let read = if port.read == Read::Fresh {
+            Read::Fresh
+        } else {
+            Read::Held
+        };
+        let gather = Gather {
+            read,
+            entries,
+            conversions,
+        };
+        Some(self.gathers.insert_full(gather).0)
+    }
+
+    /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been told.
+    fn conversions(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+        slots: &[usize],
+        lags: usize,
+        unit: Option<&Unit>,
+    ) -> Option<Vec<Conversion>> {
+        let Some(unit) = unit else {
+            return Some(Vec::new());
+        };
+        let channels = slots.iter().map(|&slot| &self.channels[slot]);
+        let channels = channels.map(|from| (from.name.as_str(), &from.channel.unit));
+        let wanted_by = format!("inputs.{}", port.name);
+        match conversion::conversions(channels, unit, &wanted_by) {
+            Ok(conversions) => {
+                let at_lag = |lag: usize| {
+                    conversions.iter().map(move |conversion| {
+                        Conversion::new(lag * slots.len() + conversion.entry, conversion.factor())
+                    })
+                };
+                Some((0..lags).flat_map(at_lag).collect())
+            }
+            Err(problems) => {
+                for problem in problems {
+                    let place = instance.input_place(port.name);
+                    self.diagnostics.report(place, problem);
+                }
+                None
+            }
+        }
+    }
+
+    /// The unit that an input port declares.
+    pub(crate) fn port_unit(port: &InputPort) -> Option<Unit> {
+        let unit = port.unit.and_then(|unit| unit.parse().ok());
+        debug_assert_eq!(unit.is_some(), port.unit.is_some(), "a kind declares units");
+        unit
+    }
+
+    /// The channels of slots, as kinds see them.
+    pub(crate) fn inputs(
+        &self,
+        instance: &Instance<'_>,
+        ports: Vec<(InputPort, Vec<usize>)>,
+    ) -> Inputs {
+        let channels = |port: InputPort, slots: Vec<usize>| {
+            let unit = Self::port_unit(&port);
+            let channels = slots.into_iter().map(|slot| {
+                let channel = self.channels[slot].channel.clone();
+                let unit = unit.clone().unwrap_or_else(|| channel.unit.clone());
+                Channel { unit, ..channel }
+            });
+            (port, channels.collect())
+        };
+        Inputs {
+            ports: ports
+                .into_iter()
+                .map(|(port, slots)| channels(port, slots))
+                .collect(),
+            member: instance.decl.member.clone(),
+        }
+    }
+}
