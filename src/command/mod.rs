@@ -7,6 +7,7 @@ mod demo;
 mod evaluate;
 mod fit;
 mod nodes;
+mod report;
 mod run;
 mod simulate;
 mod swap;
@@ -28,6 +29,8 @@ pub enum Command {
     Fit(fit::Fit),
     /// Score a model's predictions on recorded data
     Evaluate(evaluate::Evaluate),
+    /// Show what a model is worth on recorded data, as one page
+    Report(report::Report),
     /// Run a model: rows in, predictions out
     Run(run::Run),
     /// Write the recording of a simulated machine, or list the machines
@@ -49,6 +52,7 @@ impl Command {
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
+            Self::Report(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),
         }
