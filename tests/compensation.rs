@@ -5,6 +5,9 @@
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
+use athermal::core::compile::{Wanted, compile};
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{Disk, declare, load_text};
 use athermal::core::fit::{FitOptions, fit};
 use athermal::files::{Dataset, Options};
 use athermal::report::{Facts, Worth, gather, rms};
@@ -94,6 +97,43 @@ fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
         minutes
     };
     let (without, with) = (minutes(|s| s.without_min), minutes(|s| s.with_min));
+    // data/README.md, "Compensation": minutes without a correction, found by another program.
+    for (settling, reference) in worth
+        .settling
+        .iter()
+        .zip([24.0, 40.0, 57.0, 48.0, 92.0, 50.0, 62.0])
+    {
+        let found = settling.without_min.unwrap();
+        assert!(
+            (found - reference).abs() < 1.0,
+            "{found} min, the reference is {reference} min"
+        );
+    }
     assert!(with[6] <= 0.5 * without[6], "{without:?} → {with:?}");
     assert!(with[3] <= 10.0, "{with:?}");
+}
+
+/// What is told of the die tester's graph when the correction's rate looks another time ahead.
+fn told_of(ahead: &str) -> String {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/changed.toml");
+    let text = format!(
+        "schema = 1\nextends = \"die-tester-control.toml\"\nnodes.rate = {{ ahead = \"{ahead}\" }}\n"
+    );
+    let document = load_text(name, text, &Disk, &mut sources, &mut diagnostics);
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    assert!(plan.is_some() && !diagnostics.has_errors());
+    diagnostics.render(&sources, false, 140)
+}
+
+#[test]
+fn integrating_another_horizon_than_half_the_span_is_warned_of() {
+    assert_eq!(told_of("150s"), "");
+    let told = told_of("0s");
+    assert!(told.starts_with("warning[A063]"), "{told}");
+    assert!(
+        told.contains("looks 0s ahead") && told.contains("predict `ahead = \"150s\"`"),
+        "{told}"
+    );
 }

@@ -8,7 +8,8 @@ use super::Series;
 const WIDTH: f64 = 900.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 12.0;
-const TOP: f64 = 10.0;
+/// Above the frame stands the legend.
+const TOP: f64 = 26.0;
 const BOTTOM: f64 = 30.0;
 
 /// How a mark is drawn.
@@ -247,11 +248,11 @@ impl Chart<'_> {
             self.height - 2.0,
             escaped(self.x_label)
         );
-        let mut x = LEFT + 8.0;
+        let mut x = LEFT;
         let _ = write!(
             svg,
             "<text x=\"{x}\" y=\"{}\">{}</text>",
-            TOP + 15.0,
+            TOP - 9.0,
             escaped(&self.y_label)
         );
         x += 9.0 * self.y_label.chars().count() as f64 + 16.0;
@@ -260,9 +261,9 @@ impl Chart<'_> {
                 svg,
                 "<path class=\"{}\" d=\"M{x} {1}h18\" style=\"stroke-width:3\"/><text x=\"{2}\" y=\"{3}\">{4}</text>",
                 layer.class,
-                TOP + 11.0,
+                TOP - 13.0,
                 x + 23.0,
-                TOP + 15.0,
+                TOP - 9.0,
                 escaped(&layer.label)
             );
             x += 23.0 + 7.6 * layer.label.chars().count() as f64 + 18.0;

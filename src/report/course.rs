@@ -64,7 +64,7 @@ pub struct SensorFacts {
     pub rejected: u64,
     /// The longest time in s between two samples.
     pub longest_gap_s: f64,
-    /// The median is not kept; this is the mean time in s between two samples.
+    /// The mean time in s between two samples.
     pub mean_gap_s: f64,
     /// Lowest and highest sample.
     pub range: Option<(f64, f64)>,
@@ -340,12 +340,12 @@ impl SensorFacts {
         if !value.is_finite() {
             return;
         }
-        self.samples += 1;
         if let Some(last_s) = self.last_s {
             let gap = now_s - last_s;
             self.longest_gap_s = self.longest_gap_s.max(gap);
             self.mean_gap_s += (gap - self.mean_gap_s) / self.samples as f64;
         }
+        self.samples += 1;
         let (low, high) = self.range.unwrap_or((value, value));
         self.range = Some((low.min(value), high.max(value)));
         self.last_s = Some(now_s);

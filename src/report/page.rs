@@ -26,7 +26,7 @@ th:first-child,td:first-child{text-align:left}summary{cursor:pointer;font-weight
 @media print{body{max-width:none;font-size:11pt}.wide svg.chart{min-width:0}details,svg,tr{break-inside:avoid}h2,h3{break-after:avoid}.screen{display:none}}";
 
 /// Zooming: the wheel about the pointer, dragging, double click for all. All charts of time move together.
-const SCRIPT: &str = r#"(()=>{const all=[...document.querySelectorAll('svg.zoom')].map(s=>{const b=s.viewBox.baseVal;
+const SCRIPT: &str = r#"addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>{d.open=true}));(()=>{const all=[...document.querySelectorAll('svg.zoom')].map(s=>{const b=s.viewBox.baseVal;
 return{s,w:b.width,h:b.height,x0:+s.dataset.x0,x1:+s.dataset.x1,g:s.parentNode.querySelector('g.ticks')}});if(!all.length)return;
 let lo=Math.min(...all.map(c=>c.x0)),hi=Math.max(...all.map(c=>c.x1));const full=[lo,hi];
 const nice=r=>{const p=10**Math.floor(Math.log10(r));return[1,2,5,10].map(n=>n*p).find(n=>n>=r)};
