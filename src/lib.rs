@@ -21,9 +21,10 @@ pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
+pub mod report;
+
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
-use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_simulation as _;

@@ -10,6 +10,7 @@ mod explain;
 mod fit;
 mod init;
 mod nodes;
+mod report;
 mod run;
 mod schema;
 mod show;
@@ -42,6 +43,8 @@ pub enum Command {
     Fit(fit::Fit),
     /// Score a model's predictions on recorded data
     Evaluate(evaluate::Evaluate),
+    /// Show what a model is worth on recorded data, as one page
+    Report(report::Report),
     /// Run a model: rows in, predictions out
     Run(run::Run),
     /// Write the recording of a simulated machine, or list the machines
@@ -71,6 +74,7 @@ impl Command {
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
+            Self::Report(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),
             Self::Test(command) => command.run(terminal),

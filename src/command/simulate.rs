@@ -1,18 +1,22 @@
 //! `athermal simulate`: the recording of a simulated machine, as a file.
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use athermal::core::compile::Wanted;
 use athermal::core::fault::FaultSpec;
 use athermal::core::machine::{
-    KnownMachine, Machine, Row, Schedule, Setup, Simulated, Simulation, machine, machines,
+    ClosedLoop, KnownMachine, Machine, MachineError, Row, Schedule, Setup, Simulated, Simulation,
+    machine, machines,
 };
 use athermal::files::{Flush, Format as FileFormat, Writer};
 use athermal_simulation::{table_columns, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::evaluate::load_fitted;
 use crate::figures::count;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
 
@@ -48,6 +52,9 @@ pub struct Simulate {
     /// Set points over time; the machine has a schedule of its own
     #[arg(long, value_name = "FILE")]
     schedule: Option<PathBuf>,
+    /// Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm
+    #[arg(long, value_name = "MODEL")]
+    compensate: Option<PathBuf>,
     /// A sensor fault, CHANNEL=KIND[,from=…][,for=…][,size=…]
     #[arg(long = "fault", value_name = "SPEC")]
     faults: Vec<FaultSpec>,
@@ -97,13 +104,44 @@ impl Simulate {
             seed: self.seed,
             schedule: self.schedule(machine)?,
         };
-        write_recording(
-            &Simulated::new(machine, setup).with_faults(self.faults.clone()),
-            machine,
-            self.truth,
-            output,
-            terminal,
-        )
+        let recording = Simulated::new(machine, setup).with_faults(self.faults.clone());
+        match &self.compensate {
+            None => write_recording(&recording, machine, self.truth, output, terminal),
+            Some(model) => self.write_corrected(model, &recording, machine, output),
+        }
+    }
+
+    /// Writes a recording of the machine under the correction of a graph.
+    fn write_corrected(
+        &self,
+        model: &Path,
+        recording: &Simulated,
+        machine: &dyn Machine,
+        output: &Path,
+    ) -> Result<u64, Failure> {
+        let engine = load_fitted(model, Wanted::default())?.engine()?;
+        let refused = |error: MachineError| Failure::Request(error.to_string());
+        let simulation = recording.start().map_err(refused)?;
+        let mut simulation = ClosedLoop::new(machine, simulation, engine).map_err(refused)?;
+        let channels = machine.channels();
+        let axes = channels.iter().filter(|channel| channel.is_axis());
+        let mut columns = table_columns(channels, self.truth);
+        columns.extend(axes.map(|axis| format!("{}_applied_nm", axis.name)));
+        let mut writer = Writer::create(output, "time_s", &columns, Flush::Buffered)?;
+        let mut row = Row::empty(channels);
+        let (mut values, mut rows, mut time) = (Vec::new(), 0, String::new());
+        while simulation.next(&mut row) {
+            values.clear();
+            values.extend_from_slice(&row.values);
+            values.extend(row.true_drift.iter().filter(|_| self.truth));
+            values.extend_from_slice(simulation.applied());
+            time.clear();
+            let _ = write!(time, "{}", row.time_ns as f64 / 1e9);
+            writer.write_row(&time, row.time_ns, &values)?;
+            rows += 1;
+        }
+        writer.finish()?;
+        Ok(rows)
     }
 
     fn schedule(&self, machine: &dyn Machine) -> Result<Option<Schedule>, Failure> {

@@ -16,7 +16,7 @@ use crate::limit;
 ///
 /// Stable is what lies below `below`, usually the optical loss over five minutes below 0.2 dB. The set point may be a
 /// measured temperature: a change is a departure by more than `change` from where it stood at the change before, and what
-/// it does within `same_change` of that belongs to it. `settle_time` is given once the machine has been stable for
+/// it does within `same_change` of that belongs to it. A value of the loss counts until the next. `settle_time` is given once the machine has been stable for
 /// `for`; `since` is the time since a change that has not settled yet, and 0 when it has. A pause longer than
 /// `max_gap` between two values of the loss is no stable time. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -166,15 +166,29 @@ impl Settling {
         }
     }
 
-    fn loss(&mut self, value: f64, now: Instant) {
+    /// A value of the loss counts until the next one, though not beyond `max_gap`.
+    fn pass(&mut self, now: Instant) -> Option<Duration> {
         let known = &mut self.known;
         let gap = known
             .newest
             .is_some_and(|newest| now - newest > self.spec.max_gap);
+        if gap {
+            known.low_since = None;
+        }
+        let (changed, low) = known.changed.zip(known.low_since)?;
+        if known.waiting && now - low >= self.spec.r#for {
+            known.waiting = false;
+            return Some(low - changed);
+        }
+        None
+    }
+
+    fn loss(&mut self, value: f64, now: Instant) {
+        let known = &mut self.known;
         // Written so that an absent loss is not low.
         if value >= self.below || value.is_nan() {
             known.low_since = None;
-        } else if gap || known.low_since.is_none() {
+        } else if known.low_since.is_none() {
             known.low_since = Some(now);
         }
         known.newest = Some(now);
@@ -184,18 +198,14 @@ impl Settling {
 impl Operator for Settling {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let (loss, set_point) = (tick.port(0)[0], tick.port(1)[0]);
+        if let Some(time) = self.pass(tick.now) {
+            outputs.set_stamped(0, time.secs() / 60.0, tick.now);
+        }
         if !set_point.is_nan() {
             self.set_point(set_point, tick.now);
         }
         if !is_unchanged(loss) {
             self.loss(loss, tick.now);
-            if let (true, Some(changed), Some(low)) =
-                (self.known.waiting, self.known.changed, self.known.low_since)
-                && tick.now - low >= self.spec.r#for
-            {
-                self.known.waiting = false;
-                outputs.set_stamped(0, (low - changed).secs() / 60.0, tick.now);
-            }
         }
         let since = match self.known.changed {
             Some(changed) if self.known.waiting => (tick.now - changed).secs() / 60.0,

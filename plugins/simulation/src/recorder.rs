@@ -13,6 +13,8 @@ const POSITION_NOISE_NM: f64 = 12.0;
 const ALIGNMENT_S: [f64; 2] = [62.0, 88.0];
 /// Seconds in the window of a drift.
 const WINDOW_S: i64 = 300;
+/// How far the fine drive of an axis can correct to either side, in nm; beyond it clips.
+pub const CORRECTION_NM: f64 = 100_000.0;
 /// As many alignments as that window can hold, at 60 s apart.
 const IN_WINDOW: usize = 5;
 /// Decimal places of a true drift.
@@ -38,7 +40,7 @@ pub trait Plant: Send {
 /// Positions are measured about every 75 s and stamped with the first row at or after the alignment.
 /// With each comes the true drift: the least-squares slope, in nm/min, through the noise-free positions at the alignments of the trailing
 /// five minutes `(t − 5 min, t]`, once that window is full. It is the drift of the measured positions without their noise, at the same
-/// instants; what a perfect model would predict.
+/// instants; what a perfect model would predict. Corrections move the measured positions and leave the true drift.
 pub struct Recorder<P> {
     plant: P,
     temperatures: usize,
@@ -48,6 +50,8 @@ pub struct Recorder<P> {
     next_alignment_s: f64,
     origin_nm: Vec<f64>,
     position_nm: Vec<f64>,
+    /// Corrections in force.
+    applied_nm: Vec<f64>,
     /// Instants in s of the newest alignments, newest first, and the noise-free positions then, per axis.
     aligned_s: [i64; IN_WINDOW],
     aligned_nm: Vec<[f64; IN_WINDOW]>,
@@ -74,6 +78,7 @@ impl<P: Plant> Recorder<P> {
             next_alignment_s: alignment.between(ALIGNMENT_S[0], ALIGNMENT_S[1]),
             alignment,
             position_nm: vec![0.0; axes],
+            applied_nm: vec![0.0; axes],
             aligned_s: [i64::MIN; IN_WINDOW],
             aligned_nm: vec![[f64::NAN; IN_WINDOW]; axes],
             first_s: None,
@@ -103,7 +108,8 @@ impl<P: Plant> Recorder<P> {
             let truth = self.position_nm[axis] - self.origin_nm[axis];
             let column = self.temperatures + axis;
             let noise = POSITION_NOISE_NM * self.noise[column].normal();
-            row.values[column] = resolved(truth + noise, self.decimals[column]);
+            row.values[column] =
+                resolved(truth + self.applied_nm[axis] + noise, self.decimals[column]);
             aligned_nm.rotate_right(1);
             aligned_nm[0] = truth;
             if first_s <= from_s {
@@ -138,6 +144,15 @@ impl<P: Plant> Simulation for Recorder<P> {
         }
         self.row += 1;
         true
+    }
+
+    fn correct(&mut self, asked: &[f64], applied: &mut [f64]) {
+        for (applied_nm, asked_nm) in self.applied_nm.iter_mut().zip(asked) {
+            if asked_nm.is_finite() {
+                *applied_nm = asked_nm.clamp(-CORRECTION_NM, CORRECTION_NM);
+            }
+        }
+        applied.copy_from_slice(&self.applied_nm);
     }
 }
 

@@ -25,4 +25,8 @@ impl Simulation for Faulty {
         }
         more
     }
+
+    fn correct(&mut self, asked: &[f64], applied: &mut [f64]) {
+        self.simulation.correct(asked, applied);
+    }
 }

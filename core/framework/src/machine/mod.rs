@@ -55,11 +55,13 @@
 //! # }
 //! ```
 
+mod closed_loop;
 mod faulty;
 mod recording;
 mod registry;
 pub mod schedule;
 
+pub use closed_loop::ClosedLoop;
 pub use faulty::Faulty;
 pub use recording::{MachineError, Simulated};
 pub use registry::{KnownMachine, UnknownMachine, machine, machines};
@@ -256,6 +258,14 @@ pub trait Machine: Sync {
 pub trait Simulation: Send {
     /// Advances to the next row and fills `row`, which must be as wide as the machine's channels ([`Row::empty`]). `false` at the end; `row` is then unchanged.
     fn next(&mut self, row: &mut Row) -> bool;
+
+    /// Asks the axes for corrections in nm, in the order of the axes among the channels; NaN leaves an axis as it is.
+    ///
+    /// They act from now on, as far as the axes can; what is applied is written to `applied`. A machine whose axes cannot be
+    /// corrected applies nothing.
+    fn correct(&mut self, _asked: &[f64], applied: &mut [f64]) {
+        applied.fill(0.0);
+    }
 }
 
 /// Checks what every machine demands of a setup, and gives the number of rows `period_ns` apart.

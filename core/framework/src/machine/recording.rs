@@ -109,7 +109,7 @@ impl Recording for Simulated<'_> {
     }
 }
 
-fn unit_of(text: &'static str) -> Result<Unit, MachineError> {
+pub(super) fn unit_of(text: &'static str) -> Result<Unit, MachineError> {
     Unit::parse(text).map_err(|_| MachineError::UnknownUnit { unit: text })
 }
 
@@ -165,6 +165,11 @@ pub enum MachineError {
         /// Its unit in the graph.
         graph: Box<Unit>,
     },
+    /// The graph asks for no correction.
+    NoCorrection {
+        /// The axes that could be corrected.
+        axes: Vec<String>,
+    },
     /// The machine gives a channel a unit that there is not.
     UnknownUnit {
         /// That unit.
@@ -206,6 +211,11 @@ impl fmt::Display for MachineError {
             } => write!(
                 f,
                 "the graph measures `{channel}` in {graph}, the machine in {machine}"
+            ),
+            Self::NoCorrection { axes } => write!(
+                f,
+                "the graph has no output `correction.AXIS` for any of {}; add `correction = \"NODE\"` to `[outputs]`",
+                axes.join(", ")
             ),
             Self::UnknownUnit { unit } => {
                 write!(f, "the machine measures in `{unit}`, which is no unit")

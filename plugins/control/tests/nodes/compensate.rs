@@ -138,7 +138,7 @@ fn it_goes_on_from_a_snapshot_with_the_same_bits() {
 }
 
 #[test]
-fn mistakes_are_told_and_another_horizon_is_warned_of() {
+fn limits_that_do_not_fit_are_refused() {
     let told = compiled(&GRAPH.replace("10 nm/s", "1 nm/s")).0.unwrap_err();
     assert!(told.contains("slower than `max_rate`"), "{told}");
     let told = compiled(&GRAPH.replace("\"100 nm\"", "\"100 K\""))

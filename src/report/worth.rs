@@ -1,0 +1,252 @@
+//! Decides what a correction is worth: drift, light and minutes without and with it, recomputed from corrected positions.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use athermal_core::compile::{Wanted, compile};
+use athermal_core::diagnostic::{Diagnostics, Sources};
+use athermal_core::document::{Memory, declare, load_text};
+use athermal_core::engine::{Engine, Fitted};
+use athermal_core::time::Instant;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::course::Track;
+use super::{ReportError, Series};
+
+/// What a correction is worth.
+#[derive(Debug, Clone, Serialize)]
+pub struct Worth {
+    /// Names of the axes.
+    pub axes: Vec<String>,
+    /// Unit of the drifts.
+    pub unit: String,
+    /// Drift of each axis without the correction.
+    pub drift_without: Vec<Series>,
+    /// Drift of each axis with the correction added to its positions.
+    pub drift_with: Vec<Series>,
+    /// Correction of each axis at its positions.
+    pub correction: Vec<Series>,
+    /// Unit of the correction.
+    pub correction_unit: String,
+    /// Optical loss in dB without and with; empty without an `optical_loss` node.
+    pub loss_without: Series,
+    /// See `loss_without`.
+    pub loss_with: Series,
+    /// The limit of the loss in dB.
+    pub loss_limit: f64,
+    /// The set point at each loss.
+    pub set_point: Vec<f64>,
+    /// The set point's unit.
+    pub set_point_unit: Option<String>,
+    /// The changes of the set point, in order.
+    pub settling: Vec<Settling>,
+}
+
+/// A change of the set point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Settling {
+    /// When it was noticed, in s.
+    pub at_s: f64,
+    /// The set point before, and ten minutes later.
+    pub from: f64,
+    /// See `from`.
+    pub to: f64,
+    /// Minutes until the first ten stable ones, without the correction; none where they did not come.
+    pub without_min: Option<f64>,
+    /// The same with the correction.
+    pub with_min: Option<f64>,
+    /// Largest loss in dB until the next change, without and with.
+    pub largest_without: f64,
+    /// See `largest_without`.
+    pub largest_with: f64,
+}
+
+/// The limit where no `settled` node gives one: that of the article.
+const LIMIT_DB: f64 = 0.2;
+
+/// A graph of the framework's own nodes, so that drift, loss and settle time mean the same here as anywhere.
+fn graph(track: &Track) -> String {
+    let names: Vec<String> = track.axes.iter().map(|axis| format!("{axis:?}")).collect();
+    let names = names.join(", ");
+    let (position, drift) = &track.units;
+    let mut text = String::from("schema = 1\n");
+    for way in ["without", "with"] {
+        let _ = write!(
+            text,
+            "[signals.position_{way}]\nunit = \"{position}\"\nchannels = [{names}]\nmax_age = \"10min\"\n\
+             [nodes.drift_{way}]\ntype = \"slope\"\ninputs.signal = \"position_{way}\"\nwindows = [\"{}\"]\nunit = \"{drift}\"\n",
+            track.span
+        );
+    }
+    if let Some(unit) = &track.set_point {
+        let _ = write!(
+            text,
+            "[signals.set_point]\nunit = \"{unit}\"\nchannels = [\"set\"]\n"
+        );
+    }
+    let mut outputs = String::from("without = \"drift_without\"\nwith = \"drift_with\"\n");
+    if let Some(loss) = &track.loss {
+        for way in ["without", "with"] {
+            let _ = write!(
+                text,
+                "[nodes.loss_{way}]\ntype = \"optical_loss\"\ninputs.drift = \"drift_{way}\"\n"
+            );
+            parameters(&mut text, loss);
+            let _ = writeln!(outputs, "loss_{way} = \"loss_{way}\"");
+            if let (Some(settled), Some(_)) = (&track.settled, &track.set_point) {
+                let _ = write!(
+                    text,
+                    "[nodes.settled_{way}]\ntype = \"settled\"\ninputs = {{ loss = \"loss_{way}\", set_point = \"set_point\" }}\n"
+                );
+                parameters(&mut text, settled);
+                let _ = writeln!(
+                    outputs,
+                    "settled_{way} = \"settled_{way}\"\nsince_{way} = \"settled_{way}:since\""
+                );
+            }
+        }
+    }
+    text + "[outputs]\n" + &outputs
+}
+
+/// The parameters of a node as lines of TOML: texts, numbers and lists of them look the same in JSON.
+fn parameters(text: &mut String, spec: &impl Serialize) {
+    if let Ok(Value::Object(keys)) = serde_json::to_value(spec) {
+        for (key, value) in keys.iter().filter(|(_, value)| !value.is_null()) {
+            let _ = writeln!(text, "{key} = {value}");
+        }
+    }
+}
+
+fn engine(track: &Track) -> Result<Engine, ReportError> {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let document = load_text(
+        Path::new("worth.toml"),
+        graph(track),
+        &Memory::new(),
+        &mut sources,
+        &mut diagnostics,
+    );
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    let plan = plan.ok_or_else(|| diagnostics.render(&sources, false, 100))?;
+    Ok(Engine::new(Arc::new(plan), &Fitted::new())?)
+}
+
+pub(super) fn worth(track: &Track) -> Result<Worth, ReportError> {
+    let mut engine = engine(track)?;
+    let plan = Arc::clone(engine.plan());
+    let place = |name: &str| plan.outputs.iter().position(|output| output.name == name);
+    let drift = |way: &str| -> Vec<Option<usize>> {
+        track
+            .axes
+            .iter()
+            .map(|axis| place(&format!("{way}.{axis}")))
+            .collect()
+    };
+    let drifts = [drift("without"), drift("with")];
+    let losses = ["loss_without.loss", "loss_with.loss"].map(&place);
+    let settled = ["settled_without.settle_time", "settled_with.settle_time"].map(&place);
+    let since = place("since_without.since");
+    let count = track.axes.len();
+    let empty = || vec![Series::default(); count];
+    let decibel = athermal_core::unit::Unit::parse("dB").ok();
+    let limit = track.settled.as_ref().zip(decibel.as_ref());
+    let mut worth = Worth {
+        axes: track.axes.clone(),
+        unit: track.units.1.clone(),
+        drift_without: empty(),
+        drift_with: empty(),
+        correction: empty(),
+        correction_unit: track.units.0.clone(),
+        loss_without: Series::default(),
+        loss_with: Series::default(),
+        loss_limit: limit
+            .and_then(|(settled, unit)| settled.below.in_unit(unit))
+            .unwrap_or(LIMIT_DB),
+        set_point: Vec::new(),
+        set_point_unit: track.set_point.clone(),
+        settling: Vec::new(),
+    };
+    // For each way, which change it waits for.
+    let mut waits: [Option<usize>; 2] = [None; 2];
+    let (mut first, mut set_point) = (f64::NAN, f64::NAN);
+    let mut samples = vec![f64::NAN; 2 * count + usize::from(track.set_point.is_some())];
+    for row in &track.rows {
+        for i in 0..count {
+            samples[i] = row.position[i];
+            samples[count + i] = row.position[i] + row.correction[i];
+        }
+        if track.set_point.is_some() {
+            samples[2 * count] = row.set_point;
+        }
+        if !row.set_point.is_nan() {
+            set_point = row.set_point;
+            first = if first.is_nan() { set_point } else { first };
+        }
+        let outputs = engine.step(row.at, &samples)?;
+        let at_s = (row.at - Instant::from_ns(0)).secs();
+        let get = |place: Option<usize>| place.map_or(f64::NAN, |place| outputs[place]);
+        for i in 0..count {
+            let (without, with) = (get(drifts[0][i]), get(drifts[1][i]));
+            if !without.is_nan() {
+                worth.drift_without[i].push(at_s, without);
+                worth.drift_with[i].push(at_s, with);
+            }
+            if !row.position[i].is_nan() {
+                worth.correction[i].push(at_s, row.correction[i]);
+            }
+        }
+        let [without, with] = losses.map(get);
+        // Both over the same windows: those in which there is a correction at all.
+        if !without.is_nan() && !with.is_nan() {
+            worth.loss_without.push(at_s, without);
+            worth.loss_with.push(at_s, with);
+            worth.set_point.push(set_point);
+            if let Some(settling) = worth.settling.last_mut() {
+                settling.largest_without = settling.largest_without.max(without);
+                settling.largest_with = settling.largest_with.max(with);
+            }
+        }
+        // The time since an unsettled change tells when that was, to the instant.
+        let start_s = at_s - 60.0 * get(since);
+        let known = worth
+            .settling
+            .last()
+            .is_some_and(|last| (last.at_s - start_s).abs() < 1.0);
+        if get(since) > 0.0 && !known {
+            let from = worth.settling.last().map_or(first, |last| last.to);
+            worth.settling.push(Settling {
+                at_s: start_s,
+                from,
+                to: set_point,
+                without_min: None,
+                with_min: None,
+                largest_without: 0.0,
+                largest_with: 0.0,
+            });
+            waits = [Some(worth.settling.len() - 1); 2];
+        }
+        for (way, place) in settled.into_iter().enumerate() {
+            let time = get(place);
+            if !time.is_nan()
+                && let Some(nth) = waits[way].take()
+            {
+                let settling = &mut worth.settling[nth];
+                *[&mut settling.without_min, &mut settling.with_min][way] = Some(time);
+            }
+        }
+        if let Some(settling) = worth.settling.last_mut()
+            && at_s - settling.at_s <= 600.0
+        {
+            settling.to = set_point;
+        }
+        if row.begins {
+            engine.segment();
+            (first, set_point, waits) = (f64::NAN, f64::NAN, [None; 2]);
+        }
+    }
+    Ok(worth)
+}
