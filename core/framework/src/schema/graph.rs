@@ -275,10 +275,10 @@ fn node(kind: &Kind, framework: &Value, definitions: &mut Definitions) -> Value 
         }),
     );
     properties.insert("inputs".to_owned(), inputs(kind));
-    if kind.role == RoleName::Estimator {
-        if let Some(keys) = framework["properties"].as_object() {
-            properties.extend(keys.clone());
-        }
+    if kind.role == RoleName::Estimator
+        && let Some(keys) = framework["properties"].as_object()
+    {
+        properties.extend(keys.clone());
     }
     let own = parameters["properties"].take();
     if let Value::Object(own) = own {

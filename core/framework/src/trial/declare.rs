@@ -457,7 +457,10 @@ impl Declaring<'_> {
                 self.range(value, key, share.to_string(), "0 or more and below 1");
             }
         }
-        if let Some(r2) = table.r2_above.filter(|r2| !(*r2 < 1.0)) {
+        if let Some(r2) = table
+            .r2_above
+            .filter(|r2| !(f64::NEG_INFINITY..1.0).contains(r2))
+        {
             self.range(value, "r2_above", r2.to_string(), "below 1");
         }
         if let (Some(from), Some(to)) = (table.from, table.to)
@@ -471,7 +474,7 @@ impl Declaring<'_> {
             ("max_step_below", &table.max_step_below),
         ];
         for (key, size) in sizes {
-            if let Some(size) = size.as_ref().filter(|size| !(size.value > 0.0)) {
+            if let Some(size) = size.as_ref().filter(|size| size.value <= 0.0) {
                 self.range(value, key, size.to_string(), "above 0");
             }
         }

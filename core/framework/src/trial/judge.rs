@@ -323,7 +323,7 @@ impl Judge<'_> {
         }
         let given = || self.values().filter(|value| !value.2.is_nan());
         let off = given().find(|value| !wanted.admits(value.2));
-        let shown = off.or_else(|| given().last());
+        let shown = off.or_else(|| given().next_back());
         Finding {
             first: off.map(|value| (value.1, value.2)),
             ..self.finding(check, shown.map(|value| value.2), wanted, given().count())
@@ -364,7 +364,7 @@ impl fmt::Display for Wanted {
         match *self {
             Self::Below(limit) => write!(f, "below {limit}"),
             Self::Above(limit) => write!(f, "above {limit}"),
-            Self::Equal { value, within } if within == 0.0 => write!(f, "exactly {value}"),
+            Self::Equal { value, within: 0.0 } => write!(f, "exactly {value}"),
             Self::Equal { value, within } => write!(f, "{value} ± {within}"),
             Self::Between(low, high) => write!(f, "between {low} and {high}"),
         }
