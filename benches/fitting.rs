@@ -2,7 +2,7 @@
 
 mod die_tester;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::Model;
@@ -81,7 +81,7 @@ fn log(name: &str, days: f64, seed: u64) -> (PathBuf, u64) {
     (path, bytes)
 }
 
-fn dataset(path: &PathBuf) -> Dataset {
+fn dataset(path: &Path) -> Dataset {
     Dataset::new(vec![path.clone()], Options::default())
 }
 

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use athermal::Duration;
+
 /// A number to about four significant digits, without an exponent where that is readable.
 #[must_use]
 pub fn number(value: f64) -> String {
@@ -39,6 +41,18 @@ pub fn count(value: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// A length of time, rounded to the millisecond where it is longer than that.
+#[must_use]
+pub fn length(duration: Duration) -> String {
+    const MILLISECOND_NS: i64 = 1_000_000;
+    let ns = duration.as_ns();
+    if ns < MILLISECOND_NS {
+        return duration.to_string();
+    }
+    let rounded = (ns as f64 / MILLISECOND_NS as f64).round() as i64;
+    Duration::from_ns(rounded.saturating_mul(MILLISECOND_NS)).to_string()
 }
 
 /// A table with the first column to the left and the others to the right, each as wide as it must be.
@@ -89,6 +103,15 @@ mod tests {
         assert_eq!(number(1234.6), "1235");
         assert_eq!(number(1e-9), "1.00e-9");
         assert_eq!(number(f64::NAN), "NaN");
+    }
+
+    #[test]
+    fn lengths_are_told_to_the_millisecond() {
+        let told = |ns| length(Duration::from_ns(ns));
+        assert_eq!(told(1_343_222_575_030), "1343.223s");
+        assert_eq!(told(300_000_000_000), "5min");
+        assert_eq!(told(12_345), "12.345us");
+        assert_eq!(told(0), "0s");
     }
 
     #[test]

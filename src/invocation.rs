@@ -20,9 +20,36 @@ pub fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', "'\\''"))
 }
 
+/// A command for a shell, in lines of at most 80 columns.
+#[must_use]
+pub fn command(words: &[&str]) -> String {
+    const WIDTH: usize = 78;
+    let mut text = String::from(" ");
+    let mut column = 1;
+    for (position, word) in words.iter().enumerate() {
+        let length = word.chars().count() + 1;
+        if position > 0 && column + length > WIDTH {
+            text.push_str(" \\\n     ");
+            column = 5;
+        }
+        text.push(' ');
+        text.push_str(word);
+        column += length;
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use super::{command, quoted};
+
+    #[test]
+    fn long_commands_go_on_in_the_next_line() {
+        let long = ["x".repeat(40), "y".repeat(40)];
+        let words: Vec<&str> = long.iter().map(String::as_str).collect();
+        let text = command(&words);
+        assert_eq!(text, format!("  {} \\\n      {}", long[0], long[1]));
+    }
 
     #[test]
     fn words_are_quoted_only_where_a_shell_needs_it() {

@@ -23,6 +23,7 @@ pub use athermal_files as files;
 
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
+use athermal_control as _;
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_simulation as _;

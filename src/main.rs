@@ -1,6 +1,10 @@
 //! The command line of athermal.
 
+#[macro_use]
+mod output;
+
 mod command;
+mod drawing;
 mod figures;
 mod invocation;
 mod starter;

@@ -19,7 +19,7 @@ use crate::figures::count;
 pub struct Options {
     /// Text for people, or the same facts as JSON
     // A text, so that a command with forms of its own can declare the same option with other values.
-    #[arg(long, global = true, value_parser = formats(), default_value = "table")]
+    #[arg(long, global = true, value_name = "FORMAT", value_parser = formats(), default_value = "table")]
     pub format: String,
     /// Say only what was asked for and what went wrong
     #[arg(long, short, global = true)]

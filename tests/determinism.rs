@@ -11,7 +11,7 @@
 mod workbench;
 
 use std::io::{BufRead, BufReader, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Arc, OnceLock};
 
@@ -55,8 +55,8 @@ fn fitted() -> &'static Fitted {
     })
 }
 
-fn predictions(test: &PathBuf) -> String {
-    let run = athermal(&[&"run", &fitted().model, &"--input", test, &"--output", &"-"]).ended(0);
+fn predictions(test: &Path) -> String {
+    let run = athermal(&[&"run", &fitted().model, &"--input", &test, &"--output", &"-"]).ended(0);
     assert!(
         run.out.lines().count() > 3000
             && run

@@ -169,3 +169,17 @@ fn signals_and_outputs_are_compared_too() {
     );
     assert_eq!(told[6], "predicted.X1 from: \"vote.X1\" -> \"thermal.X1\"");
 }
+
+#[test]
+fn spelling_one_of_several_inputs_differently_is_no_change() {
+    let two = |unit: &str| {
+        let second = format!(
+            "[nodes.short]\ntype = \"slope\"\ninputs.signal = \"temperature\"\nwindows = [\"2min\"]\nunit = \"{unit}\"\n\n[nodes.thermal]"
+        );
+        GRAPH
+            .replace("[nodes.thermal]", &second)
+            .replace("\"gradients\"", "[\"gradients\", \"short\"]")
+    };
+    assert!(diff(&plan(&two("mK/min")), &plan(&two("mK.min-1"))).is_same());
+    assert!(diff(&plan(&two("mK.min-1")), &plan(&two("mK/min"))).is_same());
+}

@@ -17,7 +17,7 @@ use super::data::Data;
 use super::fit::fit_on;
 use super::simulate::write_recording;
 use crate::figures::{count, or_dash, table};
-use crate::invocation::{program, quoted};
+use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 const GRAPH: &str = include_str!("../../graphs/die-tester.toml");
@@ -199,6 +199,8 @@ fn describe(scores: &Scores) -> String {
 
 /// Two sentences on what the figures mean.
 fn meaning(axes: &[Axis]) -> String {
+    let noise = axes.iter().filter_map(|axis| axis.vote.truth_noise);
+    let noise = noise.reduce(f64::min);
     let gains = || axes.iter().filter_map(|axis| Some((axis, axis.gain()?)));
     let by_gain = |a: &(&Axis, f64), b: &(&Axis, f64)| a.1.total_cmp(&b.1);
     let (Some((_, least)), Some((best, most))) = (gains().min_by(by_gain), gains().max_by(by_gain))
@@ -210,37 +212,58 @@ fn meaning(axes: &[Axis]) -> String {
         best.vote.baseline_zero.unwrap_or(f64::NAN),
     );
     format!(
-        "The vote knows the drift of the next five minutes with {:.0} to {:.0} % less error\n\
-         than no model; on {} a machine that corrects by it would be off by {:.0} nm after\n\
-         five minutes where it is off by {:.0} nm today.\n\
-         What is left comes mostly from what cannot be known five minutes before, such as\n\
-         the next step of the chuck; nothing can score below the noise of the truth,\n\
-         {} nm/min here, since positions are measured with 12 nm of noise.\n",
+        "The vote foresees the drift of the next five minutes with {:.0} to {:.0} % less error\n\
+         than no model: on {}, {:.0} nm in five minutes are left of {:.0} nm.\n\
+         What is left comes mostly from what cannot be known five minutes before, such\n\
+         as the next step of the chuck; no model can score below about {} nm/min here,\n\
+         the noise of the truth itself, since positions are measured to 12 nm.\n",
         100.0 * least,
         100.0 * most,
         best.name,
         5.0 * with,
         5.0 * without,
-        or_dash(best.vote.truth_noise),
+        or_dash(noise),
     )
 }
 
 /// What to try next.
 fn next(folder: &Path) -> String {
-    let (program, folder) = (program(), quoted(&folder.display().to_string()));
-    let faulty = format!("{folder}/faulty.csv");
-    format!(
-        "Try next:
-  {program} show {folder}/die-tester.toml --format svg > graph.svg
-  {program} nodes slope
-  {program} run {folder}/model.json --input {folder}/test.csv | tail -3
-  {program} simulate {MACHINE} --days 2 --seed 2 -o {faulty} \\
-      --fault temperature.plate1=stuck,from=6h
-  {program} evaluate {folder}/model.json --data {faulty} \\
-      --abs-truth-below \"{LIMIT}\"
-and with a log of a machine of yours:
-  {program} init LOG.csv -o graph.toml"
-    )
+    let program = program();
+    let [graph, test, model, faulty, picture] = [
+        "die-tester.toml",
+        "test.csv",
+        "model.json",
+        "faulty.csv",
+        "graph.svg",
+    ]
+    .map(|file| quoted(&folder.join(file).display().to_string()));
+    let limit = format!("\"{LIMIT}\"");
+    let lines = [
+        command(&[&program, "show", &graph, "--format svg", ">", &picture]),
+        command(&[&program, "nodes slope"]),
+        command(&[&program, "run", &model, "--input", &test, "| tail -3"]),
+        command(&[
+            &program,
+            "simulate",
+            MACHINE,
+            "--days 2 --seed 2",
+            "-o",
+            &faulty,
+            "--fault temperature.plate1=missing,from=6h",
+        ]),
+        command(&[
+            &program,
+            "evaluate",
+            &model,
+            "--data",
+            &faulty,
+            "--abs-truth-below",
+            &limit,
+        ]),
+        "and with a log of a machine of yours:".to_owned(),
+        command(&[&program, "init LOG.csv -o graph.toml"]),
+    ];
+    format!("Try next:\n{}", lines.join("\n"))
 }
 
 #[cfg(test)]
@@ -282,8 +305,8 @@ mod tests {
         ];
         let text = meaning(&axes);
         assert!(text.contains("with 20 to 50 % less error"), "{text}");
-        assert!(text.contains("on Z1 a machine that corrects by it would be off by 125 nm"));
-        assert!(text.contains("it is off by 250 nm today"), "{text}");
+        let left = "on Z1, 125 nm in five minutes are left of 250 nm";
+        assert!(text.contains(left), "{text}");
         assert!(text.contains(&number(3.85)), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 80));
     }

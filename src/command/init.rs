@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::fit::write_aside;
-use crate::invocation::{program, quoted};
+use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
 
@@ -86,10 +86,10 @@ impl Init {
         let program = program();
         let [graph, data] =
             [&self.output, &self.data].map(|path| quoted(&path.display().to_string()));
+        let fit = command(&[&program, "fit", &graph, "--data", &data, "-o model.json"]);
+        let evaluate = command(&[&program, "evaluate model.json --data OTHER.csv"]);
         format!(
-            "wrote {graph}; look it over, then
-  {program} fit {graph} --data {data} -o model.json
-  {program} evaluate model.json --data OTHER.csv     (better not the log that it was fitted on)"
+            "wrote {graph}; look it over, then fit it, and test it on another log:\n{fit}\n{evaluate}"
         )
     }
 }

@@ -12,6 +12,7 @@ mod init;
 mod nodes;
 mod run;
 mod schema;
+mod show;
 mod simulate;
 mod swap;
 mod test;
@@ -27,6 +28,8 @@ pub enum Command {
     Demo(demo::Demo),
     /// Write a starter graph for a log of yours
     Init(init::Init),
+    /// Show a graph: its plan, or a picture of it
+    Show(show::Show),
     /// Look for mistakes in a graph file
     Check(check::Check),
     /// Explain the code of a mistake
@@ -59,6 +62,7 @@ impl Command {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         match self {
             Self::Demo(command) => command.run(terminal),
+            Self::Show(command) => command.run(terminal),
             Self::Init(command) => command.run(terminal),
             Self::Completions(command) => command.run(terminal),
             Self::Check(command) => command.run(terminal),

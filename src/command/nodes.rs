@@ -83,8 +83,11 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         } else {
             ""
         };
+        let unit = port
+            .unit
+            .map_or_else(String::new, |unit| format!(", in {unit}"));
         println!(
-            "  inputs.{:<10} {} ({read}{optional})",
+            "  inputs.{:<10} {} ({read}{unit}{optional})",
             port.name, port.summary
         );
     }
@@ -130,7 +133,7 @@ fn describe(kind: &Kind) -> Value {
                 Read::Held => "held",
                 Read::Truth => "truth",
             };
-            json!({ "name": port.name, "summary": port.summary, "read": read, "optional": port.optional })
+            json!({ "name": port.name, "summary": port.summary, "read": read, "unit": port.unit, "optional": port.optional })
         })
         .collect();
     json!({

@@ -29,10 +29,15 @@ pub struct Series {
 }
 
 impl Series {
-    /// The time between two values in s: half of them are shorter.
+    /// The mean time between two values in s, interruptions not counted.
     #[must_use]
     pub fn interval_s(&self) -> Option<f64> {
-        self.gap(0.5)
+        let usual = 3.0 * self.gap(0.5)?;
+        let gaps = self.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let (sum, count) = gaps
+            .filter(|gap| *gap <= usual)
+            .fold((0.0, 0.0), |(sum, count), gap| (sum + gap, count + 1.0));
+        Some(sum / count)
     }
 
     /// The time between two values in s that the share `share` of them does not exceed.

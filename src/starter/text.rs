@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use athermal::core::time::Duration;
 use athermal::core::unit::Unit;
 
 use super::clock::Clock;
@@ -39,7 +38,7 @@ pub fn graph(
         "# A starter graph, written from {file}: {} rows over {}.\n\
          # Everything in it is a guess from names and values; what each follows from stands beside it.",
         count(survey.rows),
-        clock.length(survey.duration_s),
+        clock.about(survey.duration_s),
     );
     text.push_str("\nschema = 1\n");
     let _ = writeln!(text, "name = {}", toml_string(&stem));
@@ -143,10 +142,15 @@ impl Writer<'_> {
             let known = self.columns[group.columns[0]].unit_known();
             let _ = writeln!(
                 text,
-                "\n[signals.{}]            # a value every {}; longest gap {}",
-                group.signal,
-                self.clock.length(tidy(interval)),
-                self.clock.length(tidy(longest)),
+                "\n{}",
+                beside(
+                    &format!("[signals.{}]", group.signal),
+                    &format!(
+                        "a value every {}; longest gap {}",
+                        self.clock.about(interval),
+                        self.clock.about(longest)
+                    )
+                )
             );
             let _ = writeln!(
                 text,
@@ -162,14 +166,17 @@ impl Writer<'_> {
             let _ = writeln!(text, "column = {}", toml_string(&group.pattern));
             let _ = writeln!(
                 text,
-                "max_age = \"{}\"                    # how long a value counts: a few intervals",
-                self.clock.length(self.max_age(group)),
+                "{}",
+                beside(
+                    &format!("max_age = \"{}\"", self.clock.length(self.max_age(group))),
+                    "how long a value counts: a few intervals"
+                )
             );
             let _ = writeln!(
                 text,
                 "# range = [\"{} {unit}\", \"{} {unit}\"]  # seen: {} to {}; a value outside would be left out",
-                number(low - (high - low)),
-                number(high + (high - low)),
+                number(low - (high - low) / 2.0),
+                number(high + (high - low) / 2.0),
                 number(low),
                 number(high),
                 unit = group.unit,
@@ -185,7 +192,9 @@ impl Writer<'_> {
             .map(|&index| &self.survey.series[index]);
         let gaps = members.filter_map(|series| series.gap(0.9));
         let age = 3.0 * gaps.fold(0.0, f64::max);
-        if age > 2.0 { age.ceil() } else { tidy(age) }
+        // To whole seconds, or where that is too coarse to whole milliseconds.
+        let step = if age > 2.0 { 1.0 } else { 1e-3 };
+        step * (age / step).ceil()
     }
 
     fn features(&self, text: &mut String) {
@@ -195,7 +204,12 @@ impl Writer<'_> {
             "\n# Drift window: signal to noise of the slope of {}, by width:",
             self.axes().join(", ")
         );
-        for (width_s, ratios) in &self.choice.candidates {
+        let shown = self
+            .choice
+            .candidates
+            .iter()
+            .filter(|(width_s, _)| *width_s <= 6.0 * self.choice.drift_s);
+        for (width_s, ratios) in shown {
             let told: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
             let mark = if *width_s == self.choice.drift_s {
                 "  <- chosen"
@@ -211,24 +225,28 @@ impl Writer<'_> {
         }
         let _ = writeln!(
             text,
-            "[nodes.drift]                      # what is predicted: the slope over the last {width}\n\
+            "{}\n\
              type = \"slope\"\ninputs.signal = {}\nwindows = [\"{width}\"]\nunit = {}",
+            beside(
+                "[nodes.drift]",
+                &format!("what is predicted: the slope over the last {width}")
+            ),
             names(&self.drifting),
             toml_string(&self.drift_unit()),
         );
         let causes: Vec<&Group> = self.temperatures.iter().chain(&self.drives).collect();
         for (number, group) in causes.iter().enumerate() {
             let why = if number == 0 {
-                "   # short windows see the fast part of the drift, long ones the slow part"
+                "short windows see the fast part of the drift, long ones the slow"
             } else {
-                ""
+                "the same of another signal"
             };
             let _ = writeln!(
                 text,
-                "\n[nodes.{}]{why}\n\
+                "\n{}\n\
                  type = \"slope\"\ninputs.signal = {}\n\
                  windows = {{ dynamic_range = \"{width}\", shortest = \"{}\", steps = 4, harmonics = {} }}",
-                gradients(group),
+                beside(&format!("[nodes.{}]", gradients(group)), why),
                 toml_string(&group.signal),
                 self.clock.length(self.choice.shortest_s),
                 self.choice.harmonics,
@@ -307,7 +325,7 @@ impl Writer<'_> {
             text,
             "\n[nodes.thermal]                    # from {causes} alone\n\
              type = \"linear\"\n{each}inputs.features = {features}\ninputs.truth = \"drift.{axis}\"\n\
-             ahead = \"{width}\"                     # the drift of the next {width}\n{selection}\n\
+             {}\n{selection}\n\
              # train.abs_truth = {{ below = \"{} {unit}\" }}   # leave out the wildest rows; 99 % are below\n\
              \n[nodes.motion]                     # from the drift of the past alone\n\
              type = \"ar\"\n{each}inputs.truth = \"drift.{axis}\"\nahead = \"{width}\"\nlags = {lags}\n\
@@ -319,6 +337,10 @@ impl Writer<'_> {
              inputs.voters = [\"thermal{member}\", \"motion{member}\", \"both{member}\"]\n\
              inputs.truth = \"drift.{axis}\"\nmemory = \"{}\"\n\
              \n[outputs]\npredicted = \"vote\"\n",
+            beside(
+                &format!("ahead = \"{width}\""),
+                &format!("the drift of the next {width}")
+            ),
             number(limit),
             self.clock.length(3.0 * self.choice.drift_s),
             causes = if self.temperatures.is_empty() {
@@ -339,6 +361,11 @@ impl Writer<'_> {
         };
         per_s * factor().unwrap_or(1.0)
     }
+}
+
+/// What stands in a line, and a comment beside it.
+fn beside(line: &str, comment: &str) -> String {
+    format!("{line:<34} # {comment}")
 }
 
 /// The name of the node that takes the slopes of a signal.
@@ -368,14 +395,4 @@ fn list(names: &[String]) -> String {
         [one] => one.clone(),
         many => format!("[{}]", many.join(", ")),
     }
-}
-
-/// A length of time in s with three digits.
-fn tidy(seconds: f64) -> f64 {
-    if seconds <= 0.0 {
-        return seconds;
-    }
-    let scale = 10_f64.powf(2.0 - seconds.log10().floor());
-    let tidied = (seconds * scale).round() / scale;
-    Duration::from_secs_f64(tidied).map_or(seconds, Duration::secs)
 }

@@ -3,16 +3,17 @@
 //! A wider window has less noise in its slope (as `T^−3/2` for evenly spaced samples) but smooths the drift away (Mandelli,
 //! Dankwart and Napoli, Fig. 2). For each candidate width the spread of the slope is set against its standard error from
 //! the residuals of its own lines; the narrowest width is chosen at which the drift stands [`ENOUGH`] times above its noise on
-//! half of the channels, or where none does, the one at which it stands highest.
+//! half of the channels, or where none does, the one at which it stands highest. The residuals of a line hold the bend of
+//! the drift beside the noise of the samples, so that the figure is rather too low than too high.
 
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
 
-/// Signal to noise of a drift that is enough.
-const ENOUGH: f64 = 3.0;
-/// Samples in a drift window, and in the shortest window of a temperature.
-const FEWEST: f64 = 4.0;
+/// Signal to noise of a drift that is enough: a fifth of its variance is then noise, `1 / (1 + 2²)`.
+const ENOUGH: f64 = 2.0;
+/// Samples that a drift window holds on the average, four but for rounding; and in the shortest window of a temperature.
+const FEWEST: f64 = 3.9;
 const FEWEST_OF_FEATURE: f64 = 3.0;
 /// The log must be so many drift windows long.
 const WINDOWS_IN_LOG: f64 = 20.0;
@@ -60,7 +61,8 @@ impl Choice {
             let gaps = series.iter().filter_map(|series| series.gap(share));
             gaps.fold(0.0, f64::max)
         };
-        let narrowest = (FEWEST * slowest(&drifting, 0.5))
+        let intervals = drifting.iter().filter_map(|series| series.interval_s());
+        let narrowest = (FEWEST * intervals.fold(0.0, f64::max))
             .max(FEWEST_OF_FEATURE * slowest(&drifting, 0.9))
             .max(FEWEST_OF_FEATURE * slowest(&causes, 0.9));
         let widest = survey.duration_s / WINDOWS_IN_LOG;

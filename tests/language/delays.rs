@@ -104,11 +104,11 @@ delay = "10s"
     let given = bench.tick(0.0, &[("position.Z", 5.0), ("temperature.chuck", 30.0)]);
     assert!(given[0].is_nan());
     assert_eq!(given[1], 30.0);
-    let given = bench.tick(15.0, &[]);
+    let given = bench.tick(15.0, &[("temperature.chuck", 31.0)]);
     assert_eq!(given[0], 5.0);
-    assert!(given[1].is_nan());
+    assert_eq!(given[1], 31.0);
     assert_eq!(
         (bench.stamp("some.Z"), bench.stamp("some.chuck")),
-        (10.0, 0.0)
+        (10.0, 15.0)
     );
 }

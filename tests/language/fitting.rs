@@ -265,7 +265,7 @@ out = \"thermal\"
         let (fitted, report) = fit(&plan, &table, &options, &mut |_| {}).unwrap();
         (format!("{fitted:?}"), format!("{:?}", report.estimators))
     };
-    for memory in [64 << 20, 200_000, 100_000, 1000] {
+    for memory in [64 << 20, 250_000, 100_000, 1000] {
         let one = fits(1, memory);
         assert_eq!(one, fits(2, memory), "with {memory} bytes of rows");
         assert_eq!(one, fits(6, memory), "with {memory} bytes of rows");

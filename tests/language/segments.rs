@@ -154,7 +154,7 @@ fn a_tick_out_of_order_is_refused_and_leaves_the_engine_as_it_was() {
                     .map(|value| value.to_bits()),
             );
             if disturbed && tick % 5 == 0 {
-                let wrong = [("temperature.room", 99.0), ("position.Z", 1e6)];
+                let wrong = [("temperature.room", 999.0), ("position.Z", 1e6)];
                 assert!(bench.try_tick(now, &wrong).is_err(), "the same time again");
                 assert!(bench.try_tick(now - 3.0, &wrong).is_err(), "a time before");
             }

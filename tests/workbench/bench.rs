@@ -27,7 +27,7 @@ pub fn plan(text: &str) -> Arc<Plan> {
 
 /// What is wrong with a graph.
 pub fn problems(text: &str) -> String {
-    compiled(text).err().expect("the graph has mistakes")
+    compiled(text).expect_err("the graph has mistakes")
 }
 
 /// An instant in seconds.

@@ -30,3 +30,9 @@ pub fn graph(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");
     folder.join(name).with_extension("toml")
 }
+
+/// A file of reference results, as text; nothing, with a remark, where this machine lacks it.
+pub fn oracle(file: &str) -> Option<String> {
+    let path = data()?.with_file_name("oracles").join(file);
+    Some(std::fs::read_to_string(path).unwrap())
+}

@@ -83,6 +83,10 @@ impl Errors {
             return Restored::cold("the number of voters differs");
         }
         self.squares = known.squares;
+        for squares in &mut self.squares {
+            // Whoever steps from here on must not have to make room.
+            squares.reserve(squares.len().max(32));
+        }
         (0..self.squares.len()).for_each(|voter| self.refresh(voter));
         Restored::Accepted
     }

@@ -247,6 +247,10 @@ impl Operator for Delaying {
         match state.known::<OnTheWay>() {
             Ok(state) if state.queues.len() == self.queues.len() => {
                 (self.queues, self.tick) = (state.queues, state.tick);
+                for queue in &mut self.queues {
+                    // The engine thread must not have to make room.
+                    queue.reserve(queue.len().max(16));
+                }
                 Restored::Accepted
             }
             Ok(_) => Restored::cold("the number of channels differs"),

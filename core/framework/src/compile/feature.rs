@@ -50,6 +50,7 @@ impl Resolver<'_> {
                 return None;
             }
         };
+        self.doubts(instance, feature.warnings(&inputs));
         let channels = outputs.iter().map(|port| port.channels.len());
         let behind = self.behind(&slots, channels, feature.delay());
         let role = PlannedRole::Feature {

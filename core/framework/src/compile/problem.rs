@@ -100,6 +100,11 @@ pub enum CompileProblem {
         message: String,
         help: Option<String>,
     },
+    /// Something that the kind can use and doubts to be meant.
+    Doubt {
+        message: String,
+        help: Option<String>,
+    },
     /// An estimator without a horizon.
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
@@ -181,12 +186,15 @@ impl Problem for CompileProblem {
             Self::NoOutputs => "A062",
             Self::PointOrDifference { .. } => "A063",
             Self::NoRows { .. } => "A064",
+            Self::Doubt { .. } => "A065",
         }
     }
 
     fn severity(&self) -> Severity {
         match self {
-            Self::UnusedNode { .. } | Self::UnusedSignal { .. } => Severity::Warning,
+            Self::UnusedNode { .. } | Self::UnusedSignal { .. } | Self::Doubt { .. } => {
+                Severity::Warning
+            }
             _ => Severity::Error,
         }
     }
@@ -254,7 +262,7 @@ impl Problem for CompileProblem {
             Self::NoMaxAge { channel, .. } => {
                 format!("nothing says how long a value of `{channel}` counts")
             }
-            Self::Parameter { message, .. } => message.clone(),
+            Self::Parameter { message, .. } | Self::Doubt { message, .. } => message.clone(),
             Self::NoHorizon { kind } => {
                 format!("`{kind}` needs to know how far `ahead` it predicts")
             }
@@ -308,7 +316,7 @@ impl Problem for CompileProblem {
             Self::Cycle { .. } => "part of a loop",
             Self::Leak { .. } => "sees the future",
             Self::NoMaxAge { .. } => "held without a maximum age",
-            Self::Parameter { .. } => "here",
+            Self::Parameter { .. } | Self::Doubt { .. } => "here",
             Self::NoHorizon { .. } => "`ahead` is missing",
             Self::PredictedTruth { .. } => "not measured",
             Self::LimitUnit { .. } => "another unit",
@@ -374,7 +382,7 @@ impl Problem for CompileProblem {
                     "say `max_age` on the signal, or `inputs.{input} = {{ from = \"…\", max_age = \"1min\" }}`"
                 )
             }
-            Self::Parameter { help, .. } => return help.clone(),
+            Self::Parameter { help, .. } | Self::Doubt { help, .. } => return help.clone(),
             Self::NoHorizon { .. } => {
                 "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor".to_owned()
             }

@@ -112,12 +112,24 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
             None
         }
     };
-    let instances = node
-        .instances
-        .iter()
-        .map(|instance| read_instance(kind?, node, instance, diagnostics))
-        .collect();
+    let mut instances: Vec<Option<ReadInstance>> = Vec::with_capacity(node.instances.len());
+    for (nth, instance) in node.instances.iter().enumerate() {
+        // Members whose parameters do not name them share one table, and so one specification.
+        let before = nth.checked_sub(1).map(|before| &node.instances[before]);
+        let read = match (before, instances.last()) {
+            (Some(before), Some(Some(read))) if is_shared(before, instance) => Some(read.clone()),
+            _ => kind.and_then(|kind| read_instance(kind, node, instance, diagnostics)),
+        };
+        instances.push(read);
+    }
     ReadNode { kind, instances }
+}
+
+fn is_shared(a: &InstanceDecl, b: &InstanceDecl) -> bool {
+    match (&a.parameters.data, &b.parameters.data) {
+        (Data::Table(a), Data::Table(b)) => a.is_copy_of(b),
+        _ => false,
+    }
 }
 
 fn read_instance(
@@ -205,6 +217,14 @@ impl Instance<'_> {
                 .get(nth)
                 .map_or(list.place, |element| element.place),
             _ => list.place,
+        }
+    }
+
+    /// The place of what a kind points at: an input or a parameter.
+    pub(crate) fn place_of(&self, mistake: &Mistake) -> Place {
+        match mistake.at.strip_prefix("inputs.") {
+            Some(port) => self.input_place(port),
+            None => self.parameter_place(&mistake.at),
         }
     }
 
@@ -556,13 +576,22 @@ impl<'g> Resolver<'g> {
 
     pub(crate) fn mistakes(&mut self, instance: &Instance<'_>, mistakes: Vec<Mistake>) {
         for mistake in mistakes {
-            let place = match mistake.at.strip_prefix("inputs.") {
-                Some(port) => instance.input_place(port),
-                None => instance.parameter_place(&mistake.at),
-            };
+            let place = instance.place_of(&mistake);
             let problem = CompileProblem::Parameter {
                 message: mistake.message,
                 help: mistake.help,
+            };
+            self.diagnostics.report(place, problem);
+        }
+    }
+
+    /// Tells what the kind finds odd and can live with.
+    pub(crate) fn doubts(&mut self, instance: &Instance<'_>, doubts: Vec<Mistake>) {
+        for doubt in doubts {
+            let place = instance.place_of(&doubt);
+            let problem = CompileProblem::Doubt {
+                message: doubt.message,
+                help: doubt.help,
             };
             self.diagnostics.report(place, problem);
         }

@@ -82,6 +82,11 @@ impl Table {
         Arc::make_mut(&mut self.entries).shift_remove(key)
     }
 
+    /// True if both are copies of one table, neither changed since.
+    pub fn is_copy_of(&self, other: &Table) -> bool {
+        Arc::ptr_eq(&self.entries, &other.entries)
+    }
+
     /// True if the key is there.
     pub fn contains(&self, key: &str) -> bool {
         self.entries.contains_key(key)

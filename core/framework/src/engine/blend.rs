@@ -6,12 +6,18 @@ use crate::compile::PlannedOutput;
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
-/// What is added to an output while it passes over.
+/// How an output passes over, and what it must know for the next hand-over.
+///
+/// The difference between two graphs is what is passed over, so that a new graph that gives what the old one gave changes
+/// nothing. Where both had a value at the same tick, that is their difference there; else the first value of the new graph
+/// begins where the last one shown was.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Blending {
-    /// What was put out last, by whichever graph, and when.
-    last: Option<(Instant, f64)>,
-    /// Set at a hand-over until the new graph has its first value.
+    /// What was shown last, by whichever graph, and when.
+    shown: Option<(Instant, f64)>,
+    /// What the graph itself gave last, and when.
+    own: Option<(Instant, f64)>,
+    /// Set at a hand-over whose difference is known only once the new graph has its first value.
     begins: bool,
     /// What is still added, and falls to nothing at the stated rate.
     offset: f64,
@@ -26,30 +32,51 @@ pub(crate) fn rate(output: &PlannedOutput, unit: &Unit) -> Option<f64> {
 }
 
 impl Blending {
-    /// The value to put out where the graph has `value`.
-    pub(crate) fn pass(&mut self, now: Instant, value: f64, rate: f64) -> f64 {
-        let elapsed = self.last.map_or(Duration::ZERO, |(at, _)| now - at).secs();
-        if self.begins {
-            self.begins = false;
-            self.offset = self.last.map_or(0.0, |(_, last)| last - value);
+    /// The value to show where the graph has `value`; without a rate it is that value.
+    ///
+    /// Between two values that are shown, the offset falls by no more than the rate times the time between them. Where time
+    /// starts again, no time has passed.
+    pub(crate) fn pass(&mut self, now: Instant, value: f64, rate: Option<f64>) -> f64 {
+        if std::mem::take(&mut self.begins) {
+            self.offset = self.shown.map_or(0.0, |(_, shown)| shown - value);
         }
-        let most = rate * elapsed;
+        let elapsed = self.shown.map_or(Duration::ZERO, |(at, _)| now - at);
+        let most = rate.map_or(f64::INFINITY, |rate| {
+            rate * elapsed.max(Duration::ZERO).secs()
+        });
         self.offset = if self.offset.abs() <= most {
             0.0
         } else {
             self.offset - most.copysign(self.offset)
         };
-        let shown = value + self.offset;
-        self.last = Some((now, shown));
+        // Adding zero would turn −0 into 0.
+        let shown = if self.offset == 0.0 {
+            value
+        } else {
+            value + self.offset
+        };
+        self.own = Some((now, value));
+        self.shown = Some((now, shown));
         shown
     }
 
-    /// Takes over what another graph put out last.
+    /// Takes over from another graph, both having been stepped to the same tick.
     pub(crate) fn hand_over(&mut self, from: &Self) {
-        *self = Self {
-            begins: from.last.is_some(),
-            ..*from
-        };
+        let own = self.own;
+        *self = *from;
+        self.own = own;
+        if own == from.own {
+            return;
+        }
+        match (own, from.own) {
+            (Some((at, value)), Some((same, before))) if at == same && !from.begins => {
+                self.offset += before - value;
+            }
+            _ => {
+                self.begins = from.shown.is_some();
+                self.offset = 0.0;
+            }
+        }
     }
 }
 
@@ -61,22 +88,81 @@ mod tests {
         Instant::from_ns(seconds * 1_000_000_000)
     }
 
+    const RATE: Option<f64> = Some(5.0);
+
     #[test]
-    fn an_output_passes_over_at_its_rate_and_then_follows() {
-        let mut old = Blending::default();
-        assert_eq!(old.pass(s(0), 200.0, 5.0), 200.0);
-        let mut new = Blending::default();
+    fn the_difference_at_the_hand_over_falls_at_the_rate() {
+        let (mut old, mut new) = (Blending::default(), Blending::default());
+        assert_eq!(old.pass(s(0), 200.0, RATE), 200.0);
+        new.pass(s(0), 0.0, RATE);
         new.hand_over(&old);
-        assert_eq!(new.pass(s(1), 0.0, 5.0), 195.0);
-        assert_eq!(new.pass(s(2), 1.0, 5.0), 191.0);
-        for t in 3..60 {
-            new.pass(s(t), 1.0, 5.0);
-        }
-        assert_eq!(new.pass(s(60), 1.0, 5.0), 1.0);
+        assert_eq!(new.pass(s(1), 0.0, RATE), 195.0);
         assert_eq!(
-            new.pass(s(61), 300.0, 5.0),
+            new.pass(s(2), 1.0, RATE),
+            191.0,
+            "the new graph's own step of 1 on top of 190"
+        );
+        for t in 3..60 {
+            new.pass(s(t), 1.0, RATE);
+        }
+        assert_eq!(new.pass(s(60), 1.0, RATE), 1.0);
+        assert_eq!(
+            new.pass(s(61), 300.0, RATE),
             300.0,
             "a step of the new graph itself is its own business"
+        );
+    }
+
+    #[test]
+    fn a_graph_that_gives_the_same_passes_over_nothing_even_in_the_middle_of_passing() {
+        let mut old = Blending::default();
+        old.pass(s(0), 100.0, RATE);
+        let mut new = Blending::default();
+        new.pass(s(0), 0.1, RATE);
+        new.hand_over(&old);
+        new.pass(s(1), 0.1, RATE);
+        let mut same = Blending::default();
+        same.pass(s(1), 0.1, RATE);
+        same.hand_over(&new);
+        for t in 2..40 {
+            assert_eq!(
+                same.pass(s(t), (t as f64).sin(), RATE).to_bits(),
+                new.pass(s(t), (t as f64).sin(), RATE).to_bits()
+            );
+        }
+    }
+
+    #[test]
+    fn a_first_value_that_comes_late_begins_where_the_last_one_was() {
+        let mut old = Blending::default();
+        old.pass(s(0), 200.0, RATE);
+        let mut new = Blending::default();
+        new.hand_over(&old);
+        assert_eq!(new.pass(s(8), 0.0, RATE), 160.0);
+    }
+
+    #[test]
+    fn while_time_starts_again_nothing_is_passed_over() {
+        let (mut old, mut new) = (Blending::default(), Blending::default());
+        old.pass(s(1000), 200.0, RATE);
+        new.pass(s(1000), 0.0, RATE);
+        new.hand_over(&old);
+        assert_eq!(new.pass(s(0), 0.0, RATE), 200.0);
+        assert_eq!(new.pass(s(1), 0.0, RATE), 195.0);
+    }
+
+    #[test]
+    fn without_a_rate_an_output_steps_over_at_once() {
+        let (mut old, mut new) = (Blending::default(), Blending::default());
+        old.pass(s(0), 200.0, None);
+        new.pass(s(0), 0.0, None);
+        new.hand_over(&old);
+        assert_eq!(new.pass(s(1), 0.0, None), 0.0);
+        new.hand_over(&old);
+        assert_eq!(
+            new.pass(s(2), 0.0, RATE),
+            190.0,
+            "the new graph's rate counts"
         );
     }
 
@@ -84,6 +170,6 @@ mod tests {
     fn without_a_value_before_there_is_nothing_to_pass_over_from() {
         let mut new = Blending::default();
         new.hand_over(&Blending::default());
-        assert_eq!(new.pass(s(1), 7.0, 5.0), 7.0);
+        assert_eq!(new.pass(s(1), 7.0, RATE), 7.0);
     }
 }

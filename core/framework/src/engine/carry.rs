@@ -1,23 +1,38 @@
 //! Decides which nodes of a new graph go on from what those of the old one know.
 
-use std::collections::BTreeSet;
+use std::collections::HashMap;
 
 use serde::Serialize;
 
 use super::{Engine, Fitted};
-use crate::compile::{Change, Plan, PlanDiff, PlannedNode, PlannedRole, diff};
+use crate::compile::{Change, Plan, PlannedNode, PlannedRole, diff};
 
-/// The one change after which an old state is offered to a node.
-const PARAMETERS: &str = "its parameters changed";
-
-/// What of an old graph goes on in a new one, as is: everything downstream of nothing that changed.
+/// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
-pub(crate) struct Untouched {
-    /// Instances.
-    pub(crate) nodes: BTreeSet<String>,
-    /// Channels, those of the signals with them.
-    pub(crate) channels: BTreeSet<String>,
-    diff: PlanDiff,
+pub(crate) struct Heritage {
+    /// How each node begins.
+    pub(crate) nodes: Vec<Begin>,
+    /// Whether each slot goes on as it was: nothing that it hangs on has changed.
+    pub(crate) slots: Vec<bool>,
+    /// Whether each output shows the same channel as before, which goes on as it was.
+    pub(crate) outputs: Vec<bool>,
+}
+
+/// How a node begins.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Begin {
+    /// As it was.
+    AsItWas,
+    /// The old state is offered to it.
+    Offered {
+        /// What changed.
+        reason: String,
+    },
+    /// Without what the old one knew.
+    Afresh {
+        /// What changed.
+        reason: String,
+    },
 }
 
 /// What became of a node in a swap.
@@ -58,149 +73,152 @@ pub enum Carry {
     },
 }
 
-impl Untouched {
+impl Heritage {
     /// All of a plan, in itself.
     pub(crate) fn all(plan: &Plan) -> Self {
         Self {
-            nodes: plan.nodes.iter().map(PlannedNode::instance).collect(),
-            channels: plan
-                .channels
-                .iter()
-                .map(|channel| channel.name.clone())
-                .collect(),
-            diff: diff(plan, plan),
+            nodes: vec![Begin::AsItWas; plan.nodes.len()],
+            slots: vec![true; plan.channels.len()],
+            outputs: vec![true; plan.outputs.len()],
         }
     }
 
-    /// Compares two fitted plans. With `learned`, a new fit upstream leaves untouched what was learned of it.
-    pub(crate) fn between(old: (&Plan, &Fitted), new: (&Plan, &Fitted), learned: bool) -> Self {
-        let mut untouched = Self {
-            nodes: BTreeSet::new(),
-            channels: BTreeSet::new(),
-            diff: diff(old.0, new.0),
-        };
-        let unchanged = |change: &Change| *change == Change::Unchanged;
-        let signals = untouched
-            .diff
-            .signals
-            .iter()
-            .filter(|signal| unchanged(&signal.change));
-        untouched.channels = signals.map(|signal| signal.channel.clone()).collect();
-        let same: BTreeSet<String> = untouched
-            .diff
+    /// What goes on from one engine in another. With `learned`, a node is offered its old state although it, or what it
+    /// reads, has been fitted anew.
+    pub(crate) fn between(old: &Engine, new: &Engine, learned: bool) -> Self {
+        let (was, plan) = (&**old.plan(), &**new.plan());
+        let diff = diff(was, plan);
+        let changes: HashMap<_, _> = diff
             .nodes
             .iter()
-            .filter(|node| unchanged(&node.change))
-            .filter(|node| learned || same_fit(old.1, new.1, &node.instance))
-            .map(|node| node.instance.clone())
+            .map(|node| (node.instance.as_str(), &node.change))
             .collect();
-        // A node that closes a loop is asked before what it reads; a second round lets its answer count.
-        for _ in 0..2 {
-            for node in &new.0.nodes {
+        let own: Vec<Option<Own>> = plan
+            .nodes
+            .iter()
+            .map(|node| {
                 let instance = node.instance();
-                let closing = matches!(
-                    node.role,
-                    PlannedRole::Feature {
-                        closes_loops: true,
-                        ..
-                    }
-                );
-                let reads_untouched = closing
-                    || reads(new.0, node)
-                        .all(|slot| untouched.channels.contains(&new.0.channels[slot].name));
-                if same.contains(&instance) && reads_untouched {
-                    untouched.channels.extend(
-                        node.slots
-                            .clone()
-                            .map(|slot| new.0.channels[slot].name.clone()),
-                    );
-                    untouched.nodes.insert(instance);
+                Own::of(changes.get(instance.as_str()).copied()).or_else(|| {
+                    (!same_fit(old.fitted(), new.fitted(), &instance)).then_some(Own::Fit)
+                })
+            })
+            .collect();
+        let signals = diff
+            .signals
+            .iter()
+            .map(|signal| signal.change != Change::Unchanged);
+        let mut other_signals: Vec<bool> = signals.collect();
+        other_signals.truncate(plan.sources.len());
+        let touched = Touched::by(plan, &other_signals, |node| own[node].is_some());
+        let but_for_fits = Touched::by(plan, &other_signals, |node| {
+            own[node].as_ref().is_some_and(|own| *own != Own::Fit)
+        });
+        let nodes = plan.nodes.iter().enumerate().map(|(index, node)| {
+            if !touched.nodes[index] {
+                return Begin::AsItWas;
+            }
+            let read = reads(plan, node).find(|&slot| touched.slots[slot]);
+            let reason = match (&own[index], read) {
+                (Some(own), _) => own.reason().to_owned(),
+                (None, Some(slot)) => {
+                    format!("`{}`, which it reads, changed", plan.channels[slot].name)
+                }
+                (None, None) => unreachable!("a node is touched by itself or by what it reads"),
+            };
+            let retuned = own[index] == Some(Own::Parameters) && read.is_none();
+            if retuned || (learned && !but_for_fits.nodes[index]) {
+                Begin::Offered { reason }
+            } else {
+                Begin::Afresh { reason }
+            }
+        });
+        let outputs = plan.outputs.iter().map(|output| {
+            let name = &plan.channels[output.slot].name;
+            !touched.slots[output.slot]
+                && was.outputs.iter().any(|before| {
+                    before.name == output.name && was.channels[before.slot].name == *name
+                })
+        });
+        Self {
+            nodes: nodes.collect(),
+            outputs: outputs.collect(),
+            slots: touched.slots.iter().map(|touched| !touched).collect(),
+        }
+    }
+}
+
+/// What changed about a node itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Own {
+    New,
+    Type,
+    Inputs,
+    Parameters,
+    Fit,
+}
+
+impl Own {
+    fn of(change: Option<&Change>) -> Option<Self> {
+        match change {
+            None | Some(Change::Added | Change::Removed) => Some(Self::New),
+            Some(Change::Changed(parameters)) => {
+                let of = |name: &str| {
+                    parameters
+                        .iter()
+                        .any(|change| change.path.split('.').next() == Some(name))
+                };
+                Some(match (of("type"), of("inputs")) {
+                    (true, _) => Self::Type,
+                    (false, true) => Self::Inputs,
+                    (false, false) => Self::Parameters,
+                })
+            }
+            Some(Change::Unchanged) => None,
+        }
+    }
+
+    fn reason(self) -> &'static str {
+        match self {
+            Self::New => "it is new",
+            Self::Type => "its type changed",
+            Self::Inputs => "its inputs changed",
+            Self::Parameters => "its parameters changed",
+            Self::Fit => "it was fitted anew",
+        }
+    }
+}
+
+/// What hangs on something, by number.
+pub(super) struct Touched {
+    pub(super) nodes: Vec<bool>,
+    pub(super) slots: Vec<bool>,
+}
+
+impl Touched {
+    /// Everything that hangs on these signals and nodes, through loops too.
+    pub(super) fn by(plan: &Plan, signals: &[bool], node: impl Fn(usize) -> bool) -> Self {
+        let mut slots = vec![false; plan.channels.len()];
+        slots[..signals.len()].copy_from_slice(signals);
+        let mut readers = vec![Vec::new(); plan.channels.len()];
+        for (index, node) in plan.nodes.iter().enumerate() {
+            for slot in reads(plan, node) {
+                readers[slot].push(index);
+            }
+        }
+        let mut nodes = vec![false; plan.nodes.len()];
+        let mut open: Vec<usize> = (0..plan.nodes.len()).filter(|&index| node(index)).collect();
+        for slot in (0..signals.len()).filter(|&slot| signals[slot]) {
+            open.extend(&readers[slot]);
+        }
+        while let Some(index) = open.pop() {
+            if !std::mem::replace(&mut nodes[index], true) {
+                for slot in plan.nodes[index].slots.clone() {
+                    slots[slot] = true;
+                    open.extend(&readers[slot]);
                 }
             }
-            let loops: Vec<_> = new
-                .0
-                .nodes
-                .iter()
-                .filter(|node| {
-                    matches!(
-                        node.role,
-                        PlannedRole::Feature {
-                            closes_loops: true,
-                            ..
-                        }
-                    )
-                })
-                .filter(|node| {
-                    !reads(new.0, node)
-                        .all(|slot| untouched.channels.contains(&new.0.channels[slot].name))
-                })
-                .collect();
-            if loops.is_empty() {
-                break;
-            }
-            // Something that a loop reads has changed: all that hangs on the loop is touched.
-            for node in loops {
-                untouched.touch(new.0, node);
-            }
         }
-        untouched
-    }
-
-    /// Takes a node out, with all that reads it.
-    fn touch(&mut self, plan: &Plan, node: &PlannedNode) {
-        let mut open = vec![node];
-        while let Some(node) = open.pop() {
-            if !self.nodes.remove(&node.instance()) {
-                continue;
-            }
-            for slot in node.slots.clone() {
-                self.channels.remove(&plan.channels[slot].name);
-            }
-            let slots = node.slots.clone();
-            open.extend(
-                plan.nodes
-                    .iter()
-                    .filter(|other| reads(plan, other).any(|slot| slots.contains(&slot))),
-            );
-        }
-    }
-
-    /// Why a node cannot simply go on, and whether its old state may still be of use.
-    pub(crate) fn changed(&self, old: &Engine, new: &Engine, node: &PlannedNode) -> (String, bool) {
-        let reason = self.reason(old, new, node);
-        let reads_untouched = reads(new.plan(), node)
-            .all(|slot| self.channels.contains(&new.plan().channels[slot].name));
-        (reason.clone(), reads_untouched && reason == PARAMETERS)
-    }
-
-    fn reason(&self, old: &Engine, new: &Engine, node: &PlannedNode) -> String {
-        let instance = node.instance();
-        match self.diff.node(&instance) {
-            None | Some(Change::Added | Change::Removed) => return "it is new".to_owned(),
-            Some(Change::Changed(changes)) => {
-                let inputs = changes
-                    .iter()
-                    .any(|change| change.path.starts_with("inputs"));
-                let kind = changes.iter().any(|change| change.path == "type");
-                return match (kind, inputs) {
-                    (true, _) => "its type changed",
-                    (false, true) => "its inputs changed",
-                    (false, false) => PARAMETERS,
-                }
-                .to_owned();
-            }
-            Some(Change::Unchanged) => {}
-        }
-        if !same_fit(old.fitted(), new.fitted(), &instance) {
-            return "it was fitted anew".to_owned();
-        }
-        let changed = reads(new.plan(), node)
-            .map(|slot| &new.plan().channels[slot].name)
-            .find(|name| !self.channels.contains(*name));
-        match changed {
-            Some(name) => format!("`{name}`, which it reads, changed"),
-            None => "it hangs on something that changed".to_owned(),
-        }
+        Self { nodes, slots }
     }
 }
 
@@ -214,7 +232,7 @@ fn same_fit(old: &Fitted, new: &Fitted, instance: &str) -> bool {
 }
 
 /// The slots that a node reads, with its truth.
-fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
+pub(super) fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
     let (gathers, truth): (&[usize], Option<usize>) = match &node.role {
         PlannedRole::Feature { gathers, .. } => (gathers, None),
         PlannedRole::Estimator { gathers, truth, .. } => (gathers, Some(truth.slot)),

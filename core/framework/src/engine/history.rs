@@ -74,6 +74,8 @@ impl History {
             self.entries.clear();
         }
         self.entries.extend(&other.entries);
+        // Ticks need not come as regularly as they did; the engine thread must not have to make room.
+        self.entries.reserve(self.entries.len().max(16));
         // Readers find their places anew; all that counts is that numbers go on.
         self.dropped = other.dropped;
     }

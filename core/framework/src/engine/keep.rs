@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::carry::{Carry, NodeCarry, Untouched};
+use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched, reads};
 use super::state::{NodeState, SlotState};
-use super::{Engine, EngineError, EngineState, RestoreError, Running};
+use super::{Engine, EngineState, RestoreError, Running};
 use crate::node::Restored;
 
 impl Engine {
@@ -35,39 +35,33 @@ impl Engine {
                 reason: error.to_string(),
             }
         })?;
-        let all = Untouched::all(&self.plan);
-        for node in fresh.adopt(&state, &all, |_| (String::new(), false), false) {
-            if let Carry::Cold { reason } | Carry::Warmed { reason } = node.outcome {
-                return Err(RestoreError::Refused {
-                    node: node.node,
-                    reason,
-                });
-            }
-        }
-        for ((_, blending), output) in fresh.blending.iter_mut().zip(&self.plan.outputs) {
-            *blending = state
-                .blending
-                .get(&output.name)
-                .copied()
-                .unwrap_or_default();
+        if let Some((node, reason)) = fresh.go_on(&state) {
+            return Err(RestoreError::Refused { node, reason });
         }
         *self = fresh;
         Ok(())
     }
 
     /// An engine that knows the same and goes on with the same bits.
-    pub(crate) fn twin(&self) -> Result<Self, EngineError> {
-        let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)?;
-        twin.adopt(
-            &self.state(),
-            &Untouched::all(&self.plan),
-            |_| (String::new(), false),
-            false,
-        );
-        for ((_, own), (_, blending)) in twin.blending.iter_mut().zip(&self.blending) {
-            *own = *blending;
+    ///
+    /// # Errors
+    /// When a node does not take its own state back.
+    pub(crate) fn twin(&self) -> Result<Self, RestoreError> {
+        let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)
+            .expect("what was fitted belongs to the plan, or there would be no engine to copy");
+        match twin.go_on(&self.state()) {
+            None => Ok(twin),
+            Some((node, reason)) => Err(RestoreError::Refused { node, reason }),
         }
-        Ok(twin)
+    }
+
+    /// Goes on from a state of the same graph and fit; the first node that does not, and why.
+    fn go_on(&mut self, state: &EngineState) -> Option<(String, String)> {
+        let carried = self.adopt(state, &Heritage::all(&self.plan), false);
+        carried.into_iter().find_map(|node| match node.outcome {
+            Carry::Cold { reason } | Carry::Warmed { reason } => Some((node.node, reason)),
+            Carry::Carried | Carry::Adopted { .. } | Carry::Migrated { .. } => None,
+        })
     }
 
     /// Lets outputs pass over from what another engine put out last; `from` says which of its outputs each follows.
@@ -77,6 +71,7 @@ impl Engine {
                 blending.hand_over(last);
             }
         }
+        self.refused = before.refused;
     }
 
     /// All that the engine knows, by name.
@@ -136,19 +131,17 @@ impl Engine {
         states.collect()
     }
 
-    /// Goes on from a state: untouched nodes as they were, others offered theirs where that makes sense.
+    /// Goes on from a state of this or another graph, as far as the heritage says.
     ///
-    /// `changed` says of each other node why it cannot simply go on, and whether its state may still be of use. `warmed`
-    /// says whether this engine has been stepped over the past.
+    /// `warmed` says whether this engine has been stepped over the past, so that what is not carried is not cold.
     pub(crate) fn adopt(
         &mut self,
         state: &EngineState,
-        untouched: &Untouched,
-        changed: impl Fn(&crate::compile::PlannedNode) -> (String, bool),
+        heritage: &Heritage,
         warmed: bool,
     ) -> Vec<NodeCarry> {
         let plan = Arc::clone(&self.plan);
-        let begin = |reason: String| {
+        let afresh = |reason: String| {
             if warmed {
                 Carry::Warmed { reason }
             } else {
@@ -156,39 +149,52 @@ impl Engine {
             }
         };
         let mut carried = Vec::with_capacity(plan.nodes.len());
-        for (node, running) in plan.nodes.iter().zip(&mut self.nodes) {
-            let instance = node.instance();
-            let was = state.nodes.get(&instance);
-            let outcome = if untouched.nodes.contains(&instance) {
-                match restored(running, was) {
+        let mut refusing = vec![false; plan.nodes.len()];
+        for (index, (node, running)) in plan.nodes.iter().zip(&mut self.nodes).enumerate() {
+            let was = state.nodes.get(&node.instance());
+            let outcome = match &heritage.nodes[index] {
+                Begin::AsItWas => match restored(running, was) {
                     Restored::Accepted => Carry::Carried,
                     Restored::Migrated { from } => Carry::Migrated { from },
-                    Restored::Cold { reason } => begin(reason),
-                }
-            } else {
-                let (reason, useful) = changed(node);
-                match was
-                    .filter(|_| useful)
-                    .map(|was| restored(running, Some(was)))
-                {
-                    Some(Restored::Accepted) => Carry::Adopted { reason },
-                    Some(Restored::Migrated { from }) => Carry::Migrated { from },
-                    Some(Restored::Cold { reason: why }) => begin(format!("{reason}: {why}")),
-                    None => begin(reason),
-                }
+                    Restored::Cold { reason } => {
+                        refusing[index] = true;
+                        afresh(reason)
+                    }
+                },
+                Begin::Offered { reason } => match restored(running, was) {
+                    Restored::Accepted => Carry::Adopted {
+                        reason: reason.clone(),
+                    },
+                    Restored::Migrated { from } => Carry::Migrated { from },
+                    Restored::Cold { reason: why } => afresh(format!("{reason}: {why}")),
+                },
+                Begin::Afresh { reason } => afresh(reason.clone()),
             };
             carried.push(NodeCarry {
-                node: instance,
+                node: node.instance(),
                 outcome,
             });
         }
-        self.adopt_slots(state, untouched);
+        self.adopt_slots(state, heritage, &refusing);
+        if refusing.contains(&true) {
+            // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.
+            let touched = Touched::by(&plan, &[], |node| refusing[node]);
+            for (node, carry) in plan.nodes.iter().zip(&mut carried) {
+                let read = reads(&plan, node).find(|&slot| touched.slots[slot]);
+                if let (Carry::Carried, Some(slot)) = (&carry.outcome, read) {
+                    let name = &plan.channels[slot].name;
+                    carry.outcome = Carry::Adopted {
+                        reason: format!("`{name}`, which it reads, does not go on as it was"),
+                    };
+                }
+            }
+        }
         carried
     }
 
-    fn adopt_slots(&mut self, state: &EngineState, untouched: &Untouched) {
+    fn adopt_slots(&mut self, state: &EngineState, heritage: &Heritage, refusing: &[bool]) {
         for (slot, channel) in self.plan.channels.iter().enumerate() {
-            if !untouched.channels.contains(&channel.name) {
+            if !heritage.slots[slot] || channel.node.is_some_and(|node| refusing[node]) {
                 continue;
             }
             if let Some(was) = state.slots.get(&channel.name) {
@@ -209,9 +215,11 @@ impl Engine {
         for (count, source) in self.rejected.iter_mut().zip(&self.plan.sources) {
             *count = state.rejected.get(&source.name).copied().unwrap_or(0);
         }
-        for ((_, blending), output) in self.blending.iter_mut().zip(&self.plan.outputs) {
-            if let Some(was) = state.blending.get(&output.name) {
-                blending.hand_over(was);
+        for (index, output) in self.plan.outputs.iter().enumerate() {
+            if let Some(was) = state.blending.get(&output.name)
+                && heritage.outputs[index]
+            {
+                self.blending[index].1 = *was;
             }
         }
         self.slots.tick = state.tick;

@@ -23,7 +23,7 @@ pub use pairing::{Paired, Pairing};
 pub use revision::{fnv_1a, revision};
 pub use state::{EngineState, RestoreError};
 
-pub(crate) use carry::Untouched;
+pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
 pub(crate) use history::{Cursor, History};
 pub(crate) use slots::Slots;
@@ -247,6 +247,11 @@ impl Engine {
         Ok(&self.outputs)
     }
 
+    /// Whether a tick at this instant would be taken.
+    pub(crate) fn takes(&self, time: Instant) -> bool {
+        time > self.last
+    }
+
     /// What was fitted.
     #[must_use]
     pub fn fitted(&self) -> &Fitted {
@@ -329,9 +334,10 @@ impl Engine {
             } else {
                 f64::NAN
             };
-            *shown = match rate {
-                Some(rate) if !value.is_nan() => blending.pass(now, value, *rate),
-                _ => value,
+            *shown = if value.is_nan() {
+                value
+            } else {
+                blending.pass(now, value, *rate)
             };
         }
     }

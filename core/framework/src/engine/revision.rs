@@ -1,5 +1,7 @@
 //! Decides the revision of a fitted graph: a hash of what it computes, not of how it is written.
 
+use std::collections::BTreeMap;
+
 use serde_json::json;
 
 use super::Fitted;
@@ -11,20 +13,23 @@ use crate::compile::Plan;
 /// outputs and the fits.
 #[must_use]
 pub fn revision(plan: &Plan, fitted: &Fitted) -> String {
-    let sources: Vec<_> = (0..plan.sources.len())
-        .map(|slot| plan.describe(slot))
+    let sources: BTreeMap<_, _> = (0..plan.sources.len())
+        .map(|slot| (&plan.channels[slot].name, plan.describe(slot)))
         .collect();
-    let nodes: std::collections::BTreeMap<_, _> = plan
+    let nodes: BTreeMap<_, _> = plan
         .nodes
         .iter()
         .map(|node| (node.instance(), plan.identity(node)))
         .collect();
-    let outputs: Vec<_> = plan
+    let outputs: BTreeMap<_, _> = plan
         .outputs
         .iter()
-        .map(|output| json!([output.name, plan.channels[output.slot].name, output.blend]))
+        .map(|output| {
+            let from = &plan.channels[output.slot].name;
+            (&output.name, json!([from, output.blend]))
+        })
         .collect();
-    let fitted: std::collections::BTreeMap<_, _> = fitted
+    let fitted: BTreeMap<_, _> = fitted
         .iter()
         .map(|(node, predictor)| (node, serde_json::to_value(predictor.as_ref()).ok()))
         .collect();

@@ -110,6 +110,9 @@ impl Vote {
             learning.pairing.clone_from(&from.pairing);
             learning.withheld.clone_from(&from.withheld);
             learning.votes.clone_from(&from.votes);
+            // The engine thread must not have to make room.
+            learning.withheld.reserve(learning.withheld.len().max(16));
+            learning.votes.reserve(learning.votes.len().max(64));
         }
         answer
     }

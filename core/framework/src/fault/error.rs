@@ -49,9 +49,9 @@ pub enum FaultError {
         /// The channel.
         channel: String,
         /// The unit of the size.
-        found: Unit,
+        found: Box<Unit>,
         /// A unit that fits.
-        wanted: Unit,
+        wanted: Box<Unit>,
     },
     /// There is no size, and no usual one for the unit.
     NoSize {
@@ -60,7 +60,7 @@ pub enum FaultError {
         /// The kind of fault.
         kind: FaultKind,
         /// The unit of the channel.
-        unit: Unit,
+        unit: Box<Unit>,
     },
     /// The text is not a fault.
     Text {

@@ -72,7 +72,7 @@ impl FaultSpec {
                 .ok_or_else(|| FaultError::NoSize {
                     channel: self.channel.clone(),
                     kind: self.kind,
-                    unit: unit.clone(),
+                    unit: Box::new(unit.clone()),
                 });
         };
         let difference = unit.difference();
@@ -87,8 +87,8 @@ impl FaultSpec {
             .map(|factor| size.value * factor)
             .ok_or_else(|| FaultError::SizeUnit {
                 channel: self.channel.clone(),
-                found: size.unit.clone(),
-                wanted,
+                found: Box::new(size.unit.clone()),
+                wanted: Box::new(wanted),
             })
     }
 }

@@ -125,7 +125,8 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
                 return made;
             }
             let trainee = &collector.trainees[index];
-            let mut making = begin(plan, trainee, options.memory / threads);
+            // The whole memory, or how folds are cut would depend on the number of threads.
+            let mut making = begin(plan, trainee, options.memory);
             collector.replay(index, &mut making);
             made.push((index, end(plan, trainee, making, false)));
         }

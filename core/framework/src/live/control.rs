@@ -10,9 +10,8 @@ use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::{LiveOptions, Stepper};
 use crate::compile::Plan;
-use crate::engine::{Carry, Engine, EngineError, NodeCarry, Untouched};
+use crate::engine::{Carry, Engine, EngineError, Heritage, NodeCarry, RestoreError};
 use crate::model::Model;
-use crate::recording::Event;
 use crate::time::{Duration, Instant};
 
 /// Engines that may be on their way in either direction.
@@ -31,10 +30,13 @@ pub struct Control {
     running: Arc<Plan>,
     retained: Retained,
     staged: Option<Staged>,
-    /// What has been committed, until the engine thread has taken it over.
-    committed: Option<Seated>,
+    /// What has been committed, until the engine thread has taken it over or sent it back.
+    committed: Option<Committed>,
+    /// What the engine thread has sent back after a hand-over that is not yet known here.
+    returned: Option<Box<Seated>>,
     previous: Option<Previous>,
-    tick: u64,
+    event: u64,
+    last: Option<Instant>,
     generation: u64,
     row: Vec<f64>,
 }
@@ -46,10 +48,25 @@ pub struct Staged {
     shadow: Option<Shadow>,
 }
 
-/// The graph before the last swap, kept warm.
+/// The graph before the last swap, kept warm for a while yet.
 struct Previous {
     seated: Seated,
-    until: Option<Instant>,
+    left: Duration,
+}
+
+/// A graph of which a copy is on its way to the engine thread.
+struct Committed {
+    /// None once ticks have been missed since.
+    seated: Option<Seated>,
+    revision: String,
+    plan: Arc<Plan>,
+    origin: Origin,
+}
+
+/// Where a graph goes that the engine thread sends back.
+enum Origin {
+    Staged { carry: Vec<NodeCarry> },
+    Previous { left: Duration },
 }
 
 /// What has happened since the last look.
@@ -66,7 +83,8 @@ pub enum Notice {
     },
     /// The engine thread sent a graph back because it came too late; it can be committed again.
     SentBack,
-    /// Ticks were missed: states can no longer be carried, until a graph warmed by the retained past takes over.
+    /// Ticks or segment breaks were missed: states can no longer be carried, until a graph warmed by the retained past
+    /// takes over.
     Missed {
         /// How many.
         ticks: u64,
@@ -87,6 +105,10 @@ pub enum StageError {
     NothingStaged,
     /// There is no graph before, or it is no longer warm.
     NothingToTakeBack,
+    /// Ticks were missed, so that what runs is not known here.
+    NotMirrored,
+    /// A node does not take its own state back, so that the graph cannot be copied to the engine thread.
+    NotCopied(RestoreError),
     /// Another graph has been committed and not yet taken over.
     Busy,
 }
@@ -105,6 +127,11 @@ impl fmt::Display for StageError {
                 f,
                 "there is no graph to go back to: none was replaced, or too long ago"
             ),
+            Self::NotMirrored => write!(
+                f,
+                "ticks were missed, so that there is nothing to compare with: commit without a comparison"
+            ),
+            Self::NotCopied(error) => write!(f, "the new graph cannot be handed over: {error}"),
             Self::Busy => write!(
                 f,
                 "a committed graph has not been taken over yet: wait for the next tick"
@@ -145,8 +172,10 @@ pub(super) fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Cont
         returning,
         staged: None,
         committed: None,
+        returned: None,
         previous: None,
-        tick: 0,
+        event: 0,
+        last: None,
         generation: 0,
     };
     Ok((stepper, control))
@@ -164,13 +193,7 @@ impl Control {
             chunk.commit_all();
             self.take_in(&mut notices);
         }
-        while let Ok(returned) = self.returning.pop() {
-            // What comes back is freed here, off the engine thread.
-            if returned.refused {
-                self.committed = None;
-                notices.push(Notice::SentBack);
-            }
-        }
+        self.take_back(&mut notices);
         notices
     }
 
@@ -179,9 +202,12 @@ impl Control {
     /// With `carry_learned`, what was learned of an estimator is carried although it has been fitted anew.
     ///
     /// # Errors
-    /// When it cannot take over; what runs is untouched.
+    /// When it cannot take over, or another graph is on its way; what runs, and what was staged before, is untouched.
     pub fn stage(&mut self, model: &Model, carry_learned: bool) -> Result<&Staged, StageError> {
         self.pump();
+        if self.committed.is_some() {
+            return Err(StageError::Busy);
+        }
         let engine =
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;
         let mut seated = Seated::new(engine, &self.feed, 0)
@@ -189,49 +215,32 @@ impl Control {
         let mut warmed = false;
         self.retained.for_each(|time, samples| match time {
             Some(time) => warmed |= seated.step(time, samples).is_ok(),
-            None => seated.engine.segment(),
+            None => seated.segment(),
         });
         let carry = match &self.replica {
             Some(replica) => {
-                let (old, new) = (&replica.engine, &seated.engine);
-                let untouched = Untouched::between(
-                    (old.plan(), old.fitted()),
-                    (new.plan(), new.fitted()),
-                    carry_learned,
-                );
-                let changes: std::collections::BTreeMap<String, (String, bool)> = new
-                    .plan()
-                    .nodes
-                    .iter()
-                    .map(|node| (node.instance(), untouched.changed(old, new, node)))
-                    .collect();
-                let state = old.state();
-                seated.engine.adopt(
-                    &state,
-                    &untouched,
-                    |node| changes.get(&node.instance()).cloned().unwrap_or_default(),
-                    warmed,
-                )
+                let heritage = Heritage::between(&replica.engine, &seated.engine, carry_learned);
+                let state = replica.engine.state();
+                seated.engine.adopt(&state, &heritage, warmed)
             }
             None => cold(&seated.engine, warmed),
         };
-        seated.tick = self.tick;
-        self.staged = Some(Staged {
+        seated.event = self.event;
+        Ok(self.staged.insert(Staged {
             seated,
             carry,
             shadow: None,
-        });
-        self.staged.as_ref().ok_or(StageError::NothingStaged)
+        }))
     }
 
     /// Compares the staged graph with what runs for a while; see [`Control::verdict`].
     ///
     /// # Errors
-    /// When nothing is staged.
+    /// When nothing is staged, or ticks were missed.
     pub fn shadow(&mut self, duration: Duration, margin: f64) -> Result<(), StageError> {
-        let (Some(staged), Some(replica)) = (&mut self.staged, &self.replica) else {
-            return Err(StageError::NothingStaged);
-        };
+        self.pump();
+        let staged = self.staged.as_mut().ok_or(StageError::NothingStaged)?;
+        let replica = self.replica.as_ref().ok_or(StageError::NotMirrored)?;
         staged.shadow = Some(Shadow::new(
             &replica.engine,
             &staged.seated.engine,
@@ -244,9 +253,7 @@ impl Control {
     /// What the comparison has come to; none where there is none.
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
-        let staged = self.staged.as_ref()?;
-        let shadow = staged.shadow.as_ref()?;
-        Some(shadow.verdict(&self.replica.as_ref()?.engine, &staged.seated.engine))
+        Some(self.staged.as_ref()?.shadow.as_ref()?.verdict())
     }
 
     /// The graph that is staged.
@@ -260,30 +267,36 @@ impl Control {
         self.staged = None;
     }
 
-    /// Lets the staged graph take over before the next tick.
+    /// Lets the staged graph take over before the next tick, whatever a comparison has come to.
     ///
     /// # Errors
-    /// When nothing is staged, or a graph is still on its way.
+    /// When nothing is staged, or a graph is still on its way; what is staged stays so.
     pub fn commit(&mut self) -> Result<(), StageError> {
         self.pump();
-        if self.committed.is_some() {
-            return Err(StageError::Busy);
+        let mut staged = self.staged.take().ok_or(StageError::NothingStaged)?;
+        if let Err(error) = self.send(&mut staged.seated) {
+            self.staged = Some(staged);
+            return Err(error);
         }
-        let staged = self.staged.take().ok_or(StageError::NothingStaged)?;
-        self.hand_over(staged.seated)
+        let Staged { seated, carry, .. } = staged;
+        self.committed = Some(Committed::new(seated, Origin::Staged { carry }));
+        Ok(())
     }
 
     /// Lets the graph before the last swap take over again, as it would be had it never been replaced.
     ///
     /// # Errors
-    /// When there is none that is still warm.
+    /// When there is none that is still warm, or a graph is still on its way.
     pub fn rollback(&mut self) -> Result<(), StageError> {
         self.pump();
-        if self.committed.is_some() {
-            return Err(StageError::Busy);
+        let mut previous = self.previous.take().ok_or(StageError::NothingToTakeBack)?;
+        if let Err(error) = self.send(&mut previous.seated) {
+            self.previous = Some(previous);
+            return Err(error);
         }
-        let previous = self.previous.take().ok_or(StageError::NothingToTakeBack)?;
-        self.hand_over(previous.seated)
+        let Previous { seated, left } = previous;
+        self.committed = Some(Committed::new(seated, Origin::Previous { left }));
+        Ok(())
     }
 
     /// The graph that runs, to the same bits; none after ticks have been missed.
@@ -318,19 +331,21 @@ impl Control {
         table
     }
 
-    fn hand_over(&mut self, mut seated: Seated) -> Result<(), StageError> {
-        seated.follow(&self.running);
-        let copy = copy(&seated, &self.feed).map_err(StageError::Engine)?;
-        match self.departing.push(Box::new(copy)) {
-            Ok(()) => {
-                self.committed = Some(seated);
-                Ok(())
-            }
-            Err(_) => Err(StageError::Busy),
+    /// Sends a copy of a graph to the engine thread.
+    fn send(&mut self, seated: &mut Seated) -> Result<(), StageError> {
+        if self.committed.is_some() {
+            return Err(StageError::Busy);
         }
+        seated.follow(&self.running);
+        let engine = seated.engine.twin().map_err(StageError::NotCopied)?;
+        let mut copy = Seated::new(engine, &self.feed, seated.event)
+            .expect("a twin reads what its twin reads");
+        copy.outputs.clone_from(&seated.outputs);
+        let sent = self.departing.push(Box::new(copy));
+        sent.map_err(|_| StageError::Busy)
     }
 
-    /// Does to the engines here what a tick did on the engine thread.
+    /// Does to the engines here what an event did on the engine thread.
     fn take_in(&mut self, notices: &mut Vec<Notice>) {
         let row = std::mem::take(&mut self.row);
         self.take_in_row(&row, notices);
@@ -339,21 +354,44 @@ impl Control {
 
     fn take_in_row(&mut self, row: &[f64], notices: &mut Vec<Notice>) {
         let (mark, samples) = row.split_at(Mark::WIDTH);
-        let mark = Mark::read([mark[0], mark[1], mark[2]]);
-        let Some(time) = mark.time else {
-            self.retained.segment();
-            self.for_all(|seated| seated.engine.segment());
-            return;
-        };
-        let missed = mark.tick - self.tick - 1;
+        let mark = Mark::read([mark[0], mark[1], mark[2], mark[3]]);
+        let missed = mark.event - self.event - 1;
         if missed > 0 {
             self.lose(missed, notices);
         }
+        self.event = mark.event;
+        match mark.time {
+            None => self.segment(),
+            Some(time) => self.tick(mark, time, samples, notices),
+        }
+    }
+
+    fn segment(&mut self) {
+        self.last = None;
+        self.retained.segment();
+        self.for_all(Seated::segment);
+        if let Some(shadow) = self
+            .staged
+            .as_mut()
+            .and_then(|staged| staged.shadow.as_mut())
+        {
+            shadow.segment();
+        }
+    }
+
+    fn tick(&mut self, mark: Mark, time: Instant, samples: &[f64], notices: &mut Vec<Notice>) {
+        let elapsed = self.last.map_or(Duration::ZERO, |last| time - last);
+        self.last = Some(time);
+        if let Some(previous) = &mut self.previous {
+            previous.left -= elapsed;
+            if previous.left < Duration::ZERO {
+                self.previous = None;
+            }
+        }
         if mark.generation != self.generation {
             self.generation = mark.generation;
-            self.took_over(mark.tick, time, notices);
+            self.took_over(mark, time, notices);
         }
-        self.tick = mark.tick;
         self.for_all(|seated| {
             // A tick that ran there runs here: the engines are the same.
             let _ = seated.step(time, samples);
@@ -362,62 +400,108 @@ impl Control {
         if let (Some(staged), Some(replica)) = (&mut self.staged, &self.replica)
             && let Some(shadow) = &mut staged.shadow
         {
-            shadow.look(&replica.engine, &staged.seated.engine, Event::Row(time));
+            shadow.look(&replica.engine, &staged.seated.engine, time, elapsed);
         }
-        let keep = self.options.keep_warm;
-        if let Some(previous) = &mut self.previous {
-            let until = *previous.until.get_or_insert(time + keep);
-            if time > until {
-                self.previous = None;
+    }
+
+    fn for_all(&mut self, act: impl FnMut(&mut Seated)) {
+        let staged = self.staged.iter_mut().map(|staged| &mut staged.seated);
+        let committed = self.committed.iter_mut();
+        let previous = self.previous.iter_mut();
+        self.replica
+            .iter_mut()
+            .chain(staged)
+            .chain(committed.filter_map(|committed| committed.seated.as_mut()))
+            .chain(previous.map(|previous| &mut previous.seated))
+            .for_each(act);
+    }
+
+    fn took_over(&mut self, mark: Mark, time: Instant, notices: &mut Vec<Notice>) {
+        self.take_back(notices);
+        let returned = self.returned.take();
+        let Some(Committed {
+            seated,
+            revision,
+            plan,
+            ..
+        }) = self.committed.take()
+        else {
+            return;
+        };
+        // The engine that ran stands in where there is no replica of it.
+        let old = self.replica.take().or_else(|| {
+            returned
+                .map(|returned| *returned)
+                .filter(|returned| returned.event + 1 == mark.event)
+        });
+        notices.push(Notice::TookOver {
+            revision,
+            tick: mark.tick,
+            time,
+        });
+        self.retained.keep(self.options.retain.max(plan.warm_up));
+        self.running = plan;
+        if let (Some(mut seated), Some(old)) = (seated, old) {
+            seated.take_over(&old.engine);
+            self.replica = Some(seated);
+            self.previous = Some(Previous {
+                seated: old,
+                left: self.options.keep_warm,
+            });
+        }
+    }
+
+    /// Takes what the engine thread has sent back; it is freed here.
+    fn take_back(&mut self, notices: &mut Vec<Notice>) {
+        while let Ok(returned) = self.returning.pop() {
+            if !returned.refused {
+                self.returned = Some(returned);
+                continue;
+            }
+            notices.push(Notice::SentBack);
+            let Some(Committed {
+                seated: Some(seated),
+                origin,
+                ..
+            }) = self.committed.take()
+            else {
+                continue;
+            };
+            match origin {
+                Origin::Staged { carry } => {
+                    self.staged = Some(Staged {
+                        seated,
+                        carry,
+                        shadow: None,
+                    });
+                }
+                Origin::Previous { left } => self.previous = Some(Previous { seated, left }),
             }
         }
     }
 
-    fn for_all(&mut self, mut act: impl FnMut(&mut Seated)) {
-        self.replica.iter_mut().for_each(&mut act);
-        self.staged
-            .iter_mut()
-            .map(|staged| &mut staged.seated)
-            .for_each(&mut act);
-        self.committed.iter_mut().for_each(&mut act);
-        self.previous
-            .iter_mut()
-            .map(|previous| &mut previous.seated)
-            .for_each(&mut act);
-    }
-
-    fn took_over(&mut self, tick: u64, time: Instant, notices: &mut Vec<Notice>) {
-        let Some(mut seated) = self.committed.take() else {
-            return;
-        };
-        // The engine that ran comes back before the first tick of the new one; it stands in where there is no replica.
-        let returned = self.returning.pop().ok().map(|returned| *returned);
-        let old = self.replica.take().or(returned);
-        if let Some(old) = &old {
-            seated.take_over(&old.engine);
-        }
-        notices.push(Notice::TookOver {
-            revision: seated.revision.clone(),
-            tick,
-            time,
-        });
-        self.running = Arc::clone(seated.engine.plan());
-        self.retained
-            .keep(self.options.retain.max(self.running.warm_up));
-        self.replica = Some(seated);
-        self.previous = old.map(|seated| Previous {
-            seated,
-            until: None,
-        });
-    }
-
     fn lose(&mut self, ticks: u64, notices: &mut Vec<Notice>) {
         notices.push(Notice::Missed { ticks });
+        self.last = None;
         self.replica = None;
         self.staged = None;
-        self.committed = None;
         self.previous = None;
+        // The engine thread has what was committed, and may yet take it over.
+        if let Some(committed) = &mut self.committed {
+            committed.seated = None;
+        }
         self.retained.clear();
+    }
+}
+
+impl Committed {
+    fn new(seated: Seated, origin: Origin) -> Self {
+        Self {
+            revision: seated.revision.clone(),
+            plan: Arc::clone(seated.engine.plan()),
+            seated: Some(seated),
+            origin,
+        }
     }
 }
 
@@ -433,14 +517,6 @@ impl Staged {
     pub fn revision(&self) -> &str {
         &self.seated.revision
     }
-}
-
-/// An engine that goes on exactly as another one.
-fn copy(of: &Seated, feed: &[Feed]) -> Result<Seated, EngineError> {
-    let engine = of.engine.twin()?;
-    let mut copy = Seated::new(engine, feed, of.tick).expect("a twin reads what its twin reads");
-    copy.outputs.clone_from(&of.outputs);
-    Ok(copy)
 }
 
 fn cold(engine: &Engine, warmed: bool) -> Vec<NodeCarry> {
@@ -466,7 +542,7 @@ fn cold(engine: &Engine, warmed: bool) -> Vec<NodeCarry> {
 impl fmt::Debug for Control {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Control")
-            .field("tick", &self.tick)
+            .field("event", &self.event)
             .field("generation", &self.generation)
             .finish_non_exhaustive()
     }

@@ -36,15 +36,15 @@ pub(super) struct Seated {
     pub(super) samples: Vec<f64>,
     /// For each output, that of the engine before which it passes over from.
     pub(super) outputs: Vec<Option<usize>>,
-    /// The number of the tick up to which the engine has been stepped.
-    pub(super) tick: u64,
+    /// The number of the event, tick or segment break, up to which the engine has been taken.
+    pub(super) event: u64,
     /// Whether it was sent back without having taken over.
     pub(super) refused: bool,
 }
 
 impl Seated {
     /// An engine that reads its channels among `feed`; the names of those that are not there otherwise.
-    pub(super) fn new(engine: Engine, feed: &[Feed], tick: u64) -> Result<Self, Vec<String>> {
+    pub(super) fn new(engine: Engine, feed: &[Feed], event: u64) -> Result<Self, Vec<String>> {
         let wanted = Feed::of(engine.plan());
         let place = |channel: &Feed| feed.iter().position(|fed| fed == channel);
         let places: Vec<_> = wanted.iter().map(place).collect();
@@ -61,7 +61,7 @@ impl Seated {
             samples: vec![f64::NAN; wanted.len()],
             places: places.into_iter().flatten().collect(),
             outputs: vec![None; engine.plan().outputs.len()],
-            tick,
+            event,
             refused: false,
             engine,
         })
@@ -77,8 +77,14 @@ impl Seated {
             *sample = fed[place];
         }
         self.engine.step(time, &self.samples)?;
-        self.tick += 1;
+        self.event += 1;
         Ok(())
+    }
+
+    /// The next tick belongs to another segment.
+    pub(super) fn segment(&mut self) {
+        self.engine.segment();
+        self.event += 1;
     }
 
     /// Notes which outputs of another plan those of this one pass over from.
@@ -100,15 +106,28 @@ impl Seated {
     }
 }
 
-/// What stands in the ring for a segment break, in the place of a time.
+/// What stands for a segment break, in the place of a time.
 const BREAK: f64 = f64::INFINITY;
 
-/// What is mirrored of a tick beside its samples.
+/// An instant, or none for a segment break, as a number of the same bits.
+pub(super) fn write_time(time: Option<Instant>) -> f64 {
+    time.map_or(BREAK, |time| f64::from_bits(time.as_ns().cast_unsigned()))
+}
+
+/// The instant that was written as a number; none for a segment break.
+pub(super) fn read_time(number: f64) -> Option<Instant> {
+    let bits = number.to_bits();
+    (bits != BREAK.to_bits()).then(|| Instant::from_ns(bits.cast_signed()))
+}
+
+/// What is mirrored of a tick or segment break beside the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Mark {
     /// The instant; none for a segment break.
     pub(super) time: Option<Instant>,
-    /// The number of the tick.
+    /// The number of the event, ticks and segment breaks counted alike.
+    pub(super) event: u64,
+    /// The number of ticks so far.
     pub(super) tick: u64,
     /// How many hand-overs there have been.
     pub(super) generation: u64,
@@ -116,27 +135,21 @@ pub(super) struct Mark {
 
 impl Mark {
     /// How many numbers a mark takes.
-    pub(super) const WIDTH: usize = 3;
+    pub(super) const WIDTH: usize = 4;
 
     /// The mark as numbers: their bits carry integers, none of which is rounded.
     pub(super) fn write(self) -> [f64; Self::WIDTH] {
-        let time = self
-            .time
-            .map_or(BREAK.to_bits(), |time| time.as_ns().cast_unsigned());
-        [
-            f64::from_bits(time),
-            f64::from_bits(self.tick),
-            f64::from_bits(self.generation),
-        ]
+        let [event, tick, generation] =
+            [self.event, self.tick, self.generation].map(f64::from_bits);
+        [write_time(self.time), event, tick, generation]
     }
 
-    pub(super) fn read(numbers: [f64; Self::WIDTH]) -> Self {
-        let [time, tick, generation] = numbers.map(f64::to_bits);
-        let time = (time != BREAK.to_bits()).then(|| Instant::from_ns(time.cast_signed()));
+    pub(super) fn read([time, event, tick, generation]: [f64; Self::WIDTH]) -> Self {
         Self {
-            time,
-            tick,
-            generation,
+            time: read_time(time),
+            event: event.to_bits(),
+            tick: tick.to_bits(),
+            generation: generation.to_bits(),
         }
     }
 }
@@ -156,7 +169,8 @@ mod tests {
         ] {
             let mark = Mark {
                 time: time.map(Instant::from_ns),
-                tick: u64::MAX,
+                event: u64::MAX,
+                tick: u64::MAX - 1,
                 generation: 7,
             };
             assert_eq!(Mark::read(mark.write()), mark);

@@ -12,6 +12,8 @@ pub(super) struct Retained {
     most: usize,
     times: VecDeque<Option<Instant>>,
     samples: VecDeque<f64>,
+    /// How many events there are from the last segment break on, the break not counted; all where there is none.
+    since_break: usize,
 }
 
 impl Retained {
@@ -24,6 +26,7 @@ impl Retained {
             most: (memory / each).max(1),
             times: VecDeque::new(),
             samples: VecDeque::new(),
+            since_break: 0,
         }
     }
 
@@ -35,6 +38,7 @@ impl Retained {
     pub(super) fn push(&mut self, time: Instant, samples: &[f64]) {
         self.times.push_back(Some(time));
         self.samples.extend(samples);
+        self.since_break += 1;
         self.shorten(time);
     }
 
@@ -43,20 +47,26 @@ impl Retained {
         self.times.push_back(None);
         self.samples
             .extend(std::iter::repeat_n(f64::NAN, self.width));
+        self.since_break = 0;
     }
 
     pub(super) fn clear(&mut self) {
         self.times.clear();
         self.samples.clear();
+        self.since_break = 0;
     }
 
-    /// How much of the past there is.
+    /// How much of the past there is, over all segments.
     pub(super) fn span(&self) -> Duration {
-        let mut known = self.times.iter().flatten();
-        match (known.next(), known.next_back()) {
-            (Some(&first), Some(&last)) => last - first,
-            _ => Duration::ZERO,
+        let mut before = None;
+        let mut span = Duration::ZERO;
+        for time in &self.times {
+            if let (Some(before), Some(time)) = (before, *time) {
+                span += time - before;
+            }
+            before = *time;
         }
+        span
     }
 
     /// The events, oldest first: the instant (none for a segment break) and the samples.
@@ -72,15 +82,16 @@ impl Retained {
     }
 
     fn shorten(&mut self, now: Instant) {
-        // An older segment goes once the present one alone is long enough.
-        if let Some(last_break) = self.times.iter().rposition(Option::is_none)
-            && let Some(Some(begin)) = self.times.get(last_break + 1)
-            && now - *begin >= self.span
+        let begin = self.times.len() - self.since_break;
+        // Older segments go once the present one alone is long enough; their clocks say nothing about its own.
+        if begin > 0
+            && matches!(self.times.get(begin), Some(Some(first)) if now - *first >= self.span)
         {
-            self.drop_first(last_break + 1);
+            self.drop_first(begin);
         }
         while self.times.len() > self.most
-            || matches!(self.times.get(1), Some(Some(second)) if *second <= now && now - *second >= self.span)
+            || self.times.len() == self.since_break
+                && matches!(self.times.get(1), Some(Some(second)) if now - *second >= self.span)
         {
             self.drop_first(1);
         }
@@ -89,6 +100,7 @@ impl Retained {
     fn drop_first(&mut self, ticks: usize) {
         self.times.drain(..ticks);
         self.samples.drain(..ticks * self.width);
+        self.since_break = self.since_break.min(self.times.len());
     }
 }
 
@@ -125,5 +137,24 @@ mod tests {
             retained.push(s(t), &[0.0; 10]);
         }
         assert_eq!(retained.times.len(), 50);
+    }
+
+    #[test]
+    fn a_segment_is_kept_until_the_next_one_is_long_enough_whatever_their_clocks_say() {
+        for begin in [-100_000, 0, 100_000] {
+            let mut retained = Retained::new(1, d(100), 1 << 20);
+            for t in 0..50 {
+                retained.push(s(begin + t), &[t as f64]);
+            }
+            retained.segment();
+            for t in 0..100 {
+                retained.push(s(t), &[t as f64]);
+            }
+            assert_eq!(retained.span(), d(49 + 99), "a segment from {begin} s");
+            retained.push(s(100), &[100.0]);
+            assert_eq!(retained.span(), d(100));
+            retained.push(s(101), &[101.0]);
+            assert_eq!(retained.times.len(), 101);
+        }
     }
 }

@@ -2,20 +2,16 @@
 
 use serde::Serialize;
 
-use crate::engine::Engine;
-use crate::recording::Event;
-use crate::score::Watch;
+use crate::compile::{Plan, TruthLink};
+use crate::engine::{Engine, Pairing};
 use crate::time::{Duration, Instant};
 
 /// A candidate and what runs, compared for a while.
 #[derive(Debug)]
 pub struct Shadow {
     margin: f64,
-    duration: Duration,
-    began: Option<Instant>,
-    now: Option<Instant>,
-    running: Watch,
-    candidate: Watch,
+    left: Duration,
+    pairs: Vec<Pair>,
 }
 
 /// What a comparison has come to.
@@ -44,6 +40,24 @@ pub struct Compared {
     pub candidate_rmse: f64,
 }
 
+/// An output of both, and the truth, as the running graph has it, that both predict.
+#[derive(Debug)]
+struct Pair {
+    output: String,
+    truth: usize,
+    running: Predicted,
+    candidate: Predicted,
+    n: usize,
+}
+
+/// One side of a pair.
+#[derive(Debug)]
+struct Predicted {
+    slot: usize,
+    pairing: Pairing,
+    squares: f64,
+}
+
 impl Shadow {
     pub(super) fn new(
         running: &Engine,
@@ -53,53 +67,64 @@ impl Shadow {
     ) -> Self {
         Self {
             margin,
-            duration,
-            began: None,
-            now: None,
-            running: Watch::new(running.plan()),
-            candidate: Watch::new(candidate.plan()),
+            left: duration,
+            pairs: pairs(running.plan(), candidate.plan()),
         }
     }
 
-    /// Looks at what a tick did to both.
-    pub(super) fn look(&mut self, running: &Engine, candidate: &Engine, event: Event) {
-        if let Event::Row(now) = event {
-            self.began.get_or_insert(now);
-            self.now = Some(now);
+    /// Looks at what a tick did to both, `elapsed` after the one before.
+    pub(super) fn look(
+        &mut self,
+        running: &Engine,
+        candidate: &Engine,
+        now: Instant,
+        elapsed: Duration,
+    ) {
+        self.left -= elapsed;
+        for pair in &mut self.pairs {
+            pair.running.look(running, now);
+            pair.candidate.look(candidate, now);
+            let truth = running.value(pair.truth);
+            if truth.is_nan() {
+                continue;
+            }
+            let (a, b) = (pair.running.at(now), pair.candidate.at(now));
+            if a.is_nan() || b.is_nan() {
+                continue;
+            }
+            pair.n += 1;
+            pair.running.squares += (a - truth).powi(2);
+            pair.candidate.squares += (b - truth).powi(2);
         }
-        self.running.look(running, event);
-        self.candidate.look(candidate, event);
+    }
+
+    /// What follows belongs to another segment.
+    pub(super) fn segment(&mut self) {
+        for pair in &mut self.pairs {
+            pair.running.pairing.clear();
+            pair.candidate.pairing.clear();
+        }
     }
 
     /// What it has come to so far.
     #[must_use]
-    pub fn verdict(&self, running: &Engine, candidate: &Engine) -> Verdict {
-        let outputs: Vec<_> = running
-            .plan()
-            .outputs
-            .iter()
-            .filter_map(|output| {
-                let other = candidate
-                    .plan()
-                    .outputs
-                    .iter()
-                    .find(|other| other.name == output.name)?;
-                let (truth, before) = self.running.prediction(output.slot)?;
-                let (same_truth, after) = self.candidate.prediction(other.slot)?;
-                (running.plan().channels[truth.slot].name
-                    == candidate.plan().channels[same_truth.slot].name)
-                    .then(|| compare(&output.name, &truth.values, before, after))?
-            })
-            .collect();
-        let squares = outputs
-            .iter()
-            .map(|compared| (compared.candidate_rmse / compared.running_rmse).powi(2));
+    pub fn verdict(&self) -> Verdict {
+        let compared = self.pairs.iter().filter(|pair| pair.n > 0);
+        let outputs: Vec<_> = compared.map(Pair::compared).collect();
+        let squares = outputs.iter().map(|compared| {
+            let (running, candidate) = (compared.running_rmse, compared.candidate_rmse);
+            // Two that are without error are equally good.
+            if candidate == running {
+                1.0
+            } else {
+                (candidate / running).powi(2)
+            }
+        });
         let ratio =
             (!outputs.is_empty()).then(|| (squares.sum::<f64>() / outputs.len() as f64).sqrt());
-        let over = matches!((self.began, self.now), (Some(began), Some(now)) if now - began >= self.duration);
-        // Written so that a ratio that is no number does not pass.
         Verdict {
-            over,
+            over: self.left <= Duration::ZERO,
+            // Written so that a ratio that is no number does not pass.
             passes: ratio.map(|ratio| ratio <= 1.0 + self.margin),
             ratio,
             outputs,
@@ -107,18 +132,73 @@ impl Shadow {
     }
 }
 
-fn compare(output: &str, truths: &[f64], running: &[f64], candidate: &[f64]) -> Option<Compared> {
-    let both = || {
-        let all = truths.iter().zip(running).zip(candidate);
-        all.filter(|((_, a), b)| !a.is_nan() && !b.is_nan())
-            .map(|((truth, a), b)| (a - truth, b - truth))
+/// The outputs of one name in both plans that predict the same: the same truth, at the same horizon, in the same unit.
+fn pairs(running: &Plan, candidate: &Plan) -> Vec<Pair> {
+    let pair = |output: &crate::compile::PlannedOutput| {
+        let other = candidate
+            .outputs
+            .iter()
+            .find(|other| other.name == output.name)?;
+        let (here, there) = (
+            &running.channels[output.slot],
+            &candidate.channels[other.slot],
+        );
+        let (truth, same) = (
+            &running.channels[here.predicts?],
+            &candidate.channels[there.predicts?],
+        );
+        let predicts_same = truth.name == same.name
+            && truth.channel.unit == same.channel.unit
+            && truth.channel.span == same.channel.span
+            && here.channel.ahead == there.channel.ahead;
+        if !predicts_same {
+            return None;
+        }
+        let link = TruthLink {
+            slot: here.predicts?,
+            ahead: here.channel.ahead,
+            span: truth.channel.span,
+            limit: truth.channel.default_max_age()?,
+        };
+        let predicted = |slot| Predicted {
+            slot,
+            pairing: Pairing::new(&link, 1),
+            squares: 0.0,
+        };
+        Some(Pair {
+            output: output.name.clone(),
+            truth: link.slot,
+            running: predicted(output.slot),
+            candidate: predicted(other.slot),
+            n: 0,
+        })
     };
-    let n = both().count();
-    let rmse = |squares: f64| (squares / n as f64).sqrt();
-    (n > 0).then(|| Compared {
-        output: output.to_owned(),
-        n,
-        running_rmse: rmse(both().map(|(a, _)| a * a).sum()),
-        candidate_rmse: rmse(both().map(|(_, b)| b * b).sum()),
-    })
+    running.outputs.iter().filter_map(pair).collect()
+}
+
+impl Pair {
+    fn compared(&self) -> Compared {
+        let rmse = |squares: f64| (squares / self.n as f64).sqrt();
+        Compared {
+            output: self.output.clone(),
+            n: self.n,
+            running_rmse: rmse(self.running.squares),
+            candidate_rmse: rmse(self.candidate.squares),
+        }
+    }
+}
+
+impl Predicted {
+    fn look(&mut self, engine: &Engine, now: Instant) {
+        if engine.ran(self.slot) {
+            self.pairing.run(now, [&[engine.value(self.slot)][..]]);
+        }
+    }
+
+    /// What had been predicted for a truth that arrives now; NaN for nothing.
+    fn at(&mut self, now: Instant) -> f64 {
+        self.pairing
+            .truth(now)
+            .map_or(f64::NAN, |paired| paired.row[0])
+    }
 }

@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, Producer};
 
-use super::handover::{Feed, Mark, Seated};
+use super::handover::{Feed, Mark, Seated, read_time, write_time};
 use crate::compile::Plan;
 use crate::engine::EngineError;
 use crate::time::Instant;
 
-/// Ticks that are kept for an engine that comes a little late.
-const RECENT: usize = 256;
+/// Ticks and segment breaks that are kept for an engine that comes a little late.
+const RECENT: u64 = 256;
 /// Ticks by which a new engine catches up at each tick, so that no tick becomes long.
-const CATCH_UP: usize = 4;
+const CATCH_UP: u64 = 4;
 
 /// The end of a running graph that the engine thread owns.
 pub struct Stepper {
@@ -23,6 +23,7 @@ pub struct Stepper {
     leaving: Producer<Box<Seated>>,
     next: Option<Box<Seated>>,
     recent: Vec<f64>,
+    event: u64,
     tick: u64,
     generation: u64,
     missed: u64,
@@ -55,7 +56,8 @@ impl Stepper {
             arriving,
             leaving,
             next: None,
-            recent: vec![f64::NAN; RECENT * width],
+            recent: vec![f64::NAN; RECENT as usize * width],
+            event: 0,
             tick: 0,
             generation: 0,
             missed: 0,
@@ -68,13 +70,13 @@ impl Stepper {
         &self.feed
     }
 
-    /// How many ticks could not be mirrored because the control thread was behind.
+    /// How many ticks and segment breaks could not be mirrored because the control thread was behind.
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed
     }
 
-    /// How often a channel's sample was rejected, by the graph that runs.
+    /// The engine that runs.
     #[must_use]
     pub fn engine(&self) -> &crate::engine::Engine {
         &self.seated.engine
@@ -93,11 +95,13 @@ impl Stepper {
                 expected: self.feed.len(),
             });
         }
-        self.take_over();
+        // Only a tick that is taken can be the first of another graph.
+        if self.seated.engine.takes(time) {
+            self.take_over();
+        }
         self.seated.step(time, samples)?;
         self.tick += 1;
-        self.keep(time, samples);
-        self.mirror(Some(time), samples);
+        self.record(Some(time), samples);
         let Seated {
             engine, revision, ..
         } = &*self.seated;
@@ -110,13 +114,8 @@ impl Stepper {
 
     /// The next tick belongs to another segment.
     pub fn segment(&mut self) {
-        // An engine on its way has not seen the break; it is sent back and made anew.
-        if self.next.is_none() {
-            self.next = self.arriving.pop().ok();
-        }
-        self.send_back();
-        self.seated.engine.segment();
-        self.mirror(None, &[]);
+        self.seated.segment();
+        self.record(None, &[]);
     }
 
     /// Lets a committed engine catch up, and take over once it has.
@@ -125,22 +124,26 @@ impl Stepper {
             self.next = self.arriving.pop().ok();
         }
         let Some(next) = &mut self.next else { return };
-        let behind = self.tick - next.tick;
-        if behind > RECENT as u64 {
+        let behind = self.event - next.event;
+        if next.refused || behind > RECENT {
             self.send_back();
             return;
         }
-        for _ in 0..CATCH_UP.min(usize::try_from(behind).unwrap_or(CATCH_UP)) {
-            let width = self.feed.len() + 1;
-            let row = usize::try_from(next.tick % RECENT as u64).unwrap_or(0) * width;
-            let row = &self.recent[row..row + width];
-            let time = Instant::from_ns(row[0].to_bits().cast_signed());
-            if next.step(time, &row[1..]).is_err() {
-                self.send_back();
-                return;
+        let width = self.feed.len() + 1;
+        for _ in 0..behind.min(CATCH_UP) {
+            let row = (next.event % RECENT) as usize * width;
+            let (time, samples) = (self.recent[row], &self.recent[row + 1..row + width]);
+            match read_time(time) {
+                None => next.segment(),
+                Some(time) => {
+                    if next.step(time, samples).is_err() {
+                        self.send_back();
+                        return;
+                    }
+                }
             }
         }
-        if next.tick < self.tick || self.leaving.is_full() {
+        if next.event < self.event || self.leaving.is_full() {
             return;
         }
         next.take_over(&self.seated.engine);
@@ -166,17 +169,21 @@ impl Stepper {
         }
     }
 
-    fn keep(&mut self, time: Instant, samples: &[f64]) {
+    /// Writes an event down for an engine that comes late, and for the control thread.
+    fn record(&mut self, time: Option<Instant>, samples: &[f64]) {
         let width = self.feed.len() + 1;
-        let row = usize::try_from((self.tick - 1) % RECENT as u64).unwrap_or(0) * width;
-        self.recent[row] = f64::from_bits(time.as_ns().cast_unsigned());
-        self.recent[row + 1..row + width].copy_from_slice(samples);
+        let row = (self.event % RECENT) as usize * width;
+        self.recent[row] = write_time(time);
+        self.recent[row + 1..row + 1 + samples.len()].copy_from_slice(samples);
+        self.event += 1;
+        self.mirror(time, samples);
     }
 
     fn mirror(&mut self, time: Option<Instant>, samples: &[f64]) {
         let width = self.feed.len() + Mark::WIDTH;
         let mark = Mark {
             time,
+            event: self.event,
             tick: self.tick,
             generation: self.generation,
         }

@@ -88,8 +88,8 @@ impl Recording for Simulated<'_> {
             if !from.measures_same(&planned.channel.unit) {
                 return Err(Box::new(MachineError::Unit {
                     channel: source.name.clone(),
-                    machine: from,
-                    graph: planned.channel.unit.clone(),
+                    machine: Box::new(from),
+                    graph: Box::new(planned.channel.unit.clone()),
                 }));
             }
             picks.push(Some((index, from, planned.channel.unit.clone())));
@@ -161,9 +161,9 @@ pub enum MachineError {
         /// The channel.
         channel: String,
         /// Its unit in the machine.
-        machine: Unit,
+        machine: Box<Unit>,
         /// Its unit in the graph.
-        graph: Unit,
+        graph: Box<Unit>,
     },
     /// The machine gives a channel a unit that there is not.
     UnknownUnit {

@@ -76,6 +76,11 @@ pub trait Feature: Debug + Send + Sync {
     /// Every mistake in the parameters, or in how the inputs fit them.
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>>;
 
+    /// What can be used and is probably not meant, told as warnings; asked for only where there is no mistake.
+    fn warnings(&self, _inputs: &Inputs) -> Vec<Mistake> {
+        Vec::new()
+    }
+
     /// What runs. `wanted[i]` says whether anybody reads output port `i`.
     fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator>;
 

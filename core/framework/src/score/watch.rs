@@ -82,17 +82,6 @@ impl Watch {
         }
     }
 
-    /// The truth that a slot predicts, and its predictions so far, one for each of the truth's values.
-    pub(crate) fn prediction(&self, slot: usize) -> Option<(&Truth, &[f64])> {
-        self.truths.iter().find_map(|truth| {
-            let prediction = truth
-                .predictions
-                .iter()
-                .find(|prediction| prediction.slot == slot)?;
-            Some((truth, prediction.values.as_slice()))
-        })
-    }
-
     /// Looks at what a tick did.
     pub(crate) fn look(&mut self, engine: &Engine, event: Event) {
         for truth in &mut self.truths {

@@ -30,7 +30,7 @@ pub(super) fn read(
     };
     let noise = shaping.difference("noise", table.noise.as_ref(), &unit.difference());
     let shape = shaping.shape(&table);
-    if noise < 0.0 {
+    if noise < 0.0 || noise.is_nan() {
         shaping.range("noise", noise.to_string(), "0 or more");
     }
     if table.every <= Duration::ZERO {

@@ -264,7 +264,7 @@ impl RollingSlope {
     #[inline(always)]
     fn slopes_with_gaps(&self, window: &Window, quad: usize) -> Quad {
         let moments = window.parts.moments(self.blocks.tables(), quad);
-        let mut slopes = moments.slopes();
+        let mut slopes = window.parts.slopes_with_gaps(self.blocks.tables(), quad);
         if moments.any_thin() {
             self.mend(window, quad, &moments, &mut slopes);
         }

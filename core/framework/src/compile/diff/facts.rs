@@ -97,6 +97,9 @@ fn measures(a: &Value, b: &Value) -> bool {
         (Value::Array(a), Value::Array(b)) => {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| measures(a, b))
         }
+        // One text for all channels, and each channel's own where they are spelt differently.
+        (one @ Value::String(_), Value::Array(all))
+        | (Value::Array(all), one @ Value::String(_)) => all.iter().all(|each| measures(one, each)),
         (Value::String(a), Value::String(b)) if a != b => match (a.parse(), b.parse()) {
             (Ok(a), Ok(b)) => same_quantity(&a, &b),
             _ => matches!((Unit::parse(a), Unit::parse(b)), (Ok(a), Ok(b)) if a == b),

@@ -297,6 +297,11 @@ pub const CODES: &[Code] = &[
         "`train.abs_truth` leaves no row to fit on: `below` is larger than `above`, and neither is negative."
     ),
     code!(
+        "A065",
+        "doubtful use",
+        "The node works as it is written, but not as it is meant to be used: its documentation says what it wants."
+    ),
+    code!(
         "A070",
         "nothing to run over",
         "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."

@@ -72,6 +72,26 @@ impl Parts {
         })
     }
 
+    /// Slopes per second of four channels that may be absent from some rows: for each the very operations of
+    /// [`slopes`](Self::slopes), so that a channel keeps its bits while another is absent.
+    #[inline(always)]
+    pub(super) fn slopes_with_gaps(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Quad {
+        let [h, r, w] = self.places.map(|place| place + quad);
+        let (h, r, w) = (&head.times[h], &rest.times[r], &now.times[w]);
+        let Times { n, t, tt } = r.plus(w).plus(&h.shifted(self.by));
+        let head = &head.values[self.places[0] + quad];
+        let rest = &rest.values[self.places[1] + quad];
+        let now = &now.values[self.places[2] + quad];
+        from_fn(|i| {
+            let scale = NS_PER_S / (n[i] * tt[i] - t[i] * t[i]);
+            let (of_ty, of_y) = (n[i] * scale, t[i] * scale);
+            let of_head_y = of_y - of_ty * self.by;
+            of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+                - of_y * (rest.y[i] + now.y[i])
+                - of_head_y * head.y[i]
+        })
+    }
+
     /// Sums of four channels that may be absent from some rows.
     #[inline(always)]
     pub(super) fn moments(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Moments {
@@ -150,12 +170,6 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Slopes per second.
-    #[inline(always)]
-    pub(super) fn slopes(&self) -> Quad {
-        from_fn(|i| self.n_sxy[i] / self.n_sxx[i] * NS_PER_S)
-    }
-
     /// Whether so many digits were lost that the sums must be computed from the samples.
     #[inline(always)]
     pub(super) fn thin(&self, i: usize) -> bool {

@@ -486,3 +486,38 @@ fn a_time_that_does_not_advance_changes_nothing() {
     assert!(kernel.push(i64::MAX, &[1e300]));
     assert!(is_absent(slopes(&mut kernel)[0]));
 }
+
+#[test]
+fn a_channel_that_is_absent_does_not_touch_a_bit_of_the_others() {
+    let windows = [50.0, 150.0, 700.0];
+    let absent: [fn(usize) -> bool; 3] =
+        [|_| true, |row| row >= 100, |row| row > 0 && row % 3 == 0];
+    for (nth, when) in absent.into_iter().enumerate() {
+        let (mut whole, mut holed) = (kernel(&windows, 6, DEFAULT), kernel(&windows, 6, DEFAULT));
+        let mut t = 0.0;
+        for row in 0..400_usize {
+            t += 7.0 + (row * 37 % 11) as f64 * 0.61;
+            let y: Vec<f64> = (0..6)
+                .map(|c| 20.0 + c as f64 + (0.01 * t * (c + 1) as f64).sin())
+                .collect();
+            let mut with_hole = y.clone();
+            if when(row) {
+                with_hole[2] = f64::NAN;
+            }
+            let (one, other) = (step(&mut whole, t, &y), step(&mut holed, t, &with_hole));
+            for channel in [0, 1, 3, 4, 5] {
+                let its = channel * 3..channel * 3 + 3;
+                assert_eq!(
+                    bits(&one[its.clone()]),
+                    bits(&other[its]),
+                    "slopes of {channel} in row {row}, absence {nth}"
+                );
+            }
+        }
+        assert!(
+            slopes(&mut whole)[..3]
+                .iter()
+                .all(|slope| slope.is_finite())
+        );
+    }
+}

@@ -1,0 +1,18 @@
+//! Control nodes of athermal: from a predicted drift to a correction that may be trusted, and what it is worth.
+
+mod compensate;
+mod health;
+mod limit;
+pub mod optical_loss;
+mod safe_state;
+mod settled;
+mod stability;
+mod uncorrected;
+
+pub use compensate::{Compensate, Stop};
+pub use health::Health;
+pub use optical_loss::OpticalLoss;
+pub use safe_state::{Refuge, SafeState};
+pub use settled::Settled;
+pub use stability::{Stability, StabilityState};
+pub use uncorrected::{Uncorrected, UntilFirst};

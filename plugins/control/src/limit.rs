@@ -1,0 +1,73 @@
+//! Decides how a limit given as a quantity becomes a number in a channel's unit; not what is done at the limit.
+
+use athermal_core::channel::Channel;
+use athermal_core::node::Mistake;
+use athermal_core::quantity::Quantity;
+use athermal_core::time::Duration;
+use athermal_core::unit::Unit;
+
+/// A limit of a size: 0 or more, in `unit`. Of temperatures it is a difference, given in K.
+pub(crate) fn size(limit: &Quantity, unit: &Unit, at: &str) -> Result<f64, Mistake> {
+    let factor = limit.unit.factor_to(unit);
+    let Some(factor) = factor.filter(|_| !limit.unit.is_temperature_point()) else {
+        let message = format!("`{at}` is in {}, which cannot be in {unit}", limit.unit);
+        return Err(Mistake::at(at, message).help(format!("give it in {unit}")));
+    };
+    let value = limit.value * factor;
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        let message = format!("`{at}` is {limit} and must not be negative");
+        Err(Mistake::at(at, message).help("limits are sizes, without a sign"))
+    }
+}
+
+/// The same for a limit that may be left out.
+pub(crate) fn size_or_none(
+    limit: Option<&Quantity>,
+    unit: &Unit,
+    at: &str,
+    mistakes: &mut Vec<Mistake>,
+) -> Option<f64> {
+    match size(limit?, unit, at) {
+        Ok(value) => Some(value),
+        Err(mistake) => {
+            mistakes.push(mistake);
+            None
+        }
+    }
+}
+
+/// The unit of a change per second of values in `unit`.
+pub(crate) fn per_second(unit: &Unit) -> Unit {
+    unit.difference().per(&Unit::second())
+}
+
+/// A channel of numbered states or reasons beside another channel.
+pub(crate) fn numbered(of: &Channel) -> Channel {
+    Channel {
+        name: of.name.clone(),
+        unit: Unit::one(),
+        span: of.span,
+        ahead: Duration::ZERO,
+        max_age: of.max_age,
+    }
+}
+
+/// Whether two ports have channels one for one.
+pub(crate) fn same_count(
+    port: &str,
+    found: &[Channel],
+    other: &str,
+    expected: &[Channel],
+) -> Option<Mistake> {
+    (found.len() != expected.len()).then(|| {
+        let message = format!(
+            "`{port}` has {} channels and `{other}` has {}",
+            found.len(),
+            expected.len()
+        );
+        Mistake::at(format!("inputs.{port}"), message)
+            .help("both go together one by one, in the same order")
+    })
+}

@@ -1,0 +1,284 @@
+//! What is put out when nothing can be trusted.
+
+use athermal_core::channel::Channel;
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+};
+use athermal_core::quantity::Quantity;
+use athermal_core::time::Instant;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::limit;
+
+/// Passes a signal on while it can be trusted, and otherwise puts out a stated safe value.
+///
+/// A signal is not trusted where it is absent or too old, or where the input `distrust` is other than 0 (such as the
+/// reasons of a `health` node). For up to `after` ticks the last value is kept; then the output goes to its refuge, `hold`, `zero`
+/// or a stated value, by at most `max_slew`, and comes back by the same when trust returns. It always has a value; before the first trusted one it is the
+/// refuge, or 0. The port `why` says: 0 trusted, 1 absent, 2 distrusted, 3 and 4 the same and past `after`, 5 on
+/// the way back. Runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SafeState {
+    /// What is safe.
+    pub refuge: Refuge,
+    /// The stated value, with `refuge = "value"`.
+    #[serde(default)]
+    pub value: Option<Quantity>,
+    /// The number of ticks without trust that are bridged with the last value.
+    #[serde(default)]
+    pub after: u32,
+    /// The fastest way to the refuge and back, such as `"50 nm/s"`.
+    pub max_slew: Quantity,
+}
+
+/// A safe output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Refuge {
+    /// The last trusted value.
+    Hold,
+    /// Zero.
+    Zero,
+    /// A stated value.
+    Value,
+}
+
+/// The numbers of the port `why`.
+mod why {
+    pub(super) const TRUSTED: f64 = 0.0;
+    pub(super) const ABSENT: f64 = 1.0;
+    pub(super) const DISTRUSTED: f64 = 2.0;
+    /// Added to the two above once the bridged ticks are over.
+    pub(super) const SAFE: f64 = 2.0;
+    pub(super) const RETURNING: f64 = 5.0;
+}
+
+impl SafeState {
+    /// The refuge, if it is a value, and the fastest way per second.
+    fn limits(&self, channel: &Channel) -> Result<(Option<f64>, f64), Vec<Mistake>> {
+        let mut mistakes = Vec::new();
+        let refuge = match (self.refuge, &self.value) {
+            (Refuge::Hold, None) => None,
+            (Refuge::Zero, None) => Some(0.0),
+            (Refuge::Value, Some(value)) => {
+                let found = value.in_unit(&channel.unit);
+                if found.is_none() {
+                    let message = format!(
+                        "`value` is in {}, and `{}` in {}",
+                        value.unit, channel.name, channel.unit
+                    );
+                    mistakes.push(Mistake::at("value", message));
+                }
+                found
+            }
+            (Refuge::Value, None) => {
+                let mistake = Mistake::at("refuge", "`refuge = \"value\"` needs to know which");
+                mistakes.push(mistake.help(format!("add `value = \"0 {}\"`", channel.unit)));
+                None
+            }
+            (Refuge::Hold | Refuge::Zero, Some(_)) => {
+                let mistake = Mistake::at(
+                    "value",
+                    "`value` has a meaning only with `refuge = \"value\"`",
+                );
+                mistakes.push(mistake);
+                None
+            }
+        };
+        match limit::size(
+            &self.max_slew,
+            &limit::per_second(&channel.unit),
+            "max_slew",
+        ) {
+            Ok(slew) if mistakes.is_empty() => Ok((refuge, slew)),
+            Ok(_) => Err(mistakes),
+            Err(mistake) => {
+                mistakes.push(mistake);
+                Err(mistakes)
+            }
+        }
+    }
+}
+
+impl Feature for SafeState {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("signal", "what is put out while it can be trusted"),
+                InputPort::held(
+                    "distrust",
+                    "other than 0 where the signal must not be trusted: one, or one per channel",
+                )
+                .or_none(),
+            ]
+        }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let signal = inputs.port("signal");
+        let distrust = inputs.port("distrust");
+        if !matches!(distrust.len(), 0 | 1)
+            && let Some(mistake) = limit::same_count("distrust", distrust, "signal", signal)
+        {
+            return Err(vec![mistake]);
+        }
+        for channel in signal {
+            self.limits(channel)?;
+        }
+        Ok(vec![
+            OutputPort {
+                name: "safe",
+                channels: signal.to_vec(),
+            },
+            OutputPort {
+                name: "why",
+                channels: signal.iter().map(limit::numbered).collect(),
+            },
+        ])
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        let signal = inputs.port("signal");
+        let limits: Vec<_> = signal
+            .iter()
+            .map(|channel| self.limits(channel).unwrap_or((None, 0.0)))
+            .collect();
+        let channels = limits
+            .iter()
+            .map(|&(refuge, _)| Output::new(refuge))
+            .collect();
+        Box::new(Guarding {
+            after: self.after,
+            limits,
+            known: Known {
+                last: None,
+                channels,
+            },
+        })
+    }
+
+    fn every_tick(&self) -> bool {
+        true
+    }
+}
+
+struct Guarding {
+    after: u32,
+    limits: Vec<(Option<f64>, f64)>,
+    known: Known,
+}
+
+/// The state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Known {
+    last: Option<Instant>,
+    channels: Vec<Output>,
+}
+
+/// What is known of one channel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Output {
+    given: f64,
+    /// Ticks without trust so far.
+    doubtful: u32,
+    /// Whether the output has left the signal and is not back yet.
+    away: bool,
+    /// Whether there has been a trusted value.
+    begun: bool,
+}
+
+impl Output {
+    fn new(refuge: Option<f64>) -> Self {
+        Self {
+            given: refuge.unwrap_or(0.0),
+            doubtful: 0,
+            away: false,
+            begun: false,
+        }
+    }
+
+    /// Moves towards a goal, and says whether it has been reached.
+    fn approach(&mut self, goal: f64, step: f64) -> bool {
+        let missing = goal - self.given;
+        if missing.abs() > step {
+            self.given += step.copysign(missing);
+            false
+        } else {
+            self.given = goal;
+            true
+        }
+    }
+}
+
+impl Operator for Guarding {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        let (signal, distrust) = (tick.port(0), tick.port(1));
+        let dt = self.known.last.map_or(0.0, |last| (tick.now - last).secs());
+        self.known.last = Some(tick.now);
+        let count = signal.len();
+        for (i, (output, &(refuge, slew))) in
+            self.known.channels.iter_mut().zip(&self.limits).enumerate()
+        {
+            let mark = distrust.get(if distrust.len() == 1 { 0 } else { i });
+            // A distrust that is not known is a reason for it.
+            let distrusted = mark.is_some_and(|&mark| mark != 0.0);
+            let why = if signal[i].is_finite() && !distrusted {
+                output.doubtful = 0;
+                let there = if output.away {
+                    output.approach(signal[i], slew * dt)
+                } else {
+                    output.given = signal[i];
+                    true
+                };
+                output.away = !there;
+                output.begun = true;
+                if there { why::TRUSTED } else { why::RETURNING }
+            } else {
+                let cause = if distrusted {
+                    why::DISTRUSTED
+                } else {
+                    why::ABSENT
+                };
+                output.doubtful = output.doubtful.saturating_add(1);
+                if output.doubtful > self.after {
+                    // Without a trusted value so far there is nothing to come back from slowly.
+                    output.away = output.begun;
+                    output.approach(refuge.unwrap_or(output.given), slew * dt);
+                    cause + why::SAFE
+                } else {
+                    cause
+                }
+            };
+            outputs.set_stamped(i, output.given, tick.now);
+            outputs.set_stamped(count + i, why, tick.now);
+        }
+    }
+
+    fn segment(&mut self) {
+        self.known.last = None;
+        for (output, &(refuge, _)) in self.known.channels.iter_mut().zip(&self.limits) {
+            *output = Output::new(refuge);
+        }
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(self.known.clone()))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known::<Known>() {
+            Ok(known) if known.channels.len() == self.known.channels.len() => {
+                self.known = known;
+                Restored::Accepted
+            }
+            Ok(_) => Restored::cold("the number of channels differs"),
+            Err(cold) => cold,
+        }
+    }
+}
+
+athermal_core::state!(Known, "safe_state/1");
+
+athermal_core::register!(SafeState, Feature, "safe_state");

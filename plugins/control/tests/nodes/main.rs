@@ -1,0 +1,11 @@
+//! Each node in a graph of its own, stepped by the real engine.
+
+#![allow(clippy::unwrap_used)]
+
+mod compensate;
+mod health;
+mod loss_and_settling;
+mod machine;
+mod safe_state;
+mod stability;
+mod uncorrected;

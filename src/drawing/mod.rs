@@ -1,0 +1,367 @@
+//! Decides what a picture of a graph shows: boxes, what stands in them, and arrows; not how they are drawn.
+
+pub mod dot;
+mod layout;
+pub mod mermaid;
+pub mod plan;
+pub mod svg;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
+use athermal::core::node::RoleName;
+use athermal::core::time::Duration;
+
+use crate::figures::length;
+
+/// A graph as boxes and arrows, from what is measured to what comes out.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Diagram {
+    /// The name of the graph.
+    pub name: String,
+    /// The boxes.
+    pub boxes: Vec<Box>,
+    /// The arrows.
+    pub arrows: Vec<Arrow>,
+}
+
+/// A signal, a node or an output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Box {
+    /// Its name.
+    pub title: String,
+    /// What it is.
+    pub class: Class,
+    /// What is to be said of it, line by line.
+    pub lines: Vec<String>,
+}
+
+/// What a box stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// Something measured.
+    Signal,
+    /// Channels from channels.
+    Feature,
+    /// A prediction.
+    Estimator,
+    /// One prediction of several.
+    Combiner,
+    /// What comes out.
+    Output,
+}
+
+/// From one box to another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Arrow {
+    /// The number of the box it comes from.
+    pub from: usize,
+    /// The number of the box it goes to.
+    pub to: usize,
+    /// What travels.
+    pub kind: Flow,
+}
+
+/// What travels along an arrow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Flow {
+    /// Values of this tick.
+    Data,
+    /// Values of earlier ticks, which close a loop.
+    Delayed,
+    /// What is predicted, once it has been measured.
+    Truth,
+}
+
+/// The boxes and arrows of a plan; instances of one node share a box unless `expand`.
+#[must_use]
+pub fn diagram(plan: &Plan, expand: bool) -> Diagram {
+    let mut drawn = Drawn {
+        plan,
+        diagram: Diagram {
+            name: plan.name.clone().unwrap_or_default(),
+            ..Diagram::default()
+        },
+        of_slot: vec![None; plan.channels.len()],
+        arrows: BTreeSet::new(),
+    };
+    drawn.signals();
+    drawn.nodes(expand);
+    drawn.outputs();
+    drawn.diagram.arrows = drawn.arrows.into_iter().collect();
+    drawn.diagram
+}
+
+struct Drawn<'a> {
+    plan: &'a Plan,
+    diagram: Diagram,
+    /// The box that gives each slot its values.
+    of_slot: Vec<Option<usize>>,
+    arrows: BTreeSet<Arrow>,
+}
+
+impl Drawn<'_> {
+    fn add(&mut self, title: &str, class: Class, lines: Vec<String>) -> usize {
+        self.diagram.boxes.push(Box {
+            title: title.to_owned(),
+            class,
+            lines,
+        });
+        self.diagram.boxes.len() - 1
+    }
+
+    fn signals(&mut self) {
+        let mut signals: Vec<(&str, Vec<usize>)> = Vec::new();
+        for (slot, source) in self.plan.sources.iter().enumerate() {
+            let signal = source.name.split('.').next().unwrap_or(&source.name);
+            match signals.iter_mut().find(|(name, _)| *name == signal) {
+                Some((_, slots)) => slots.push(slot),
+                None => signals.push((signal, vec![slot])),
+            }
+        }
+        for (signal, slots) in signals {
+            let unit = &self.plan.channels[slots[0]].channel.unit;
+            let lines = vec![format!("{} in {unit}", counted(slots.len(), "channel"))];
+            let number = self.add(signal, Class::Signal, lines);
+            for slot in slots {
+                self.of_slot[slot] = Some(number);
+            }
+        }
+    }
+
+    fn nodes(&mut self, expand: bool) {
+        let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+        for node in &self.plan.nodes {
+            let number = match numbers.get(node.name.as_str()) {
+                Some(&number) if !expand => number,
+                _ => {
+                    let title = if expand {
+                        node.instance()
+                    } else {
+                        node.name.clone()
+                    };
+                    let number = self.node(&title, node, expand);
+                    numbers.insert(&node.name, number);
+                    number
+                }
+            };
+            for slot in node.slots.clone() {
+                self.of_slot[slot] = Some(number);
+            }
+        }
+        let mut next = self.diagram.boxes.len() - if expand { self.plan.nodes.len() } else { 0 };
+        for node in &self.plan.nodes {
+            if expand {
+                numbers.insert(&node.name, next);
+                next += 1;
+            }
+            self.arrows_to(node, numbers[node.name.as_str()]);
+        }
+    }
+
+    fn node(&mut self, title: &str, node: &PlannedNode, expand: bool) -> usize {
+        let instances = if expand {
+            1
+        } else {
+            let same = self
+                .plan
+                .nodes
+                .iter()
+                .filter(|other| other.name == node.name);
+            same.count()
+        };
+        let mut lines = vec![if instances > 1 {
+            format!("{} × {instances}", node.kind.name)
+        } else {
+            node.kind.name.to_owned()
+        }];
+        lines.extend(self.said_of(node));
+        let class = match node.kind.role {
+            RoleName::Feature => Class::Feature,
+            RoleName::Estimator => Class::Estimator,
+            RoleName::Combiner => Class::Combiner,
+        };
+        self.add(title, class, lines)
+    }
+
+    fn said_of(&self, node: &PlannedNode) -> Vec<String> {
+        let first_port = node.ports.first().map(|(_, slots)| slots.clone());
+        let slots = first_port.unwrap_or_else(|| node.slots.clone());
+        let channels = || slots.clone().map(|slot| &self.plan.channels[slot].channel);
+        let mut lines = Vec::new();
+        let unit = channels().next().map(|channel| channel.unit.to_string());
+        match &node.role {
+            PlannedRole::Feature { .. } => {
+                let count = counted(slots.len(), "channel");
+                lines.push(unit.map_or(count.clone(), |unit| format!("{count} in {unit}")));
+                let spans: BTreeSet<Duration> = channels().map(|channel| channel.span).collect();
+                match (spans.first(), spans.last()) {
+                    (Some(&first), Some(&last)) if first != last => {
+                        lines.push(format!("over {} … {}", length(first), length(last)));
+                    }
+                    (Some(&only), _) if only > Duration::ZERO => {
+                        lines.push(format!("over {}", length(only)))
+                    }
+                    _ => {}
+                }
+            }
+            PlannedRole::Estimator {
+                regressors, truth, ..
+            } => {
+                lines.push(format!("from {}", counted(regressors.len(), "regressor")));
+                lines.push(format!("{} ahead", length(truth.ahead)));
+            }
+            PlannedRole::Combiner { voters, .. } => {
+                let voters = self.plan.gathers[*voters].entries.len();
+                lines.push(format!("of {}", counted(voters, "voter")));
+                lines.extend(unit.map(|unit| format!("in {unit}")));
+            }
+        }
+        lines
+    }
+
+    fn arrows_to(&mut self, node: &PlannedNode, to: usize) {
+        let (gathers, truth, kind) = match &node.role {
+            PlannedRole::Feature {
+                gathers,
+                closes_loops,
+                ..
+            } => {
+                let kind = if *closes_loops {
+                    Flow::Delayed
+                } else {
+                    Flow::Data
+                };
+                (gathers.clone(), None, kind)
+            }
+            PlannedRole::Estimator { gathers, truth, .. } => {
+                (gathers.clone(), Some(truth.slot), Flow::Data)
+            }
+            PlannedRole::Combiner { voters, truth, .. } => {
+                (vec![*voters], truth.map(|truth| truth.slot), Flow::Data)
+            }
+        };
+        for gather in gathers {
+            for entry in &self.plan.gathers[gather].entries {
+                self.arrow(entry.slot, to, kind);
+            }
+        }
+        if let Some(slot) = truth {
+            self.arrow(slot, to, Flow::Truth);
+        }
+    }
+
+    fn arrow(&mut self, slot: usize, to: usize, kind: Flow) {
+        if let Some(from) = self.of_slot[slot] {
+            self.arrows.insert(Arrow { from, to, kind });
+        }
+    }
+
+    fn outputs(&mut self) {
+        let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
+        for output in &self.plan.outputs {
+            let name = output.name.split('.').next().unwrap_or(&output.name);
+            match groups.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, slots)) => slots.push(output.slot),
+                None => groups.push((name, vec![output.slot])),
+            }
+        }
+        for (name, slots) in groups {
+            let unit = &self.plan.channels[slots[0]].channel.unit;
+            let lines = vec![format!("{} in {unit}", counted(slots.len(), "column"))];
+            let number = self.add(name, Class::Output, lines);
+            for slot in slots {
+                self.arrow(slot, number, Flow::Data);
+            }
+        }
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use athermal::Model;
+
+    use super::*;
+
+    fn die_tester(expand: bool) -> Diagram {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/graphs/die-tester.toml");
+        let model = Model::load(std::path::Path::new(path)).unwrap();
+        diagram(&model.plan, expand)
+    }
+
+    fn named(diagram: &Diagram, name: &str) -> usize {
+        let found = diagram.boxes.iter().position(|shown| shown.title == name);
+        found.unwrap()
+    }
+
+    #[test]
+    fn instances_share_a_box_until_they_are_expanded() {
+        let folded = die_tester(false);
+        let titles: Vec<&str> = folded
+            .boxes
+            .iter()
+            .map(|shown| shown.title.as_str())
+            .collect();
+        let expected = [
+            "temperature",
+            "position",
+            "drift",
+            "gradients",
+            "thermal",
+            "motion",
+            "both",
+            "vote",
+            "predicted",
+        ];
+        assert_eq!(titles, expected);
+        // Two signals, two slopes, four nodes for six axes each, one output.
+        assert_eq!(die_tester(true).boxes.len(), 2 + 2 + 4 * 6 + 1);
+    }
+
+    #[test]
+    fn arrows_say_what_travels() {
+        let folded = die_tester(false);
+        let has = |from, to, kind| {
+            let (from, to) = (named(&folded, from), named(&folded, to));
+            folded.arrows.contains(&Arrow { from, to, kind })
+        };
+        assert!(has("gradients", "thermal", Flow::Data));
+        assert!(has("drift", "thermal", Flow::Truth));
+        assert!(!has("drift", "thermal", Flow::Data));
+        assert!(has("drift", "motion", Flow::Data));
+        assert!(has("vote", "predicted", Flow::Data));
+    }
+
+    #[test]
+    fn an_expanded_instance_has_arrows_of_its_own() {
+        let expanded = die_tester(true);
+        let to = named(&expanded, "vote.Z1");
+        let from: Vec<&str> = expanded
+            .arrows
+            .iter()
+            .filter(|arrow| arrow.to == to && arrow.kind == Flow::Data)
+            .map(|arrow| expanded.boxes[arrow.from].title.as_str())
+            .collect();
+        assert_eq!(from, ["thermal.Z1", "motion.Z1", "both.Z1"]);
+    }
+
+    #[test]
+    fn names_cannot_break_out_of_a_picture() {
+        let diagram = Diagram {
+            name: "a <b> & \"c\"".to_owned(),
+            boxes: vec![Box {
+                title: "<script>\"".to_owned(),
+                class: Class::Feature,
+                lines: Vec::new(),
+            }],
+            arrows: Vec::new(),
+        };
+        assert!(!svg::text(&diagram).contains("<script>"));
+        assert!(!mermaid::text(&diagram).contains("<script>"));
+        assert!(dot::text(&diagram).contains("<script>\\\""));
+    }
+}

@@ -1,0 +1,28 @@
+//! Decides what becomes of a result that cannot be printed: a reader that has gone away has seen enough, and anything else
+//! is told. It stands in the place of the standard macros, which panic.
+
+use std::fmt;
+use std::io::{ErrorKind, Write};
+
+/// Prints, or ends the program: with 0 where nobody reads any more, with 3 where it cannot be written.
+pub fn put(text: fmt::Arguments<'_>) {
+    if let Err(error) = std::io::stdout().lock().write_fmt(text) {
+        if error.kind() == ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        let _ = writeln!(
+            std::io::stderr(),
+            "error: cannot write to standard output: {error}"
+        );
+        std::process::exit(3);
+    }
+}
+
+macro_rules! print {
+    ($($text:tt)*) => { $crate::output::put(format_args!($($text)*)) };
+}
+
+macro_rules! println {
+    () => { $crate::output::put(format_args!("\n")) };
+    ($($text:tt)*) => { $crate::output::put(format_args!("{}\n", format_args!($($text)*))) };
+}

@@ -1,0 +1,154 @@
+//! What sees the future is told, along which way it does, and which lag would not.
+
+#![allow(clippy::unwrap_used)]
+
+use athermal as _;
+use athermal::core::compile::{Wanted, compile};
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{Memory, declare, load_text};
+
+const HEAD: &str = "schema = 1\n\
+    [signals.position]\nunit = \"nm\"\nchannels = [\"X\", \"Y\"]\nmax_age = \"3min\"\n\
+    [signals.temperature]\nunit = \"Cel\"\nchannels = [\"room\"]\nmax_age = \"1min\"\n\
+    [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"5min\"]\n";
+
+/// Message and help of every mistake but those of what is unused.
+fn told(nodes: &str) -> Vec<(String, String)> {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let text = format!("{HEAD}{nodes}");
+    let files = Memory::new();
+    let document = load_text("graph.toml", text, &files, &mut sources, &mut diagnostics);
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    let _ = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    let errors = diagnostics
+        .iter()
+        .filter(|found| !matches!(found.code, "A059" | "A060"));
+    errors
+        .map(|found| {
+            assert_eq!(
+                found.code,
+                "A052",
+                "{}",
+                diagnostics.render(&sources, false, 100)
+            );
+            (
+                found.message.clone(),
+                found.help.clone().unwrap_or_default(),
+            )
+        })
+        .collect()
+}
+
+/// A linear estimator of the drift of X on one feature.
+fn estimator(feature: &str, ahead: &str) -> String {
+    format!(
+        "[nodes.linear]\ntype = \"linear\"\ninputs.features = \"{feature}\"\ninputs.truth = \"drift.X\"\nahead = \"{ahead}\"\n\
+         [outputs]\npredicted = \"linear\"\n"
+    )
+}
+
+const TRUTH: &str = "the truth summarises 5min and is predicted";
+
+#[test]
+fn a_derived_feature_leaks_as_its_signal_does() {
+    let pick = "[nodes.fast]\ntype = \"slope\"\ninputs.signal = \"position.X\"\nwindows = [\"1min\"]\n\
+        [nodes.some]\ntype = \"pick\"\ninputs.signal = [\"temperature\", \"fast\"]\n";
+    let leak = told(&format!("{pick}{}", estimator("some", "2min")));
+    assert_eq!(
+        leak,
+        [(
+            "`some.X` contains part of the answer: it overlaps the value of `drift.X` that is predicted".to_owned(),
+            format!(
+                "it is made of what the truth is made of: `some.X` from `fast.X` from `position.X`; {TRUTH} 2min ahead, \
+                 so the smallest lag allowed is 3min (here it is 0s)"
+            )
+        )]
+    );
+    assert_eq!(told(&format!("{pick}{}", estimator("some", "5min"))), []);
+}
+
+#[test]
+fn another_axis_and_a_temperature_do_not_leak() {
+    assert_eq!(told(&estimator("drift.Y", "0s")), []);
+    assert_eq!(told(&estimator("temperature", "0s")), []);
+}
+
+#[test]
+fn delays_along_the_way_add_up() {
+    let late = |first: &str, second: &str| {
+        format!(
+            "[nodes.a]\ntype = \"delay\"\ninputs.signal = \"drift.X\"\ndelay = \"{first}\"\n\
+             [nodes.b]\ntype = \"delay\"\ninputs.signal = \"a\"\ndelay = \"{second}\"\n{}",
+            estimator("b", "0s")
+        )
+    };
+    assert_eq!(told(&late("2min", "3min")), []);
+    let leak = told(&late("2min", "150s"));
+    assert_eq!(
+        leak[0].1,
+        format!(
+            "it is made of what the truth is made of: `b.X` from `a.X` from `drift.X` from `position.X`; {TRUTH} 0s ahead, \
+             so the smallest lag allowed is 5min (here it is 4m30s)"
+        )
+        .replace("4m30s", "270s")
+    );
+}
+
+#[test]
+fn the_shortest_of_two_ways_counts() {
+    let nodes = "[nodes.late]\ntype = \"delay\"\ninputs.signal = \"drift.X\"\ndelay = \"1h\"\n\
+        [nodes.both]\ntype = \"pick\"\ninputs.signal = [\"late\", \"drift.X\"]\nnames = [\"late\", \"now\"]\n";
+    assert_eq!(
+        told(&format!("{nodes}{}", estimator("both.late", "0s"))),
+        []
+    );
+    let leak = told(&format!("{nodes}{}", estimator("both", "0s")));
+    assert!(leak[0].0.starts_with("`both.now` "), "{}", leak[0].0);
+}
+
+#[test]
+fn feedback_brings_the_truth_back_too() {
+    // The loop is closed before what it brings back is known.
+    let nodes = "[nodes.back]\ntype = \"delay\"\ninputs.signal = \"sum.now\"\ndelay = \"1min\"\nunit = \"nm/min\"\n\
+        [nodes.sum]\ntype = \"pick\"\ninputs.signal = [\"drift.X\", \"back\"]\nnames = [\"now\", \"before\"]\n";
+    let held = "{ from = \"back\", max_age = \"1min\" }";
+    let held = |ahead: &str| estimator("back", ahead).replace("\"back\"", held);
+    let leak = told(&format!("{nodes}{}", held("0s")));
+    assert_eq!(leak.len(), 1);
+    assert!(
+        leak[0]
+            .1
+            .contains("`back.value` from `sum.now` from `drift.X` from `position.X`")
+            && leak[0].1.ends_with("(here it is 1min)"),
+        "{}",
+        leak[0].1
+    );
+    assert_eq!(told(&format!("{nodes}{}", held("4min"))), []);
+}
+
+#[test]
+fn a_module_hides_nothing() {
+    let nodes = "[modules.m]\ninputs = [\"signal\"]\noutputs.slope = \"s\"\n\
+        nodes.s = { type = \"slope\", inputs.signal = \"{signal}\", windows = [\"1min\"] }\n\
+        [nodes.inner]\nmodule = \"m\"\ninputs.signal = \"position\"\n";
+    let leak = told(&format!("{nodes}{}", estimator("inner", "0s")));
+    assert!(
+        leak[0].1.contains("`inner/s.X` from `position.X`"),
+        "{}",
+        leak[0].1
+    );
+}
+
+#[test]
+fn a_lag_of_the_truth_leaks_until_its_window_is_past() {
+    let ar = |lag: &str| {
+        format!(
+            "[nodes.ar]\ntype = \"ar\"\ninputs.truth = \"drift.X\"\nahead = \"2min\"\nlags = [\"{lag}\", \"1h\"]\n[outputs]\npredicted = \"ar\"\n"
+        )
+    };
+    assert_eq!(told(&ar("3min")), []);
+    assert_eq!(
+        told(&ar("179s"))[0].1,
+        format!("{TRUTH} 2min ahead, so the smallest lag allowed is 3min (here it is 179s)")
+    );
+}

@@ -1,0 +1,142 @@
+//! A graph made of modules means what the same graph written out means.
+
+#![allow(clippy::unwrap_used)]
+
+use athermal as _;
+use athermal::core::compile::{Plan, Wanted, compile};
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{Memory, declare, load_text};
+
+const PLAIN: &str = include_str!("../graphs/die-tester.toml");
+
+fn compiled(text: &str) -> (Option<Plan>, String) {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let files = Memory::new();
+    let document = load_text("graph.toml", text, &files, &mut sources, &mut diagnostics);
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    (plan, diagnostics.render(&sources, false, 100))
+}
+
+/// The die tester with the estimators and the vote of an axis in a module.
+fn in_a_module() -> String {
+    let (head, _) = PLAIN.split_once("[nodes.thermal]").unwrap();
+    head.to_owned()
+        + r#"
+[modules.axis]
+inputs = ["features", "truth"]
+required = ["limit"]
+parameters = { ahead = "5min", lags = ["0s", "5min", "10min"], selection = { method = "forward", folds = 3, tolerance = 1e-3 } }
+outputs = { predicted = "vote", thermal = "thermal" }
+
+[modules.axis.nodes.thermal]
+type = "linear"
+inputs.features = "{features}"
+inputs.truth = "{truth}"
+ahead = "{ahead}"
+train.abs_truth = { below = "150 nm/min" }
+selection = "{selection}"
+
+[modules.axis.nodes.motion]
+type = "ar"
+inputs.truth = "{truth}"
+ahead = "{ahead}"
+lags = "{lags}"
+train.abs_truth = { below = "{limit} nm/min" }
+
+[modules.axis.nodes.both]
+type = "arx"
+inputs.features = "{features}"
+inputs.truth = "{truth}"
+ahead = "{ahead}"
+lags = "{lags}"
+train.abs_truth = { below = "{limit} nm/min" }
+selection = "{selection}"
+
+[modules.axis.nodes.vote]
+type = "auto_weighted"
+inputs.voters = ["thermal", "motion", "both"]
+inputs.truth = "{truth}"
+memory = "15min"
+
+[nodes.model]
+module = "axis"
+each = "axis"
+inputs.features = "gradients"
+inputs.truth = "drift.{axis}"
+limit = 850
+
+[outputs]
+predicted = "model"
+"#
+}
+
+#[test]
+fn the_plan_is_that_of_the_graph_written_out() {
+    let (plain, _) = compiled(PLAIN);
+    let (modular, told) = compiled(&in_a_module());
+    let (plain, modular) = (plain.unwrap(), modular.unwrap_or_else(|| panic!("{told}")));
+    let outside = |plan: &Plan| -> Vec<_> {
+        let nodes = plan.nodes.iter().map(|node| {
+            let identity = plan.identity(node).to_string().replace("model/", "");
+            (node.instance().replace("model/", ""), identity)
+        });
+        let mut nodes: Vec<_> = nodes.collect();
+        nodes.sort();
+        nodes
+    };
+    assert_eq!(outside(&modular), outside(&plain));
+    let columns = |plan: &Plan| -> Vec<_> {
+        plan.outputs
+            .iter()
+            .map(|column| column.name.clone())
+            .collect()
+    };
+    assert_eq!(columns(&modular), columns(&plain));
+    assert!(
+        modular
+            .nodes
+            .iter()
+            .any(|node| node.instance() == "model/vote.Z1")
+    );
+}
+
+#[test]
+fn a_mistake_inside_names_instance_and_member_and_stands_where_it_was_written() {
+    let (plan, told) =
+        compiled(&in_a_module().replace("limit = 850", "limit = \"850\"\nahead = \"2min\""));
+    assert!(plan.is_none());
+    assert!(
+        told.contains("note: node `model/motion`, member `X1`, and 11 more members"),
+        "{told}"
+    );
+    assert!(
+        told.contains("the smallest lag allowed is 3min (here it is 0s)"),
+        "{told}"
+    );
+    // The lags are the module's own, written in its parameters.
+    assert!(told.contains("parameters = { ahead"), "{told}");
+}
+
+#[test]
+fn what_an_instance_lacks_or_has_too_much_is_told() {
+    let (plan, told) = compiled(
+        &in_a_module()
+            .replace("limit = 850", "limits = 850\ntype = \"mean\"")
+            .replace(
+                "inputs.features = \"gradients\"",
+                "inputs.feature = \"gradients\"",
+            ),
+    );
+    assert!(plan.is_none());
+    for expected in [
+        "error[A006]: node \"model\" of module \"axis\" has no key \"limits\"",
+        "error[A006]: node \"model\" of module \"axis\" has no key \"type\"",
+        "error[A006]: `inputs` of node \"model\" of module \"axis\" has no key \"feature\"",
+        "error[A007]: node \"model\" of module \"axis\" needs the key \"limit\"",
+        "error[A007]: node \"model\" of module \"axis\" needs the key \"inputs.features\"",
+    ] {
+        assert!(told.contains(expected), "{expected}\n{told}");
+    }
+    assert_eq!(told.matches("error[").count(), 5, "{told}");
+}

@@ -1,0 +1,12 @@
+//! A graph is replaced while it runs: nothing is lost, repeated or reordered, and reports tell the truth.
+
+#![allow(clippy::unwrap_used)]
+
+mod allocation;
+mod blending;
+mod course;
+mod model;
+mod properties;
+mod random_graph;
+mod snapshots;
+mod threads;
