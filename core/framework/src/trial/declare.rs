@@ -2,17 +2,16 @@
 
 use super::channels::{look_up, look_up_measured};
 use super::data::{DataSet, Simulation};
-use super::expectation::{Check, Expectation, Period, Rival, Tolerance};
+use super::expectation::Expectation;
 use super::problem::TrialProblem;
 use super::series::{Series, Synthetic};
 use super::shape;
-use super::table::{ExpectTable, SimulationTable, Within};
+use super::table::SimulationTable;
 use crate::compile::{Plan, PlannedRole};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{Data, DocumentProblem, GraphFile, Table, Value, decode, known_keys};
 use crate::fault::{FaultSpec, Faults};
 use crate::machine::{LONGEST_DAYS, machines};
-use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -113,10 +112,11 @@ pub fn observe(plan: &mut Plan, trials: &[Trial]) {
     }
 }
 
-struct Declaring<'a> {
-    plan: &'a Plan,
+/// Reads one test; what it expects is read in a file of its own.
+pub(super) struct Declaring<'a> {
+    pub(super) plan: &'a Plan,
     sources: &'a Sources,
-    diagnostics: &'a mut Diagnostics,
+    pub(super) diagnostics: &'a mut Diagnostics,
 }
 
 impl Declaring<'_> {
@@ -353,219 +353,7 @@ impl Declaring<'_> {
         .ok()
     }
 
-    fn expectation(&mut self, value: &Value) -> Option<Expectation> {
-        let table = decode::<ExpectTable>(value, "the expectation", self.diagnostics)?;
-        self.check_keys(value, &table);
-        let slots = self.channels(&table.of, place_of(value, "of"))?;
-        let checks = self.checks(value, &table);
-        if checks.is_empty() {
-            let what = "the expectation";
-            let problem = TrialProblem::NothingExpected { what };
-            self.diagnostics.report(value.place, problem);
-        }
-        for &slot in &slots {
-            self.check_channel(value, &table, &checks, slot);
-        }
-        Some(Expectation {
-            slots,
-            abs_truth_below: table.abs_truth_below,
-            period: Period {
-                from: table.from.unwrap_or(Duration::ZERO),
-                to: table.to.unwrap_or(Duration::MAX),
-            },
-            at: table.at,
-            checks,
-        })
-    }
-
-    fn checks(&mut self, value: &Value, table: &ExpectTable) -> Vec<Check> {
-        let mut checks = Vec::new();
-        checks.extend(table.rmse_below.clone().map(Check::RmseBelow));
-        checks.extend(table.r2_above.map(Check::R2Above));
-        if let Some(beats) = &table.beats {
-            let places = place_list(value, "beats");
-            let rivals = beats.iter().zip(places).filter_map(|(name, place)| {
-                Some(match name.as_str() {
-                    "zero" => Rival::Zero,
-                    "persistence" => Rival::Persistence,
-                    _ => Rival::Channels(name.clone(), self.channels(name, place)?),
-                })
-            });
-            let rivals: Vec<Rival> = rivals.collect();
-            if !rivals.is_empty() {
-                checks.push(Check::Beats(rivals));
-            }
-        }
-        checks.extend(table.valid_above.map(Check::ValidAbove));
-        checks.extend(table.given_above.map(Check::GivenAbove));
-        let tolerance = match &table.within {
-            None => Tolerance::Number(0.0),
-            Some(Within::Number(number)) => Tolerance::Number(*number),
-            Some(Within::Quantity(quantity)) => Tolerance::Quantity(quantity.clone()),
-        };
-        let equals = table.equals.clone();
-        checks.extend(equals.map(|equals| Check::Equals(equals, tolerance)));
-        let between = table.between.clone();
-        checks.extend(between.map(|(low, high)| Check::Between(low, high)));
-        checks.extend(table.max_step_below.clone().map(Check::MaxStepBelow));
-        checks
-    }
-
-    /// Keys that need or exclude each other, and numbers out of their range.
-    fn check_keys(&mut self, value: &Value, table: &ExpectTable) {
-        let at = table.at.is_some();
-        let one_value = table.equals.is_some() || table.between.is_some();
-        let period = table.from.is_some() || table.to.is_some();
-        let of_truths = table.rmse_below.is_some()
-            || table.r2_above.is_some()
-            || table.beats.is_some()
-            || table.valid_above.is_some();
-        let wrong = [
-            (
-                table.within.is_some() && table.equals.is_none(),
-                "within",
-                "equals",
-                false,
-            ),
-            (at && !one_value, "at", "equals", false),
-            (
-                at && period,
-                "at",
-                if table.from.is_some() { "from" } else { "to" },
-                true,
-            ),
-            (
-                table.abs_truth_below.is_some() && !of_truths,
-                "abs_truth_below",
-                "rmse_below",
-                false,
-            ),
-        ];
-        for (_, key, with, excluded) in wrong.into_iter().filter(|(wrong, ..)| *wrong) {
-            let problem = TrialProblem::Keys {
-                key,
-                with,
-                excluded,
-            };
-            self.diagnostics.report(place_of(value, key), problem);
-        }
-        for (key, share) in [
-            ("valid_above", table.valid_above),
-            ("given_above", table.given_above),
-        ] {
-            if let Some(share) = share.filter(|share| !(0.0..1.0).contains(share)) {
-                self.range(value, key, share.to_string(), "0 or more and below 1");
-            }
-        }
-        if let Some(r2) = table.r2_above.filter(|r2| *r2 >= 1.0 || r2.is_nan()) {
-            self.range(value, "r2_above", r2.to_string(), "below 1");
-        }
-        if let (Some(from), Some(to)) = (table.from, table.to)
-            && from > to
-        {
-            self.range(value, "from", from.to_string(), "not after `to`");
-        }
-        let sizes = [
-            ("rmse_below", &table.rmse_below),
-            ("abs_truth_below", &table.abs_truth_below),
-            ("max_step_below", &table.max_step_below),
-        ];
-        for (key, size) in sizes {
-            if let Some(size) = size
-                .as_ref()
-                .filter(|size| size.value <= 0.0 || size.value.is_nan())
-            {
-                self.range(value, key, size.to_string(), "above 0");
-            }
-        }
-        let off = match &table.within {
-            Some(Within::Number(number)) => Some((*number, number.to_string())),
-            Some(Within::Quantity(quantity)) => Some((quantity.value, quantity.to_string())),
-            None => None,
-        };
-        if let Some((_, found)) = off.filter(|(off, _)| !(*off >= 0.0 && off.is_finite())) {
-            self.range(value, "within", found, "0 or more");
-        }
-        if let Some((low, high)) = &table.between
-            && low.unit.measures_same(&high.unit)
-            && !high
-                .in_unit(&low.unit)
-                .is_some_and(|high| low.value <= high)
-        {
-            let found = format!("from {low} to {high}");
-            self.range(value, "between", found, "given with the lower end first");
-        }
-    }
-
-    /// What a channel must be for the checks to make sense.
-    fn check_channel(&mut self, value: &Value, table: &ExpectTable, checks: &[Check], slot: usize) {
-        let planned = &self.plan.channels[slot];
-        let (unit, name) = (&planned.channel.unit, &planned.name);
-        let truth = planned.predicts;
-        let prediction_keys = checks.iter().filter(|check| check.is_of_predictions());
-        let limit = table.abs_truth_below.as_ref().map(|_| "abs_truth_below");
-        let first = prediction_keys.map(Check::key).chain(limit).next();
-        if let Some(key) = first.filter(|_| truth.is_none()) {
-            let channel = name.clone();
-            let problem = TrialProblem::NotAPrediction { key, channel };
-            self.diagnostics.report(place_of(value, key), problem);
-        }
-        let mut quantities: Vec<(&'static str, &Quantity, Unit)> = Vec::new();
-        for check in checks {
-            match check {
-                Check::RmseBelow(size) | Check::MaxStepBelow(size) => {
-                    quantities.push((check.key(), size, unit.difference()));
-                }
-                Check::Equals(wanted, tolerance) => {
-                    quantities.push(("equals", wanted, unit.clone()));
-                    if let Tolerance::Quantity(within) = tolerance {
-                        quantities.push(("within", within, unit.difference()));
-                    }
-                }
-                Check::Between(low, high) => {
-                    quantities.push(("between", low, unit.clone()));
-                    quantities.push(("between", high, unit.clone()));
-                }
-                Check::Beats(rivals) => self.check_rivals(value, rivals, slot),
-                Check::R2Above(_) | Check::ValidAbove(_) | Check::GivenAbove(_) => {}
-            }
-        }
-        if let (Some(limit), Some(truth)) = (&table.abs_truth_below, truth) {
-            let unit = self.plan.channels[truth].channel.unit.clone();
-            quantities.push(("abs_truth_below", limit, unit));
-        }
-        for (key, quantity, unit) in quantities {
-            if !quantity.unit.measures_same(&unit) {
-                let problem = TrialProblem::Units {
-                    key,
-                    found: quantity.unit.clone(),
-                    channel: name.clone(),
-                    expected: unit,
-                };
-                self.diagnostics.report(place_of(value, key), problem);
-            }
-        }
-    }
-
-    fn check_rivals(&mut self, value: &Value, rivals: &[Rival], slot: usize) {
-        let Some(truth) = self.plan.channels[slot].predicts else {
-            return;
-        };
-        for rival in rivals {
-            if let Rival::Channels(name, slots) = rival
-                && rival_of(self.plan, slot, slots).is_none()
-            {
-                let problem = TrialProblem::NoRival {
-                    rival: name.clone(),
-                    channel: self.plan.channels[slot].name.clone(),
-                    truth: self.plan.channels[truth].name.clone(),
-                };
-                self.diagnostics.report(place_of(value, "beats"), problem);
-            }
-        }
-    }
-
-    fn channels(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
+    pub(super) fn channels(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
         look_up(self.plan, reference)
             .map_err(|problem| self.diagnostics.report(place, problem))
             .ok()
@@ -590,7 +378,13 @@ impl Declaring<'_> {
         }
     }
 
-    fn range(&mut self, value: &Value, key: &'static str, found: String, allowed: &'static str) {
+    pub(super) fn range(
+        &mut self,
+        value: &Value,
+        key: &'static str,
+        found: String,
+        allowed: &'static str,
+    ) {
         let problem = TrialProblem::Range {
             key,
             found,
@@ -600,29 +394,10 @@ impl Declaring<'_> {
     }
 }
 
-/// The one of `slots` that predicts what `slot` does, as far ahead.
-pub(super) fn rival_of(plan: &Plan, slot: usize, slots: &[usize]) -> Option<usize> {
-    let of = &plan.channels[slot];
-    slots.iter().copied().find(|&rival| {
-        let rival = &plan.channels[rival];
-        rival.predicts.is_some()
-            && rival.predicts == of.predicts
-            && rival.channel.ahead == of.channel.ahead
-    })
-}
-
 /// Where the value of a key stands, or the table without it.
 pub(super) fn place_of(table: &Value, key: &str) -> Place {
     let value = table.as_table().and_then(|keys| keys.get(key));
     value.map_or(table.place, |value| value.place)
-}
-
-fn place_list(table: &Value, key: &str) -> Vec<Place> {
-    let list = table.as_table().and_then(|keys| keys.get(key)?.as_list());
-    list.unwrap_or_default()
-        .iter()
-        .map(|value| value.place)
-        .collect()
 }
 
 fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::declare::rival_of;
+use super::expect::rival_of;
 use super::expectation::{Check, Expectation, Rival, Tolerance};
 use super::run::Observed;
 use super::shape::as_difference;

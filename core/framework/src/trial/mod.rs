@@ -4,6 +4,7 @@
 mod channels;
 mod data;
 mod declare;
+mod expect;
 mod expectation;
 mod judge;
 mod problem;
