@@ -132,7 +132,7 @@ impl Run {
             writer.write_labelled_row(&row.time_text, row.time_ns, &shown, stepped.revision)?;
         }
         writer.finish()?;
-        course.tell(control.pump());
+        course.end(&mut control);
         let engine = stepper.engine();
         self.tell(terminal, engine, &reader);
         Ok(Answer::Fine)

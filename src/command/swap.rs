@@ -16,11 +16,12 @@ use crate::terminal::{Failure, Terminal};
 /// When and how the graph is replaced.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// Replace the graph at this time of the data, by another model or a graph whose estimators mean the same
+    /// Replace the graph at this time of the data, or so long after its first row, by another model or a graph whose
+    /// estimators mean the same
     #[arg(long, value_name = "TIME=GRAPH")]
     swap_at: Vec<String>,
     /// Compare a new graph with the running one for so long before it takes over
-    #[arg(long, value_name = "DURATION")]
+    #[arg(long, value_name = "DURATION", value_parser = some_time)]
     shadow: Option<Duration>,
     /// By how much the error of a new graph may be larger, such as "5%"
     #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = percent)]
@@ -30,8 +31,8 @@ pub struct Options {
     watch: bool,
 }
 
-/// How often a watched file is looked at, in rows.
-const LOOK_EVERY: u64 = 256;
+/// How often a watched file is looked at, however fast or slowly rows come.
+const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(200);
 
 fn percent(text: &str) -> Result<f64, String> {
     let digits = text
@@ -43,6 +44,16 @@ fn percent(text: &str) -> Result<f64, String> {
         _ => Err(format!(
             "expected a percentage such as \"5%\", found {text:?}"
         )),
+    }
+}
+
+fn some_time(text: &str) -> Result<Duration, String> {
+    match text.parse::<Duration>() {
+        Ok(time) if time > Duration::ZERO => Ok(time),
+        Ok(_) => Err(format!(
+            "expected some time such as \"30min\", found {text:?}"
+        )),
+        Err(error) => Err(error.to_string()),
     }
 }
 
@@ -58,38 +69,45 @@ impl Options {
     /// # Errors
     /// When a time cannot be read, or a graph not be used.
     pub fn schedule(&self, running: &Model) -> Result<Vec<Swap>, Failure> {
-        let mut swaps = Vec::new();
-        let mut before = running.clone();
+        let mut swaps: Vec<Swap> = Vec::new();
         for text in &self.swap_at {
             let (time, path) = text.split_once('=').ok_or_else(|| {
                 Failure::Request(format!("--swap-at takes TIME=GRAPH, such as 3600=new.toml or 1h=new.toml, found {text:?}"))
             })?;
-            let model = load(Path::new(path), &before)?;
-            before = model.clone();
+            let at = When::read(time, &running.plan.time)?;
+            let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
+            let model = load(Path::new(path), known)?;
             swaps.push(Swap {
-                at: instant(time, &running.plan.time)?,
+                at,
                 path: path.into(),
                 model,
             });
         }
-        swaps.sort_by_key(|swap| swap.at);
         Ok(swaps)
     }
+}
+
+/// When a graph takes over.
+#[derive(Debug, Clone, Copy)]
+enum When {
+    At(Instant),
+    /// So long after the first row.
+    After(Duration),
 }
 
 /// A graph that takes over at a time.
 #[derive(Debug)]
 pub struct Swap {
-    at: Instant,
+    at: When,
     path: PathBuf,
     /// The graph, with fits.
     pub model: Model,
 }
 
-/// A graph or model, with the fits of what has not changed since `before`.
-fn load(path: &Path, before: &Model) -> Result<Model, Failure> {
+/// A graph or model, with the fits of what means the same in one that is known.
+fn load<'a>(path: &Path, known: impl Iterator<Item = &'a Model>) -> Result<Model, Failure> {
     let mut model = Model::load(path)?;
-    model.take_fits_of(before);
+    known.for_each(|known| model.take_fits_of(known));
     let nodes = model.unfitted();
     if model.card.is_none() && !nodes.is_empty() {
         let error = athermal::core::model::ModelError::NotFitted {
@@ -101,47 +119,52 @@ fn load(path: &Path, before: &Model) -> Result<Model, Failure> {
     Ok(model)
 }
 
-/// A time as the data give it, or a duration since their zero.
-fn instant(text: &str, base: &TimeBase) -> Result<Instant, Failure> {
-    let TimeBase::Column { form, .. } = base;
-    let unit = match form {
-        TimeForm::Numbers { unit } => Some(*unit),
-        TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
-        TimeForm::Rfc3339 => None,
-    };
-    let plain = text
-        .parse::<f64>()
-        .ok()
-        .zip(unit)
-        .and_then(|(number, unit)| {
+impl When {
+    /// A time as the data give it, or a duration.
+    fn read(text: &str, base: &TimeBase) -> Result<Self, Failure> {
+        let TimeBase::Column { form, .. } = base;
+        let unit = match form {
+            TimeForm::Numbers { unit } => Some(*unit),
+            TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
+            TimeForm::Rfc3339 => None,
+        };
+        let number = || {
+            let (number, unit) = (text.parse::<f64>().ok()?, unit?);
             let ns = (number * unit.as_ns() as f64).round();
             (ns.abs() < 9e18).then_some(Instant::from_ns(ns as i64))
-        });
-    let written = || {
-        text.parse::<jiff::Timestamp>()
-            .ok()
-            .map(|time| i64::try_from(time.as_nanosecond()))
-    };
-    let dated = || written()?.ok().map(Instant::from_ns);
-    let since = || {
-        text.parse::<Duration>()
-            .ok()
-            .map(|since| Instant::from_ns(since.as_ns()))
-    };
-    plain.or_else(dated).or_else(since).ok_or_else(|| {
-        Failure::Request(format!("--swap-at: {text:?} is no time of these data: write it as they do, or as a duration such as 6h"))
-    })
+        };
+        let date = || {
+            let time = text.parse::<jiff::Timestamp>().ok()?;
+            i64::try_from(time.as_nanosecond())
+                .ok()
+                .map(Instant::from_ns)
+        };
+        let after = || text.parse().ok().map(Self::After);
+        let at = number().or_else(date).map(Self::At);
+        at.or_else(after).ok_or_else(|| {
+            Failure::Request(format!("--swap-at: {text:?} is no time of these data: write it as they do, or as a duration such as 6h"))
+        })
+    }
+
+    fn instant(self, first: Instant) -> Instant {
+        match self {
+            Self::At(at) => at,
+            Self::After(after) => first + after,
+        }
+    }
 }
 
 /// The course of replacements during a run.
 pub struct Course<'a> {
     terminal: &'a Terminal,
     options: &'a Options,
-    waiting: std::vec::IntoIter<Swap>,
-    next: Option<Swap>,
+    /// Latest first, once there has been a row.
+    waiting: Vec<Swap>,
+    first: Option<Instant>,
     running: Model,
     staged: Option<(Model, PathBuf)>,
-    watched: Option<(PathBuf, Option<SystemTime>)>,
+    watched: Option<(PathBuf, Option<Written>)>,
+    looked: std::time::Instant,
     columns: Vec<String>,
     rows: u64,
 }
@@ -156,17 +179,16 @@ impl<'a> Course<'a> {
         swaps: Vec<Swap>,
         columns: Vec<String>,
     ) -> Self {
-        let mut waiting = swaps.into_iter();
-        let next = waiting.next();
         let watched = options.watch.then(|| (path.to_owned(), changed(path)));
         Self {
             terminal,
             options,
-            waiting,
-            next,
+            waiting: swaps,
+            first: None,
             running,
             staged: None,
             watched,
+            looked: std::time::Instant::now(),
             columns,
             rows: 0,
         }
@@ -178,8 +200,16 @@ impl<'a> Course<'a> {
     /// When a graph named at the start cannot take over.
     pub fn before(&mut self, control: &mut Control, now: Instant) -> Result<(), Failure> {
         self.rows += 1;
-        let due = self.next.as_ref().is_some_and(|swap| swap.at <= now);
-        let look = self.watched.is_some() && self.rows.is_multiple_of(LOOK_EVERY);
+        let first = *self.first.get_or_insert_with(|| {
+            // Of two for the same time, the first named takes over first.
+            self.waiting.reverse();
+            self.waiting
+                .sort_by_key(|swap| std::cmp::Reverse(swap.at.instant(now)));
+            now
+        });
+        let next = self.waiting.last();
+        let due = next.is_some_and(|swap| swap.at.instant(first) <= now);
+        let look = self.watched.is_some() && self.looked.elapsed() >= LOOK_EVERY;
         if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(1024)) {
             return Ok(());
         }
@@ -187,16 +217,14 @@ impl<'a> Course<'a> {
         if self.staged.is_some() {
             self.judge(control)?;
         }
-        if due && self.staged.is_none() {
-            let swap = self.next.take();
-            self.next = self.waiting.next();
-            if let Some(Swap {
+        if due
+            && self.staged.is_none()
+            && let Some(Swap {
                 path, mut model, ..
-            }) = swap
-            {
-                model.take_fits_of(&self.running);
-                self.stage(control, model, path)?;
-            }
+            }) = self.waiting.pop()
+        {
+            model.take_fits_of(&self.running);
+            self.stage(control, model, path)?;
         }
         if look && self.staged.is_none() {
             self.look(control);
@@ -206,6 +234,7 @@ impl<'a> Course<'a> {
 
     /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
     fn look(&mut self, control: &mut Control) {
+        self.looked = std::time::Instant::now();
         let Some((path, seen)) = &mut self.watched else {
             return;
         };
@@ -215,7 +244,7 @@ impl<'a> Course<'a> {
         }
         *seen = now;
         let path = path.clone();
-        let model = match load(&path, &self.running) {
+        let model = match load(&path, std::iter::once(&self.running)) {
             Ok(model) => model,
             Err(failure) => {
                 self.terminal.error(&failure);
@@ -282,8 +311,21 @@ impl<'a> Course<'a> {
         Ok(())
     }
 
+    /// Tells, once the data have ended, what has happened since and what has not.
+    pub fn end(&self, control: &mut Control) {
+        self.tell(control.pump());
+        let shadowed = self.staged.iter().map(|(_, path)| path);
+        let waiting = self.waiting.iter().rev().map(|swap| &swap.path);
+        for path in shadowed.chain(waiting) {
+            self.terminal.warning(format_args!(
+                "{} did not take over: the data ended before",
+                path.display()
+            ));
+        }
+    }
+
     /// Tells what has happened.
-    pub fn tell(&self, notices: Vec<Notice>) {
+    fn tell(&self, notices: Vec<Notice>) {
         for notice in notices {
             match notice {
                 Notice::TookOver { revision, tick, .. } => {
@@ -339,10 +381,12 @@ pub fn reading(running: &Model, swaps: &[Swap], feed: &[Feed]) -> athermal::core
     plan
 }
 
-fn changed(path: &Path) -> Option<SystemTime> {
-    std::fs::metadata(path)
-        .and_then(|facts| facts.modified())
-        .ok()
+/// When a file was written, and how long it is.
+type Written = (SystemTime, u64);
+
+fn changed(path: &Path) -> Option<Written> {
+    let facts = std::fs::metadata(path).ok()?;
+    Some((facts.modified().ok()?, facts.len()))
 }
 
 fn refused(error: StageError) -> Failure {
