@@ -77,8 +77,8 @@ impl ClosedLoop {
             if !unit.measures_same(&planned.channel.unit) {
                 return Err(MachineError::Unit {
                     channel: source.name.clone(),
-                    machine: unit,
-                    graph: planned.channel.unit.clone(),
+                    machine: Box::new(unit),
+                    graph: Box::new(planned.channel.unit.clone()),
                 });
             }
             feeds.push(Some(Feed {
