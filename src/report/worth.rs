@@ -135,8 +135,15 @@ fn engine(track: &Track) -> Result<Engine, ReportError> {
     Ok(Engine::new(Arc::new(plan), &Fitted::new())?)
 }
 
-pub(super) fn worth(track: &Track) -> Result<Worth, ReportError> {
-    let mut engine = engine(track)?;
+pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
+    let mut engine = match engine(track) {
+        // The graph's loss may be of other axes than are corrected; the drifts are told all the same.
+        Err(_) if track.loss.is_some() => {
+            track.loss = None;
+            engine(track)?
+        }
+        engine => engine?,
+    };
     let plan = Arc::clone(engine.plan());
     let place = |name: &str| plan.outputs.iter().position(|output| output.name == name);
     let drift = |way: &str| -> Vec<Option<usize>> {
