@@ -82,7 +82,9 @@ pub fn gather(
         &mut |_| {},
     )?;
     let (course, track) = course::follow(model, recording)?;
-    let worth = track.map(|track| worth::worth(&track)).transpose()?;
+    let worth = track
+        .map(|mut track| worth::worth(&mut track))
+        .transpose()?;
     Ok(Facts {
         graph: model.plan.name.clone().unwrap_or_default(),
         data,

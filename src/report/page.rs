@@ -23,7 +23,7 @@ p,ul{margin:.4rem 0}.muted{color:var(--muted);font-size:.9rem}.good{color:var(--
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.9rem}th,td{padding:.15rem .6rem;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap}\
 th:first-child,td:first-child{text-align:left}summary{cursor:pointer;font-weight:600;padding:.3rem 0}\
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,320px),1fr));gap:.6rem}.pair svg.chart{width:100%}\
-@media print{body{max-width:none;font-size:11pt}.wide svg.chart{min-width:0}details,svg,tr{break-inside:avoid}h2,h3{break-after:avoid}.screen{display:none}}";
+@media print{body{max-width:none;font-size:11pt}.wide{overflow:visible}.wide svg.chart{min-width:0}table{font-size:7.5pt}th,td{padding:.1rem .3rem}details,svg,tr{break-inside:avoid}h2,h3{break-after:avoid}.screen{display:none}}";
 
 /// Zooming: the wheel about the pointer, dragging, double click for all. All charts of time move together.
 const SCRIPT: &str = r#"addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>{d.open=true}));(()=>{const all=[...document.querySelectorAll('svg.zoom')].map(s=>{const b=s.viewBox.baseVal;

@@ -135,8 +135,15 @@ fn engine(track: &Track) -> Result<Engine, ReportError> {
     Ok(Engine::new(Arc::new(plan), &Fitted::new())?)
 }
 
-pub(super) fn worth(track: &Track) -> Result<Worth, ReportError> {
-    let mut engine = engine(track)?;
+pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
+    let mut engine = match engine(track) {
+        // The graph's loss may be of other axes than are corrected; the drifts are told all the same.
+        Err(_) if track.loss.is_some() => {
+            track.loss = None;
+            engine(track)?
+        }
+        engine => engine?,
+    };
     let plan = Arc::clone(engine.plan());
     let place = |name: &str| plan.outputs.iter().position(|output| output.name == name);
     let drift = |way: &str| -> Vec<Option<usize>> {
@@ -189,8 +196,8 @@ pub(super) fn worth(track: &Track) -> Result<Worth, ReportError> {
         let outputs = engine.step(row.at, &samples)?;
         let at_s = (row.at - Instant::from_ns(0)).secs();
         let get = |place: Option<usize>| place.map_or(f64::NAN, |place| outputs[place]);
-        for i in 0..count {
-            let (without, with) = (get(drifts[0][i]), get(drifts[1][i]));
+        for (i, (&without, &with)) in drifts[0].iter().zip(&drifts[1]).enumerate() {
+            let (without, with) = (get(without), get(with));
             if !without.is_nan() {
                 worth.drift_without[i].push(at_s, without);
                 worth.drift_with[i].push(at_s, with);

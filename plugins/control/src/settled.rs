@@ -185,12 +185,8 @@ impl Settling {
 
     fn loss(&mut self, value: f64, now: Instant) {
         let known = &mut self.known;
-        // Written so that an absent loss is not low.
-        if value >= self.below || value.is_nan() {
-            known.low_since = None;
-        } else if known.low_since.is_none() {
-            known.low_since = Some(now);
-        }
+        // An absent loss is not low.
+        known.low_since = (value < self.below).then(|| known.low_since.unwrap_or(now));
         known.newest = Some(now);
     }
 }
