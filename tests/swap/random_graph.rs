@@ -121,7 +121,7 @@ impl Node {
 }
 
 /// Writes the same in other words.
-fn respell(random: &mut Prng, lines: &mut Vec<String>) {
+fn respell(random: &mut Prng, lines: &mut [String]) {
     for line in lines.iter_mut() {
         for (from, to) in [
             ("\"45s\"", "\"0.75min\""),

@@ -65,9 +65,6 @@ impl Blending {
         let own = self.own;
         *self = *from;
         self.own = own;
-        if own == from.own {
-            return;
-        }
         match (own, from.own) {
             (Some((at, value)), Some((same, before))) if at == same && !from.begins => {
                 self.offset += before - value;
