@@ -82,7 +82,7 @@ fn log(name: &str, days: f64, seed: u64) -> (PathBuf, u64) {
 }
 
 fn dataset(path: &Path) -> Dataset {
-    Dataset::new(vec![path.clone()], Options::default())
+    Dataset::new(vec![path.to_path_buf()], Options::default())
 }
 
 #[divan::bench(sample_count = 10)]

@@ -87,11 +87,7 @@ fn check_embargo(ahead_s: f64, truth: &str, span_s: f64) {
         bench.tick(now, &samples);
         let told = bench.value("vote.Z");
         let allowed = now + (ahead_s - span_s).min(0.0);
-        let expected = truths
-            .iter()
-            .copied()
-            .filter(|&tau| tau <= allowed)
-            .next_back();
+        let expected = truths.iter().copied().rfind(|&tau| tau <= allowed);
         assert_eq!(
             told,
             expected.unwrap_or(-1.0),

@@ -55,11 +55,7 @@ fn walk(bench: &mut Bench, mut check: impl FnMut(&Bench, f64, &[(f64, f64)])) {
 
 /// The last position at or before an instant that is not older, counted from there, than the signal's `max_age`.
 fn last(known: &[(f64, f64)], asked: f64) -> Option<(f64, f64)> {
-    let found = known
-        .iter()
-        .copied()
-        .filter(|(at, _)| *at <= asked)
-        .next_back();
+    let found = known.iter().copied().rfind(|(at, _)| *at <= asked);
     found.filter(|(at, _)| asked - at <= 180.0)
 }
 
@@ -115,11 +111,7 @@ fn check_persistence(ahead: &str, lag_s: f64) {
             drifts.push((now, bench.value("drift.Z")));
         }
         let asked = now - lag_s;
-        let held = drifts
-            .iter()
-            .copied()
-            .filter(|(at, _)| *at <= asked)
-            .next_back();
+        let held = drifts.iter().copied().rfind(|(at, _)| *at <= asked);
         let expected = held
             .filter(|(at, _)| asked - at <= 300.0)
             .map_or(f64::NAN, |(_, value)| value);
