@@ -131,7 +131,7 @@ fn told_of(ahead: &str) -> String {
 fn integrating_another_horizon_than_half_the_span_is_warned_of() {
     assert_eq!(told_of("150s"), "");
     let told = told_of("0s");
-    assert!(told.starts_with("warning[A063]"), "{told}");
+    assert!(told.starts_with("warning[A065]"), "{told}");
     assert!(
         told.contains("looks 0s ahead") && told.contains("predict `ahead = \"150s\"`"),
         "{told}"

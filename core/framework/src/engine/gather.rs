@@ -47,6 +47,13 @@ impl Gathered {
             Some(range) => self.read_range(gather, slots, range, now),
             None => self.read_each(gather, slots, histories, now),
         }
+        for conversion in &gather.conversions {
+            let value = &mut self.values[conversion.entry];
+            // A NaN says why there is no value, and must stay as it is.
+            if !value.is_nan() {
+                *value *= conversion.factor();
+            }
+        }
     }
 
     /// A whole port, as it is most often read. It has a loop of its own since it is the widest of a tick.
@@ -82,13 +89,6 @@ impl Gathered {
             self.fresh |= ran && !value.is_nan();
             self.values[i] = seen(gather.read, entry, value, ran, now - stamp);
             self.stamps[i] = stamp;
-        }
-        for conversion in &gather.conversions {
-            let value = &mut self.values[conversion.entry];
-            // A NaN says why there is no value, and must stay as it is.
-            if !value.is_nan() {
-                *value *= conversion.factor();
-            }
         }
     }
 

@@ -7,6 +7,9 @@ use super::parts::Parts;
 use super::rows::Rows;
 use super::sums::{Quad, Table, quads};
 
+/// Blocks that restored ones have room for, beside as many again.
+const SPARE_BLOCKS: usize = 16;
+
 /// Rows of a block at most. Fewer cost more when a block closes, as all blocks are added up then; more make that step longer.
 const MOST_ROWS: u64 = 64;
 
@@ -210,6 +213,10 @@ impl Blocks {
         rebases: [u64; 2],
     ) {
         self.starts.extend_from_slice(starts);
+        // Whoever appends from here on must not have to make room.
+        self.starts.reserve(self.starts.len() + SPARE_BLOCKS);
+        self.rest
+            .resize((2 * self.starts.len() + SPARE_BLOCKS).next_power_of_two());
         self.origins.as_flattened_mut()[..origins.len()].copy_from_slice(origins);
         self.gaps = rows.complete_from() > self.oldest();
         self.keep_times();

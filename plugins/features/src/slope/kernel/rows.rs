@@ -134,10 +134,22 @@ impl Rows {
 
     /// Makes room for one more row if all from `oldest` on are kept; says whether rows have changed their slots.
     pub(super) fn reserve(&mut self, oldest: u64) -> bool {
-        let old = self.time.len();
-        if self.next - oldest < old as u64 {
+        if self.next - oldest < self.time.len() as u64 {
             return false;
         }
+        self.grow(oldest);
+        true
+    }
+
+    /// Makes room for twice the rows that there are, so that whoever appends to restored rows need not.
+    pub(super) fn make_room(&mut self) {
+        while (self.time.len() as u64) < 2 * self.next {
+            self.grow(0);
+        }
+    }
+
+    fn grow(&mut self, oldest: u64) {
+        let old = self.time.len();
         let width = self.quads;
         self.time.resize(2 * old, 0);
         self.samples.resize(2 * old * width, [0.0; 4]);
@@ -149,7 +161,6 @@ impl Rows {
             self.samples.copy_within(groups.clone(), to * width);
             self.wait.copy_within(groups, to * width);
         }
-        true
     }
 
     /// Appends a row where room has been made; `y` is one sample per channel, absent where it ends early or is `limit` or more.

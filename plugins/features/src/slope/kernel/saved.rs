@@ -107,6 +107,7 @@ impl TryFrom<Saved> for RollingSlope {
             kernel.rows.reserve(0);
             kernel.rows.append(t_ns, &samples, LIMIT, 0);
         }
+        kernel.rows.make_room();
         for channel in 0..channels {
             let times = [saved.first_ns[channel], saved.newest_ns[channel]];
             kernel.rows.set_first_and_newest(channel, times);
