@@ -99,7 +99,7 @@ fn a_port_is_given_its_channels_in_its_own_unit() {
         Some(1)
     );
     assert_eq!(
-        plan.channels.last().unwrap().channel.unit.to_string(),
+        plan.channels[plan.outputs[0].slot].channel.unit.to_string(),
         "mK/min"
     );
 }
@@ -135,7 +135,10 @@ fn votes_are_given_in_the_unit_of_the_truth() {
     };
     for (truth, unit, entry) in [("rate", "K/s", 1), ("fine", "mK/min", 0)] {
         let plan = compiled(&vote(truth)).unwrap();
-        assert_eq!(plan.channels.last().unwrap().channel.unit.to_string(), unit);
+        assert_eq!(
+            plan.channels[plan.outputs[0].slot].channel.unit.to_string(),
+            unit
+        );
         let all: Vec<_> = plan
             .gathers
             .iter()

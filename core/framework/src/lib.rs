@@ -9,7 +9,7 @@
 //!
 //! | layer | decides |
 //! |---|---|
-//! | [`time`], [`unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
+//! | [`time`], [`mod@unit`], [`quantity`], [`channel`] | instants, durations, units, named channels with unit and span |
 //! | [`diagnostic`] | how a mistake in a file is told: code, place, reason, a way out |
 //! | [`document`] | a file (with what it extends) as a tree with places, expanded into declarations |
 //! | [`node`] | the traits that authors implement, the registry of kinds |
