@@ -232,23 +232,21 @@ impl ByHand {
             .filter(|(_, square)| !square.is_nan())
             .fold(f64::INFINITY, |best, (_, square)| best.min(*square))
             .max(f64::MIN_POSITIVE);
-        let (mut known, mut weights, mut weighted) = (0.0, 0.0, 0.0);
-        let (mut new, mut sum_of_new) = (0.0, 0.0);
+        let weight = |square: f64| best / square.max(f64::MIN_POSITIVE);
+        let known = there.clone().filter(|(_, square)| !square.is_nan());
+        let (sum, count) = known.fold((0.0, 0.0), |(sum, count), (_, square)| {
+            (sum + weight(*square), count + 1.0)
+        });
+        let of_new = if count > 0.0 { sum / count } else { 1.0 };
+        let (mut weights, mut weighted) = (0.0, 0.0);
         for (vote, square) in there {
-            if square.is_nan() {
-                new += 1.0;
-                sum_of_new += vote;
+            let weight = if square.is_nan() {
+                of_new
             } else {
-                let weight = best / square.max(f64::MIN_POSITIVE);
-                known += 1.0;
-                weights += weight;
-                weighted += weight * vote;
-            }
-        }
-        if new > 0.0 {
-            let weight = if known > 0.0 { weights / known } else { 1.0 };
-            weighted += weight * sum_of_new;
-            weights += weight * new;
+                weight(*square)
+            };
+            weights += weight;
+            weighted += weight * vote;
         }
         weighted / weights
     }
