@@ -114,14 +114,9 @@ pub fn tell(
     }
 }
 
-/// Fowler, Noll and Vo's hash in its variant 1a with 64 bits: for telling files apart, not for guarding them.
+/// The checksum of a content as text: [`athermal::core::engine::fnv_1a`] in hexadecimal digits.
 pub fn fnv_1a(content: &[u8]) -> String {
-    let hash = content
-        .iter()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-        });
-    format!("{hash:016x}")
+    format!("{:016x}", athermal::core::engine::fnv_1a(content))
 }
 
 #[cfg(test)]
