@@ -1,4 +1,5 @@
-//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, stochastic gradients.
+//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, stochastic gradients; and the Kalman
+//! filter of structural models.
 //!
 //! Decides how rows of regressors become statistics and how statistics become coefficients. Does not decide where rows
 //! come from, what a regressor is called or what its unit is. Everything runs on the calling thread, and the same rows
@@ -27,9 +28,11 @@ mod error;
 mod fold_state;
 mod folds;
 mod gram;
+mod kalman;
 mod least_squares;
 mod normal_equations;
 mod orthogonal;
+mod prediction_variance;
 mod scaler;
 mod score;
 mod selection;
@@ -39,7 +42,12 @@ pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
 pub use error::NumericsError;
 pub use folds::{Split, contiguous_folds, leave_one_out};
 pub use gram::Gram;
+pub use kalman::{
+    Forecast, Innovation, Kalman, MostLikely, Passage, Series, Structural, log_likelihood,
+    most_likely,
+};
 pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
+pub use prediction_variance::PredictionVariance;
 pub use scaler::{Standardization, Standardizer};
 pub use score::{Score, ScoreAccumulator};
 pub use selection::{CandidateScore, ForwardSelection, Selection, SelectionScore, SelectionStep};

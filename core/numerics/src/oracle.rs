@@ -9,6 +9,16 @@ pub(crate) struct Table {
 }
 
 impl Table {
+    pub(crate) fn parse(text: &str) -> Self {
+        let mut lines = text
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+        Self {
+            header: lines.next().unwrap(),
+            records: lines.collect(),
+        }
+    }
+
     /// All records as numbers, NaN where a field is empty or text.
     pub(crate) fn numbers(&self) -> Vec<Vec<f64>> {
         self.records
@@ -44,12 +54,5 @@ pub(crate) fn text(file: &str) -> Option<String> {
 
 /// A CSV file under `oracles/`; see [`text`].
 pub(crate) fn table(file: &str) -> Option<Table> {
-    let text = text(file)?;
-    let mut lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    Some(Table {
-        header: lines.next().unwrap(),
-        records: lines.collect(),
-    })
+    text(file).map(|text| Table::parse(&text))
 }
