@@ -33,6 +33,7 @@ mod least_squares;
 mod normal_equations;
 mod orthogonal;
 mod prediction_variance;
+mod rls;
 mod scaler;
 mod score;
 mod selection;
@@ -48,6 +49,7 @@ pub use kalman::{
 };
 pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
 pub use prediction_variance::PredictionVariance;
+pub use rls::{Forgetting, Rls, RlsOptions};
 pub use scaler::{Standardization, Standardizer};
 pub use score::{Score, ScoreAccumulator};
 pub use selection::{CandidateScore, ForwardSelection, Selection, SelectionScore, SelectionStep};

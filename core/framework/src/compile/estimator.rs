@@ -2,13 +2,14 @@
 
 use super::instance::{Instance, Limits};
 use super::leak::Suspect;
+use super::learning;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
 use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::diagnostic::Place;
-use crate::node::{Estimator, OutputPort, Regressor, TruthLags};
+use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -35,6 +36,7 @@ impl Resolver<'_> {
         for port in (instance.kind.inputs)() {
             match port.name {
                 "truth" => truth = self.single(instance, port).map(|slot| (*port, slot)),
+                FREEZE => {}
                 _ => features = self.slots(instance, port).map(|slots| (Some(*port), slots)),
             }
         }
@@ -87,9 +89,11 @@ impl Resolver<'_> {
             gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
         }
         let training = self.limits(instance, &link);
+        let learning = self.learning(instance, estimator);
         if !whole {
             return None;
         }
+        let (training, learning) = (training?, learning?);
         let behind = Provenance::of(
             behind
                 .iter()
@@ -105,13 +109,19 @@ impl Resolver<'_> {
             gathers,
             every_tick: wanted.every_tick,
             truth: link,
-            training: training?,
+            training,
+            learning,
         };
-        let port = OutputPort {
+        let mut ports = vec![OutputPort {
             name: "prediction",
-            channels: vec![prediction],
-        };
-        self.add(instance, vec![port], role, vec![behind], Some(truth))
+            channels: vec![prediction.clone()],
+        }];
+        let mut behind = vec![behind];
+        if learning.is_some() {
+            ports.push(learning::port(&prediction));
+            behind.push(behind[0].clone());
+        }
+        self.add(instance, ports, role, behind, Some(truth))
     }
 
     /// A truth as predictions `ahead` of it are paired with it.

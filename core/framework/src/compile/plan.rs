@@ -166,6 +166,8 @@ pub enum PlannedRole {
         truth: TruthLink,
         /// Which rows it is fitted on.
         training: TrainingLimits,
+        /// How it goes on learning while it runs, where it does.
+        learning: Option<PlannedLearning>,
     },
     /// One prediction of several.
     Combiner {
@@ -176,6 +178,17 @@ pub enum PlannedRole {
         /// Whether somebody reads its weights.
         weights: bool,
     },
+}
+
+/// How an estimator goes on learning while it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedLearning {
+    /// A truth that misses its prediction by more than this multiple of the recent error is not learned from.
+    pub outliers: f64,
+    /// By which multiple of its width a regressor may lie outside its range in the fit.
+    pub margin: f64,
+    /// The gather of the channels that must all be 0 for learning to go on.
+    pub freeze: Option<usize>,
 }
 
 /// A truth and how predictions are paired with it.

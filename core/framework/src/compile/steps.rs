@@ -61,8 +61,12 @@ pub(super) fn warm_up(plan: &Plan) -> Duration {
 
 fn gathers(role: &PlannedRole) -> Vec<usize> {
     match role {
-        PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
-            gathers.clone()
+        PlannedRole::Feature { gathers, .. } => gathers.clone(),
+        PlannedRole::Estimator {
+            gathers, learning, ..
+        } => {
+            let freeze = learning.as_ref().and_then(|learning| learning.freeze);
+            gathers.iter().copied().chain(freeze).collect()
         }
         PlannedRole::Combiner { voters, .. } => vec![*voters],
     }

@@ -233,15 +233,27 @@ fn same_fit(old: &Fitted, new: &Fitted, instance: &str) -> bool {
 
 /// The slots that a node reads, with its truth.
 pub(super) fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
-    let (gathers, truth): (&[usize], Option<usize>) = match &node.role {
-        PlannedRole::Feature { gathers, .. } => (gathers, None),
-        PlannedRole::Estimator { gathers, truth, .. } => (gathers, Some(truth.slot)),
-        PlannedRole::Combiner { voters, truth, .. } => {
-            (std::slice::from_ref(voters), truth.map(|truth| truth.slot))
+    let (gathers, freeze, truth): (&[usize], _, Option<usize>) = match &node.role {
+        PlannedRole::Feature { gathers, .. } => (gathers, None, None),
+        PlannedRole::Estimator {
+            gathers,
+            learning,
+            truth,
+            ..
+        } => {
+            let freeze = learning.as_ref().and_then(|learning| learning.freeze);
+            (gathers, freeze, Some(truth.slot))
         }
+        PlannedRole::Combiner { voters, truth, .. } => (
+            std::slice::from_ref(voters),
+            None,
+            truth.map(|truth| truth.slot),
+        ),
     };
     let entries = gathers
         .iter()
-        .flat_map(|&gather| &plan.gathers[gather].entries);
+        .copied()
+        .chain(freeze)
+        .flat_map(|gather| &plan.gathers[gather].entries);
     entries.map(|entry| entry.slot).chain(truth)
 }

@@ -7,6 +7,7 @@
 mod combiner;
 mod estimator;
 mod feature;
+mod learner;
 mod port;
 mod registry;
 mod state;
@@ -17,7 +18,8 @@ pub use estimator::{
     TrainingReport, TrainingSetup, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
-pub use port::{InputPort, Inputs, Mistake, OutputPort, Read};
+pub use learner::{Learner, Learns, TrainedRange};
+pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{Kind, NodeSpec, Role, RoleName, kind, kinds};
