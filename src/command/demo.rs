@@ -124,8 +124,11 @@ fn fit_model(
 }
 
 fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Failure> {
-    let standard_errors = true;
-    let model = Model::load_for(model, Wanted { standard_errors })?;
+    let wanted = Wanted {
+        standard_errors: true,
+        intervals: false,
+    };
+    let model = Model::load_for(model, wanted)?;
     let dataset = Data::of(vec![test.to_owned()]).dataset();
     let options = ScoreOptions {
         abs_truth_below: LIMIT.parse().ok(),

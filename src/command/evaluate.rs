@@ -47,6 +47,7 @@ impl Evaluate {
             &self.model,
             Wanted {
                 standard_errors: true,
+                intervals: true,
             },
         )?;
         self.check_limit(&model)?;

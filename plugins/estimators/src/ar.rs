@@ -14,6 +14,8 @@ use crate::regression::{LinearTrainer, Solver, lag_mistakes};
 /// `ŷ(t + ahead) = b₀ + Σ b_l y(t − L_l)` (Ljung 1999, section 4.2). Lags count back from the instant of the run, and the
 /// value taken is the last one at or before the instant asked for. A lag whose window overlaps the predicted one is an
 /// error. The answer changes with time alone, so the node runs at every tick.
+///
+/// The port `deviation` is the standard deviation of the truth about the prediction, as `linear` gives it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ar {
@@ -41,6 +43,10 @@ impl Estimator for Ar {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes
+    }
+
+    fn deviates(&self) -> bool {
+        self.solver.deviates()
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -13,6 +13,8 @@ use crate::regression::{LinearTrainer, Selection, Solver, lag_mistakes};
 ///
 /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t − F) + Σ a_l y(t − L_l)` (Ljung 1999, section 4.2). With a selection, lags are
 /// candidates like the features. The answer changes with time alone, so the node runs at every tick.
+///
+/// The port `deviation` is the standard deviation of the truth about the prediction, as `linear` gives it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arx {
@@ -57,6 +59,10 @@ impl Estimator for Arx {
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
         mistakes
+    }
+
+    fn deviates(&self) -> bool {
+        self.solver.deviates()
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

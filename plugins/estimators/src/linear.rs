@@ -12,6 +12,11 @@ use crate::regression::{LinearTrainer, Selection, Solver};
 /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t)`. Features are standardised over all training rows (mean 0, population variance 1)
 /// before the solver sees them; the stated coefficients are for the features as they are. With a selection, features are
 /// added one by one by cross-validation, as in Mandelli, Dankwart and Napoli, section 3.3.
+///
+/// The port `deviation` is the standard deviation of the truth about the prediction, in the unit of the truth (not with the
+/// solver `sgd`): `s √(1 + 1/n + (x − x̄)ᵀ (XᵀX + αI)⁻¹ (x − x̄))` on standardised features, `s²` the residual variance
+/// (Draper and Smith 1998, section 3.1; for ridge, the posterior of Hastie, Tibshirani and Friedman 2009, section 3.4.1).
+/// It takes the data for more of the same: `conformal` measures how often an interval holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {
@@ -47,6 +52,10 @@ impl Estimator for Linear {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
         mistakes
+    }
+
+    fn deviates(&self) -> bool {
+        self.solver.deviates()
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

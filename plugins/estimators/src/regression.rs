@@ -8,7 +8,7 @@ use athermal_core::node::{
 use athermal_core::time::Duration;
 use athermal_numerics::{
     ForwardSelection, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
-    SelectionScore, Sgd, SgdOptions, Standardization,
+    PredictionVariance, SelectionScore, Sgd, SgdOptions, Standardization,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -140,6 +140,14 @@ impl Solver {
             }
         }
         mistakes
+    }
+
+    /// Whether theory says how far predictions may be off.
+    pub(crate) fn deviates(&self) -> bool {
+        match self {
+            Self::Ridge { .. } | Self::Ols {} => true,
+            Self::Sgd { .. } => false,
+        }
     }
 
     /// The penalty that selection works with.
@@ -282,6 +290,10 @@ impl LinearTrainer {
                 regressors: names,
                 coefficients: fit.coefficients.clone(),
                 intercept: fit.intercept,
+                // Without more rows than coefficients there is a prediction, and nothing to say about its error.
+                variance: squares
+                    .prediction_variance(&gram, &standard.scales, &fit)
+                    .ok(),
             },
             Solver::Sgd {
                 alpha,
@@ -358,6 +370,7 @@ impl LinearTrainer {
             regressors: names,
             coefficients,
             intercept: sgd.intercept() + mean - shift,
+            variance: None,
         })
     }
 
@@ -428,6 +441,9 @@ pub struct LinearPredictor {
     /// The intercept, in the unit of the truth.
     #[serde(with = "number")]
     intercept: f64,
+    /// How far a truth may be from its prediction, where theory says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    variance: Option<PredictionVariance>,
 }
 
 #[typetag::serde(name = "linear")]
@@ -439,5 +455,10 @@ impl Predictor for LinearPredictor {
     fn predict(&self, regressors: &[f64]) -> f64 {
         let terms = self.coefficients.iter().zip(regressors);
         terms.fold(self.intercept, |sum, (b, x)| sum + b * x)
+    }
+
+    fn deviation(&self, regressors: &[f64]) -> f64 {
+        let variance = self.variance.as_ref();
+        variance.map_or(f64::NAN, |variance| variance.at(regressors).sqrt())
     }
 }

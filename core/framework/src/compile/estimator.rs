@@ -13,6 +13,21 @@ use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
+/// The port of the standard deviation of the truth about its prediction.
+pub(super) const DEVIATION: &str = "deviation";
+
+/// The port of the standard deviation of the truth about a prediction.
+pub(super) fn deviation_of(prediction: &Channel) -> OutputPort {
+    let channel = Channel {
+        unit: prediction.unit.difference(),
+        ..prediction.clone()
+    };
+    OutputPort {
+        name: DEVIATION,
+        channels: vec![channel],
+    }
+}
+
 impl Resolver<'_> {
     pub(super) fn estimator(
         &mut self,
@@ -104,14 +119,6 @@ impl Resolver<'_> {
             ahead: link.ahead,
             ..of.clone()
         };
-        let role = PlannedRole::Estimator {
-            regressors,
-            gathers,
-            every_tick: wanted.every_tick,
-            truth: link,
-            training,
-            learning,
-        };
         let mut ports = vec![OutputPort {
             name: "prediction",
             channels: vec![prediction.clone()],
@@ -121,6 +128,21 @@ impl Resolver<'_> {
             ports.push(learning::port(&prediction));
             behind.push(behind[0].clone());
         }
+        let mut deviation = None;
+        if estimator.deviates() {
+            deviation = Some(self.channels.len() + ports.len());
+            ports.push(deviation_of(&prediction));
+            behind.push(behind[0].clone());
+        }
+        let role = PlannedRole::Estimator {
+            regressors,
+            gathers,
+            every_tick: wanted.every_tick,
+            truth: link,
+            training,
+            learning,
+            deviation,
+        };
         self.add(instance, ports, role, behind, Some(truth))
     }
 

@@ -39,6 +39,8 @@ use crate::document::GraphFile;
 pub struct Wanted {
     /// The standard errors of truths whose producers can give them (a port named `stderr`).
     pub standard_errors: bool,
+    /// The standard deviations of predictions whose makers can give them, and the bounds of intervals.
+    pub intervals: bool,
 }
 
 /// Compiles a graph. All mistakes are told; without one there is a plan.

@@ -168,6 +168,8 @@ pub enum PlannedRole {
         training: TrainingLimits,
         /// How it goes on learning while it runs, where it does.
         learning: Option<PlannedLearning>,
+        /// The slot of its standard deviation, where somebody reads it.
+        deviation: Option<usize>,
     },
     /// One prediction of several.
     Combiner {
@@ -178,6 +180,17 @@ pub enum PlannedRole {
         /// Whether somebody reads its weights.
         weights: bool,
     },
+}
+
+impl PlannedRole {
+    /// The slot of the standard deviation of its predictions, where somebody reads it.
+    #[must_use]
+    pub fn deviation(&self) -> Option<usize> {
+        match self {
+            Self::Estimator { deviation, .. } => *deviation,
+            Self::Feature { .. } | Self::Combiner { .. } => None,
+        }
+    }
 }
 
 /// How an estimator goes on learning while it runs.

@@ -85,6 +85,9 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wante
             let ports = node.ports.get(1);
             *weights = ports.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
         }
+        if let PlannedRole::Estimator { deviation, .. } = &mut node.role {
+            *deviation = deviation.filter(|slot| wanted.intervals || read.contains(slot));
+        }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
                 let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";

@@ -125,6 +125,19 @@ impl Estimate {
         prediction.is_finite().then_some((prediction, oldest))
     }
 
+    /// The standard deviation of the truth about the prediction that was made at this tick.
+    pub(crate) fn deviation(&self, now: Instant) -> f64 {
+        let deviation = match &self.learning {
+            Some(learning) => learning.deviation(&self.row, now),
+            None => self.predictor.deviation(&self.row),
+        };
+        if deviation.is_finite() {
+            deviation
+        } else {
+            f64::NAN
+        }
+    }
+
     /// What goes on learning.
     pub(crate) fn learning(&mut self) -> Option<&mut Learning> {
         self.learning.as_mut()

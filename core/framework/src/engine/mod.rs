@@ -445,6 +445,14 @@ impl Engine {
                     .and_then(|estimate| estimate.run(&self.gathered, now, on));
                 let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
                 self.slots.set(node.slots.start, value, stamp);
+                if let (Some(estimate), Some(slot)) = (estimate, node.role.deviation()) {
+                    let known = if value.is_nan() {
+                        f64::NAN
+                    } else {
+                        estimate.deviation(now)
+                    };
+                    self.slots.set(slot, known, stamp);
+                }
             }
             Running::Vote(vote) => {
                 vote.release(now);

@@ -100,6 +100,11 @@ pub trait Estimator: Debug + Send + Sync {
         Learns::Never { help: None }
     }
 
+    /// Whether its predictions come with their standard deviation, in the port `deviation`.
+    fn deviates(&self) -> bool {
+        false
+    }
+
     /// What learns from the rows.
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer>;
 }
@@ -255,6 +260,12 @@ pub trait Predictor: Debug + Send + Sync {
 
     /// The prediction, from present values of the used regressors.
     fn predict(&self, regressors: &[f64]) -> f64;
+
+    /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
+    /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
+    fn deviation(&self, _regressors: &[f64]) -> f64 {
+        f64::NAN
+    }
 
     /// What goes on learning from here; none for one that stays as it was fitted.
     fn learner(&self) -> Option<Box<dyn Learner>> {
