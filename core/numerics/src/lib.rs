@@ -49,7 +49,7 @@ pub use kalman::{
 };
 pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
 pub use prediction_variance::PredictionVariance;
-pub use rls::{Forgetting, Rls, RlsOptions};
+pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use scaler::{Standardization, Standardizer};
 pub use score::{Score, ScoreAccumulator};
 pub use selection::{CandidateScore, ForwardSelection, Selection, SelectionScore, SelectionStep};

@@ -157,6 +157,19 @@ impl Sgd {
         }
     }
 
+    /// Goes on with other options.
+    #[must_use]
+    pub fn with(mut self, options: SgdOptions) -> Self {
+        self.options = options;
+        self
+    }
+
+    /// How the model learns.
+    #[must_use]
+    pub fn options(&self) -> SgdOptions {
+        self.options
+    }
+
     /// The weights, one per regressor.
     pub fn weights(&self) -> &[f64] {
         &self.weights

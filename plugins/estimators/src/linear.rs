@@ -1,6 +1,8 @@
 //! The exogenous estimator: drift from temperatures.
 
-use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup};
+use athermal_core::node::{
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
+};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,6 +39,7 @@ impl Estimator for Linear {
                     "what the prediction is made of, such as slopes of temperatures",
                 ),
                 InputPort::truth("what is predicted, such as the drift of an axis"),
+                InputPort::freeze(),
             ]
         }
     }
@@ -52,6 +55,10 @@ impl Estimator for Linear {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
         mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        self.solver.learns()
     }
 
     fn deviates(&self) -> bool {

@@ -2,16 +2,18 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Mistake, Predictor, SelectionStep, Trained, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Learns, Mistake, Predictor, SelectionStep, Trained, TrainedRange, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{
-    ForwardSelection, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
-    PredictionVariance, SelectionScore, Sgd, SgdOptions, Standardization,
+    ForwardSelection, Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method,
+    NumericsError, PredictionVariance, SelectionScore, Sgd, SgdOptions, Standardization,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::online::{Frame, OnlinePredictor, Recursion};
 
 /// How coefficients are found, on standardised regressors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -142,6 +144,16 @@ impl Solver {
         mistakes
     }
 
+    /// Whether estimators go on learning with it.
+    pub(crate) fn learns(&self) -> Learns {
+        match self {
+            Self::Sgd { .. } => Learns::WhenTold,
+            Self::Ridge { .. } | Self::Ols {} => Learns::Never {
+                help: Some("write `solver = { type = \"sgd\" }`, or use `type = \"rls\"`"),
+            },
+        }
+    }
+
     /// Whether theory says how far predictions may be off.
     pub(crate) fn deviates(&self) -> bool {
         match self {
@@ -217,6 +229,18 @@ pub(crate) struct LinearTrainer {
     solver: Solver,
     selection: Option<Selection>,
     blocks: GramBlocks,
+    /// The range of the regressors, for an estimator that goes on learning.
+    range: Option<TrainedRange>,
+}
+
+/// A fit of the chosen columns, and what it stands on.
+pub(crate) struct Found {
+    pub(crate) columns: Vec<usize>,
+    pub(crate) names: Vec<String>,
+    pub(crate) gram: Gram,
+    pub(crate) standard: Standardization,
+    pub(crate) squares: LeastSquares,
+    pub(crate) fit: LinearFit,
 }
 
 impl LinearTrainer {
@@ -232,6 +256,9 @@ impl LinearTrainer {
             solver,
             selection,
             blocks,
+            range: setup
+                .learns
+                .then(|| TrainedRange::new(setup.regressors.len())),
         }
     }
 
@@ -273,7 +300,8 @@ impl LinearTrainer {
         Ok(selected.order())
     }
 
-    fn solve(&self, report: &mut TrainingReport) -> Result<LinearPredictor, NumericsError> {
+    /// Chooses the columns and solves for their coefficients.
+    pub(crate) fn find(&self, report: &mut TrainingReport) -> Result<Found, NumericsError> {
         let gram = self.blocks.total();
         let standard = Standardization::of(&gram);
         let columns = self.chosen(&standard.scales, report)?;
@@ -285,16 +313,35 @@ impl LinearTrainer {
             .iter()
             .map(|&column| self.names[column].clone())
             .collect();
-        let predictor = match self.solver {
-            Solver::Ridge { .. } | Solver::Ols {} => LinearPredictor {
-                regressors: names,
-                coefficients: fit.coefficients.clone(),
-                intercept: fit.intercept,
+        report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
+        Ok(Found {
+            columns,
+            names,
+            gram,
+            standard,
+            squares,
+            fit,
+        })
+    }
+
+    /// The range of some of the regressors, where it was kept.
+    pub(crate) fn range_of(&self, columns: &[usize]) -> Option<TrainedRange> {
+        Some(self.range.as_ref()?.of(columns))
+    }
+
+    fn solve(&self, report: &mut TrainingReport) -> Result<Box<dyn Predictor>, NumericsError> {
+        let found = self.find(report)?;
+        Ok(match self.solver {
+            Solver::Ridge { .. } | Solver::Ols {} => Box::new(LinearPredictor {
+                regressors: found.names,
+                coefficients: found.fit.coefficients.clone(),
+                intercept: found.fit.intercept,
                 // Without more rows than coefficients there is a prediction, and nothing to say about its error.
-                variance: squares
-                    .prediction_variance(&gram, &standard.scales, &fit)
+                variance: found
+                    .squares
+                    .prediction_variance(&found.gram, &found.standard.scales, &found.fit)
                     .ok(),
-            },
+            }),
             Solver::Sgd {
                 alpha,
                 eta0,
@@ -306,26 +353,9 @@ impl LinearTrainer {
                 } else {
                     LearningRate::InvScaling { eta0, power }
                 };
-                self.descend(
-                    SgdOptions { alpha, rate },
-                    epochs,
-                    &columns,
-                    names,
-                    &standard,
-                )?
+                self.descend(SgdOptions { alpha, rate }, epochs, &found, report)?
             }
-        };
-        report.in_sample_rmse = Some(match self.blocks.rows() {
-            Some(rows) if matches!(self.solver, Solver::Sgd { .. }) => {
-                let squared = rows.iter().map(|(x, y, _)| {
-                    let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
-                    (predictor.predict(&row) - y).powi(2)
-                });
-                (squared.sum::<f64>() / rows.count() as f64).sqrt()
-            }
-            _ => (fit.residual_sum_of_squares / gram.count() as f64).sqrt(),
-        });
-        Ok(predictor)
+        })
     }
 
     /// Stochastic gradients on standardised regressors and centred truths, told on the scale of the data.
@@ -333,10 +363,15 @@ impl LinearTrainer {
         &self,
         options: SgdOptions,
         epochs: usize,
-        columns: &[usize],
-        names: Vec<String>,
-        standard: &Standardization,
-    ) -> Result<LinearPredictor, NumericsError> {
+        found: &Found,
+        report: &mut TrainingReport,
+    ) -> Result<Box<dyn Predictor>, NumericsError> {
+        let Found {
+            columns,
+            names,
+            standard,
+            ..
+        } = found;
         let Some(rows) = self.blocks.rows() else {
             return Err(NumericsError::TooFewRows {
                 needed: self.blocks.count(),
@@ -366,11 +401,23 @@ impl LinearTrainer {
             .zip(columns)
             .map(|(b, &column)| b * standard.means[column])
             .sum();
-        Ok(LinearPredictor {
-            regressors: names,
+        let predictor = LinearPredictor {
+            regressors: names.clone(),
             coefficients,
             intercept: sgd.intercept() + mean - shift,
             variance: None,
+        };
+        let squared = rows.iter().map(|(x, y, _)| {
+            let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
+            (predictor.predict(&row) - y).powi(2)
+        });
+        report.in_sample_rmse = Some((squared.sum::<f64>() / rows.count() as f64).sqrt());
+        Ok(match self.range_of(columns) {
+            None => Box::new(predictor),
+            Some(range) => {
+                let frame = Frame::new(names.clone(), columns, standard, mean);
+                Box::new(OnlinePredictor::new(frame, Recursion::Sgd(sgd), range))
+            }
         })
     }
 
@@ -409,24 +456,31 @@ impl LinearTrainer {
 
 impl Trainer for LinearTrainer {
     fn row(&mut self, regressors: &[f64], truth: f64) {
+        if let Some(range) = &mut self.range {
+            range.include(regressors);
+        }
         self.blocks.push(regressors, truth);
     }
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
         match self.solve(&mut report) {
-            Ok(predictor) => Ok(Trained {
-                predictor: Box::new(predictor),
-                report,
-            }),
-            Err(NumericsError::TooFewRows { needed, found }) => Err(TrainingError::TooFewRows {
-                rows: usize::try_from(found).unwrap_or(usize::MAX),
-                needed: usize::try_from(needed).unwrap_or(usize::MAX),
-            }),
-            Err(error) => Err(TrainingError::Unsolvable {
-                reason: error.to_string(),
-            }),
+            Ok(predictor) => Ok(Trained { predictor, report }),
+            Err(error) => Err(untrained(&error)),
         }
+    }
+}
+
+/// Why a fit gave nothing, as the framework tells it.
+pub(crate) fn untrained(error: &NumericsError) -> TrainingError {
+    match *error {
+        NumericsError::TooFewRows { needed, found } => TrainingError::TooFewRows {
+            rows: usize::try_from(found).unwrap_or(usize::MAX),
+            needed: usize::try_from(needed).unwrap_or(usize::MAX),
+        },
+        _ => TrainingError::Unsolvable {
+            reason: error.to_string(),
+        },
     }
 }
 
