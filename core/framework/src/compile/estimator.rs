@@ -103,6 +103,17 @@ impl Resolver<'_> {
         if !lags.is_empty() {
             gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
         }
+        if regressors.is_empty() && !wanted.every_tick {
+            // An optional input that was left out, and nothing in its place.
+            let port = features_port.unwrap_or(truth_port);
+            let problem = CompileProblem::MissingInput {
+                kind: instance.kind.name,
+                input: port.name,
+                summary: port.summary,
+            };
+            self.diagnostics.report(instance.node.place, problem);
+            whole = false;
+        }
         let training = self.limits(instance, &link);
         let learning = self.learning(instance, estimator);
         if !whole {
