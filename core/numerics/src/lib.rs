@@ -24,6 +24,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocks;
+mod change;
 mod error;
 mod fold_state;
 mod folds;
@@ -40,6 +41,7 @@ mod selection;
 mod sgd;
 
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
+pub use change::{Adwin, AdwinOptions, Change, PageHinkley, PageHinkleyOptions};
 pub use error::NumericsError;
 pub use folds::{Split, contiguous_folds, leave_one_out};
 pub use gram::Gram;
