@@ -7,6 +7,8 @@ mod error;
 mod estimate;
 mod gather;
 mod history;
+#[cfg(feature = "testkit")]
+mod idle;
 mod keep;
 mod pairing;
 mod revision;
