@@ -12,6 +12,7 @@ use athermal as _;
 use athermal::core::compile::{Wanted, compile, diff};
 use athermal::core::diagnostic::{Diagnostics, Severity, Sources};
 use athermal::core::document::{Memory, declare, load};
+use athermal::core::trial;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -241,8 +242,14 @@ fn holds(text: &str) -> Result<(), TestCaseError> {
     let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
     let document = load(Path::new("a.toml"), &files, &mut sources, &mut diagnostics);
     let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    let plan = graph
+        .as_ref()
+        .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
     prop_assert_eq!(plan.is_none(), diagnostics.has_errors());
+    if let (Some(graph), Some(plan)) = (&graph, &plan) {
+        let trials = trial::declare(graph, plan, &files, &mut sources, &mut diagnostics);
+        prop_assert_eq!(trials.is_none(), diagnostics.has_errors());
+    }
     for found in diagnostics
         .iter()
         .filter(|found| found.severity == Severity::Error)
