@@ -10,3 +10,4 @@ mod properties;
 mod random_graph;
 mod snapshots;
 mod threads;
+mod versions;

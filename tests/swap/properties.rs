@@ -346,6 +346,7 @@ fn check_seed(seed: u64) {
     let revisions = [revision(&before), revision(&after)];
     if cosmetic {
         assert_eq!(old.untouched(&new).len(), before.plan.nodes.len());
+        assert_eq!(revisions[0], revisions[1], "seed {seed}");
     }
     let unheard = chance(&mut random, 0.2).then(|| {
         let text = new.text(None);

@@ -12,7 +12,7 @@ pub struct Expectation {
     pub abs_truth_below: Option<Quantity>,
     /// When.
     pub period: Period,
-    /// The time of the one value that `equals`, `between` and `absent` look at.
+    /// The time of the one value that `equals` and `between` look at, and of the tick that `absent` looks at.
     pub at: Option<Duration>,
     /// What is checked of each channel.
     pub checks: Vec<Check>,

@@ -319,20 +319,20 @@ impl Judge<'_> {
         self.observed.ticks.iter().filter(within).count()
     }
 
-    /// The first value where there should be none, or the one at a time.
+    /// The first value where there should be none, or the one of the last tick at or before a time.
     fn nothing(&self, check: &Check) -> Finding {
-        let (value, instants) = match self.expectation.at {
-            Some(at) => {
-                let ticks = self.observed.ticks.iter();
-                let last = self.values().rfind(|(_, time, _)| *time <= at);
-                (last, ticks.filter(|time| **time <= at).count().min(1))
-            }
-            None => {
-                let given = self.values().find(|value| !value.2.is_nan());
-                (given, self.ticks())
-            }
+        let tick = self.expectation.at.map(|at| {
+            let ticks = self.observed.ticks.iter().copied();
+            ticks.filter(|tick| *tick <= at).max()
+        });
+        let mut given = self.values().filter(|value| !value.2.is_nan());
+        let (value, instants) = match tick {
+            Some(tick) => (
+                given.find(|value| Some(value.1) == tick),
+                usize::from(tick.is_some()),
+            ),
+            None => (given.next(), self.ticks()),
         };
-        let value = value.filter(|value| !value.2.is_nan());
         Finding {
             first: value.map(|value| (value.1, value.2)),
             ..self.finding(check, value.map(|value| value.2), Wanted::Nothing, instants)

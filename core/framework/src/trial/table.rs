@@ -142,11 +142,11 @@ pub(super) struct ExpectTable {
     pub(super) within: Option<Within>,
     /// Every value, or the one `at` a time, lies between these, both included.
     pub(super) between: Option<(Quantity, Quantity)>,
-    /// `true`: there is no value, at any tick or `at` a time.
+    /// `true`: there is no value, at any tick or, `at` a time, at the last tick at or before it.
     pub(super) absent: Option<bool>,
     /// From one value to the next the change is always below.
     pub(super) max_step_below: Option<Quantity>,
-    /// The time of the one value that `equals`, `between` and `absent` look at: the last one computed at or before it.
+    /// The time of the one value that `equals` and `between` look at: the last one computed at or before it.
     pub(super) at: Option<Duration>,
     /// Only what comes at this time or later counts.
     pub(super) from: Option<Duration>,

@@ -152,16 +152,13 @@ impl Texts {
 }
 
 fn of_text(text: &str) -> String {
-    match (text.parse::<Quantity>(), Unit::parse(text)) {
-        (Ok(quantity), _) => {
-            let base = quantity.unit.base();
-            let value = quantity.in_unit(&base).unwrap_or(quantity.value);
-            // Neither zero has a sign here.
-            format!("{:.11e} {base}", value + 0.0)
-        }
-        (Err(_), Ok(unit)) => unit.meaning(),
-        _ => text.to_owned(),
+    if let Ok(quantity) = text.parse::<Quantity>() {
+        let base = quantity.unit.base();
+        let value = quantity.in_unit(&base).unwrap_or(quantity.value);
+        // Neither zero has a sign here.
+        return format!("{:.11e} {base}", value + 0.0);
     }
+    Unit::parse(text).map_or_else(|_| text.to_owned(), |unit| unit.meaning())
 }
 
 pub(super) fn time(plan: &Plan) -> Facts {
@@ -359,5 +356,44 @@ fn one_or_all(texts: Vec<String>) -> Value {
     match texts.first() {
         Some(first) if texts.iter().all(|text| text == first) => first.as_str().into(),
         _ => texts.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn texts_mean_the_same_exactly_where_they_measure_the_same() {
+        let texts = [
+            "150 nm/min",
+            "0.15 um/min",
+            "2.5 nm/s",
+            "20 Cel",
+            "293.15 K",
+            "20 K",
+            "0 nm",
+            "-0 nm",
+            "0 K",
+            "K",
+            "Cel",
+            "mK/min",
+            "mK.min-1",
+            "uK/min",
+            "1 dB",
+            "ridge",
+            "lasso",
+        ];
+        for a in texts {
+            for b in texts {
+                let alike = measures(&a.into(), &b.into());
+                assert_eq!(of_text(a) == of_text(b), alike, "{a} and {b}");
+            }
+        }
+        let meaning = |value: Value| Texts::default().meaning(value);
+        assert_eq!(meaning(json!(["1 K", "1000 mK"])), meaning(json!("1 K")));
+        assert_ne!(meaning(json!(["1 K", "2 K"])), meaning(json!("1 K")));
     }
 }
