@@ -55,10 +55,26 @@ fn main() {
     let mut others = of(&times, |tick| !tick.takes_over);
     let mut more = extra(&times);
     tell("a tick, median", &us(quantile(&mut others, 0.5)), "");
-    tell("the tick of a commit, median", &us(quantile(&mut commits, 0.5)), "");
-    tell("more than its neighbours, median", &us(quantile(&mut more, 0.5)), "20 µs");
-    tell("more than its neighbours, 95 %", &us(quantile(&mut more, 0.95)), "20 µs");
-    tell("more than its neighbours, at most", &us(quantile(&mut more, 1.0)), "");
+    tell(
+        "the tick of a commit, median",
+        &us(quantile(&mut commits, 0.5)),
+        "",
+    );
+    tell(
+        "more than its neighbours, median",
+        &us(quantile(&mut more, 0.5)),
+        "20 µs",
+    );
+    tell(
+        "more than its neighbours, 95 %",
+        &us(quantile(&mut more, 0.95)),
+        "20 µs",
+    );
+    tell(
+        "more than its neighbours, at most",
+        &us(quantile(&mut more, 1.0)),
+        "",
+    );
     tell("allocations of all ticks", &total.to_string(), "0");
     assert_eq!(total, 0, "the engine thread neither allocates nor frees");
 }
@@ -149,7 +165,9 @@ fn extra(times: &[Cost<Duration>]) -> Vec<Duration> {
     commits
         .map(|(nth, commit)| {
             let around = &times[nth - NEIGHBOURS..=nth + NEIGHBOURS];
-            let mut alike = of(around, |tick| !tick.takes_over && tick.truth == commit.truth);
+            let mut alike = of(around, |tick| {
+                !tick.takes_over && tick.truth == commit.truth
+            });
             commit.cost.saturating_sub(quantile(&mut alike, 0.5))
         })
         .collect()

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use athermal as _;
 use athermal::core::compile::{Wanted, compile, diff};
-use athermal::core::diagnostic::{Diagnostics, Severity, Sources};
+use athermal::core::diagnostic::{Diagnostics, Severity, Sources, explain};
 use athermal::core::document::{Memory, declare, load};
 use athermal::core::trial;
 use proptest::prelude::*;
@@ -258,11 +258,15 @@ fn holds(text: &str) -> Result<(), TestCaseError> {
             place.start <= place.end && place.end as usize <= sources.text(place.source).len()
         });
         prop_assert!(fits, "{:?}", found);
+        prop_assert!(explain(found.code).is_some(), "{}", found.code);
     }
     prop_assert_eq!(
         diagnostics.render(&sources, false, 100).is_empty(),
         diagnostics.is_empty()
     );
+    let json = diagnostics.to_json(&sources);
+    let listed = json["diagnostics"].as_array().map(Vec::len);
+    prop_assert_eq!(listed, Some(diagnostics.len()));
     if let Some(plan) = plan {
         prop_assert!(diff(&plan, &plan).is_same());
     }

@@ -2,23 +2,19 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod workbench;
+
 use std::collections::BTreeMap;
 
-use athermal as _;
-use athermal::core::compile::{Plan, Wanted, compile, meaning};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Memory, declare, load_text};
+use athermal::core::compile::{Plan, meaning};
 use serde_json::Value;
+use workbench::Read;
 
 const PLAIN: &str = include_str!("../graphs/die-tester.toml");
 
 fn compiled(text: &str) -> (Option<Plan>, String) {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let files = Memory::new();
-    let document = load_text("graph.toml", text, &files, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    (plan, diagnostics.render(&sources, false, 100))
+    let mut read = Read::new(text);
+    (read.plan.take(), read.told())
 }
 
 /// The die tester with the estimators and the vote of an axis in a module.

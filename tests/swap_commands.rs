@@ -111,7 +111,9 @@ fn outputs_that_only_one_graph_has_are_empty_while_another_runs() {
     let scratch = desk("columns");
     let more = "schema = 1\nextends = \"graph.toml\"\n[outputs]\nstill = \"model:still\"\n";
     scratch.file("more.toml", more);
-    let out = run(&scratch, &[&swap(&scratch, "1200", "more.toml")]).ended(0).out;
+    let out = run(&scratch, &[&swap(&scratch, "1200", "more.toml")])
+        .ended(0)
+        .out;
     let mut lines = out.lines();
     assert_eq!(lines.next(), Some("time_s,predicted.Z,still.Z,revision"));
     for line in lines {
@@ -166,11 +168,17 @@ fn what_cannot_be_swapped_is_told_before_the_first_row() {
         ),
         (vec![swap(&scratch, "1200", "nowhere.toml")], "nowhere.toml"),
         (
-            vec![swap(&scratch, "1200", "still.toml"), "--margin=5".to_owned()],
+            vec![
+                swap(&scratch, "1200", "still.toml"),
+                "--margin=5".to_owned(),
+            ],
             "expected a percentage such as \"5%\", found \"5\"",
         ),
         (
-            vec![swap(&scratch, "1200", "still.toml"), "--shadow=0s".to_owned()],
+            vec![
+                swap(&scratch, "1200", "still.toml"),
+                "--shadow=0s".to_owned(),
+            ],
             "expected some time such as \"30min\", found \"0s\"",
         ),
     ] {

@@ -384,7 +384,6 @@ pub fn reading(running: &Model, swaps: &[Swap], feed: &[Feed]) -> athermal::core
     plan
 }
 
-
 fn refused(error: StageError) -> Failure {
     Failure::Request(error.to_string())
 }

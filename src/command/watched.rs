@@ -22,7 +22,10 @@ impl Watched {
     /// The graph or model in a file, as it is now.
     pub(super) fn of(path: &Path) -> Self {
         let noting = Noting::default();
-        if path.extension().is_some_and(|extension| extension == "toml") {
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "toml")
+        {
             // Mistakes are told when the graph is taken over; its files are watched all the same.
             let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
             document::load(path, &noting, &mut sources, &mut diagnostics);

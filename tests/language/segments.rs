@@ -209,7 +209,14 @@ fn neither_fits_nor_scores_pair_over_a_break() {
         u64::from(2 * AHEAD)
     );
     let plan = Arc::clone(&plan);
-    let scores = score(&plan, &fitted, &table, &ScoreOptions::default(), &mut |_| {}).unwrap();
+    let scores = score(
+        &plan,
+        &fitted,
+        &table,
+        &ScoreOptions::default(),
+        &mut |_| {},
+    )
+    .unwrap();
     for score in scores.scores {
         assert_eq!(score.n as u64, within, "{}", score.output);
     }

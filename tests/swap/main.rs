@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../workbench/mod.rs"]
+mod workbench;
+
 mod allocation;
 mod blending;
 mod course;

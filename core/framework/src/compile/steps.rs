@@ -72,10 +72,7 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
         (PlannedRole::Feature { gathers, .. }, Role::Feature(feature)) => {
             feature.memory() + before(gathers)
         }
-        (
-            PlannedRole::Combiner { voters, truth, .. },
-            Role::Combiner(combiner),
-        ) => {
+        (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(combiner)) => {
             let learned = truth.map_or(Duration::ZERO, |truth| {
                 truth.embargo() + truth.ahead + truth.limit
             });

@@ -88,7 +88,10 @@ pub fn machines() -> &'static BTreeMap<&'static str, Vec<KnownMachine>> {
 fn by_name(all: impl Iterator<Item = KnownMachine>) -> BTreeMap<&'static str, Vec<KnownMachine>> {
     let mut machines = BTreeMap::<_, Vec<_>>::new();
     for known in all {
-        machines.entry(known.machine.name()).or_default().push(known);
+        machines
+            .entry(known.machine.name())
+            .or_default()
+            .push(known);
     }
     for same in machines.values_mut() {
         same.sort_by_key(|known| known.package);

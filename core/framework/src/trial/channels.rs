@@ -110,5 +110,9 @@ fn ports(plan: &Plan, slot: usize) -> Vec<&'static str> {
 fn names(plan: &Plan) -> Vec<String> {
     let channels = plan.channels.iter().map(|channel| channel.name.as_str());
     let outputs = plan.outputs.iter().map(|output| output.name.as_str());
-    outermost(channels.chain(outputs).map(|name| Reference::parse(name).node))
+    outermost(
+        channels
+            .chain(outputs)
+            .map(|name| Reference::parse(name).node),
+    )
 }

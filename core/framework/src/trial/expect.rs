@@ -209,10 +209,8 @@ impl Declaring<'_> {
                     quantities.push(("between", high, unit.clone()));
                 }
                 Check::Beats(rivals) => self.check_rivals(value, rivals, slot),
-                Check::R2Above(_)
-                | Check::ValidAbove(_)
-                | Check::GivenAbove(_)
-                | Check::Absent => {}
+                Check::R2Above(_) | Check::ValidAbove(_) | Check::GivenAbove(_) | Check::Absent => {
+                }
             }
         }
         if let (Some(limit), Some(truth)) = (&table.abs_truth_below, truth) {

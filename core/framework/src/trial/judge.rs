@@ -72,9 +72,7 @@ impl Finding {
         match self.wanted {
             // Where no tick was looked at, nothing has been shown.
             Wanted::Nothing => self.found.is_none() && self.instants > 0,
-            wanted => {
-                self.first.is_none() && self.found.is_some_and(|found| wanted.admits(found))
-            }
+            wanted => self.first.is_none() && self.found.is_some_and(|found| wanted.admits(found)),
         }
     }
 }
@@ -193,7 +191,9 @@ impl Judge<'_> {
             Check::RmseBelow(_) | Check::Beats(_) | Check::MaxStepBelow(_) => {
                 planned.channel.unit.difference().to_string()
             }
-            Check::Equals(..) | Check::Between(..) | Check::Absent => planned.channel.unit.to_string(),
+            Check::Equals(..) | Check::Between(..) | Check::Absent => {
+                planned.channel.unit.to_string()
+            }
         };
         Finding {
             of: planned.name.clone(),

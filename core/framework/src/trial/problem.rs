@@ -120,7 +120,10 @@ impl Problem for TrialProblem {
                 format!("there is no simulated machine `{machine}`")
             }
             Self::MachineTwice { machine, packages } => {
-                format!("the machine `{machine}` is in {}", packages.join(" and in "))
+                format!(
+                    "the machine `{machine}` is in {}",
+                    packages.join(" and in ")
+                )
             }
             Self::ScheduleUnreadable { path, reason } => {
                 format!("the schedule {path} cannot be read: {reason}")
