@@ -14,24 +14,24 @@ const BOTTOM: f64 = 30.0;
 
 /// How a mark is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mark {
+pub(crate) enum Mark {
     Line,
     Dots,
     Bars,
 }
 
 /// One layer of a chart.
-pub(super) struct Layer<'a> {
-    pub(super) x: &'a [f64],
-    pub(super) y: &'a [f64],
+pub(crate) struct Layer<'a> {
+    pub(crate) x: &'a [f64],
+    pub(crate) y: &'a [f64],
     /// The class that gives its colour: `c1` … `c6`.
-    pub(super) class: &'static str,
-    pub(super) label: String,
-    pub(super) mark: Mark,
+    pub(crate) class: &'static str,
+    pub(crate) label: String,
+    pub(crate) mark: Mark,
 }
 
 impl<'a> Layer<'a> {
-    pub(super) fn line(series: &'a Series, class: &'static str, label: impl Into<String>) -> Self {
+    pub(crate) fn line(series: &'a Series, class: &'static str, label: impl Into<String>) -> Self {
         Self {
             x: &series.time_s,
             y: &series.value,
@@ -43,24 +43,24 @@ impl<'a> Layer<'a> {
 }
 
 /// A chart to be drawn.
-pub(super) struct Chart<'a> {
-    pub(super) title: String,
-    pub(super) x_label: &'a str,
-    pub(super) y_label: String,
-    pub(super) height: f64,
-    pub(super) layers: Vec<Layer<'a>>,
+pub(crate) struct Chart<'a> {
+    pub(crate) title: String,
+    pub(crate) x_label: &'a str,
+    pub(crate) y_label: String,
+    pub(crate) height: f64,
+    pub(crate) layers: Vec<Layer<'a>>,
     /// Stretches of the x axis with a class each, drawn behind.
-    pub(super) bands: Vec<(f64, f64, &'static str)>,
+    pub(crate) bands: Vec<(f64, f64, &'static str)>,
     /// A horizontal limit.
-    pub(super) limit: Option<f64>,
+    pub(crate) limit: Option<f64>,
     /// Lowest and highest y; else what the layers span.
-    pub(super) y_range: Option<(f64, f64)>,
+    pub(crate) y_range: Option<(f64, f64)>,
     /// Whether x is in seconds and shown in hours, and can be zoomed.
-    pub(super) time: bool,
+    pub(crate) time: bool,
 }
 
 /// Colours and lines of all charts, light and dark.
-pub(super) const STYLE: &str = "\
+pub(crate) const STYLE: &str = "\
 svg.chart{font:13px system-ui,sans-serif;fill:var(--ink)}\
 .chart .frame{fill:none;stroke:var(--line)}.chart .grid{stroke:var(--grid);stroke-width:1;vector-effect:non-scaling-stroke}\
 .chart path{fill:none;stroke-width:1.3;vector-effect:non-scaling-stroke;stroke-linejoin:round}\
@@ -71,7 +71,7 @@ svg.chart{font:13px system-ui,sans-serif;fill:var(--ink)}\
 .chart .s1{fill:var(--s1)}.chart .s2{fill:var(--s2)}.chart .s0{fill:none}";
 
 /// The colours, for pictures that stand alone and as the root of the page.
-pub(super) const COLOURS: &str = "\
+pub(crate) const COLOURS: &str = "\
 :root{--ink:#1b2430;--paper:#fff;--line:#9aa5b1;--grid:#e4e8ec;--muted:#5d6975;--bad:#b3261e;--good:#1b7f4b;\
 --c1:#5d6975;--c2:#0b62a8;--c3:#c2410c;--c4:#1b7f4b;--c5:#7b3fa0;--c6:#8a6d00;--s1:#fff3d6;--s2:#fbdcd8}\
 @media(prefers-color-scheme:dark){:root{--ink:#e6eaee;--paper:#14181d;--line:#5b6672;--grid:#2a313a;--muted:#9aa5b1;--bad:#ff8a80;--good:#6fd39b;\
@@ -80,7 +80,7 @@ pub(super) const COLOURS: &str = "\
 --c1:#5d6975;--c2:#0b62a8;--c3:#c2410c;--c4:#1b7f4b;--c5:#7b3fa0;--c6:#8a6d00;--s1:#fff3d6;--s2:#fbdcd8}}";
 
 /// At most about twice as many points as `buckets`: of each stretch of x the lowest and the highest, in their order.
-pub(super) fn decimated(x: &[f64], y: &[f64], buckets: usize) -> Vec<(f64, f64)> {
+pub(crate) fn decimated(x: &[f64], y: &[f64], buckets: usize) -> Vec<(f64, f64)> {
     let count = x.len().min(y.len());
     if count <= 2 * buckets {
         return (0..count).map(|i| (x[i], y[i])).collect();
@@ -106,7 +106,7 @@ pub(super) fn decimated(x: &[f64], y: &[f64], buckets: usize) -> Vec<(f64, f64)>
 }
 
 /// Round numbers that divide a range.
-pub(super) fn ticks(low: f64, high: f64, about: usize) -> Vec<f64> {
+pub(crate) fn ticks(low: f64, high: f64, about: usize) -> Vec<f64> {
     let raw = (high - low) / about as f64;
     if !(raw > 0.0 && raw.is_finite()) {
         return vec![low];
@@ -146,7 +146,7 @@ impl Chart<'_> {
     }
 
     /// The picture as an `svg` element.
-    pub(super) fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let Some((x0, x1)) = self.x_range() else {
             return String::new();
         };
@@ -273,7 +273,7 @@ impl Chart<'_> {
     }
 
     /// The picture as a file of its own.
-    pub(super) fn file(&self) -> String {
+    pub(crate) fn file(&self) -> String {
         let style = format!("<style>{COLOURS}{STYLE}</style>");
         self.svg().replacen('>', &format!(">{style}"), 1)
     }

@@ -3,7 +3,7 @@
 //! [`gather`] steps the model over a recording and collects [`Facts`]; [`page`] makes one self-contained HTML page of
 //! them, [`plots`] single pictures.
 
-mod chart;
+pub(crate) mod chart;
 mod course;
 mod page;
 mod worth;
