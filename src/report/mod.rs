@@ -28,6 +28,10 @@ use athermal_core::recording::Recording;
 use athermal_core::score::{Score, ScoreOptions, Scores, score};
 use serde::Serialize;
 
+use crate::diagnosis::lag::{Lags, lags};
+use crate::diagnosis::observe;
+use crate::diagnosis::response::{Responses, responses};
+
 /// All that a report says.
 #[derive(Debug, Clone, Serialize)]
 pub struct Facts {
@@ -45,6 +49,10 @@ pub struct Facts {
     pub course: Course,
     /// How the errors of what is put out are spread, by axis.
     pub errors: Vec<Errors>,
+    /// How features go with truths and residuals, against the lag.
+    pub lags: Vec<Lags>,
+    /// How estimators answer a change of one sensor.
+    pub responses: Vec<Responses>,
     /// What the correction is worth; none for a graph without a `compensate` node.
     pub worth: Option<Worth>,
     /// How the model was made.
@@ -109,6 +117,7 @@ pub fn gather(
         &ScoreOptions::default(),
         &mut |_| {},
     )?;
+    let observation = observe(model, recording)?;
     let (course, track) = course::follow(model, recording)?;
     let worth = track
         .map(|mut track| worth::worth(&mut track))
@@ -120,6 +129,8 @@ pub fn gather(
         verdicts: course.axes.iter().map(verdict).collect(),
         published: published::published(&course),
         errors: course.axes.iter().map(Errors::of).collect(),
+        lags: lags(model, recording, &observation)?,
+        responses: responses(model, &observation)?,
         scores,
         course,
         worth,

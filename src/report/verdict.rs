@@ -120,7 +120,7 @@ impl Verdict {
 }
 
 /// Whether a reference such as `drift.Z1` or `drift:slope.Z1` names a channel.
-fn is_channel(reference: &str, channel: &str) -> bool {
+pub(super) fn is_channel(reference: &str, channel: &str) -> bool {
     let node_and_port = reference.strip_suffix(channel);
     node_and_port.is_some_and(|rest| rest.ends_with('.'))
 }

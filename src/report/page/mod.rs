@@ -1,6 +1,7 @@
 //! Decides what stands on the page and in which order; how a picture is drawn is decided by [`crate::chart`].
 
 mod charts;
+mod curves;
 mod style;
 mod tables;
 
@@ -129,7 +130,10 @@ fn wide(html: &mut String, chart: &Chart<'_>) {
 }
 
 fn votes(html: &mut String, facts: &Facts) {
-    html.push_str("<h2>Votes and errors</h2>");
+    html.push_str(
+        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
+         An impulse is one kelvin, or unit of the sensor, for one minute.</p>",
+    );
     for (axis, errors) in facts.course.axes.iter().zip(&facts.errors) {
         let _ = write!(html, "<details><summary>{}</summary>", escaped(&axis.name));
         wide(html, &charts::votes(axis));
@@ -137,6 +141,9 @@ fn votes(html: &mut String, facts: &Facts) {
             wide(html, &chart);
         }
         html.push_str("<div class=\"pair\">");
+        for curves in curves::of(axis, facts) {
+            html.push_str(&curves.chart().svg());
+        }
         for (_, chart) in charts::errors(axis, errors) {
             html.push_str(&chart.svg());
         }
@@ -241,6 +248,9 @@ pub fn plots(facts: &Facts) -> Vec<Plot> {
         add(format!("votes-{name}"), &charts::votes(axis));
         if let Some(chart) = charts::weights(axis) {
             add(format!("weights-{name}"), &chart);
+        }
+        for curves in curves::of(axis, facts) {
+            add(format!("{}-{name}", curves.kind), &curves.chart());
         }
         for (kind, chart) in charts::errors(axis, spread) {
             add(format!("{kind}-{name}"), &chart);
