@@ -324,7 +324,8 @@ impl Engine {
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.
-    pub(crate) fn gathered(&self, gather: usize) -> (&[f64], bool) {
+    #[must_use]
+    pub fn gathered(&self, gather: usize) -> (&[f64], bool) {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
     }
 
