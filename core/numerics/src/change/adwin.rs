@@ -119,7 +119,9 @@ impl Adwin {
             options,
             seen: 0,
             window: Part::default(),
-            buckets: (0..SIZES).map(|_| Vec::with_capacity(BUCKETS + 1)).collect(),
+            buckets: (0..SIZES)
+                .map(|_| Vec::with_capacity(BUCKETS + 1))
+                .collect(),
         })
     }
 
@@ -166,7 +168,9 @@ impl Adwin {
     pub fn with(mut self, options: AdwinOptions) -> Self {
         self.options = options;
         // What has been read back must not have to make room later.
-        self.buckets.iter_mut().for_each(|size| size.reserve(BUCKETS + 1));
+        self.buckets
+            .iter_mut()
+            .for_each(|size| size.reserve(BUCKETS + 1));
         self
     }
 
@@ -245,14 +249,26 @@ mod tests {
                 // A cut is as fine as the buckets at its place.
                 let change_at = if row < 1500 { 800 } else { 1500 };
                 let since = row + 1 - change_at;
-                assert!(window.count() < 4 * since as u64, "{row}: {}", window.count());
+                assert!(
+                    window.count() < 4 * since as u64,
+                    "{row}: {}",
+                    window.count()
+                );
             }
         }
         // `adwin_default` of drift_expected.json has 831 and 1535, its window emptied by the first alarm.
         assert_eq!(alarms[0], (831, Change::Up));
         let second = alarms.iter().find(|(row, _)| *row > 1000).unwrap();
-        assert!((1500..1600).contains(&second.0) && second.1 == Change::Down, "{alarms:?}");
-        assert!(alarms.iter().all(|(row, _)| (800..900).contains(row) || (1500..1600).contains(row)), "{alarms:?}");
+        assert!(
+            (1500..1600).contains(&second.0) && second.1 == Change::Down,
+            "{alarms:?}"
+        );
+        assert!(
+            alarms
+                .iter()
+                .all(|(row, _)| (800..900).contains(row) || (1500..1600).contains(row)),
+            "{alarms:?}"
+        );
     }
 
     #[test]
@@ -282,7 +298,10 @@ mod tests {
         let mut window = Adwin::new(AdwinOptions::default()).unwrap();
         window.push(1.0);
         let before = window.clone();
-        assert_eq!((window.push(f64::NAN), window.push(f64::INFINITY)), (None, None));
+        assert_eq!(
+            (window.push(f64::NAN), window.push(f64::INFINITY)),
+            (None, None)
+        );
         assert_eq!(window, before);
         let with = |confidence, clock, shortest| {
             Adwin::new(AdwinOptions {

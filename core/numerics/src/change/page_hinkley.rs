@@ -157,7 +157,10 @@ mod tests {
         let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
         test.push(1.0);
         let before = test.clone();
-        assert_eq!((test.push(f64::NAN), test.push(f64::INFINITY)), (None, None));
+        assert_eq!(
+            (test.push(f64::NAN), test.push(f64::INFINITY)),
+            (None, None)
+        );
         assert_eq!(test, before);
         let with = |tolerance, threshold, factor| {
             PageHinkley::new(PageHinkleyOptions {
