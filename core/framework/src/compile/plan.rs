@@ -183,6 +183,15 @@ pub enum PlannedRole {
 }
 
 impl PlannedRole {
+    /// The slots of both ends of its intervals, where it gives them.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(usize, usize)> {
+        match self {
+            Self::Feature { .. } | Self::Estimator { .. } => None,
+            Self::Combiner { bounds, .. } => *bounds,
+        }
+    }
+
     /// The slot of the standard deviation of its predictions, where somebody reads it.
     #[must_use]
     pub fn deviation(&self) -> Option<usize> {

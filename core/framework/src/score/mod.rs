@@ -1,10 +1,12 @@
 //! Decides how predictions are scored against the truths measured later; not how they are made.
 
+mod interval;
 mod table;
 mod watch;
 
 use std::sync::Arc;
 
+pub use interval::IntervalScore;
 pub use table::{Score, Scores};
 pub(crate) use watch::{Prediction, Watch};
 
