@@ -11,6 +11,9 @@ use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;
 use crate::unit::Unit;
 
+/// The port of the weights.
+pub(super) const WEIGHTS: &str = "weights";
+
 impl Resolver<'_> {
     pub(super) fn combiner(
         &mut self,
@@ -22,15 +25,18 @@ impl Resolver<'_> {
         self.mistakes(instance, mistakes);
         let mut voters = None;
         let mut truth = Some(None);
+        let mut state = Some(None);
         for port in (instance.kind.inputs)() {
             match port.name {
                 "truth" if port.optional && instance.input("truth").is_none() => {}
                 "truth" => truth = self.single(instance, port).map(Some),
+                "state" => state = self.single(instance, port).map(|slot| Some((*port, slot))),
                 _ => voters = self.slots(instance, port).map(|slots| (*port, slots)),
             }
         }
         let (port, voters) = voters?;
         let truth = truth?;
+        let state = state?;
         let Some(&first) = voters.first() else {
             let problem = CompileProblem::ChannelCount {
                 input: port.name,
@@ -70,25 +76,38 @@ impl Resolver<'_> {
             unit,
             ..self.channels[first].channel.clone()
         };
-        let behind = Provenance::of(
-            voters
-                .iter()
-                .map(|&slot| (&self.provenance[slot], Duration::ZERO)),
-        );
+        let slots = voters.iter().copied().chain(state.map(|(_, slot)| slot));
+        let behind = Provenance::of(slots.map(|slot| (&self.provenance[slot], Duration::ZERO)));
+        let state = match state {
+            Some((port, slot)) => {
+                let unit = Self::port_unit(&port);
+                let lags = [Duration::ZERO];
+                Some(self.gather(instance, &port, &[slot], &lags, unit.as_ref())?)
+            }
+            None => None,
+        };
+        let reason = self.beside(first, combined.name.clone());
         let mut outputs = vec![OutputPort {
             name: "prediction",
             channels: vec![combined],
         }];
-        let mut behind = vec![behind];
         if combiner.weighs() {
             outputs.push(OutputPort {
-                name: "weights",
+                name: WEIGHTS,
                 channels: self.weights(&voters),
             });
-            behind.extend(std::iter::repeat_n(behind[0].clone(), voters.len()));
         }
+        if combiner.reasons() {
+            outputs.push(OutputPort {
+                name: "reason",
+                channels: vec![reason],
+            });
+        }
+        let channels = outputs.iter().map(|port| port.channels.len()).sum();
+        let behind = vec![behind; channels];
         let role = PlannedRole::Combiner {
             voters: gather,
+            state,
             truth: link,
             weights: false,
         };
@@ -112,14 +131,19 @@ impl Resolver<'_> {
                 &self.channels[slot].name
             }
         };
-        let weight = |&slot: &usize| Channel {
-            name: format!("weight-{}", name(slot)),
+        let weight = |&slot: &usize| self.beside(slot, format!("weight-{}", name(slot)));
+        voters.iter().map(weight).collect()
+    }
+
+    /// A channel of plain numbers that tell of a vote, held as long as the vote is.
+    fn beside(&self, slot: usize, name: String) -> Channel {
+        Channel {
+            name,
             unit: Unit::one(),
             span: Duration::ZERO,
             ahead: Duration::ZERO,
             max_age: self.channels[slot].channel.default_max_age(),
-        };
-        voters.iter().map(weight).collect()
+        }
     }
 
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.

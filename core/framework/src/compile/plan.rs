@@ -171,11 +171,36 @@ pub enum PlannedRole {
     Combiner {
         /// The gather of the votes.
         voters: usize,
+        /// The gather of the state that it goes by, where it goes by one.
+        state: Option<usize>,
         /// What is predicted, where it learns from errors.
         truth: Option<TruthLink>,
         /// Whether somebody reads its weights.
         weights: bool,
     },
+}
+
+impl PlannedRole {
+    /// What is read as data at a tick: the gathers, in the order of the ports.
+    pub fn gathers(&self) -> impl Iterator<Item = usize> + '_ {
+        let (many, voters, state) = match self {
+            Self::Feature { gathers, .. } | Self::Estimator { gathers, .. } => {
+                (&gathers[..], None, None)
+            }
+            Self::Combiner { voters, state, .. } => (&[][..], Some(*voters), *state),
+        };
+        many.iter().copied().chain(voters).chain(state)
+    }
+
+    /// What is predicted, or compared with predictions.
+    #[must_use]
+    pub fn truth(&self) -> Option<&TruthLink> {
+        match self {
+            Self::Feature { .. } => None,
+            Self::Estimator { truth, .. } => Some(truth),
+            Self::Combiner { truth, .. } => truth.as_ref(),
+        }
+    }
 }
 
 /// A truth and how predictions are paired with it.

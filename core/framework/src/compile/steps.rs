@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::Wanted;
+use super::combiner::WEIGHTS;
 use super::plan::{Plan, PlannedRole, Step};
 use super::problem::CompileProblem;
 use crate::diagnostic::Diagnostics;
@@ -24,7 +25,7 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
                 ..
             }
         );
-        let gathers = gathers(&node.role);
+        let gathers: Vec<usize> = node.role.gathers().collect();
         if closes_loops {
             late.push((index, gathers));
         } else {
@@ -59,27 +60,19 @@ pub(super) fn warm_up(plan: &Plan) -> Duration {
     of_slot.into_iter().max().unwrap_or(Duration::ZERO)
 }
 
-fn gathers(role: &PlannedRole) -> Vec<usize> {
-    match role {
-        PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
-            gathers.clone()
-        }
-        PlannedRole::Combiner { voters, .. } => vec![*voters],
-    }
-}
-
 /// Notes which ports of features somebody reads. The first is always computed.
 pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wanted) {
     let truths: BTreeSet<usize> = plan
         .nodes
         .iter()
-        .filter_map(|node| truth(&node.role))
+        .filter_map(|node| node.role.truth())
+        .map(|truth| truth.slot)
         .collect();
     for node in &mut plan.nodes {
         let is_truth = truths.range(node.slots.clone()).next().is_some();
         if let PlannedRole::Combiner { weights, .. } = &mut node.role {
-            let ports = node.ports.get(1);
-            *weights = ports.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
+            let port = node.ports.iter().find(|(name, _)| *name == WEIGHTS);
+            *weights = port.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
         }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
@@ -88,14 +81,6 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wante
                     index == 0 || error_of_truth || read.range(slots.clone()).next().is_some();
             }
         }
-    }
-}
-
-fn truth(role: &PlannedRole) -> Option<usize> {
-    match role {
-        PlannedRole::Estimator { truth, .. } => Some(truth.slot),
-        PlannedRole::Combiner { truth, .. } => truth.map(|truth| truth.slot),
-        PlannedRole::Feature { .. } => None,
     }
 }
 
@@ -158,10 +143,10 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
 /// The slots that a node reads, with its truth.
 fn reads(plan: &Plan, node: usize) -> impl Iterator<Item = usize> + '_ {
     let role = &plan.nodes[node].role;
-    let data = gathers(role)
-        .into_iter()
+    let data = role
+        .gathers()
         .flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
-    data.chain(truth(role))
+    data.chain(role.truth().map(|truth| truth.slot))
 }
 
 /// Every slot that a measured channel reaches.

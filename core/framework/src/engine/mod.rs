@@ -25,7 +25,7 @@ pub use state::{EngineState, RestoreError};
 
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
-pub(crate) use history::{Cursor, History};
+pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
 use crate::compile::{Plan, PlannedRole, Step};
@@ -139,6 +139,7 @@ impl Engine {
                         spec.build(widths[*voters]),
                         widths[*voters],
                         *truth,
+                        spec.reasons(),
                     ))
                 }
                 _ => unreachable!("a plan gives each node the role of its specification"),
@@ -407,24 +408,34 @@ impl Engine {
             Running::Vote(vote) => {
                 vote.release(now);
                 let PlannedRole::Combiner {
-                    voters, weights, ..
+                    voters,
+                    state,
+                    weights,
+                    ..
                 } = node.role
                 else {
                     unreachable!("a vote is planned as a combiner")
                 };
-                if !self.gathered[voters].fresh {
+                let votes = &self.gathered[voters];
+                let mut fresh = votes.fresh;
+                if let Some(state) = state {
+                    vote.go_by(self.gathered[state].values[0], now);
+                    fresh |= self.gathered[state].fresh;
+                }
+                if !fresh {
                     return;
                 }
-                let (value, stamp) = vote.run(&self.gathered[voters], now);
+                let (value, stamp) = vote.run(votes, now);
                 self.slots.set(node.slots.start, value, stamp);
+                let mut beside = node.slots.start + 1..node.slots.end;
+                if vote.reasons() {
+                    beside.end -= 1;
+                    self.slots.set(beside.end, vote.reason(votes), stamp);
+                }
                 if weights {
-                    let slots = node.slots.start + 1..node.slots.end;
-                    vote.weights(
-                        &self.gathered[voters],
-                        &mut self.slots.values[slots.clone()],
-                    );
-                    self.slots.stamps[slots.clone()].fill(stamp);
-                    self.slots.written[slots].fill(self.slots.tick);
+                    vote.weights(votes, &mut self.slots.values[beside.clone()]);
+                    self.slots.stamps[beside.clone()].fill(stamp);
+                    self.slots.written[beside].fill(self.slots.tick);
                 }
             }
         }

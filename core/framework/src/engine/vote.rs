@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Vote {
     combine: Box<dyn Combine>,
     learning: Option<Learning>,
+    reasons: bool,
 }
 
 struct Learning {
@@ -26,7 +27,12 @@ struct Learning {
 }
 
 impl Vote {
-    pub(crate) fn new(combine: Box<dyn Combine>, voters: usize, link: Option<TruthLink>) -> Self {
+    pub(crate) fn new(
+        combine: Box<dyn Combine>,
+        voters: usize,
+        link: Option<TruthLink>,
+        reasons: bool,
+    ) -> Self {
         let learning = link.map(|link| Learning {
             link,
             pairing: Pairing::new(&link, voters),
@@ -34,7 +40,26 @@ impl Vote {
             votes: VecDeque::new(),
             row: vec![0.0; voters],
         });
-        Self { combine, learning }
+        Self {
+            combine,
+            learning,
+            reasons,
+        }
+    }
+
+    /// Tells the combiner the state that it goes by.
+    pub(crate) fn go_by(&mut self, state: f64, now: Instant) {
+        self.combine.state(now, state);
+    }
+
+    /// Whether it gives reasons.
+    pub(crate) fn reasons(&self) -> bool {
+        self.reasons
+    }
+
+    /// Why the votes of this tick are combined as they are.
+    pub(crate) fn reason(&self, votes: &Gathered) -> f64 {
+        self.combine.reason(Votes(&votes.values))
     }
 
     /// Hands over what the embargo lets through at `now`.

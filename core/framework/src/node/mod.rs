@@ -8,6 +8,7 @@ mod combiner;
 mod estimator;
 mod feature;
 mod port;
+mod reach;
 mod registry;
 mod state;
 
@@ -18,6 +19,7 @@ pub use estimator::{
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use port::{InputPort, Inputs, Mistake, OutputPort, Read};
+pub use reach::Reach;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{Kind, NodeSpec, Role, RoleName, kind, kinds};
