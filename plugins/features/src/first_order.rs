@@ -1,7 +1,8 @@
 //! First-order lags: the thermal masses between a sensor and what it explains.
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
@@ -133,6 +134,10 @@ impl Feature for FirstOrder {
             name: "lagged",
             channels,
         }])
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -32,8 +32,8 @@ impl Plan {
                     "learning": learning.as_ref().map(|learning| self.learning(learning)),
                 })
             }
-            PlannedRole::Combiner { voters, truth, .. } => json!({
-                "inputs": [self.read(*voters)],
+            PlannedRole::Combiner { truth, .. } => json!({
+                "inputs": node.role.inputs().map(|gather| self.read(gather)).collect::<Vec<_>>(),
                 "truth": truth.as_ref().map(|truth| self.link(truth)),
             }),
         };
@@ -60,25 +60,22 @@ impl Plan {
     /// The time after which a node, started cold, knows all that it would know had it always run.
     pub(super) fn warm_up_of(&self, slot_warm_up: &[Duration], node: &PlannedNode) -> Duration {
         let entries = |gather: usize| &self.gathers[gather].entries;
-        let before = |gathers: &[usize]| {
-            let all = gathers.iter().flat_map(|&gather| entries(gather));
+        let before = || {
+            let all = node.role.gathers().flat_map(entries);
             let ages = all.map(|entry| slot_warm_up[entry.slot] + entry.lag + entry.max_age);
             ages.max().unwrap_or(Duration::ZERO)
         };
         match (&node.role, node.spec.role()) {
-            (PlannedRole::Feature { gathers, .. }, crate::node::Role::Feature(feature)) => {
-                feature.memory() + before(gathers)
+            (PlannedRole::Feature { .. }, crate::node::Role::Feature(feature)) => {
+                feature.memory() + before()
             }
-            (
-                PlannedRole::Combiner { voters, truth, .. },
-                crate::node::Role::Combiner(combiner),
-            ) => {
+            (PlannedRole::Combiner { truth, .. }, crate::node::Role::Combiner(combiner)) => {
                 let learned = truth.map_or(Duration::ZERO, |truth| {
                     truth.embargo() + truth.ahead + truth.limit
                 });
-                combiner.memory() + learned + before(&[*voters])
+                combiner.memory() + learned + before()
             }
-            (PlannedRole::Estimator { gathers, .. }, _) => before(gathers),
+            (PlannedRole::Estimator { .. }, _) => before(),
             _ => unreachable!("a plan gives each node the role of its specification"),
         }
     }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::{IntervalScore, ScoreOptions};
 use super::watch::{Truth, Watch};
+use super::{IntervalScore, ScoreOptions};
 use crate::compile::Plan;
 use crate::engine::Engine;
 use crate::time::Instant;
@@ -194,7 +194,9 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                 ),
                 own_instants,
                 interval: prediction.intervals.and_then(|intervals| {
-                    let ends = instants.iter().map(|&i| (prediction.ends[i], truth.values[i]));
+                    let ends = instants
+                        .iter()
+                        .map(|&i| (prediction.ends[i], truth.values[i]));
                     IntervalScore::of(intervals, ends)
                 }),
             }
