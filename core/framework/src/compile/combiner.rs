@@ -36,13 +36,7 @@ impl Resolver<'_> {
         let truth = truth?;
         let state = state?;
         let Some(&first) = voters.first() else {
-            let problem = CompileProblem::ChannelCount {
-                input: port.name,
-                found: Vec::new(),
-                expected: "one channel or more",
-            };
-            self.diagnostics
-                .report(instance.input_place(port.name), problem);
+            self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
         let mut agree = sound;

@@ -158,4 +158,11 @@ impl Estimate {
             None => Restored::Accepted,
         }
     }
+
+    /// Asks for the prediction from any values.
+    #[cfg(feature = "testkit")]
+    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+        let row: Vec<f64> = self.row.iter().map(|_| value()).collect();
+        self.predictor.predict(&row);
+    }
 }

@@ -3,6 +3,7 @@
 use super::gather::Gathered;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
+use crate::channel::ABSENT;
 use crate::compile::TruthLink;
 use crate::node::{Combine, Combiner, Restored, Votes};
 use crate::time::{Duration, Instant};
@@ -60,6 +61,11 @@ impl Vote {
     /// Combines the votes of this tick: the result and its stamp.
     pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
         let combined = self.combine.combine(Votes(&votes.values));
+        let combined = if combined.is_infinite() {
+            ABSENT
+        } else {
+            combined
+        };
         if let Some(ends) = &mut self.interval {
             *ends = self.combine.interval(Votes(&votes.values));
         }
@@ -98,11 +104,24 @@ impl Vote {
         }
         self.weights = weights;
         // Written so that NaN fails.
-        if (sum - 1.0).abs() < 1e-9 && variance >= 0.0 {
+        if (sum - 1.0).abs() < 1e-9 && variance >= 0.0 && variance.is_finite() {
             variance.sqrt()
         } else {
             f64::NAN
         }
+    }
+
+    /// Asks for the answer to any votes, all of them and all but the first.
+    #[cfg(feature = "testkit")]
+    pub(crate) fn ask_idly(&self, mut votes: Vec<f64>) {
+        self.combine.combine(Votes(&votes));
+        self.combine.interval(Votes(&votes));
+        self.combine
+            .weights(Votes(&votes), &mut vec![f64::NAN; votes.len()]);
+        if let Some(first) = votes.first_mut() {
+            *first = f64::NAN;
+        }
+        self.combine.combine(Votes(&votes));
     }
 
     /// The truth to look at after all outputs, if any.

@@ -2,12 +2,14 @@
 
 mod interval;
 mod table;
+mod trace;
 mod watch;
 
 use std::sync::Arc;
 
 pub use interval::IntervalScore;
 pub use table::{Score, Scores};
+pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
 pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;
