@@ -19,6 +19,10 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
 /// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
+///
+/// Where predictions have intervals (bounds, as of `conformal`, or a standard deviation, of which 1.645 to either side are
+/// to cover nine tenths), a second table tells which share of the truths they cover, how wide they are on average, and
+/// their interval score: the width plus 2/(1 − share to cover) times the mean distance of truths outside, small being good.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
@@ -181,9 +185,27 @@ fn describe(scores: &Scores) -> String {
         ];
         let cells: Vec<Vec<String>> = rows.iter().map(|row| line(row)).collect();
         text.push_str(&table(&header, &cells));
+        let cells: Vec<Vec<String>> = rows.iter().filter_map(|row| interval(row)).collect();
+        if !cells.is_empty() {
+            let header = ["  interval", "from", "to cover", "covers", "width", "score"];
+            text.push_str(&table(&header, &cells));
+        }
         text.push('\n');
     }
     text
+}
+
+fn interval(score: &Score) -> Option<Vec<String>> {
+    let interval = score.interval.as_ref()?;
+    let percent = |share: f64| format!("{:.1}%", 100.0 * share);
+    Some(vec![
+        format!("  {}", score.output),
+        interval.from.to_owned(),
+        percent(interval.stated),
+        percent(interval.covered),
+        number(interval.width),
+        number(interval.score),
+    ])
 }
 
 fn line(score: &Score) -> Vec<String> {

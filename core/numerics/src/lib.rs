@@ -53,8 +53,7 @@ pub use error::NumericsError;
 pub use folds::{Split, contiguous_folds, leave_one_out};
 pub use gram::Gram;
 pub use kalman::{
-    Forecast, Innovation, Kalman, MostLikely, Passage, Series, Structural, log_likelihood,
-    most_likely,
+    Followed, Forecast, Innovation, Kalman, Passage, Series, Structural, follow, most_likely,
 };
 pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
 pub use prediction_variance::PredictionVariance;

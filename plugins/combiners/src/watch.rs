@@ -202,7 +202,9 @@ impl Combiner for PageHinkley {
     fn build(&self, _voters: usize) -> Box<dyn Combine> {
         let test = numerics::PageHinkley::new(self.options())
             .expect("a graph with parameters out of range is not compiled");
-        Box::new(Watching::new(self.watch, self.first, self.every, self.hold, test))
+        Box::new(Watching::new(
+            self.watch, self.first, self.every, self.hold, test,
+        ))
     }
 }
 
@@ -247,7 +249,9 @@ impl Combiner for Adwin {
     fn build(&self, _voters: usize) -> Box<dyn Combine> {
         let window = numerics::Adwin::new(self.options())
             .expect("a graph with parameters out of range is not compiled");
-        Box::new(Watching::new(self.watch, self.first, self.every, self.hold, window))
+        Box::new(Watching::new(
+            self.watch, self.first, self.every, self.hold, window,
+        ))
     }
 }
 
@@ -481,7 +485,10 @@ mod tests {
                 alarm.get_or_insert(nth);
             }
         }
-        assert!(alarm.is_some_and(|alarm| (300..350).contains(&alarm)), "{alarm:?}");
+        assert!(
+            alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
+            "{alarm:?}"
+        );
     }
 
     #[test]
@@ -491,6 +498,9 @@ mod tests {
             ..page_hinkley()
         };
         let said = watched(seldom.build(1), 200, 2.0, 200);
-        assert_eq!(said.iter().position(|&said| said == reason::NONE), Some(29 * 5));
+        assert_eq!(
+            said.iter().position(|&said| said == reason::NONE),
+            Some(29 * 5)
+        );
     }
 }

@@ -1,7 +1,9 @@
-//! Estimator nodes of athermal: linear, AR and ARX regression, recursive least squares, and the baselines `zero` and `persistence`.
+//! Estimator nodes of athermal: linear, AR and ARX regression, recursive least squares, structural models followed by a Kalman
+//! filter, and the baselines `zero` and `persistence`.
 
 mod ar;
 mod arx;
+mod kalman;
 mod linear;
 mod online;
 mod persistence;
@@ -11,6 +13,7 @@ mod zero;
 
 pub use ar::Ar;
 pub use arx::Arx;
+pub use kalman::{Kalman, Noises};
 pub use linear::Linear;
 pub use online::OnlinePredictor;
 pub use persistence::Persistence;

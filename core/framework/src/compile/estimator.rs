@@ -64,7 +64,9 @@ impl Resolver<'_> {
         let mut regressors = Vec::new();
         let mut behind = Vec::new();
         let mut whole = sound;
-        if let Some(port) = features_port {
+        if let Some(port) = features_port
+            && !features.is_empty()
+        {
             let unit = Self::port_unit(&port);
             for &lag in &wanted.feature_lags {
                 for &slot in &features {

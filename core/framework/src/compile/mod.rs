@@ -24,8 +24,8 @@ pub use diff::{
 };
 pub(crate) use instance::EstimatorKeys;
 pub use plan::{
-    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode, PlannedOutput,
-    PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
+    Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode,
+    PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;

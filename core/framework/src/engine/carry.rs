@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::{Engine, Fitted};
-use crate::compile::{Change, Plan, PlannedNode, PlannedRole, diff};
+use crate::compile::{Change, Plan, PlannedNode, diff};
 
 /// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
@@ -233,27 +233,8 @@ fn same_fit(old: &Fitted, new: &Fitted, instance: &str) -> bool {
 
 /// The slots that a node reads, with its truth.
 pub(super) fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
-    let (gathers, freeze, truth): (&[usize], _, Option<usize>) = match &node.role {
-        PlannedRole::Feature { gathers, .. } => (gathers, None, None),
-        PlannedRole::Estimator {
-            gathers,
-            learning,
-            truth,
-            ..
-        } => {
-            let freeze = learning.as_ref().and_then(|learning| learning.freeze);
-            (gathers, freeze, Some(truth.slot))
-        }
-        PlannedRole::Combiner { voters, truth, .. } => (
-            std::slice::from_ref(voters),
-            None,
-            truth.map(|truth| truth.slot),
-        ),
-    };
-    let entries = gathers
-        .iter()
-        .copied()
-        .chain(freeze)
-        .flat_map(|gather| &plan.gathers[gather].entries);
+    let gathers = node.role.gathers();
+    let entries = gathers.flat_map(|gather| &plan.gathers[gather].entries);
+    let truth = node.role.truth().map(|truth| truth.slot);
     entries.map(|entry| entry.slot).chain(truth)
 }

@@ -29,7 +29,7 @@ pub use state::{EngineState, RestoreError};
 
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
-pub(crate) use history::{Cursor, History};
+pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
 use crate::compile::{Plan, PlannedRole, Step};
@@ -154,11 +154,7 @@ impl Engine {
                     }
                 }
                 (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
-                    Running::Vote(Vote::new(
-                        spec.build(widths[*voters]),
-                        widths[*voters],
-                        *truth,
-                    ))
+                    Running::Vote(Vote::new(spec, widths[*voters], *truth))
                 }
                 _ => unreachable!("a plan gives each node the role of its specification"),
             });
@@ -464,24 +460,43 @@ impl Engine {
             Running::Vote(vote) => {
                 vote.release(now);
                 let PlannedRole::Combiner {
-                    voters, weights, ..
+                    voters,
+                    state,
+                    beside,
+                    ..
                 } = node.role
                 else {
                     unreachable!("a vote is planned as a combiner")
                 };
-                if !self.gathered[voters].fresh {
+                let votes = &self.gathered[voters];
+                let mut fresh = votes.fresh;
+                if let Some(state) = state {
+                    vote.go_by(self.gathered[state].values[0], now);
+                    fresh |= self.gathered[state].fresh;
+                }
+                if !fresh {
                     return;
                 }
-                let (value, stamp) = vote.run(&self.gathered[voters], now);
+                let (value, stamp) = vote.run(votes, now);
                 self.slots.set(node.slots.start, value, stamp);
-                if weights {
-                    let slots = node.slots.start + 1..node.slots.end;
-                    vote.weights(
-                        &self.gathered[voters],
-                        &mut self.slots.values[slots.clone()],
-                    );
+                if let Some(first) = beside.weights {
+                    let slots = first..first + votes.values.len();
+                    vote.weights(votes, &mut self.slots.values[slots.clone()]);
                     self.slots.stamps[slots.clone()].fill(stamp);
                     self.slots.written[slots].fill(self.slots.tick);
+                }
+                if let Some(slot) = beside.reason {
+                    self.slots.set(slot, vote.reason(votes), stamp);
+                }
+                if let Some((lower, upper)) = beside.bounds {
+                    let ends = vote.interval();
+                    self.slots.set(lower, ends[0], stamp);
+                    self.slots.set(upper, ends[1], stamp);
+                }
+                if let Some((slot, of_voters)) = beside.deviation {
+                    let of_voters = &self.gathered[of_voters].values;
+                    let deviation = vote.deviation(votes, of_voters, value);
+                    self.slots.set(slot, deviation, stamp);
                 }
             }
         }

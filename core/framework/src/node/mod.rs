@@ -9,6 +9,7 @@ mod estimator;
 mod feature;
 mod learner;
 mod port;
+mod reach;
 mod registry;
 mod state;
 
@@ -20,6 +21,7 @@ pub use estimator::{
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use learner::{Learner, Learns, TrainedRange};
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
+pub use reach::Reach;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{Kind, NodeSpec, Role, RoleName, kind, kinds};

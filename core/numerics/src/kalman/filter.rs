@@ -164,7 +164,7 @@ impl Kalman {
             order,
             "a row has a value per coefficient"
         );
-        let error = y - self.mean(0.0, x);
+        let error = y - self.expected(0.0, |regressor| x[regressor]);
         if !error.is_finite() {
             return None;
         }
@@ -205,14 +205,20 @@ impl Kalman {
     /// When `x` has not one value per coefficient.
     #[must_use]
     pub fn forecast(&self, time: f64, x: &[f64]) -> Option<Forecast> {
-        let order = self.state.len();
         assert_eq!(
             self.model.moving() + x.len(),
-            order,
+            self.state.len(),
             "a row has a value per coefficient"
         );
+        self.forecast_of(time, |regressor| x[regressor])
+    }
+
+    /// The same, the regressors given by their number.
+    #[must_use]
+    pub fn forecast_of(&self, time: f64, x: impl Fn(usize) -> f64) -> Option<Forecast> {
+        let order = self.state.len();
         let weight = |i: usize| match i.checked_sub(self.model.moving()) {
-            Some(regressor) => x[regressor],
+            Some(regressor) => x(regressor),
             None if i == 0 => 1.0,
             None => time,
         };
@@ -231,7 +237,7 @@ impl Kalman {
             }
         }
         Some(Forecast {
-            mean: self.mean(time, x),
+            mean: self.expected(time, &x),
             variance: (spread(&self.covariance) + self.model.gained(time).level).max(0.0),
         })
     }
@@ -241,6 +247,46 @@ impl Kalman {
         for state in 0..self.model.moving() {
             self.forget(state);
         }
+    }
+
+    /// Starts level and trend afresh from what is known of them, each a mean and a variance; the coefficients stay.
+    ///
+    /// # Panics
+    /// When there is not one pair for the level and, where there is one, the trend; or one is not finite.
+    pub fn restart_level(&mut self, known: &[(f64, f64)]) {
+        assert_eq!(
+            known.len(),
+            self.model.moving(),
+            "level and trend are told together"
+        );
+        let order = self.state.len();
+        self.forget_level();
+        for (state, &(mean, variance)) in known.iter().enumerate() {
+            assert!(
+                mean.is_finite() && variance >= 0.0 && variance.is_finite(),
+                "what is known is finite"
+            );
+            self.state[state] = mean;
+            self.covariance[state * order + state] = variance;
+            self.diffuse[state * order + state] = 0.0;
+            self.unknown -= 1;
+        }
+    }
+
+    /// Goes on from what another filter knew of the same states, under this one's variances; whether the two have the same
+    /// states.
+    #[must_use]
+    pub fn resume(&mut self, from: &Self) -> bool {
+        let same = self.model.moving() == from.model.moving()
+            && self.state.len() == from.state.len()
+            && from.covariance.len() == from.state.len().pow(2);
+        if same {
+            self.state.clone_from(&from.state);
+            self.covariance.clone_from(&from.covariance);
+            self.diffuse.clone_from(&from.diffuse);
+            self.unknown = from.unknown;
+        }
+        same
     }
 
     /// Makes a state diffuse.
@@ -262,15 +308,18 @@ impl Kalman {
         self.unknown += usize::from(known);
     }
 
+    /// What is expected `time` from now of the observation that has these regressors, given by their number; of no
+    /// meaning while that is diffuse.
+    #[must_use]
     #[inline]
-    fn mean(&self, time: f64, x: &[f64]) -> f64 {
+    pub fn expected(&self, time: f64, x: impl Fn(usize) -> f64) -> f64 {
         let moving = self.model.moving();
         let mut mean = self.state[0];
         if moving > 1 {
             mean += time * self.state[1];
         }
-        let terms = self.state[moving..].iter().zip(x);
-        terms.fold(mean, |sum, (coefficient, x)| sum + coefficient * x)
+        let terms = self.state[moving..].iter().enumerate();
+        terms.fold(mean, |sum, (nth, coefficient)| sum + coefficient * x(nth))
     }
 
     /// Takes an observation of something that nothing is known of; none where all that it tells of is known.

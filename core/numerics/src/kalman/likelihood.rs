@@ -26,10 +26,10 @@ pub struct Series<'a> {
     pub prior: f64,
 }
 
-/// The variances that make a series most likely.
+/// A series as a model follows it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MostLikely {
-    /// The model with them.
+pub struct Followed {
+    /// The model.
     pub model: Structural,
     /// The logarithm of the likelihood; where the level was diffuse, the diffuse one.
     pub log_likelihood: f64,
@@ -37,6 +37,9 @@ pub struct MostLikely {
     pub filter: Kalman,
     /// The root mean square of the errors of predictions from one observation to the next.
     pub innovation_rms: f64,
+    /// What is known of the level and, where there is one, the trend at any time: mean and variance of each over the
+    /// series, the filter's own uncertainty included.
+    pub at_large: Vec<(f64, f64)>,
 }
 
 impl Series<'_> {
@@ -95,11 +98,16 @@ struct Passed {
     logarithms: f64,
     errors: f64,
     diffuse: f64,
+    /// Sums over the predicted ones of level and trend, their squares and their variances.
+    moving: [(f64, f64, f64); 2],
 }
 
 impl Passed {
-    fn over(model: Structural, series: &Series<'_>, total: f64) -> Result<Self, NumericsError> {
+    fn over(model: Structural, series: &Series<'_>) -> Result<Self, NumericsError> {
         let moving = model.moving();
+        let typical = series.typical();
+        let of_trend = model.trend.unwrap_or(0.0) * typical.powi(3);
+        let total = model.observation + model.level * typical + of_trend;
         let mut variances = vec![f64::INFINITY; moving];
         variances.resize(moving + series.width(), series.prior * total);
         let start = vec![0.0; variances.len()];
@@ -111,6 +119,7 @@ impl Passed {
             logarithms: 0.0,
             errors: 0.0,
             diffuse: 0.0,
+            moving: [(0.0, 0.0, 0.0); 2],
         };
         let width = series.width();
         let rows = series.times.iter().zip(series.observations).enumerate();
@@ -132,10 +141,39 @@ impl Passed {
                     passed.squares += known.error * known.error / known.variance;
                     passed.logarithms += known.variance.ln();
                     passed.errors += known.error * known.error;
+                    passed.note_level();
                 }
             }
         }
         Ok(passed)
+    }
+
+    fn note_level(&mut self) {
+        let order = self.filter.state().len();
+        let moving = self.filter.model().moving();
+        for (nth, (sum, squares, variances)) in self.moving[..moving].iter_mut().enumerate() {
+            let state = self.filter.state()[nth];
+            *sum += state;
+            *squares += state * state;
+            *variances += self.filter.covariance()[nth * order + nth];
+        }
+    }
+
+    fn followed(self, scale: f64) -> Followed {
+        let count = self.predicted;
+        let moving = &self.moving[..self.filter.model().moving()];
+        let at_large = moving.iter().map(|(sum, squares, variances)| {
+            let mean = sum / count;
+            let spread = (squares / count - mean * mean).max(0.0);
+            (mean, spread + variances / count)
+        });
+        Followed {
+            model: self.filter.model(),
+            log_likelihood: self.log_likelihood(scale),
+            innovation_rms: (self.errors / count).sqrt(),
+            at_large: at_large.collect(),
+            filter: self.filter,
+        }
     }
 
     /// The scale of all variances that makes the series most likely, and the logarithm of the likelihood with it.
@@ -151,15 +189,21 @@ impl Passed {
     }
 }
 
-/// The logarithm of the likelihood of a series under a model.
+/// Follows a series with a model whose variances are given.
 ///
 /// # Errors
-/// [`NumericsError::Parameter`], [`NumericsError::Width`] and [`NumericsError::NotFinite`] for what does not fit.
-pub fn log_likelihood(model: Structural, series: &Series<'_>) -> Result<f64, NumericsError> {
+/// [`NumericsError::TooFewRows`] when no observation can be predicted, [`NumericsError::Parameter`],
+/// [`NumericsError::Width`] and [`NumericsError::NotFinite`] for what does not fit.
+pub fn follow(model: Structural, series: &Series<'_>) -> Result<Followed, NumericsError> {
     series.check()?;
-    let per_step = (model.level + model.trend.unwrap_or(0.0)) * series.typical();
-    let passed = Passed::over(model, series, model.observation + per_step)?;
-    Ok(passed.log_likelihood(1.0))
+    let passed = Passed::over(model, series)?;
+    if passed.predicted == 0.0 {
+        return Err(NumericsError::TooFewRows {
+            needed: passed.unknown as u64 + 1,
+            found: passed.unknown as u64,
+        });
+    }
+    Ok(passed.followed(1.0))
 }
 
 /// Finds the variances that make a series most likely, of a local level or, with `trend`, a local linear trend.
@@ -169,12 +213,12 @@ pub fn log_likelihood(model: Structural, series: &Series<'_>) -> Result<f64, Num
 ///
 /// # Errors
 /// [`NumericsError::TooFewRows`] when fewer observations can be predicted than there are variances;
-/// [`NumericsError::NoConvergence`] where all observations are predicted exactly; and as [`log_likelihood`].
+/// [`NumericsError::NoConvergence`] where all observations are predicted exactly; and as [`follow`].
 pub fn most_likely(
     trend: bool,
     passage: Passage,
     series: &Series<'_>,
-) -> Result<MostLikely, NumericsError> {
+) -> Result<Followed, NumericsError> {
     series.check()?;
     let typical = series.typical();
     let model = |level: f64, slope: f64| {
@@ -187,7 +231,7 @@ pub fn most_likely(
             passage,
         }
     };
-    let pass = |level: f64, slope: f64| Passed::over(model(level, slope), series, 1.0);
+    let pass = |level: f64, slope: f64| Passed::over(model(level, slope), series);
     let needed = 3 + u64::from(trend);
     let first = pass(1.0, if trend { 1.0 } else { 0.0 })?;
     if first.predicted < needed as f64 {
@@ -239,10 +283,5 @@ pub fn most_likely(
         trend: relative.trend.map(|trend| scale * trend),
         passage,
     };
-    Ok(MostLikely {
-        filter: Passed::over(model, series, scale)?.filter,
-        model,
-        log_likelihood,
-        innovation_rms: (passed.errors / passed.predicted).sqrt(),
-    })
+    follow(model, series)
 }

@@ -11,5 +11,5 @@ mod simplex;
 mod tests;
 
 pub use filter::{Forecast, Innovation, Kalman};
-pub use likelihood::{MostLikely, Series, log_likelihood, most_likely};
+pub use likelihood::{Followed, Series, follow, most_likely};
 pub use model::{Passage, Structural};

@@ -1,6 +1,6 @@
 //! The filter against statsmodels: the shared oracle, and series with regressors, gaps and irregular times of its own.
 
-use super::{Kalman, Passage, Series, Structural, log_likelihood, most_likely};
+use super::{Kalman, Passage, Series, Structural, follow, most_likely};
 use crate::NumericsError;
 use crate::oracle::{Table, table, text};
 
@@ -163,8 +163,8 @@ fn the_diffuse_likelihood_equals_the_oracle() {
             regressors: &regressors,
             prior: f64::INFINITY,
         };
-        let found = log_likelihood(Structural { passage, ..OWN }, &series).unwrap();
-        near(found, number(&scalars, &[name]), 1e-8);
+        let found = follow(Structural { passage, ..OWN }, &series).unwrap();
+        near(found.log_likelihood, number(&scalars, &[name]), 1e-8);
     }
 }
 
@@ -188,8 +188,8 @@ fn the_most_likely_variances_equal_the_oracle() {
             let expected = scalars[name]["params"][nth].as_f64().unwrap();
             near(variance, expected, 0.01 * expected);
         }
-        let again = log_likelihood(model, &series).unwrap();
-        near(again, found.log_likelihood, 1e-8);
+        let again = follow(model, &series).unwrap();
+        near(again.log_likelihood, found.log_likelihood, 1e-8);
     }
 }
 
@@ -221,7 +221,7 @@ fn the_search_is_no_worse_than_the_oracle_of_the_shared_series() {
         trend: Some(variances[2]),
         passage: Passage::Steps,
     };
-    let of_theirs = log_likelihood(of_theirs, &series).unwrap();
+    let of_theirs = follow(of_theirs, &series).unwrap().log_likelihood;
     assert!(
         found.log_likelihood >= of_theirs - 1e-6,
         "{} below {of_theirs}",
@@ -318,6 +318,43 @@ fn a_level_that_is_forgotten_is_learned_anew_and_coefficients_stay() {
     near(filter.forecast(0.0, &[1.0]).unwrap().mean, -50.0, 1e-9);
     // Two observations at a distance tell the level; the trend is still unknown after one.
     assert!(filter.forecast(5.0, &[1.0]).is_none());
+}
+
+#[test]
+fn a_level_that_is_restarted_is_known_as_well_as_is_told() {
+    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+    for step in 0..200 {
+        let x = f64::from(step % 7);
+        filter.observe(&[x], 10.0 + 2.0 * x);
+        filter.advance(1.0);
+    }
+    let coefficient = filter.covariance()[8];
+    filter.restart_level(&[(-3.0, 4.0), (0.5, 0.25)]);
+    assert!(!filter.is_diffuse());
+    let forecast = filter.forecast(2.0, &[0.0]).unwrap();
+    near(forecast.mean, -2.0, 1e-12);
+    let gained = 2.0 * OWN.level + OWN.trend.unwrap();
+    near(forecast.variance, 4.0 + 4.0 * 0.25 + gained, 1e-12);
+    assert_eq!(filter.covariance()[8], coefficient);
+}
+
+#[test]
+fn a_filter_goes_on_from_another_of_the_same_states_only() {
+    let mut from = Kalman::diffuse(OWN, 1).unwrap();
+    for (x, y) in [(1.0, 2.0), (3.0, 1.0), (2.0, 2.0), (5.0, 5.0)] {
+        from.observe(&[x], y);
+        from.advance(1.0);
+    }
+    let noisier = Structural {
+        observation: 1.0,
+        ..OWN
+    };
+    let mut to = Kalman::diffuse(noisier, 1).unwrap();
+    assert!(to.resume(&from));
+    assert_eq!((to.state(), to.model()), (from.state(), noisier));
+    let level = Structural { trend: None, ..OWN };
+    assert!(!Kalman::diffuse(level, 1).unwrap().resume(&from));
+    assert!(!Kalman::diffuse(level, 2).unwrap().resume(&from));
 }
 
 #[test]

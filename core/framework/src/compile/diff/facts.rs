@@ -294,13 +294,12 @@ fn is_measured(schema: &Value) -> bool {
 
 fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
     let (gathers, link) = match &node.role {
-        PlannedRole::Feature { gathers, .. } => (gathers.clone(), None),
         PlannedRole::Estimator { gathers, truth, .. } => {
             // The gathers after the first read the same channels at other lags, which are parameters.
             let first = gathers.first().filter(|_| reads_features(node));
             (first.copied().into_iter().collect(), Some(*truth))
         }
-        PlannedRole::Combiner { voters, truth, .. } => (vec![*voters], *truth),
+        role => (role.inputs().collect::<Vec<_>>(), role.truth().copied()),
     };
     let ports = (node.kind.inputs)();
     let data = ports
