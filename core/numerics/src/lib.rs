@@ -23,26 +23,37 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocks;
+mod checks;
+mod elastic_net;
 mod error;
-mod fold_state;
 mod folds;
 mod gram;
+mod huber;
 mod least_squares;
 mod normal_equations;
 mod orthogonal;
+mod penalty;
 mod scaler;
 mod score;
 mod selection;
 mod sgd;
 
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
+pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;
-pub use folds::{Split, contiguous_folds, leave_one_out};
+pub use folds::{FoldRows, Folds, Split};
 pub use gram::Gram;
-pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
+pub use huber::{Huber, HuberFit};
+pub use least_squares::{
+    DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
+};
+pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
 pub use scaler::{Standardization, Standardizer};
 pub use score::{Score, ScoreAccumulator};
-pub use selection::{CandidateScore, ForwardSelection, Selection, SelectionScore, SelectionStep};
+pub use selection::{
+    CandidateScore, Candidates, Change, Direction, Search, Selection, SelectionScore,
+    SelectionStep, Smallest, Start, Stepwise, StepwiseSelection, StepwiseStep,
+};
 pub use sgd::{LearningRate, Sgd, SgdOptions};
 
 #[cfg(test)]

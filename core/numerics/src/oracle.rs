@@ -44,12 +44,26 @@ pub(crate) fn text(file: &str) -> Option<String> {
 
 /// A CSV file under `oracles/`; see [`text`].
 pub(crate) fn table(file: &str) -> Option<Table> {
-    let text = text(file)?;
+    text(file).map(|text| read(&text))
+}
+
+/// The text of a file under this project's own `tests/oracles/`.
+pub(crate) fn own_text(file: &str) -> String {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles");
+    std::fs::read_to_string(root.join(file)).unwrap()
+}
+
+/// A CSV file under this project's own `tests/oracles/`.
+pub(crate) fn own_table(file: &str) -> Table {
+    read(&own_text(file))
+}
+
+fn read(text: &str) -> Table {
     let mut lines = text
         .lines()
         .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    Some(Table {
+    Table {
         header: lines.next().unwrap(),
         records: lines.collect(),
-    })
+    }
 }

@@ -156,6 +156,10 @@ impl Resolver<'_> {
         Regressor {
             name,
             unit: from.channel.unit.to_string(),
+            sensors: self.provenance[slot]
+                .sources()
+                .map(|(source, _)| self.channels[source].name.clone())
+                .collect(),
         }
     }
 
