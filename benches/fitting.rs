@@ -10,9 +10,7 @@ use athermal::core::fit::{FitOptions, fit};
 use athermal::core::recording::Recording;
 use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
-use athermal_numerics::{
-    DEFAULT_ROW_MEMORY, Direction, Folds, GramBlocks, LeastSquares, Search, Standardization,
-};
+use athermal_numerics::{Direction, Folds, GramBlocks, LeastSquares, Search, Standardization};
 use divan::Bencher;
 use divan::counter::BytesCount;
 
@@ -23,12 +21,7 @@ fn main() {
 const CANDIDATES: usize = 64;
 
 /// Rows of 64 candidates that hang together in pairs, and a truth of which 20 of them know something.
-fn blocks(rows: usize) -> GramBlocks {
-    blocks_keeping(rows, DEFAULT_ROW_MEMORY)
-}
-
-fn blocks_keeping(rows: usize, memory: usize) -> GramBlocks {
-    let mut blocks = GramBlocks::with_row_memory(CANDIDATES, memory);
+fn each_row(rows: usize, mut take: impl FnMut(&[f64], f64)) {
     let mut state = 1_u64;
     let mut uniform = || {
         state = state
@@ -45,8 +38,13 @@ fn blocks_keeping(rows: usize, memory: usize) -> GramBlocks {
         }
         let known = row.iter().step_by(3).enumerate();
         let truth = known.fold(uniform(), |sum, (i, value)| sum + value / (i + 1) as f64);
-        blocks.push(&row, truth);
+        take(&row, truth);
     }
+}
+
+fn blocks(rows: usize) -> GramBlocks {
+    let mut blocks = GramBlocks::new(CANDIDATES);
+    each_row(rows, |row, truth| blocks.push(row, truth));
     blocks
 }
 
@@ -87,13 +85,11 @@ fn rows_into_blocks(bencher: Bencher, rows: usize) {
 #[divan::bench(sample_count = 10)]
 fn least_squares_from_rows(bencher: Bencher) {
     const ROWS: usize = 603_458;
-    let kept = blocks_keeping(ROWS, usize::MAX);
     let mut rows = Vec::with_capacity(ROWS * (CANDIDATES + 1));
-    for (x, y, _) in kept.rows().expect("all rows are kept").iter() {
-        rows.extend_from_slice(x);
-        rows.push(y);
-    }
-    drop(kept);
+    each_row(ROWS, |row, truth| {
+        rows.extend_from_slice(row);
+        rows.push(truth);
+    });
     let columns: Vec<_> = (0..CANDIDATES).collect();
     bencher.bench_local(|| {
         let mut blocks = GramBlocks::new(CANDIDATES);

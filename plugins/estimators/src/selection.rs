@@ -41,6 +41,7 @@ pub enum Selection {
 /// How a cross-validated selection goes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(inline)]
 pub struct CrossValidated {
     /// How the rows are cut: a number of contiguous folds, 2 or more, or a table such as
     /// `{ type = "blocked", count = 5, gap_rows = 4, embargo_rows = 8 }` or `{ type = "expanding", count = 5 }`.
