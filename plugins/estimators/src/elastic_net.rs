@@ -30,7 +30,7 @@ pub struct ElasticNet {
     pub alpha: SparsePenalty,
     /// The share of the absolute values in the penalty, above 0 (towards ridge) up to 1 (lasso).
     #[serde(default = "half")]
-    #[schemars(range(max = 1.0))]
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub l1_ratio: f64,
 }
 
@@ -57,6 +57,7 @@ pub struct Path {
     pub folds: Folds,
     /// The smallest penalty tried, as a share of the one that leaves out every feature; above 0, below 1.
     #[serde(default = "thousandth")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub smallest_share: f64,
     /// How many are tried to each factor of ten, 1 or more.
     #[serde(default = "twenty")]

@@ -35,9 +35,11 @@ pub enum Choice {
         folds: Folds,
         /// The smallest penalty tried, above 0.
         #[serde(default = "smallest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
         smallest: f64,
         /// The largest penalty tried, above the smallest.
         #[serde(default = "largest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
         largest: f64,
         /// How many are tried to each factor of ten, 1 or more.
         #[serde(default = "four")]
@@ -49,9 +51,11 @@ pub enum Choice {
     GeneralisedCrossValidation {
         /// The smallest penalty tried, above 0.
         #[serde(default = "smallest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
         smallest: f64,
         /// The largest penalty tried, above the smallest.
         #[serde(default = "largest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
         largest: f64,
         /// How many are tried to each factor of ten, 1 or more.
         #[serde(default = "four")]

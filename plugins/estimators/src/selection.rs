@@ -27,9 +27,11 @@ pub enum Selection {
     Stepwise {
         /// The least F with which a regressor enters.
         #[serde(default = "four")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
         f_enter: f64,
         /// A regressor whose F is below leaves; from 0 to `f_enter`.
         #[serde(default = "below_four")]
+        #[schemars(range(min = 0.0))]
         f_remove: f64,
         /// The most regressors to choose; without it there is no limit.
         #[serde(default)]
