@@ -359,6 +359,29 @@ mod tests {
     }
 
     #[test]
+    fn variable_forgetting_follows_the_oracle() {
+        let rows = oracle::own_table("rls_variable/rows.csv").numbers();
+        let expected = oracle::own_table("rls_variable/expected.csv").numbers();
+        let variable = RlsOptions {
+            forgetting: Forgetting::Variable {
+                memory: 200.0,
+                noise: 0.1,
+                lowest: 0.8,
+            },
+            most_trace: f64::INFINITY,
+        };
+        let mut rls = Rls::new(3, 100.0, variable).unwrap();
+        for (row, expected) in rows.iter().zip(&expected) {
+            let error = rls.step(&row[..3], row[3]);
+            assert!((error - expected[1]).abs() < 1e-8, "{error} {}", expected[1]);
+            for (found, wanted) in rls.coefficients().iter().zip(&expected[2..5]) {
+                assert!((found - wanted).abs() < 1e-8, "{found} {wanted}");
+            }
+        }
+        assert_eq!(expected.len(), 250);
+    }
+
+    #[test]
     fn a_million_rows_leave_the_covariance_symmetric_and_positive() {
         for factor in [1.0, 0.999, 0.9] {
             let width = 8;

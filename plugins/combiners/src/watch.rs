@@ -2,7 +2,7 @@
 
 use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{self as numerics, AdwinOptions, Change, PageHinkleyOptions};
+use athermal_numerics::{self as numerics, AdwinOptions, MeanChange, PageHinkleyOptions};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -259,14 +259,14 @@ athermal_core::register!(Adwin, Combiner, "adwin");
 
 /// What tells whether the mean of a series has changed.
 trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeOwned + 'static {
-    fn push(&mut self, value: f64) -> Option<Change>;
+    fn push(&mut self, value: f64) -> Option<MeanChange>;
 
     /// Goes on with the parameters of another.
     fn as_told_to(self, other: &Self) -> Self;
 }
 
 impl Detector for numerics::PageHinkley {
-    fn push(&mut self, value: f64) -> Option<Change> {
+    fn push(&mut self, value: f64) -> Option<MeanChange> {
         self.push(value)
     }
 
@@ -276,7 +276,7 @@ impl Detector for numerics::PageHinkley {
 }
 
 impl Detector for numerics::Adwin {
-    fn push(&mut self, value: f64) -> Option<Change> {
+    fn push(&mut self, value: f64) -> Option<MeanChange> {
         self.push(value)
     }
 
@@ -391,7 +391,7 @@ where
             Watched::Size => relative.abs(),
         };
         if let Some(change) = seen.detector.push(value) {
-            seen.alarm = Some((arrived, change == Change::Up));
+            seen.alarm = Some((arrived, change == MeanChange::Up));
         }
     }
 

@@ -7,7 +7,9 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Solver, lag_mistakes};
+use crate::lags::lag_mistakes;
+use crate::regression::LinearTrainer;
+use crate::solver::Solver;
 
 /// Autoregression: linear regression of the truth on its own past.
 ///

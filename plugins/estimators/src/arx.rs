@@ -7,7 +7,10 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Selection, Solver, lag_mistakes};
+use crate::lags::lag_mistakes;
+use crate::regression::LinearTrainer;
+use crate::selection::Selection;
+use crate::solver::Solver;
 
 /// Autoregression with exogenous inputs: linear regression of the truth on features and on its own past.
 ///

@@ -7,13 +7,17 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Selection, Solver};
+use crate::regression::LinearTrainer;
+use crate::selection::Selection;
+use crate::solver::Solver;
 
 /// Linear regression of the truth on features.
 ///
 /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t)`. Features are standardised over all training rows (mean 0, population variance 1)
 /// before the solver sees them; the stated coefficients are for the features as they are. With a selection, features are
-/// added one by one by cross-validation, as in Mandelli, Dankwart and Napoli, section 3.3.
+/// chosen by cross-validation: `method = "forward"` adds them one by one, as in Mandelli, Dankwart and Napoli, section 3.3;
+/// `by = "sensor"` and `most = 2` tell which two sensors are worth their price. The penalty of ridge can be chosen too, for
+/// all candidates before a selection and for those chosen after it: `alpha = { by = "cross_validation", folds = 5 }`.
 ///
 /// The port `deviation` is the standard deviation of the truth about the prediction, in the unit of the truth (not with the
 /// solver `sgd`): `s √(1 + 1/n + (x − x̄)ᵀ (XᵀX + αI)⁻¹ (x − x̄))` on standardised features, `s²` the residual variance

@@ -5,12 +5,16 @@ use athermal_core::node::{
     TrainingReport, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
-use athermal_numerics::{NumericsError, RlsOptions, covariance_of};
+use athermal_numerics::{RlsOptions, covariance_of};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::online::{Frame, OnlinePredictor, Recursion};
-use crate::regression::{LinearTrainer, Selection, Solver, lag_mistakes, untrained};
+use crate::lags::lag_mistakes;
+use crate::penalty::Penalty;
+use crate::regression::{LinearTrainer, told};
+use crate::selection::Selection;
+use crate::solver::Solver;
 
 /// Recursive least squares: linear regression that goes on learning while it runs, and forgets.
 ///
@@ -170,7 +174,9 @@ impl Estimator for Rls {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        let solver = Solver::Ridge { alpha: self.alpha };
+        let solver = Solver::Ridge {
+            alpha: Penalty::Fixed(self.alpha),
+        };
         // The range is kept whether it learns or not, so that the same fit serves both.
         let setup = TrainingSetup {
             learns: true,
@@ -192,7 +198,7 @@ struct RlsTrainer {
 }
 
 impl RlsTrainer {
-    fn start(&self, report: &mut TrainingReport) -> Result<OnlinePredictor, NumericsError> {
+    fn start(&self, report: &mut TrainingReport) -> Result<OnlinePredictor, TrainingError> {
         let Rls {
             forgetting, alpha, ..
         } = self.parameters;
@@ -205,7 +211,7 @@ impl RlsTrainer {
             .max(f64::MIN_POSITIVE.sqrt());
         let rows = forgetting.memory().min(count);
         let (columns, scales) = (&found.columns, &found.standard.scales);
-        let covariance = covariance_of(&found.gram, columns, scales, alpha, rows)?;
+        let covariance = covariance_of(&found.gram, columns, scales, alpha, rows).map_err(told)?;
         let trace: f64 = covariance.iter().step_by(columns.len() + 2).sum();
         let options = RlsOptions {
             forgetting: match forgetting {
@@ -224,7 +230,7 @@ impl RlsTrainer {
         };
         let frame = Frame::new(found.names.clone(), columns, &found.standard, 0.0);
         let coefficients = frame.scaled(&found.fit.coefficients, found.fit.intercept);
-        let rls = athermal_numerics::Rls::starting_at(coefficients, covariance, options)?;
+        let rls = athermal_numerics::Rls::starting_at(coefficients, covariance, options).map_err(told)?;
         let range = self.rows.range_of(columns).unwrap_or_default();
         Ok(OnlinePredictor::new(
             frame,
@@ -241,7 +247,7 @@ impl Trainer for RlsTrainer {
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
-        let predictor = self.start(&mut report).map_err(|error| untrained(&error))?;
+        let predictor = self.start(&mut report)?;
         let predictor: Box<dyn Predictor> = Box::new(predictor);
         Ok(Trained { predictor, report })
     }

@@ -201,6 +201,10 @@ impl Resolver<'_> {
         Regressor {
             name,
             unit: from.channel.unit.to_string(),
+            sensors: self.provenance[slot]
+                .sources()
+                .map(|(source, _)| self.channels[source].name.clone())
+                .collect(),
         }
     }
 

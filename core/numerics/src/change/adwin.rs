@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Change;
+use super::MeanChange;
 use crate::NumericsError;
 
 /// How many buckets of a size there are before two of them are put together.
@@ -127,7 +127,7 @@ impl Adwin {
 
     /// Takes a value, without allocating; tells where the mean has gone if the window had to be cut. A value that is not
     /// finite is ignored.
-    pub fn push(&mut self, value: f64) -> Option<Change> {
+    pub fn push(&mut self, value: f64) -> Option<MeanChange> {
         if !value.is_finite() {
             return None;
         }
@@ -195,7 +195,7 @@ impl Adwin {
     }
 
     /// Looks for a cut, from the oldest value on.
-    fn cut(&self) -> Option<Change> {
+    fn cut(&self) -> Option<MeanChange> {
         let count = self.window.count as f64;
         let spread = self.window.squares / count;
         let surprise = (2.0 * count.ln() / self.options.confidence).ln();
@@ -216,7 +216,7 @@ impl Adwin {
                 (2.0 * inverse * spread * surprise).sqrt() + 2.0 / 3.0 * surprise * inverse;
             let gone = new.mean() - old.mean();
             if gone.abs() > chance {
-                return Some(if gone > 0.0 { Change::Up } else { Change::Down });
+                return Some(if gone > 0.0 { MeanChange::Up } else { MeanChange::Down });
             }
         }
         None
@@ -257,10 +257,10 @@ mod tests {
             }
         }
         // `adwin_default` of drift_expected.json has 831 and 1535, its window emptied by the first alarm.
-        assert_eq!(alarms[0], (831, Change::Up));
+        assert_eq!(alarms[0], (831, MeanChange::Up));
         let second = alarms.iter().find(|(row, _)| *row > 1000).unwrap();
         assert!(
-            (1500..1600).contains(&second.0) && second.1 == Change::Down,
+            (1500..1600).contains(&second.0) && second.1 == MeanChange::Down,
             "{alarms:?}"
         );
         assert!(

@@ -9,7 +9,7 @@ pub use page_hinkley::{PageHinkley, PageHinkleyOptions};
 
 /// Where a mean has gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Change {
+pub enum MeanChange {
     /// Up.
     Up,
     /// Down.

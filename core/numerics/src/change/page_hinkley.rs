@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Change;
+use super::MeanChange;
 use crate::NumericsError;
 
 /// How sensitive the test is, in the unit of the series.
@@ -87,7 +87,7 @@ impl PageHinkley {
     }
 
     /// Takes a value; the test begins anew after an alarm. A value that is not finite is ignored.
-    pub fn push(&mut self, value: f64) -> Option<Change> {
+    pub fn push(&mut self, value: f64) -> Option<MeanChange> {
         if !value.is_finite() {
             return None;
         }
@@ -107,9 +107,9 @@ impl PageHinkley {
         let change = if self.count < first {
             None
         } else if self.up - self.lowest > threshold {
-            Some(Change::Up)
+            Some(MeanChange::Up)
         } else if self.highest - self.down > threshold {
-            Some(Change::Down)
+            Some(MeanChange::Down)
         } else {
             None
         };
@@ -149,7 +149,7 @@ mod tests {
             .filter_map(|row| Some((row, test.push(rows[row][0])?)))
             .collect();
         // `page_hinkley_default` of drift_expected.json; the mean goes up at 800 and down at 1500.
-        assert_eq!(alarms, [(833, Change::Up), (1505, Change::Down)]);
+        assert_eq!(alarms, [(833, MeanChange::Up), (1505, MeanChange::Down)]);
     }
 
     #[test]
