@@ -39,21 +39,20 @@ fn predicting_changes_nothing_that_was_learned() {
     quiet[250..350].iter_mut().for_each(|row| row[2] = NAN);
     let mut gap = engine(&graph(RLS));
     run(&mut gap, 0, &quiet[..260]);
-    let probe = all[260];
+    let probe = quiet[260];
     // The same row asked again and again, without a truth: the same answer, once what was on its way has arrived.
     let answers = run(&mut gap, 260, &[probe; 80]);
-    let quiet = &answers[10..];
+    let late = &answers[10..];
     assert!(
-        quiet
-            .iter()
-            .all(|answer| answer[0].to_bits() == quiet[0][0].to_bits())
+        late.iter()
+            .all(|answer| answer[0].to_bits() == late[0][0].to_bits())
     );
 }
 
 #[test]
 fn learning_freezes_on_command_and_goes_on_after_it() {
     let rows = rows(4, 900, 300);
-    let mut engine = engine(&graph(RLS));
+    let mut engine = engine(&graph(&RLS.replace("6.0", "inf")));
     run(&mut engine, 0, &rows[..300]);
     engine.freeze(true);
     let before = engine.snapshot();

@@ -373,7 +373,11 @@ mod tests {
         let mut rls = Rls::new(3, 100.0, variable).unwrap();
         for (row, expected) in rows.iter().zip(&expected) {
             let error = rls.step(&row[..3], row[3]);
-            assert!((error - expected[1]).abs() < 1e-8, "{error} {}", expected[1]);
+            assert!(
+                (error - expected[1]).abs() < 1e-8,
+                "{error} {}",
+                expected[1]
+            );
             for (found, wanted) in rls.coefficients().iter().zip(&expected[2..5]) {
                 assert!((found - wanted).abs() < 1e-8, "{found} {wanted}");
             }

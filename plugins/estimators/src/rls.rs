@@ -9,8 +9,8 @@ use athermal_numerics::{RlsOptions, covariance_of};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::lags::lag_mistakes;
+use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::penalty::Penalty;
 use crate::regression::{LinearTrainer, told};
 use crate::selection::Selection;
@@ -230,7 +230,8 @@ impl RlsTrainer {
         };
         let frame = Frame::new(found.names.clone(), columns, &found.standard, 0.0);
         let coefficients = frame.scaled(&found.fit.coefficients, found.fit.intercept);
-        let rls = athermal_numerics::Rls::starting_at(coefficients, covariance, options).map_err(told)?;
+        let rls =
+            athermal_numerics::Rls::starting_at(coefficients, covariance, options).map_err(told)?;
         let range = self.rows.range_of(columns).unwrap_or_default();
         Ok(OnlinePredictor::new(
             frame,

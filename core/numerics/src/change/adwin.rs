@@ -216,7 +216,11 @@ impl Adwin {
                 (2.0 * inverse * spread * surprise).sqrt() + 2.0 / 3.0 * surprise * inverse;
             let gone = new.mean() - old.mean();
             if gone.abs() > chance {
-                return Some(if gone > 0.0 { MeanChange::Up } else { MeanChange::Down });
+                return Some(if gone > 0.0 {
+                    MeanChange::Up
+                } else {
+                    MeanChange::Down
+                });
             }
         }
         None
