@@ -1,4 +1,4 @@
-//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, stochastic gradients.
+//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, stochastic gradients, correlations.
 //!
 //! Decides how rows of regressors become statistics and how statistics become coefficients. Does not decide where rows
 //! come from, what a regressor is called or what its unit is. Everything runs on the calling thread, and the same rows
@@ -23,6 +23,8 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocks;
+mod collinearity;
+mod correlation;
 mod error;
 mod fold_state;
 mod folds;
@@ -36,6 +38,11 @@ mod selection;
 mod sgd;
 
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
+pub use collinearity::Collinearity;
+pub use correlation::{
+    LjungBox, NORMAL_95, autocorrelation, autocorrelation_errors, chi_squared_tail,
+    cross_correlation, cross_correlation_error, ljung_box,
+};
 pub use error::NumericsError;
 pub use folds::{Split, contiguous_folds, leave_one_out};
 pub use gram::Gram;

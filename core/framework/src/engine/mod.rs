@@ -7,6 +7,8 @@ mod error;
 mod estimate;
 mod gather;
 mod history;
+#[cfg(feature = "testkit")]
+mod idle;
 mod keep;
 mod pairing;
 mod revision;
@@ -322,7 +324,8 @@ impl Engine {
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.
-    pub(crate) fn gathered(&self, gather: usize) -> (&[f64], bool) {
+    #[must_use]
+    pub fn gathered(&self, gather: usize) -> (&[f64], bool) {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
     }
 

@@ -1,11 +1,13 @@
 //! Decides how predictions are scored against the truths measured later; not how they are made.
 
 mod table;
+mod trace;
 mod watch;
 
 use std::sync::Arc;
 
 pub use table::{Score, Scores};
+pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
 pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;
