@@ -78,22 +78,34 @@ impl Report {
             }
         }
         if let Some(folder) = &self.plots {
-            let failed = |error: std::io::Error| {
-                Failure::Outside(format!("cannot make {}: {error}", folder.display()))
-            };
-            std::fs::create_dir_all(folder).map_err(failed)?;
-            let plots = plots(&facts);
-            for (name, svg) in &plots {
-                write(&folder.join(file_name(name)), svg)?;
-            }
-            terminal.note(format_args!(
-                "wrote {} pictures to {}",
-                plots.len(),
-                folder.display()
-            ));
+            write_pictures(terminal, folder, &plots(&facts))?;
         }
         Ok(Answer::Fine)
     }
+}
+
+/// Writes pictures, each a name and its SVG, into a folder.
+///
+/// # Errors
+/// When the folder or a file cannot be written.
+pub fn write_pictures(
+    terminal: &Terminal,
+    folder: &Path,
+    pictures: &[(String, String)],
+) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| {
+        Failure::Outside(format!("cannot make {}: {error}", folder.display()))
+    };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    for (name, svg) in pictures {
+        write(&folder.join(file_name(name)), svg)?;
+    }
+    terminal.note(format_args!(
+        "wrote {} pictures to {}",
+        pictures.len(),
+        folder.display()
+    ));
+    Ok(())
 }
 
 /// A name that is one file in any folder, whatever an axis is called.

@@ -63,6 +63,15 @@ pub struct Response {
     pub asymmetry: f64,
 }
 
+impl Response {
+    /// Leaves out what comes later, where nothing does.
+    fn end_after(&mut self, count: usize) {
+        for series in [&mut self.time_s, &mut self.step, &mut self.impulse] {
+            series.truncate(count);
+        }
+    }
+}
+
 /// The responses of every estimator that answers any sensor.
 ///
 /// # Errors
@@ -102,6 +111,9 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         let truth = truth.map(|slot| &plan.channels[slot]);
         let largest = sensors.iter().map(|of| of.peak.abs()).fold(0.0, f64::max);
         sensors.retain(|of| of.peak.abs() > NOTHING * largest);
+        let last = |of: &Response| of.step.iter().rposition(|y| y.abs() > NOTHING * largest);
+        let last = sensors.iter().filter_map(last).max().unwrap_or(0);
+        sensors.iter_mut().for_each(|of| of.end_after(last + 2));
         Responses {
             node: node.instance(),
             truth: truth.map_or_else(String::new, |of| of.name.clone()),
