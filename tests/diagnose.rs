@@ -127,7 +127,8 @@ fn an_impulse_response_is_the_sum_of_the_frame_times_its_coefficients() {
         assert!((a.time_s[age] - 10.0 * age as f64).abs() < 1e-9);
     }
     // A step of 1 K in the end: the sum of the coefficients in nm per mK.
-    assert!((a.total - 300.0).abs() < 1e-6 && (b.total - 700.0).abs() < 1e-6);
+    let [of_a, of_b] = [a, b].map(|of| of.total.unwrap());
+    assert!((of_a - 300.0).abs() < 1e-6 && (of_b - 700.0).abs() < 1e-6);
     assert!(a.asymmetry < 1e-9, "{}", a.asymmetry);
     // The step response of one window is a parabola with its top in the middle.
     assert!((b.peak_s - 300.0).abs() <= 10.0, "{}", b.peak_s);
@@ -138,8 +139,26 @@ fn an_impulse_response_is_the_sum_of_the_frame_times_its_coefficients() {
 }
 
 #[test]
+fn an_answer_that_lasts_has_no_end() {
+    let text = TWO_SENSORS.replace(
+        "inputs.features = \"gradients\"",
+        "inputs.features = \"temperature\"",
+    );
+    let terms = [("temperature.a", 3.0)];
+    let model = model("lasting", &text, &[("thermal", linear(&terms, 0.0))]);
+    let table = wandering(600, |course, row| 1000.0 * course[row][0]);
+    let observation = observe(&model, &table).unwrap();
+    let found = response::responses(&model, &observation).unwrap();
+    let [of] = &found[0].sensors[..] else {
+        panic!("{found:?}")
+    };
+    assert_eq!((of.total, of.settled_s), (None, None));
+    assert!(of.step.iter().all(|step| (step - 3.0).abs() < 1e-9));
+}
+
+#[test]
 fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_there() {
-    let terms = [("gradients.b@150s", 1.0)];
+    let terms = [("gradients.b@150s", 0.1)];
     let model = model("lags", TWO_SENSORS, &[("thermal", linear(&terms, 0.0))]);
     let table = wandering(6000, |course, row| {
         1000.0 * course[row.saturating_sub(60)][0]

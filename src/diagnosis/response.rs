@@ -21,6 +21,8 @@ use super::of_truths;
 const MOST_INSTANTS: i64 = 2_000;
 /// A step response below this share of the largest of its estimator is none.
 const NOTHING: f64 = 1e-9;
+/// A step response that ends above this share of its largest value has not come to an end.
+const LASTS: f64 = 0.01;
 /// The share of an answer that must have come for it to have settled.
 const SETTLED: f64 = 0.9;
 
@@ -51,8 +53,8 @@ pub struct Response {
     /// What is predicted at each time after an impulse of one unit times one minute, in the unit of the truth.
     pub impulse: Vec<f64>,
     /// The sum of the step response over time, in the unit of the truth times minutes: of a drift per minute, how far a step of
-    /// one unit moves the axis in the end.
-    pub total: f64,
+    /// one unit moves the axis in the end. None where the step response does not come to an end.
+    pub total: Option<f64>,
     /// The time in s at which the step response is largest in size.
     pub peak_s: f64,
     /// The step response there.
@@ -224,16 +226,17 @@ impl Answer<'_> {
             })
             .collect();
         let total = *sums.last()?;
+        let ends = step.last()?.abs() <= LASTS * peak.abs();
         let outside = |sum: &f64| (sum - total).abs() > (1.0 - SETTLED) * total.abs();
         let settled = sums.iter().rposition(outside).map_or(0, |last| last + 1);
         Some(Response {
             sensor: plan.sources[source].name.clone(),
             sensor_unit: plan.channels[source].channel.unit.difference().to_string(),
             impulse: impulse.collect(),
-            total,
+            total: ends.then_some(total),
             peak_s: time_s[largest],
             peak,
-            settled_s: time_s.get(settled).copied(),
+            settled_s: time_s.get(settled).copied().filter(|_| ends),
             asymmetry: asymmetric / peak.abs(),
             time_s,
             step,

@@ -216,9 +216,13 @@ impl<'a> Tables<'a> {
                 "{node}: how far a step of 1 {} moves what it predicts in the end, in {in_the_end}",
                 first.sensor_unit
             );
-            text.push_str(&matrix("sensor", &columns, &cells(|of| number(of.total))));
+            text.push_str(&matrix(
+                "sensor",
+                &columns,
+                &cells(|of| of.total.map_or("no end".to_owned(), number)),
+            ));
             let _ = writeln!(text, "{node}: time until nine tenths of that have come");
-            let settled = |of: &Response| of.settled_s.map_or("never".to_owned(), seconds);
+            let settled = |of: &Response| of.settled_s.map_or("no end".to_owned(), seconds);
             text.push_str(&matrix("sensor", &columns, &cells(settled)));
             let bent = of_node.iter().flat_map(|of| &of.sensors);
             if bent.clone().any(|of| of.asymmetry > 1e-6) {
