@@ -21,6 +21,7 @@ pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
+pub mod chart;
 pub mod diagnosis;
 pub mod report;
 

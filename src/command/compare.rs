@@ -175,7 +175,11 @@ fn describe(comparison: &Comparison) -> String {
         ("no model".to_owned(), plain(|truth| truth.no_model)),
         ("persistence".to_owned(), plain(|truth| truth.persistence)),
     ];
+    let mut graph = None;
     for (nth, row) in comparison.rows.iter().enumerate() {
+        if several && graph.replace(&row.graph) != Some(&row.graph) {
+            rows.push((row.graph.clone(), vec![String::new(); columns.len()]));
+        }
         let cells = row
             .rmse
             .iter()
@@ -190,11 +194,8 @@ fn describe(comparison: &Comparison) -> String {
                 };
                 format!("{mark}{}", or_dash(*rmse))
             });
-        let label = if several {
-            format!("{}: {}", row.graph, row.node)
-        } else {
-            row.node.clone()
-        };
+        let indent = if several { "  " } else { "" };
+        let label = format!("{indent}{}", row.node);
         rows.push((label, cells.collect()));
     }
     text.push_str(&matrix("", &columns, &rows));

@@ -1,10 +1,12 @@
-//! Decides which pictures a diagnosis has; how one is drawn is decided by [`crate::report::chart`].
+//! Decides which pictures a diagnosis has; how one is drawn is decided by [`crate::chart`].
 
 use super::Diagnosis;
-use super::lag::{Correlogram, Lags};
+use super::day::{CurvePoint, Days};
+use super::lag::{Correlogram, FeatureLags, Lags};
 use super::residual::Residuals;
-use super::response::Responses;
-use crate::report::chart::{Chart, Layer, Mark};
+use super::response::{Response, Responses};
+use super::window::{Width, Windows};
+use crate::chart::{Chart, Layer, Mark, Plot};
 
 const COLOURS: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
 /// Lines whose labels have room beside each other.
@@ -48,84 +50,107 @@ impl Points {
     }
 }
 
-fn picture(title: &str, x_label: &str, y_label: &str, points: &[Points]) -> String {
-    let layers = points.iter().map(|of| Layer {
-        x: &of.x,
-        y: &of.y,
-        class: of.class,
-        label: of.label.clone(),
-        mark: of.mark,
-    });
-    let chart = Chart {
-        title: title.to_owned(),
-        x_label,
-        y_label: y_label.to_owned(),
-        height: 340.0,
-        layers: layers.collect(),
-        bands: Vec::new(),
-        limit: None,
-        y_range: None,
-        time: false,
-    };
-    chart.file()
+/// A picture without its name.
+struct Picture {
+    title: String,
+    x_label: &'static str,
+    y_label: String,
+    points: Vec<Points>,
 }
 
-/// Every picture of a diagnosis: name without ending, and SVG.
+impl Picture {
+    fn plot(&self, name: impl Into<String>) -> Option<Plot> {
+        let layers = self.points.iter().map(|of| Layer {
+            x: &of.x,
+            y: &of.y,
+            class: of.class,
+            label: of.label.clone(),
+            mark: of.mark,
+        });
+        let chart = Chart {
+            title: self.title.clone(),
+            x_label: self.x_label,
+            y_label: self.y_label.clone(),
+            height: 340.0,
+            layers: layers.collect(),
+            ..Chart::default()
+        };
+        Plot::of(name, &chart)
+    }
+}
+
+/// Every picture of a diagnosis; those with nothing to draw are left out.
 #[must_use]
-pub fn plots(diagnosis: &Diagnosis) -> Vec<(String, String)> {
+pub fn plots(diagnosis: &Diagnosis) -> Vec<Plot> {
     let mut plots = Vec::new();
+    let mut add = |name: String, picture: Picture| plots.extend(picture.plot(name));
     let is_main = |name: &str| diagnosis.main.iter().any(|main| main.prediction == name);
     let residuals = diagnosis.residuals.iter();
     for of in residuals.filter(|of| is_main(&of.prediction) && !of.bound.is_empty()) {
-        let name = format!("autocorrelation-{}", of.prediction);
-        plots.push((name, autocorrelation(of)));
+        add(
+            format!("autocorrelation-{}", of.prediction),
+            autocorrelation(of),
+        );
     }
     for of in &diagnosis.lags {
         let truth = lags(of, &of.truth, |feature| &feature.truth);
-        plots.push((format!("lags-{}", of.truth), truth));
+        add(format!("lags-{}", of.truth), truth);
         let left = format!("what {} leaves of {}", of.prediction, of.truth);
         let left = lags(of, &left, |feature| &feature.residual);
-        plots.push((format!("lags-residual-{}", of.truth), left));
+        add(format!("lags-residual-{}", of.truth), left);
     }
     for of in &diagnosis.responses {
-        plots.push((format!("impulse-{}", of.node), response(of, true)));
-        plots.push((format!("step-{}", of.node), response(of, false)));
+        add(format!("impulse-{}", of.node), response(of, true));
+        add(format!("step-{}", of.node), response(of, false));
     }
     if let Some(days) = &diagnosis.days {
-        let x: Vec<f64> = days.curve.iter().map(|point| point.days as f64).collect();
-        let curve = diagnosis.main.iter().enumerate().map(|(nth, main)| {
-            let score = |point: &super::day::CurvePoint| {
-                let mut scores = point.scores.iter();
-                let score = scores.find(|score| score.prediction == main.prediction);
-                score.and_then(|score| score.rmse).unwrap_or(f64::NAN)
-            };
-            let y = days.curve.iter().map(score).collect();
-            Points::line(nth, &main.prediction, x.clone(), y)
-        });
-        let curve: Vec<Points> = curve.collect();
-        let unit = diagnosis.main.first().map_or("", |main| main.unit.as_str());
-        let title = "Error on other days against days of the fit";
-        plots.push(("days".to_owned(), picture(title, "days", unit, &curve)));
+        add("days".to_owned(), learning(diagnosis, days));
     }
     if !diagnosis.windows.is_empty() {
-        let lines = diagnosis.windows.iter().enumerate().map(|(nth, of)| {
-            let shown = |width: &&super::window::Width| {
-                width.window_s <= WINDOWS_SHOWN * of.window_s && width.ratio.is_finite()
-            };
-            let shown: Vec<_> = of.widths.iter().filter(shown).collect();
-            let x = shown.iter().map(|width| width.window_s / 60.0).collect();
-            let y = shown.iter().map(|width| width.ratio).collect();
-            Points::line(nth, &of.truth, x, y)
-        });
-        let lines: Vec<Points> = lines.collect();
-        let title = "Signal to noise of the drift against its window";
-        let svg = picture(title, "window in minutes", "signal to noise", &lines);
-        plots.push(("windows".to_owned(), svg));
+        add("windows".to_owned(), windows(&diagnosis.windows));
     }
     plots
 }
 
-fn autocorrelation(of: &Residuals) -> String {
+fn learning(diagnosis: &Diagnosis, days: &Days) -> Picture {
+    let x: Vec<f64> = days.curve.iter().map(|point| point.days as f64).collect();
+    let curve = diagnosis.main.iter().enumerate().map(|(nth, main)| {
+        let score = |point: &CurvePoint| {
+            let mut scores = point.scores.iter();
+            let score = scores.find(|score| score.prediction == main.prediction);
+            score.and_then(|score| score.rmse).unwrap_or(f64::NAN)
+        };
+        let y = days.curve.iter().map(score).collect();
+        Points::line(nth, &main.prediction, x.clone(), y)
+    });
+    let unit = diagnosis.main.first().map(|main| main.unit.clone());
+    Picture {
+        title: "Error on other days against days of the fit".to_owned(),
+        x_label: "days",
+        y_label: unit.unwrap_or_default(),
+        points: curve.collect(),
+    }
+}
+
+fn windows(windows: &[Windows]) -> Picture {
+    let lines = windows.iter().enumerate().map(|(nth, of)| {
+        let shown = |width: &&Width| {
+            width.window_s <= WINDOWS_SHOWN * of.window_s && width.ratio.is_finite()
+        };
+        let shown: Vec<_> = of.widths.iter().filter(shown).collect();
+        let x = shown.iter().map(|width| width.window_s / 60.0).collect();
+        let y = shown.iter().map(|width| width.ratio).collect();
+        Points::line(nth, &of.truth, x, y)
+    });
+    Picture {
+        title: "Signal to noise of the drift against its window".to_owned(),
+        x_label: "window in minutes",
+        y_label: "signal to noise".to_owned(),
+        points: lines.collect(),
+    }
+}
+
+fn autocorrelation(of: &Residuals) -> Picture {
     let lags = 1..=of.autocorrelation.len();
     let x: Vec<f64> = lags.map(|lag| lag as f64 * of.spacing_s / 60.0).collect();
     // The bounds reach past the bars to either side, or half of the outer ones would be cut off.
@@ -151,15 +176,19 @@ fn autocorrelation(of: &Residuals) -> String {
         label: String::new(),
         mark: Mark::Bars,
     };
-    let points = [bars, bound(1.0, "95 % of white series"), bound(-1.0, "")];
-    let title = format!("Autocorrelation of the residuals of {}", of.prediction);
-    picture(&title, "lag in minutes", &of.prediction, &points)
+    let (above, below) = (bound(1.0, "95 % of white series"), bound(-1.0, ""));
+    Picture {
+        title: format!("Autocorrelation of the residuals of {}", of.prediction),
+        x_label: "lag in minutes",
+        y_label: of.prediction.clone(),
+        points: vec![bars, above, below],
+    }
 }
 
 /// Of each sensor the feature that says most.
-fn lags(of: &Lags, title: &str, side: fn(&super::lag::FeatureLags) -> &Correlogram) -> String {
+fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Picture {
     let x: Vec<f64> = of.lag_s.iter().map(|lag| lag / 60.0).collect();
-    let mut shown: Vec<&super::lag::FeatureLags> = Vec::new();
+    let mut shown: Vec<&FeatureLags> = Vec::new();
     let sensor = |name: &str| name.split('@').next().unwrap_or_default().to_owned();
     for feature in of.features.iter().filter(|of| !side(of).best.is_nan()) {
         let rival = shown
@@ -179,8 +208,12 @@ fn lags(of: &Lags, title: &str, side: fn(&super::lag::FeatureLags) -> &Correlogr
     let mut points: Vec<Points> = lines.collect();
     let widest = shown.iter().map(|of| side(of).error).fold(0.0, f64::max);
     points.extend(Points::bounds(&x, 3.0 * widest, "3 σ"));
-    let title = format!("Correlation of features with {title}");
-    picture(&title, "minutes that it follows the feature", "r", &points)
+    Picture {
+        title: format!("Correlation of features with {title}"),
+        x_label: "minutes that it follows the feature",
+        y_label: "r".to_owned(),
+        points,
+    }
 }
 
 /// A channel without its node, for a legend.
@@ -188,8 +221,8 @@ fn short(name: &str) -> &str {
     name.split_once('.').map_or(name, |(_, channel)| channel)
 }
 
-fn response(of: &Responses, impulse: bool) -> String {
-    let mut largest: Vec<&super::response::Response> = of.sensors.iter().collect();
+fn response(of: &Responses, impulse: bool) -> Picture {
+    let mut largest: Vec<&Response> = of.sensors.iter().collect();
     largest.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
     largest.truncate(COLOURS.len());
     let lines = largest.iter().enumerate().map(|(nth, sensor)| {
@@ -201,13 +234,16 @@ fn response(of: &Responses, impulse: bool) -> String {
         };
         Points::line(nth, short(&sensor.sensor), x, y.clone())
     });
-    let lines: Vec<Points> = lines.collect();
     let of_unit = of.sensors.first().map_or("", |of| of.sensor_unit.as_str());
     let (what, unit) = if impulse {
         ("Impulse", format!("{} per {of_unit}·min", of.unit))
     } else {
         ("Step", format!("{} per {of_unit}", of.unit))
     };
-    let title = format!("{what} response of {}", of.node);
-    picture(&title, "minutes after the change", &unit, &lines)
+    Picture {
+        title: format!("{what} response of {}", of.node),
+        x_label: "minutes after the change",
+        y_label: unit,
+        points: lines.collect(),
+    }
 }

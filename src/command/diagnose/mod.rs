@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::data::{self, Data};
 use super::evaluate::load_fitted;
-use super::report::write_pictures;
+use super::report::write_plots;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use tables::Tables;
 
@@ -51,7 +51,7 @@ pub struct Diagnose {
     /// Leave out what needs fits of its own: days left out, and how many are needed
     #[arg(long)]
     no_fit: bool,
-    /// A folder for every picture as an SVG file
+    /// A folder for every picture as SVG and PNG files
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }
@@ -93,7 +93,7 @@ impl Diagnose {
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
         self.tell(terminal, &diagnosis);
         if let Some(folder) = &self.plots {
-            write_pictures(terminal, folder, &plots(&diagnosis))?;
+            write_plots(terminal, folder, &plots(&diagnosis))?;
         }
         Ok(Answer::Fine)
     }
