@@ -1,9 +1,11 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
 mod check;
+mod compare;
 mod completions;
 mod data;
 mod demo;
+mod diagnose;
 mod diff;
 mod evaluate;
 mod explain;
@@ -44,6 +46,10 @@ pub enum Command {
     Fit(fit::Fit),
     /// Score a model's predictions on recorded data
     Evaluate(evaluate::Evaluate),
+    /// Fit several graphs on the same data and score them on others, in one table
+    Compare(compare::Compare),
+    /// Show why a model predicts as well as it does, and what would make it better
+    Diagnose(diagnose::Diagnose),
     /// Show what a model is worth on recorded data, as one page
     Report(report::Report),
     /// Run a model: rows in, predictions out
@@ -75,6 +81,8 @@ impl Command {
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
+            Self::Compare(command) => command.run(terminal),
+            Self::Diagnose(command) => command.run(terminal),
             Self::Report(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),
