@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Facts, Published, Worth, figure};
+use super::{Facts, Published, Worth, figure, spelled};
 
 /// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
 #[must_use]
@@ -38,11 +38,7 @@ pub fn text(facts: &Facts) -> String {
 
 /// Errors in nm/min, the article's before ours in each row.
 fn published(text: &mut String, table: &Published) {
-    let _ = write!(
-        text,
-        "\n{}, in nm/min: published | here\n{:<21}",
-        table.source, ""
-    );
+    let _ = write!(text, "{:<21}", "");
     let width = if table.axes.len() > 3 { 9 } else { 14 };
     for axis in &table.axes {
         let _ = write!(text, "{axis:>width$}");
@@ -64,20 +60,15 @@ fn published(text: &mut String, table: &Published) {
 }
 
 fn loss(text: &mut String, worth: &Worth) {
-    let Some((without, with)) = worth.below_limit else {
+    let Some(headline) = worth.headline() else {
         return;
     };
-    let _ = writeln!(
-        text,
-        "\nFive-minute losses below {} dB: {:.1} % without, {:.1} % with correction.",
-        worth.loss_limit,
-        100.0 * without,
-        100.0 * with
-    );
+    text.push('\n');
+    text.push_str(&filled(&headline, ""));
     if worth.settling.is_empty() {
         return;
     }
-    let unit = worth.set_point_unit.as_deref().unwrap_or_default();
+    let unit = spelled(worth.set_point_unit.as_deref().unwrap_or_default());
     let _ = writeln!(
         text,
         "\n{:>27}{:>21}{:>27}\n{:>6}{:>9}{:>9}{:>15}{:>9}{:>17}{:>9}",
