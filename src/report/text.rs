@@ -12,10 +12,16 @@ pub fn text(facts: &Facts) -> String {
         let sentence = format!("{}: {}", verdict.axis, verdict.sentence());
         text.push_str(&filled(&sentence, "   "));
     }
-    facts
-        .published
-        .iter()
-        .for_each(|table| published(&mut text, table));
+    let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
+    for table in &facts.published {
+        let _ = writeln!(
+            text,
+            "\n{}: errors in nm/min, here {} min ahead",
+            table.source,
+            ahead / 60.0
+        );
+        published(&mut text, table);
+    }
     if let Some(worth) = &facts.worth {
         loss(&mut text, worth);
     }
@@ -36,26 +42,27 @@ pub fn text(facts: &Facts) -> String {
     text
 }
 
-/// Errors in nm/min, the article's before ours in each row.
+/// The article's errors, and ours under them.
 fn published(text: &mut String, table: &Published) {
-    let _ = write!(text, "{:<21}", "");
-    let width = if table.axes.len() > 3 { 9 } else { 14 };
+    let _ = write!(text, "{:<32}", "");
     for axis in &table.axes {
-        let _ = write!(text, "{axis:>width$}");
+        let _ = write!(text, "{axis:>8}");
     }
     text.push('\n');
-    for row in &table.rows {
-        let _ = write!(text, "{:<21}", row.name);
-        for (published, ours) in row.published.iter().zip(&row.ours) {
-            let short = |value: Option<f64>| match value {
-                Some(value) if value < 10.0 => format!("{value:.1}"),
-                Some(value) => format!("{value:.0}"),
-                None => "-".to_owned(),
-            };
-            let both = format!("{}|{}", short(Some(*published)), short(*ours));
-            let _ = write!(text, "{both:>width$}");
+    let mut line = |name: &str, whose: &str, figures: &mut dyn Iterator<Item = Option<f64>>| {
+        let _ = write!(text, "{name:<22}{whose:<10}");
+        for value in figures {
+            let _ = write!(text, "{:>8}", figure(value));
         }
         text.push('\n');
+    };
+    for row in &table.rows {
+        line(
+            row.name,
+            "published",
+            &mut row.published.iter().map(|value| Some(*value)),
+        );
+        line("", "here", &mut row.ours.iter().copied());
     }
 }
 
