@@ -95,7 +95,7 @@ fn a_tick_of_every_shipped_graph_allocates_nothing_once_warm() {
         );
     }
     // What stands between a prediction and a motor is shown in full.
-    let of_control = kinds().into_values().flatten();
+    let of_control = kinds().values().flatten();
     for kind in of_control.filter(|kind| kind.package == "athermal-control") {
         assert!(
             stepped.contains(kind.name),

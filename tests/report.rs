@@ -117,7 +117,8 @@ fn what_a_correction_is_worth_agrees_with_a_calculation_by_hand() {
         let at = |row: usize, with: f64| {
             (
                 measured["time_s"][row],
-                position[row] + with * correction[row],
+                // The correction is in µm.
+                position[row] + 1000.0 * with * correction[row],
             )
         };
         let ways =
@@ -314,7 +315,7 @@ fn weights_of_a_vote_add_up_to_one_at_every_truth() {
     // Its axes are those of the article's single axis system, and it has no correction.
     assert_eq!(
         facts["published"][0]["source"],
-        "Table 2, single axis system"
+        "Table 2, single axis system, drift below 100 nm/min"
     );
     assert!(facts["worth"].is_null());
 }
@@ -372,9 +373,9 @@ fn a_sensor_that_failed_is_told_with_what_was_wrong() {
     assert!((ticks - 330.0).abs() < 3.0, "{ticks}");
     assert!(stuck["most_unchanged"].as_f64().unwrap() >= 360.0);
     assert_eq!(sound["health"].as_object().unwrap().len(), 1);
-    // The air's noise is 1 mK beside its own turbulence.
-    let noise = sound["noise"].as_f64().unwrap();
-    assert!((0.9e-3..0.02).contains(&noise), "{noise}");
+    // The column is slow, so that what differs from sample to sample is the noise of 1 mK.
+    let noise = sensor("t3")["noise"].as_f64().unwrap();
+    assert!((0.9e-3..1.1e-3).contains(&noise), "{noise}");
     assert_eq!(sensor("t3")["rejected"], 3);
 }
 

@@ -57,6 +57,8 @@ struct Looking {
     lengths: Vec<f64>,
     /// The channel's range in the graph.
     limits: (f64, f64),
+    /// Whether data may lack it, such as what a machine reports as applied, which may rest.
+    optional: bool,
     /// The slot in which a `health` node says what is wrong.
     reason: Option<usize>,
 }
@@ -70,6 +72,7 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
         max_age_s: plan.channels[slot].channel.max_age.map(|age| age.secs()),
         looking: Looking {
             limits: source.range,
+            optional: source.optional,
             reason: reasons.get(&slot).copied(),
             ..Looking::default()
         },
@@ -169,7 +172,7 @@ impl SensorFacts {
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        if self.samples == 0 {
+        if self.samples == 0 && !self.looking.optional {
             remarks.push("no sample".to_owned());
         }
         let beyond = self.rejected - self.infinite;
@@ -187,7 +190,10 @@ impl SensorFacts {
             ));
         }
         let moving = self.looking.changes as f64 + self.most_unchanged as f64;
-        if self.most_unchanged >= STUCK && moving > CHANGES * self.samples as f64 {
+        if !self.looking.optional
+            && self.most_unchanged >= STUCK
+            && moving > CHANGES * self.samples as f64
+        {
             remarks.push(format!("the same value {} times", self.most_unchanged));
         }
         let faults = self

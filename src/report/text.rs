@@ -14,12 +14,7 @@ pub fn text(facts: &Facts) -> String {
     }
     let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
     for table in &facts.published {
-        let _ = writeln!(
-            text,
-            "\n{}: errors in nm/min, here {} min ahead",
-            table.source,
-            ahead / 60.0
-        );
+        let _ = writeln!(text, "\n{}; here {} min ahead", table.source, ahead / 60.0);
         published(&mut text, table);
     }
     if let Some(worth) = &facts.worth {
@@ -44,7 +39,7 @@ pub fn text(facts: &Facts) -> String {
 
 /// The article's errors, and ours under them.
 fn published(text: &mut String, table: &Published) {
-    let _ = write!(text, "{:<32}", "");
+    let _ = write!(text, "{:<32}", "errors in nm/min");
     for axis in &table.axes {
         let _ = write!(text, "{axis:>8}");
     }
