@@ -35,6 +35,7 @@ pub enum Solver {
         alpha: f64,
         /// The first step size, above 0.
         #[serde(default = "first_step")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
         eta0: f64,
         /// How fast the step size falls, 0 (not at all) to 1.
         #[serde(default = "quarter")]

@@ -32,13 +32,7 @@ impl Resolver<'_> {
         let (port, voters) = voters?;
         let truth = truth?;
         let Some(&first) = voters.first() else {
-            let problem = CompileProblem::ChannelCount {
-                input: port.name,
-                found: Vec::new(),
-                expected: "one channel or more",
-            };
-            self.diagnostics
-                .report(instance.input_place(port.name), problem);
+            self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
         let mut agree = sound;

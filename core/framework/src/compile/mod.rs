@@ -6,7 +6,6 @@ mod conversion;
 mod diff;
 mod estimator;
 mod feature;
-mod identity;
 mod inputs;
 mod instance;
 mod leak;
@@ -19,7 +18,9 @@ mod resolver;
 mod scope;
 mod steps;
 
-pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
+pub use diff::{
+    Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
+};
 pub(crate) use instance::EstimatorKeys;
 pub use plan::{
     Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
@@ -29,6 +30,7 @@ pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
 pub use provenance::smallest_lag;
 pub(crate) use reference::{Reference, is_pattern, matches};
+pub(crate) use scope::outermost;
 
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;

@@ -3,10 +3,11 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::Wanted;
-use super::plan::{Plan, PlannedRole, Step};
+use super::plan::{Plan, PlannedNode, PlannedRole, Step};
 use super::problem::CompileProblem;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
+use crate::node::Role;
 use crate::time::Duration;
 
 /// The steps: each gather right before its first reader, each node after those that it reads, captures last.
@@ -53,10 +54,33 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
 pub(super) fn warm_up(plan: &Plan) -> Duration {
     let mut of_slot = vec![Duration::ZERO; plan.channels.len()];
     for node in &plan.nodes {
-        let warm_up = plan.warm_up_of(&of_slot, node);
+        let warm_up = warm_up_of(plan, &of_slot, node);
         of_slot[node.slots.clone()].fill(warm_up);
     }
     of_slot.into_iter().max().unwrap_or(Duration::ZERO)
+}
+
+/// The time after which a node, started cold, knows all that it would know had it always run.
+fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Duration {
+    let entries = |gather: usize| &plan.gathers[gather].entries;
+    let before = |gathers: &[usize]| {
+        let all = gathers.iter().flat_map(|&gather| entries(gather));
+        let ages = all.map(|entry| slot_warm_up[entry.slot] + entry.lag + entry.max_age);
+        ages.max().unwrap_or(Duration::ZERO)
+    };
+    match (&node.role, node.spec.role()) {
+        (PlannedRole::Feature { gathers, .. }, Role::Feature(feature)) => {
+            feature.memory() + before(gathers)
+        }
+        (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(combiner)) => {
+            let learned = truth.map_or(Duration::ZERO, |truth| {
+                truth.embargo() + truth.ahead + truth.limit
+            });
+            combiner.memory() + learned + before(&[*voters])
+        }
+        (PlannedRole::Estimator { gathers, .. }, _) => before(gathers),
+        _ => unreachable!("a plan gives each node the role of its specification"),
+    }
 }
 
 fn gathers(role: &PlannedRole) -> Vec<usize> {

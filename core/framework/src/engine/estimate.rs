@@ -85,4 +85,11 @@ impl Estimate {
         let prediction = self.predictor.predict(&self.row);
         prediction.is_finite().then_some((prediction, oldest))
     }
+
+    /// Asks for the prediction from any values.
+    #[cfg(feature = "testkit")]
+    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+        let row: Vec<f64> = self.row.iter().map(|_| value()).collect();
+        self.predictor.predict(&row);
+    }
 }

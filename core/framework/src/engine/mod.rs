@@ -7,6 +7,8 @@ mod error;
 mod estimate;
 mod gather;
 mod history;
+#[cfg(feature = "testkit")]
+mod idle;
 mod keep;
 mod pairing;
 mod revision;
@@ -15,7 +17,7 @@ mod state;
 mod vote;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 pub use carry::{Carry, NodeCarry};
 pub use error::EngineError;
@@ -45,6 +47,8 @@ pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
 pub struct Engine {
     plan: Arc<Plan>,
     fitted: Fitted,
+    /// Worked out when it is first asked for.
+    revision: OnceLock<Arc<str>>,
     slots: Slots,
     gathered: Vec<Gathered>,
     histories: Vec<Option<History>>,
@@ -184,6 +188,7 @@ impl Engine {
                 })
                 .collect(),
             fitted: fitted.clone(),
+            revision: OnceLock::new(),
             plan,
         })
     }
@@ -260,8 +265,9 @@ impl Engine {
 
     /// The revision of the graph that runs; see [`revision`].
     #[must_use]
-    pub fn revision(&self) -> String {
-        revision(&self.plan, &self.fitted)
+    pub fn revision(&self) -> &str {
+        self.revision
+            .get_or_init(|| revision(&self.plan, &self.fitted).into())
     }
 
     /// The next tick belongs to another segment: windows, lags and filters start afresh, what was learned stays.

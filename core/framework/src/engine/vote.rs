@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use super::gather::Gathered;
 use super::pairing::Pairing;
 use super::state::NodeState;
+use crate::channel::ABSENT;
 use crate::compile::TruthLink;
 use crate::node::{Combine, Restored, Votes};
 use crate::time::{Duration, Instant};
@@ -49,6 +50,11 @@ impl Vote {
     /// Combines the votes of this tick: the result and its stamp.
     pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
         let combined = self.combine.combine(Votes(&votes.values));
+        let combined = if combined.is_infinite() {
+            ABSENT
+        } else {
+            combined
+        };
         if let Some(learning) = &mut self.learning {
             learning.pairing.run(now, [&votes.values[..]]);
         }
@@ -59,6 +65,18 @@ impl Vote {
     pub(crate) fn weights(&self, votes: &Gathered, weights: &mut [f64]) {
         weights.fill(f64::NAN);
         self.combine.weights(Votes(&votes.values), weights);
+    }
+
+    /// Asks for the answer to any votes, all of them and all but the first.
+    #[cfg(feature = "testkit")]
+    pub(crate) fn ask_idly(&self, mut votes: Vec<f64>) {
+        self.combine.combine(Votes(&votes));
+        self.combine
+            .weights(Votes(&votes), &mut vec![f64::NAN; votes.len()]);
+        if let Some(first) = votes.first_mut() {
+            *first = f64::NAN;
+        }
+        self.combine.combine(Votes(&votes));
     }
 
     /// The truth to look at after all outputs, if any.

@@ -10,6 +10,7 @@ use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::{LiveOptions, Stepper};
 use crate::compile::Plan;
+use crate::document::TimeBase;
 use crate::engine::{Carry, Engine, EngineError, Heritage, NodeCarry, RestoreError};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
@@ -99,6 +100,13 @@ pub enum StageError {
         /// The channels.
         channels: Vec<String>,
     },
+    /// It reads time in another way.
+    OtherTime {
+        /// How what runs does.
+        running: TimeBase,
+        /// How the new graph does.
+        new: TimeBase,
+    },
     /// What was fitted does not belong to it.
     Engine(EngineError),
     /// Nothing is staged.
@@ -120,6 +128,10 @@ impl fmt::Display for StageError {
                 f,
                 "the new graph reads {}, for which no samples are given: name all graphs at the start, or add the channels",
                 channels.join(", ")
+            ),
+            Self::OtherTime { running, new } => write!(
+                f,
+                "the new graph reads time from {new} and what runs from {running}: let both have the same [time]"
             ),
             Self::Engine(error) => write!(f, "{error}"),
             Self::NothingStaged => write!(f, "no graph is staged: stage one first"),
@@ -207,6 +219,12 @@ impl Control {
         self.pump();
         if self.committed.is_some() {
             return Err(StageError::Busy);
+        }
+        if model.plan.time != self.running.time {
+            return Err(StageError::OtherTime {
+                running: self.running.time.clone(),
+                new: model.plan.time.clone(),
+            });
         }
         let engine =
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;

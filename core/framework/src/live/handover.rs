@@ -57,7 +57,7 @@ impl Seated {
             return Err(missing);
         }
         Ok(Self {
-            revision: engine.revision(),
+            revision: engine.revision().to_owned(),
             samples: vec![f64::NAN; wanted.len()],
             places: places.into_iter().flatten().collect(),
             outputs: vec![None; engine.plan().outputs.len()],
