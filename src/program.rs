@@ -9,7 +9,7 @@ use crate::{command, terminal};
 /// Predicts and corrects the thermal drift of precision machines.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true, max_term_width = 100, after_help = EXAMPLES)]
-struct Arguments {
+pub(crate) struct Arguments {
     #[command(subcommand)]
     command: command::Command,
     #[command(flatten)]

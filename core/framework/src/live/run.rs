@@ -18,7 +18,7 @@ pub fn run(
     source: &mut dyn Source,
     sink: &mut dyn Sink,
 ) -> Result<(), RunError> {
-    let revision = engine.revision();
+    let revision = engine.revision().to_owned();
     let mut samples = Samples::default();
     while let Some(event) = source.next(&mut samples).map_err(RunError::Source)? {
         let Event::Row(time) = event else {
