@@ -21,9 +21,25 @@ pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
+#[macro_use]
+mod output;
+
 pub mod chart;
+mod checkout;
+mod command;
 pub mod diagnosis;
+mod drawing;
+mod figures;
+mod invocation;
+mod program;
 pub mod report;
+mod starter;
+mod terminal;
+
+pub use program::command_line;
+
+// The commands use what the library offers to everybody by the name that everybody uses.
+extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
