@@ -123,7 +123,7 @@ fn an_estimator_that_cannot_learn_says_what_can() {
     let told = problems(&with(
         "solver = { type = \"sgd\" }\nlearn = { outlier = 3.0 }\n",
     ));
-    assert!(told.contains("`outliers`"), "{told}");
+    assert!(told.contains("did you mean \"outliers\"?"), "{told}");
 }
 
 #[test]
