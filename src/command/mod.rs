@@ -10,6 +10,7 @@ mod explain;
 mod fit;
 mod init;
 mod nodes;
+mod parameters;
 mod report;
 mod run;
 mod schema;

@@ -243,6 +243,15 @@ pub struct SelectionStep {
     pub candidates: Vec<CandidateScore>,
 }
 
+impl SelectionStep {
+    /// The name, with a minus before one that was taken out.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let sign = if self.removed { "− " } else { "" };
+        format!("{sign}{}", self.regressor)
+    }
+}
+
 /// A candidate of a selection step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CandidateScore {
