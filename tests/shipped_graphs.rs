@@ -14,6 +14,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         .map(|(name, same)| (*name, same.iter().map(|kind| kind.package).collect()))
         .collect();
     let expected = [
+        ("adwin", "athermal-combiners"),
         ("ar", "athermal-estimators"),
         ("arx", "athermal-estimators"),
         ("auto_weighted", "athermal-combiners"),
@@ -31,10 +32,12 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("mean", "athermal-combiners"),
         ("median", "athermal-combiners"),
         ("optical_loss", "athermal-control"),
+        ("page_hinkley", "athermal-combiners"),
         ("persistence", "athermal-estimators"),
         ("pick", "athermal-features"),
         ("polynomial", "athermal-estimators"),
         ("product", "athermal-features"),
+        ("rls", "athermal-estimators"),
         ("safe_state", "athermal-control"),
         ("scale", "athermal-features"),
         ("settled", "athermal-control"),
