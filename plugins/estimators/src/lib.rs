@@ -5,6 +5,7 @@ mod arx;
 mod linear;
 mod persistence;
 mod regression;
+mod stack;
 mod zero;
 
 pub use ar::Ar;
@@ -12,4 +13,5 @@ pub use arx::Arx;
 pub use linear::Linear;
 pub use persistence::Persistence;
 pub use regression::{LinearPredictor, Selection, Solver};
+pub use stack::Stack;
 pub use zero::Zero;

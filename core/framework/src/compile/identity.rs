@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::plan::{Gather, Plan, PlannedNode, PlannedRole, TruthLink};
+use super::plan::{Gather, Plan, PlannedLearning, PlannedNode, PlannedRole, TruthLink};
 use crate::time::Duration;
 
 impl Plan {
@@ -20,6 +20,7 @@ impl Plan {
                 gathers,
                 truth,
                 training,
+                learning,
                 ..
             } => {
                 let inputs: Vec<_> = gathers.iter().map(|&gather| self.read(gather)).collect();
@@ -28,6 +29,7 @@ impl Plan {
                     "truth": self.link(truth),
                     "above": training.above.to_bits(),
                     "below": training.below.to_bits(),
+                    "learning": learning.as_ref().map(|learning| self.learning(learning)),
                 })
             }
             PlannedRole::Combiner { truth, .. } => json!({
@@ -87,6 +89,14 @@ impl Plan {
             })
             .collect();
         json!({ "fresh": *read == crate::node::Read::Fresh, "entries": entries })
+    }
+
+    fn learning(&self, learning: &PlannedLearning) -> Value {
+        json!({
+            "outliers": learning.outliers.to_bits(),
+            "margin": learning.margin.to_bits(),
+            "freeze": learning.freeze.map(|gather| self.read(gather)),
+        })
     }
 
     fn link(&self, truth: &TruthLink) -> Value {

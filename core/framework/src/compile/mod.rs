@@ -10,6 +10,7 @@ mod identity;
 mod inputs;
 mod instance;
 mod leak;
+mod learning;
 mod order;
 mod plan;
 mod problem;
@@ -22,8 +23,8 @@ mod steps;
 pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
 pub(crate) use instance::EstimatorKeys;
 pub use plan::{
-    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
-    SourceChannel, Step, TrainingLimits, TruthLink,
+    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode, PlannedOutput,
+    PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;

@@ -166,6 +166,8 @@ pub enum PlannedRole {
         truth: TruthLink,
         /// Which rows it is fitted on.
         training: TrainingLimits,
+        /// How it goes on learning while it runs, where it does.
+        learning: Option<PlannedLearning>,
     },
     /// One prediction of several.
     Combiner {
@@ -181,8 +183,8 @@ pub enum PlannedRole {
 }
 
 impl PlannedRole {
-    /// What is read as data at a tick: the gathers, in the order of the ports.
-    pub fn gathers(&self) -> impl Iterator<Item = usize> + '_ {
+    /// What the outputs are made of: the gathers, in the order of the ports.
+    pub fn data(&self) -> impl Iterator<Item = usize> + '_ {
         let (many, voters, state) = match self {
             Self::Feature { gathers, .. } | Self::Estimator { gathers, .. } => {
                 (&gathers[..], None, None)
@@ -190,6 +192,15 @@ impl PlannedRole {
             Self::Combiner { voters, state, .. } => (&[][..], Some(*voters), *state),
         };
         many.iter().copied().chain(voters).chain(state)
+    }
+
+    /// All that is read at a tick: the data, and what freezes learning.
+    pub fn gathers(&self) -> impl Iterator<Item = usize> + '_ {
+        let freeze = match self {
+            Self::Estimator { learning, .. } => learning.as_ref().and_then(|own| own.freeze),
+            Self::Feature { .. } | Self::Combiner { .. } => None,
+        };
+        self.data().chain(freeze)
     }
 
     /// What is predicted, or compared with predictions.
@@ -201,6 +212,17 @@ impl PlannedRole {
             Self::Combiner { truth, .. } => truth.as_ref(),
         }
     }
+}
+
+/// How an estimator goes on learning while it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedLearning {
+    /// A truth that misses its prediction by more than this multiple of the recent error is not learned from.
+    pub outliers: f64,
+    /// By which multiple of its width a regressor may lie outside its range in the fit.
+    pub margin: f64,
+    /// The gather of the channels that must all be 0 for learning to go on.
+    pub freeze: Option<usize>,
 }
 
 /// A truth and how predictions are paired with it.

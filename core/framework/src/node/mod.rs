@@ -7,6 +7,7 @@
 mod combiner;
 mod estimator;
 mod feature;
+mod learner;
 mod port;
 mod reach;
 mod registry;
@@ -18,7 +19,8 @@ pub use estimator::{
     TrainingReport, TrainingSetup, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
-pub use port::{InputPort, Inputs, Mistake, OutputPort, Read};
+pub use learner::{Learner, Learns, TrainedRange};
+pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
 pub use reach::Reach;
 #[doc(hidden)]
 pub use registry::read;

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::ParameterChange;
 use crate::compile::plan::{Plan, PlannedNode, PlannedRole, TruthLink};
 use crate::document::{TimeBase, TimeForm};
-use crate::node::{Read, Role, TruthLags};
+use crate::node::{FREEZE, Read, Role, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -184,7 +184,10 @@ fn node_facts(plan: &Plan, node: &PlannedNode, schema: &Value) -> Facts {
     let mut facts = Facts::default();
     facts.plain("type", node.kind.name);
     if let PlannedRole::Estimator {
-        truth, training, ..
+        truth,
+        training,
+        learning,
+        ..
     } = &node.role
     {
         facts.plain("ahead", truth.ahead.to_string());
@@ -196,6 +199,10 @@ fn node_facts(plan: &Plan, node: &PlannedNode, schema: &Value) -> Facts {
             if limit != none {
                 facts.measured(path, format!("{limit} {unit}"));
             }
+        }
+        if let Some(learning) = learning {
+            facts.plain("learn.outliers", learning.outliers.to_string());
+            facts.plain("learn.margin", learning.margin.to_string());
         }
     }
     if let Value::Object(parameters) = node.spec.parameters() {
@@ -234,7 +241,9 @@ fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
         role => (role.gathers().collect::<Vec<_>>(), role.truth().copied()),
     };
     let ports = (node.kind.inputs)();
-    let data = ports.iter().filter(|port| port.read != Read::Truth);
+    let data = ports
+        .iter()
+        .filter(|port| port.read != Read::Truth && port.name != FREEZE);
     for (port, gather) in data.zip(gathers) {
         let gather = &plan.gathers[gather];
         let slots: Vec<usize> = gather.entries.iter().map(|entry| entry.slot).collect();
@@ -242,9 +251,23 @@ fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
             .then(|| gather.entries.iter().map(|entry| entry.max_age).collect());
         input(plan, port.name, &slots, ages, facts);
     }
+    if let Some(gather) = freeze(&node.role) {
+        let entries = &plan.gathers[gather].entries;
+        let slots: Vec<usize> = entries.iter().map(|entry| entry.slot).collect();
+        let ages = entries.iter().map(|entry| entry.max_age).collect();
+        input(plan, FREEZE, &slots, Some(ages), facts);
+    }
     if let Some(TruthLink { slot, limit, .. }) = link {
         let age = held_truth(plan, node).unwrap_or(limit);
         input(plan, "truth", &[slot], Some(vec![age]), facts);
+    }
+}
+
+/// The gather of the channels that freeze the learning of an estimator.
+fn freeze(role: &PlannedRole) -> Option<usize> {
+    match role {
+        PlannedRole::Estimator { learning, .. } => learning.as_ref()?.freeze,
+        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
     }
 }
 
