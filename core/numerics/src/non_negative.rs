@@ -184,4 +184,42 @@ mod tests {
         let found = non_negative_least_squares(&[f64::NAN], &[1.0]);
         assert_eq!(found, Err(NumericsError::NotFinite));
     }
+
+    /// Rows of a table under `tests/oracles/`, see its `generate.py`.
+    fn table(file: &str) -> Vec<Vec<f64>> {
+        let folder = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/oracles/non_negative"
+        );
+        let text = std::fs::read_to_string(format!("{folder}/{file}")).unwrap();
+        let row = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        text.lines().map(row).collect()
+    }
+
+    #[test]
+    fn oracle_of_nearly_collinear_columns() {
+        let rows = table("problems.csv");
+        let (mut zeros, mut others) = (0, 0);
+        for expected in table("expected.csv") {
+            let rows = rows.iter().filter(|row| row[0] == expected[0]);
+            let rows: Vec<&[f64]> = rows.map(|row| &row[1..]).collect();
+            let order = expected.len() - 1;
+            let sum = |i: usize, j: usize| rows.iter().map(|row| row[i] * row[j]).sum::<f64>();
+            let gram: Vec<f64> = (0..order * order)
+                .map(|place| sum(place / order, place % order))
+                .collect();
+            let target: Vec<f64> = (0..order).map(|i| sum(i, order)).collect();
+            let found = non_negative_least_squares(&gram, &target).unwrap();
+            for (found, &expected) in found.iter().zip(&expected[1..]) {
+                assert!((found - expected).abs() <= 1e-9, "{found} for {expected}");
+                assert_eq!(*found == 0.0, expected == 0.0);
+                *(if expected == 0.0 {
+                    &mut zeros
+                } else {
+                    &mut others
+                }) += 1;
+            }
+        }
+        assert!(zeros > 20 && others > 40, "{zeros} {others}");
+    }
 }
