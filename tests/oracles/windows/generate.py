@@ -27,7 +27,7 @@ at = pd.to_datetime(ms, unit="ms")
 def write(name, records, columns):
     text = [",".join(columns)]
     for record in records:
-        cells = ["" if isinstance(c, float) and np.isnan(c) else repr(c) for c in record]
+        cells = ["" if isinstance(c, float) and np.isnan(c) else str(c) for c in record]
         text.append(",".join(cells))
     (HERE / name).write_text("\n".join(text) + "\n")
 
