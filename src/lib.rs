@@ -21,6 +21,8 @@ pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
+pub mod chart;
+pub mod diagnosis;
 pub mod report;
 
 // A plugin that no code names is left out by the linker.

@@ -2,27 +2,15 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+mod workbench;
+
+use std::path::Path;
 
 use athermal::Model;
-use athermal::core::compile::{Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Disk, declare, load_text};
 use athermal::core::fit::{FitOptions, fit};
 use athermal::files::{Dataset, Options};
 use athermal::report::{Facts, Worth, gather, rms};
-
-/// The folder with data and oracles, if this machine has one.
-fn shared() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let named = std::env::var_os("ATHERMAL_SHARED").map(PathBuf::from);
-    let folder = named.unwrap_or_else(|| root.join("../shared"));
-    let there = folder.join("data/die-tester/train.csv").exists();
-    if !there {
-        eprintln!("skipped: there is no data folder (ATHERMAL_SHARED)");
-    }
-    there.then_some(folder.join("data/die-tester"))
-}
+use workbench::{Read, data};
 
 fn facts(data: &Path) -> Facts {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -53,7 +41,9 @@ fn left(worth: &Worth, axis: &str, limit: f64) -> (f64, f64) {
 
 #[test]
 fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
-    let Some(data) = shared() else { return };
+    let Some(data) = data().map(|data| data.join("die-tester")) else {
+        return;
+    };
     let worth = facts(&data).worth.unwrap();
     for axis in worth.axes.clone() {
         for limit in [250.0, f64::INFINITY] {
@@ -115,16 +105,11 @@ fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
 
 /// What is told of the die tester's graph when the correction's rate looks another time ahead.
 fn told_of(ahead: &str) -> String {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/changed.toml");
-    let text = format!(
+    let read = Read::new(&format!(
         "schema = 1\nextends = \"die-tester-control.toml\"\nnodes.rate = {{ ahead = \"{ahead}\" }}\n"
-    );
-    let document = load_text(name, text, &Disk, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    assert!(plan.is_some() && !diagnostics.has_errors());
-    diagnostics.render(&sources, false, 140)
+    ));
+    assert!(read.plan.is_some() && !read.diagnostics.has_errors());
+    read.told()
 }
 
 #[test]

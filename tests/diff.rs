@@ -2,23 +2,12 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::Path;
+mod workbench;
 
-use athermal as _;
-use athermal::core::compile::{Change, Plan, PlanDiff, Wanted, compile, diff};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Disk, declare, load_text};
+use athermal::core::compile::{Change, PlanDiff, diff};
+use workbench::plan;
 
 const GRAPH: &str = include_str!("../graphs/die-tester.toml");
-
-fn plan(text: &str) -> Plan {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/changed.toml");
-    let document = load_text(name, text, &Disk, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    plan.unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 100)))
-}
 
 /// The differences between the die tester's graph and one in which texts have been replaced.
 fn replaced(changes: &[(&str, &str)]) -> PlanDiff {

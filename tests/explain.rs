@@ -18,7 +18,8 @@ fn check(text: &str) -> (Diagnostics, Sources) {
     let base = explain("A062").unwrap().right;
     let files = Memory::new()
         .with("graph.toml", text)
-        .with("base.toml", base);
+        .with("base.toml", base)
+        .with("chuck.csv", "time_h,chuck_degC\n0,20\n4,50\n8,repeat\n");
     let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
     let document = load(
         Path::new("graph.toml"),
@@ -32,7 +33,7 @@ fn check(text: &str) -> (Diagnostics, Sources) {
         .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
     assert_eq!(plan.is_none(), diagnostics.has_errors());
     if let (Some(graph), Some(plan)) = (graph, plan) {
-        trial::declare(&graph, &plan, &sources, &mut diagnostics);
+        trial::declare(&graph, &plan, &files, &mut sources, &mut diagnostics);
     }
     (diagnostics, sources)
 }

@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 
 use athermal as _;
 use athermal::core::compile::{Wanted, compile, diff};
-use athermal::core::diagnostic::{Diagnostics, Severity, Sources};
+use athermal::core::diagnostic::{Diagnostics, Severity, Sources, explain};
 use athermal::core::document::{Memory, declare, load};
+use athermal::core::trial;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -241,8 +242,14 @@ fn holds(text: &str) -> Result<(), TestCaseError> {
     let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
     let document = load(Path::new("a.toml"), &files, &mut sources, &mut diagnostics);
     let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    let plan = graph
+        .as_ref()
+        .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
     prop_assert_eq!(plan.is_none(), diagnostics.has_errors());
+    if let (Some(graph), Some(plan)) = (&graph, &plan) {
+        let trials = trial::declare(graph, plan, &files, &mut sources, &mut diagnostics);
+        prop_assert_eq!(trials.is_none(), diagnostics.has_errors());
+    }
     for found in diagnostics
         .iter()
         .filter(|found| found.severity == Severity::Error)
@@ -251,11 +258,15 @@ fn holds(text: &str) -> Result<(), TestCaseError> {
             place.start <= place.end && place.end as usize <= sources.text(place.source).len()
         });
         prop_assert!(fits, "{:?}", found);
+        prop_assert!(explain(found.code).is_some(), "{}", found.code);
     }
     prop_assert_eq!(
         diagnostics.render(&sources, false, 100).is_empty(),
         diagnostics.is_empty()
     );
+    let json = diagnostics.to_json(&sources);
+    let listed = json["diagnostics"].as_array().map(Vec::len);
+    prop_assert_eq!(listed, Some(diagnostics.len()));
     if let Some(plan) = plan {
         prop_assert!(diff(&plan, &plan).is_same());
     }

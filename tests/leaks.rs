@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal as _;
-use athermal::core::compile::{Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Memory, declare, load_text};
+mod workbench;
+
 use athermal::core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use workbench::Read;
 
 const HEAD: &str = "schema = 1\n\
     [signals.position]\nunit = \"nm\"\nchannels = [\"X\", \"Y\"]\nmax_age = \"3min\"\n\
@@ -19,23 +18,14 @@ const HEAD: &str = "schema = 1\n\
 
 /// Message and help of every mistake but those of what is unused.
 fn told(nodes: &str) -> Vec<(String, String)> {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let text = format!("{HEAD}{nodes}");
-    let files = Memory::new();
-    let document = load_text("graph.toml", text, &files, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let _ = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    let errors = diagnostics
+    let read = Read::new(&format!("{HEAD}{nodes}"));
+    let errors = read
+        .diagnostics
         .iter()
         .filter(|found| !matches!(found.code, "A059" | "A060"));
     errors
         .map(|found| {
-            assert_eq!(
-                found.code,
-                "A052",
-                "{}",
-                diagnostics.render(&sources, false, 100)
-            );
+            assert_eq!(found.code, "A052", "{}", read.told());
             (
                 found.message.clone(),
                 found.help.clone().unwrap_or_default(),

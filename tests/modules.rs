@@ -2,20 +2,19 @@
 
 #![allow(clippy::unwrap_used)]
 
-use athermal as _;
-use athermal::core::compile::{Plan, Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Memory, declare, load_text};
+mod workbench;
+
+use std::collections::BTreeMap;
+
+use athermal::core::compile::{Plan, meaning};
+use serde_json::Value;
+use workbench::Read;
 
 const PLAIN: &str = include_str!("../graphs/die-tester.toml");
 
 fn compiled(text: &str) -> (Option<Plan>, String) {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let files = Memory::new();
-    let document = load_text("graph.toml", text, &files, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    (plan, diagnostics.render(&sources, false, 100))
+    let mut read = Read::new(text);
+    (read.plan.take(), read.told())
 }
 
 /// The die tester with the estimators and the vote of an axis in a module.
@@ -76,16 +75,9 @@ fn the_plan_is_that_of_the_graph_written_out() {
     let (plain, _) = compiled(PLAIN);
     let (modular, told) = compiled(&in_a_module());
     let (plain, modular) = (plain.unwrap(), modular.unwrap_or_else(|| panic!("{told}")));
-    let outside = |plan: &Plan| -> Vec<_> {
-        let nodes = plan.nodes.iter().map(|node| {
-            let identity = plan.identity(node).to_string().replace("model/", "");
-            (node.instance().replace("model/", ""), identity)
-        });
-        let mut nodes: Vec<_> = nodes.collect();
-        nodes.sort();
-        nodes
-    };
-    assert_eq!(outside(&modular), outside(&plain));
+    let nodes = |plan: &Plan| meaning(plan)["nodes"].to_string().replace("model/", "");
+    let sorted = |nodes: &str| -> BTreeMap<String, Value> { serde_json::from_str(nodes).unwrap() };
+    assert_eq!(sorted(&nodes(&modular)), sorted(&nodes(&plain)));
     let columns = |plan: &Plan| -> Vec<_> {
         plan.outputs
             .iter()

@@ -231,6 +231,143 @@ expect = [{ of = "slopes.room", at = "40s", equals = "60 mK/min", within = 1e-6 
 }
 
 #[test]
+fn absence_can_be_expected_and_is_told_where_it_is_broken() {
+    let tests = r#"
+[[tests]]
+name = "a dead sensor has no slope until its window is whole again"
+inputs = { "temperature.room" = { ramp = "1 mK/s", for = "10min", every = "5s" } }
+faults = [{ channel = "temperature", kind = "missing", from = "3min", for = "3min" }]
+expect = [
+  { of = "slopes.room", to = "25s", absent = true },
+  { of = "slopes.room", at = "4min", absent = true },
+  { of = "slopes.room", from = "3min30s", to = "5min55s", absent = true },
+  { of = "slopes.plate", absent = true },
+]
+[[tests]]
+name = "it is not absent"
+inputs = { "temperature.room" = { ramp = "1 mK/s", for = "2min", every = "5s" } }
+expect = [
+  { of = "slopes.room", absent = true },
+  { of = "slopes.room", at = "1min", absent = true },
+  { of = "slopes.plate", from = "1h", absent = true },
+]
+"#;
+    insta::assert_snapshot!(told("absence", tests, 1), @r"
+      ✓ a dead sensor has no slope until its window is whole again
+      ✗ it is not absent
+          slopes.room: absent: found 60 mK/min at 30s, wanted none
+          slopes.room: absent: found 60 mK/min at 1min, wanted none
+          slopes.plate: absent: found no value over 0 instants, wanted none
+    ");
+}
+
+#[test]
+fn what_stands_beside_absence_and_absence_that_is_not_meant_are_mistakes() {
+    let tests = format!(
+        "[[tests]]\nname = \"wrong\"\n{EVENLY}\nexpect = [\n  {{ of = \"drift.Z\", absent = false }},\n  {{ of = \"drift.Z\", absent = true, given_above = 0.5 }},\n]\n"
+    );
+    let scratch = Scratch::new("absent-mistakes");
+    let path = scratch.file("graph.toml", graph(&tests));
+    athermal(&[&"check", &path]).ended(2).tells(&[
+        "`absent` is false and must be true, or left out",
+        "`absent` has no meaning together with `given_above`",
+    ]);
+}
+
+#[test]
+fn a_test_names_what_an_instance_of_a_module_gives_as_the_graph_does() {
+    let text = r#"
+schema = 1
+[sets]
+axis = ["X", "Z"]
+[signals.position]
+unit = "nm"
+channels = "axis"
+max_age = "3min"
+[modules.model]
+inputs = ["position"]
+outputs = { predicted = "same", drift = "slope" }
+nodes.slope = { type = "slope", inputs.signal = "{position}", windows = ["30s"], unit = "nm/min" }
+nodes.same = { type = "persistence", inputs.truth = "slope", ahead = "30s" }
+nodes.zero = { type = "zero", inputs.truth = "slope", ahead = "30s" }
+[nodes.model]
+module = "model"
+each = "axis"
+inputs.position = "position.{axis}"
+[nodes.none]
+type = "zero"
+inputs.truth = "model:drift.X"
+ahead = "30s"
+[outputs]
+out = "model"
+none = "none"
+[[tests]]
+name = "instances of modules"
+inputs = { "position" = { ramp = "1 nm/s", for = "10min", every = "5s" } }
+expect = [
+  { of = "model.Z", rmse_below = "1e-6 nm/min", beats = ["zero"] },
+  { of = "model", at = "1min", equals = "60 nm/min", within = 1e-6 },
+  { of = "model:drift.{X,Z}", at = "1min", equals = "60 nm/min", within = 1e-6 },
+  { of = "model.X", beats = ["none", "model/zero"] },
+]
+"#;
+    let scratch = Scratch::new("modules-tested");
+    let path = scratch.file("graph.toml", text);
+    athermal(&[&"test", &path]).ended(0);
+    for (right, wrong, told) in [
+        (
+            "of = \"model.X\"",
+            "of = \"modle.X\"",
+            "did you mean `model`?",
+        ),
+        (
+            "of = \"model:drift.{X,Z}\"",
+            "of = \"model:drif.X\"",
+            "\"model\" has no output \"drif\"",
+        ),
+        (
+            "of = \"model.Z\"",
+            "of = \"zzz\"",
+            "there are `position`, `model`, `none`, `out`",
+        ),
+    ] {
+        let path = scratch.file("wrong.toml", text.replace(right, wrong));
+        athermal(&[&"check", &path]).ended(2).tells(&[told]);
+    }
+}
+
+#[test]
+fn a_machine_follows_the_schedule_that_a_test_names() {
+    let text = r#"
+schema = 1
+[signals.temperature]
+unit = "Cel"
+channels = ["chuck"]
+max_age = "1min"
+[nodes.shown]
+type = "pick"
+inputs.signal = "temperature"
+[outputs]
+shown = "shown"
+[[tests]]
+name = "the chuck is warm"
+on = { simulate = "die-tester", days = 0.1, schedule = "steps.csv" }
+expect = [{ of = "temperature.chuck", from = "2h", between = ["44 Cel", "46 Cel"] }]
+"#;
+    let scratch = Scratch::new("schedule");
+    let path = scratch.file("graph.toml", text);
+    scratch.file("steps.csv", "time_h,chuck_degC\n0,20\n1,45\n");
+    athermal(&[&"test", &path]).ended(0);
+    scratch.file("steps.csv", "time_h,chuck_degC\n0,20\n1,45\n0.5,999\n");
+    athermal(&[&"test", &path]).ended(2).tells(&[
+        "A170",
+        "the time 0.5 must be after that of the row before",
+        "steps.csv:4:1",
+        "test \"the chuck is warm\"",
+    ]);
+}
+
+#[test]
 fn junit_has_each_test_and_why_it_failed() {
     let tests = format!(
         r#"

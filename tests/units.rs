@@ -2,18 +2,17 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::Path;
+mod workbench;
 
 use athermal::Instant;
-use athermal::core::compile::{Plan, Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Memory, declare, load_text};
+use athermal::core::compile::Plan;
 use athermal::core::engine::{Engine, Fitted};
 use athermal::core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use workbench::Read;
 
 /// Passes on what it reads, which it takes in mK/min.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -57,14 +56,10 @@ const SIGNALS: &str = "schema = 1\n\
     [signals.difference]\nunit = \"K\"\nchannels = [\"a\"]\nmax_age = \"1min\"\n";
 
 fn compiled(nodes: &str) -> Result<Plan, String> {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let files = Memory::new();
-    let text = format!("{SIGNALS}{nodes}");
-    let name = Path::new("graph.toml");
-    let document = load_text(name, text, &files, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    let texts = diagnostics
+    let mut read = Read::new(&format!("{SIGNALS}{nodes}"));
+    let plan = read.plan.take();
+    let texts = read
+        .diagnostics
         .iter()
         .map(|found| format!("{}: {}", found.code, found.message));
     plan.ok_or_else(|| texts.collect::<Vec<_>>().join("\n"))

@@ -42,7 +42,7 @@ impl Check {
                 .and_then(|read| document::declare(read, &mut of_file));
             let plan = graph.and_then(|graph| {
                 let plan = compile(&graph, Wanted::default(), &mut of_file)?;
-                trial::declare(&graph, &plan, &sources, &mut of_file)?;
+                trial::declare(&graph, &plan, &Disk, &mut sources, &mut of_file)?;
                 Some(plan)
             });
             diagnostics.extend(of_file);

@@ -17,6 +17,7 @@ mod show;
 mod simulate;
 mod swap;
 mod test;
+mod watched;
 
 use clap::Subcommand;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use athermal::report::{WANTED, gather, page, plots};
+use athermal::report::{Plot, WANTED, gather, page, plots, text};
 use clap::Args;
 
 use super::data::Data;
@@ -11,12 +11,14 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Show what a model is worth on recorded data, as one page
 ///
-/// Writes a self-contained HTML page: a verdict per axis, scores, drift and its correction over time, optical loss and
-/// settle time without and with the correction, chosen features, sensors, and the model's card. With `--format json` the
-/// same facts go to standard output.
+/// Tells a verdict per axis, optical loss and settle time without and with the correction, and which sensors to look at.
+/// With `-o` it writes a self-contained HTML page that also has scores, the published figures for a machine of the same kind,
+/// drift and its correction over time, votes and errors, chosen features, all sensors, and the model's card. With
+/// `--format json` the same facts go to standard output.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  athermal report model.json --data test.csv -o report.html\n  \
+    after_help = "Examples:\n  athermal report model.json --data test.csv\n  \
+                        athermal report model.json --data test.csv -o report.html\n  \
                         athermal report model.json --data test.csv --plots plots\n  \
                         athermal report model.json --data test.csv --format json"
 )]
@@ -28,7 +30,7 @@ pub struct Report {
     /// Where the page goes; `-` is standard output
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// A folder for every picture as an SVG file of its own
+    /// A folder for every picture as files of its own, SVG and PNG
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
 }
@@ -39,12 +41,6 @@ impl Report {
     /// # Errors
     /// When the model or the data cannot be used, or a file cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        if self.output.is_none() && self.plots.is_none() && terminal.format != Format::Json {
-            return Err(Failure::Request(
-                "name a file for the page: `-o report.html` (or `--plots DIR`, or `--format json`)"
-                    .to_owned(),
-            ));
-        }
         let model = load_fitted(&self.model, WANTED)?;
         let dataset = self.data.dataset();
         let names = dataset
@@ -60,16 +56,22 @@ impl Report {
             );
         }
         if terminal.format == Format::Json {
-            let text = serde_json::to_string_pretty(&facts)
+            let json = serde_json::to_string_pretty(&facts)
                 .map_err(|error| Failure::Outside(error.to_string()))?;
-            println!("{text}");
+            println!("{json}");
+        } else if self
+            .output
+            .as_deref()
+            .is_none_or(|path| path.as_os_str() != "-")
+        {
+            print!("{}", text(&facts));
         }
         if let Some(path) = &self.output {
             let page = page(&facts);
             if path.as_os_str() == "-" {
                 print!("{page}");
             } else {
-                write(path, &page)?;
+                write(path, page.as_bytes())?;
                 terminal.note(format_args!(
                     "wrote {} ({} kB)",
                     path.display(),
@@ -78,14 +80,8 @@ impl Report {
             }
         }
         if let Some(folder) = &self.plots {
-            let failed = |error: std::io::Error| {
-                Failure::Outside(format!("cannot make {}: {error}", folder.display()))
-            };
-            std::fs::create_dir_all(folder).map_err(failed)?;
             let plots = plots(&facts);
-            for (name, svg) in &plots {
-                write(&folder.join(file_name(name)), svg)?;
-            }
+            write_plots(folder, &plots)?;
             terminal.note(format_args!(
                 "wrote {} pictures to {}",
                 plots.len(),
@@ -96,19 +92,31 @@ impl Report {
     }
 }
 
+fn write_plots(folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::Outside(format!("cannot make {}: {error}", folder.display())))?;
+    for plot in plots {
+        let name = file_name(&plot.name);
+        write(&folder.join(format!("{name}.svg")), plot.svg.as_bytes())?;
+        #[cfg(feature = "png")]
+        write(&folder.join(format!("{name}.png")), &plot.png)?;
+    }
+    Ok(())
+}
+
 /// A name that is one file in any folder, whatever an axis is called.
 fn file_name(name: &str) -> String {
-    let plain = name.chars().map(|c| {
+    let plain = |c: char| {
         if c.is_alphanumeric() || "-_@".contains(c) {
             c
         } else {
             '_'
         }
-    });
-    plain.chain(".svg".chars()).collect()
+    };
+    name.chars().map(plain).collect()
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text)
+fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, content)
         .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
 }

@@ -232,11 +232,11 @@ impl Simulation for Watched {
 
 fn list(terminal: &Terminal) {
     if terminal.format == Format::Json {
-        let all: Vec<Value> = machines().values().map(describe).collect();
+        let all: Vec<Value> = machines().values().flatten().map(describe).collect();
         println!("{:#}", json!({ "machines": all }));
         return;
     }
-    for known in machines().values() {
+    for known in machines().values().flatten() {
         let machine = known.machine;
         println!(
             "{} (from {} {})\n  {}",

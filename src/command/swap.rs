@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::SystemTime;
 
 use athermal::core::document::{TimeBase, TimeForm};
 use athermal::core::engine::Carry;
@@ -10,6 +9,7 @@ use athermal::core::live::{Control, Feed, Notice, StageError, Staged, Verdict};
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
+use super::watched::Watched;
 use crate::figures::{count, number};
 use crate::terminal::{Failure, Terminal};
 
@@ -77,6 +77,13 @@ impl Options {
             let at = When::read(time, &running.plan.time)?;
             let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
             let model = load(Path::new(path), known)?;
+            if model.plan.time != running.plan.time {
+                let refused = StageError::OtherTime {
+                    running: running.plan.time.clone(),
+                    new: model.plan.time.clone(),
+                };
+                return Err(Failure::Request(format!("{path}: {refused}")));
+            }
             swaps.push(Swap {
                 at,
                 path: path.into(),
@@ -163,7 +170,7 @@ pub struct Course<'a> {
     first: Option<Instant>,
     running: Model,
     staged: Option<(Model, PathBuf)>,
-    watched: Option<(PathBuf, Option<Written>)>,
+    watched: Option<Watched>,
     looked: std::time::Instant,
     columns: Vec<String>,
     rows: u64,
@@ -179,7 +186,7 @@ impl<'a> Course<'a> {
         swaps: Vec<Swap>,
         columns: Vec<String>,
     ) -> Self {
-        let watched = options.watch.then(|| (path.to_owned(), changed(path)));
+        let watched = options.watch.then(|| Watched::of(path));
         Self {
             terminal,
             options,
@@ -235,15 +242,11 @@ impl<'a> Course<'a> {
     /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
     fn look(&mut self, control: &mut Control) {
         self.looked = std::time::Instant::now();
-        let Some((path, seen)) = &mut self.watched else {
+        let Some(watched) = self.watched.as_mut().filter(|watched| watched.changed()) else {
             return;
         };
-        let now = changed(path);
-        if now.is_none() || now == *seen {
-            return;
-        }
-        *seen = now;
-        let path = path.clone();
+        let path = watched.path.clone();
+        *watched = Watched::of(&path);
         let model = match load(&path, std::iter::once(&self.running)) {
             Ok(model) => model,
             Err(failure) => {
@@ -379,14 +382,6 @@ pub fn reading(running: &Model, swaps: &[Swap], feed: &[Feed]) -> athermal::core
     };
     plan.sources = feed.iter().filter_map(source).collect();
     plan
-}
-
-/// When a file was written, and how long it is.
-type Written = (SystemTime, u64);
-
-fn changed(path: &Path) -> Option<Written> {
-    let facts = std::fs::metadata(path).ok()?;
-    Some((facts.modified().ok()?, facts.len()))
 }
 
 fn refused(error: StageError) -> Failure {

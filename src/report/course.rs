@@ -3,15 +3,23 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use athermal_control::{OpticalLoss, Settled};
-use athermal_core::compile::{Plan, PlannedNode, PlannedRole, TruthLink};
+use athermal_control::Stability;
+use athermal_core::compile::{Plan, PlannedRole, TruthLink};
 use athermal_core::engine::{Engine, EngineError, Pairing};
 use athermal_core::model::Model;
+use athermal_core::quantity::Quantity;
 use athermal_core::recording::{Event, Recording};
 use athermal_core::time::{Duration, Instant};
+use athermal_core::unit::Unit;
 use serde::Serialize;
 
+use super::sensors::{SensorFacts, ask_for_reasons, sensors};
+use super::track::{Track, parameters, places};
 use super::{ReportError, Series};
+
+/// Limits of the states of stability where no `stability` node gives them, in nm/min (Mandelli, Dankwart and Napoli, section 3.4).
+const STABLE: f64 = 30.0;
+const TRANSIENT: f64 = 80.0;
 
 /// What happened over time.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -39,6 +47,23 @@ pub struct Axis {
     pub voters: Vec<Voter>,
     /// Which of them is what the graph puts out.
     pub main: usize,
+    /// How far ahead that looks, in s.
+    pub ahead_s: f64,
+    /// The weights of a vote's voters at each truth; empty where nothing is weighed.
+    pub weights: Vec<Weight>,
+    /// Below this absolute truth the axis is stable, and from the second on transient; none where the truth is no drift.
+    pub states: Option<(f64, f64)>,
+}
+
+/// How much a voter counts.
+#[derive(Debug, Clone, Serialize)]
+pub struct Weight {
+    /// The node that votes.
+    pub node: String,
+    /// The voter.
+    pub voter: String,
+    /// Its weight at each truth.
+    pub value: Vec<f64>,
 }
 
 /// A prediction of a truth.
@@ -53,118 +78,17 @@ pub struct Voter {
     pub value: Vec<f64>,
 }
 
-/// What can be said of a measured channel.
-#[derive(Debug, Clone, Serialize)]
-pub struct SensorFacts {
-    /// The channel: `temperature.plate1`.
-    pub name: String,
-    /// Samples taken.
-    pub samples: u64,
-    /// Samples rejected as infinite or out of range.
-    pub rejected: u64,
-    /// The longest time in s between two samples.
-    pub longest_gap_s: f64,
-    /// The mean time in s between two samples.
-    pub mean_gap_s: f64,
-    /// Lowest and highest sample.
-    pub range: Option<(f64, f64)>,
-    #[serde(skip)]
-    last_s: Option<f64>,
-}
-
-/// What the correction was and what it acts on, for working out its worth.
-#[derive(Debug)]
-pub(super) struct Track {
-    /// Names of the axes.
-    pub(super) axes: Vec<String>,
-    /// Unit of position and of drift.
-    pub(super) units: (String, String),
-    pub(super) span: Duration,
-    pub(super) loss: Option<OpticalLoss>,
-    pub(super) settled: Option<Settled>,
-    /// The unit of the set point.
-    pub(super) set_point: Option<String>,
-    pub(super) rows: Vec<TrackRow>,
-}
-
-/// One instant at which something was measured.
-#[derive(Debug)]
-pub(super) struct TrackRow {
-    pub(super) at: Instant,
-    pub(super) position: Vec<f64>,
-    pub(super) correction: Vec<f64>,
-    pub(super) set_point: f64,
-    /// Whether another segment begins here.
-    pub(super) begins: bool,
-}
-
-/// Where to look for what a correction does.
-struct Places {
-    positions: Vec<usize>,
-    corrections: Vec<usize>,
-    factor: f64,
-    set_point: Option<usize>,
-}
-
-fn parameters<T: serde::de::DeserializeOwned>(plan: &Plan, kind: &str) -> Option<T> {
-    let node = plan.nodes.iter().find(|node| node.kind.name == kind)?;
-    serde_json::from_value(node.spec.parameters()).ok()
-}
-
-fn first_input(plan: &Plan, node: &PlannedNode, port: usize, nth: usize) -> Option<usize> {
-    let PlannedRole::Feature { gathers, .. } = &node.role else {
-        return None;
-    };
-    let gather = plan.gathers.get(*gathers.get(port)?)?;
-    gather.entries.get(nth).map(|entry| entry.slot)
-}
-
-/// Finds the correction, the positions that it acts on, and how its worth is judged.
-fn places(plan: &Plan) -> Option<(Places, Track)> {
-    let node = plan
-        .nodes
-        .iter()
-        .find(|node| node.kind.name == "compensate")?;
-    let corrections: Vec<usize> = node.ports.first()?.1.clone().collect();
-    let mut places = Places {
-        positions: Vec::new(),
-        corrections: corrections.clone(),
-        factor: f64::NAN,
-        set_point: None,
-    };
-    let mut of_drift = None;
-    for (nth, &correction) in corrections.iter().enumerate() {
-        let rate = first_input(plan, node, 0, nth)?;
-        let truth = plan.channels[rate].predicts?;
-        let slope = &plan.nodes[plan.channels[truth].node?];
-        let position = first_input(plan, slope, 0, truth - slope.slots.start)?;
-        let unit = &plan.channels[position].channel.unit;
-        places.factor = plan.channels[correction].channel.unit.factor_to(unit)?;
-        places.positions.push(position);
-        of_drift = Some((truth, position));
+/// The plan, with the weights of votes and the reasons of watches computed, whether or not the graph reads them.
+fn telling(plan: &Plan) -> Plan {
+    let mut plan = plan.clone();
+    ask_for_reasons(&mut plan);
+    for node in &mut plan.nodes {
+        if let PlannedRole::Combiner { beside, .. } = &mut node.role {
+            let weights = node.ports.iter().find(|(name, _)| *name == "weights");
+            beside.weights = weights.map(|(_, slots)| slots.start);
+        }
     }
-    let (truth, position) = of_drift?;
-    let settled = plan.nodes.iter().find(|node| node.kind.name == "settled");
-    places.set_point = settled.and_then(|node| first_input(plan, node, 1, 0));
-    let drift = &plan.channels[truth].channel;
-    let track = Track {
-        axes: corrections
-            .iter()
-            .map(|&slot| plan.channels[slot].channel.name.clone())
-            .collect(),
-        units: (
-            plan.channels[position].channel.unit.to_string(),
-            drift.unit.to_string(),
-        ),
-        span: drift.span,
-        loss: parameters(plan, "optical_loss"),
-        settled: parameters(plan, "settled"),
-        set_point: places
-            .set_point
-            .map(|slot| plan.channels[slot].channel.unit.to_string()),
-        rows: Vec::new(),
-    };
-    Some((places, track))
+    plan
 }
 
 /// A prediction being paired with its truth.
@@ -174,6 +98,8 @@ struct Pairs {
     slot: usize,
     truth: usize,
     pairing: Pairing,
+    /// The slots of the weights by which it combines others.
+    weights: std::ops::Range<usize>,
 }
 
 /// Steps the model over the recording.
@@ -181,14 +107,10 @@ pub(super) fn follow(
     model: &Model,
     recording: &dyn Recording,
 ) -> Result<(Course, Option<Track>), ReportError> {
-    let plan = Arc::clone(&model.plan);
+    let plan = Arc::new(telling(&model.plan));
     let mut engine = Engine::new(Arc::clone(&plan), &model.fitted)?;
     let mut course = Course {
-        sensors: plan
-            .sources
-            .iter()
-            .map(|source| sensor(&source.name))
-            .collect(),
+        sensors: sensors(&plan),
         ..Course::default()
     };
     let mut pairs = pairs(&plan, &mut course);
@@ -202,10 +124,7 @@ pub(super) fn follow(
             Event::Segment => {
                 engine.segment();
                 pairs.iter_mut().for_each(|pair| pair.pairing.clear());
-                course
-                    .sensors
-                    .iter_mut()
-                    .for_each(|sensor| sensor.last_s = None);
+                course.sensors.iter_mut().for_each(SensorFacts::segment);
                 begins = true;
                 continue;
             }
@@ -226,7 +145,7 @@ pub(super) fn follow(
         let (from, _) = course.period_s.unwrap_or((now_s, now_s));
         course.period_s = Some((from, now_s));
         for (sensor, &value) in course.sensors.iter_mut().zip(&values) {
-            sensor.look(now_s, value);
+            sensor.look(now_s, value, &engine);
         }
         look(&mut pairs, &mut course, &engine, time, now_s);
         if let Some((places, track)) = &mut found {
@@ -234,9 +153,7 @@ pub(super) fn follow(
         }
         begins = false;
     }
-    for (sensor, &rejected) in course.sensors.iter_mut().zip(engine.rejected()) {
-        sensor.rejected = rejected;
-    }
+    course.sensors.iter_mut().for_each(SensorFacts::finish);
     Ok((course, found.map(|(_, track)| track)))
 }
 
@@ -270,6 +187,9 @@ fn pairs(plan: &Plan, course: &mut Course) -> Vec<Pairs> {
                 truth: Series::default(),
                 voters: Vec::new(),
                 main: 0,
+                ahead_s: channel.channel.ahead.secs(),
+                weights: Vec::new(),
+                states: states(plan, &of.unit),
             });
             standing.push(0);
             course.axes.len() - 1
@@ -289,14 +209,37 @@ fn pairs(plan: &Plan, course: &mut Course) -> Vec<Pairs> {
         // What is integrated counts most, then what is put out first.
         let stands = 2 * u8::from(rates.contains(&slot)) + u8::from(put_out.contains(&slot));
         if stands > standing[axis] {
-            (standing[axis], course.axes[axis].main) = (stands, voter);
+            standing[axis] = stands;
+            course.axes[axis].main = voter;
+            course.axes[axis].ahead_s = channel.channel.ahead.secs();
         }
+        let ports = &plan.nodes[node].ports;
+        let weighs = matches!(plan.nodes[node].role, PlannedRole::Combiner { .. });
+        let weights = match ports.get(1) {
+            // One vote is shown, the first: the picture of two would not be read.
+            Some((_, slots)) if weighs && course.axes[axis].weights.is_empty() => slots.clone(),
+            _ => 0..0,
+        };
+        course.axes[axis]
+            .weights
+            .extend(weights.clone().map(|slot| {
+                Weight {
+                    node: plan.nodes[node].name.clone(),
+                    voter: plan.channels[slot]
+                        .channel
+                        .name
+                        .trim_start_matches("weight-")
+                        .to_owned(),
+                    value: Vec::new(),
+                }
+            }));
         pairs.push(Pairs {
             axis,
             voter,
             slot,
             truth,
             pairing: Pairing::new(&link, 1),
+            weights,
         });
     }
     pairs
@@ -320,63 +263,18 @@ fn look(pairs: &mut [Pairs], course: &mut Course, engine: &Engine, time: Instant
             .truth(time)
             .map_or(f64::NAN, |paired| paired.row[0]);
         axis.voters[pair.voter].value.push(paired);
+        for (weight, slot) in axis.weights.iter_mut().zip(pair.weights.clone()) {
+            weight.value.push(engine.value(slot));
+        }
     }
 }
 
-fn sensor(name: &str) -> SensorFacts {
-    SensorFacts {
-        name: name.to_owned(),
-        samples: 0,
-        rejected: 0,
-        longest_gap_s: 0.0,
-        mean_gap_s: 0.0,
-        range: None,
-        last_s: None,
+/// The limits of the states of stability in the unit of a drift.
+fn states(plan: &Plan, unit: &Unit) -> Option<(f64, f64)> {
+    let in_unit = |quantity: &Quantity| quantity.in_unit(unit);
+    if let Some(node) = parameters::<Stability>(plan, "stability") {
+        return in_unit(&node.stable_below).zip(in_unit(&node.transient_above));
     }
-}
-
-impl SensorFacts {
-    fn look(&mut self, now_s: f64, value: f64) {
-        if !value.is_finite() {
-            return;
-        }
-        if let Some(last_s) = self.last_s {
-            let gap = now_s - last_s;
-            self.longest_gap_s = self.longest_gap_s.max(gap);
-            self.mean_gap_s += (gap - self.mean_gap_s) / self.samples as f64;
-        }
-        self.samples += 1;
-        let (low, high) = self.range.unwrap_or((value, value));
-        self.range = Some((low.min(value), high.max(value)));
-        self.last_s = Some(now_s);
-    }
-}
-
-impl Track {
-    fn look(&mut self, places: &Places, engine: &Engine, now: Instant, begins: bool) {
-        let position: Vec<f64> = places
-            .positions
-            .iter()
-            .map(|&slot| engine.value(slot))
-            .collect();
-        let set_point = places.set_point.map_or(f64::NAN, |slot| engine.value(slot));
-        if begins && let Some(row) = self.rows.last_mut() {
-            // Kept on the row before, so that it is seen even where nothing is measured at the break.
-            row.begins = true;
-        }
-        if position.iter().all(|value| value.is_nan()) && set_point.is_nan() {
-            return;
-        }
-        let correction = places
-            .corrections
-            .iter()
-            .map(|&slot| engine.value(slot) * places.factor);
-        self.rows.push(TrackRow {
-            at: now,
-            position,
-            correction: correction.collect(),
-            set_point,
-            begins: false,
-        });
-    }
+    let factor = Unit::parse("nm/min").ok()?.factor_to(unit)?;
+    Some((STABLE * factor, TRANSIENT * factor))
 }

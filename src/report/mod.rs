@@ -1,22 +1,36 @@
 //! What a fitted graph is worth on recorded data: the facts, and the page that shows them.
 //!
 //! [`gather`] steps the model over a recording and collects [`Facts`]; [`page`] makes one self-contained HTML page of
-//! them, [`plots`] single pictures.
+//! them, [`plots`] single pictures, [`text`] what fits on a terminal.
 
-mod chart;
 mod course;
+mod errors;
 mod page;
+mod published;
+mod sensors;
+mod text;
+mod track;
+mod verdict;
 mod worth;
 
-pub use course::{Axis, Course, SensorFacts, Voter};
-pub use page::{page, plots};
-pub use worth::{Settling, Worth};
+pub use course::{Axis, Course, Voter, Weight};
+pub use errors::Errors;
+pub use page::{Plot, page, plots};
+pub use published::{Published, PublishedRow};
+pub use sensors::SensorFacts;
+pub use text::text;
+pub use verdict::Verdict;
+pub use worth::{Settling, StepLoss, Worth};
 
 use athermal_core::compile::Wanted;
 use athermal_core::model::{Card, Model};
 use athermal_core::recording::Recording;
 use athermal_core::score::{Score, ScoreOptions, Scores, score};
 use serde::Serialize;
+
+use crate::diagnosis::lag::{Lags, lags};
+use crate::diagnosis::observe;
+use crate::diagnosis::response::{Responses, responses};
 
 /// All that a report says.
 #[derive(Debug, Clone, Serialize)]
@@ -25,10 +39,20 @@ pub struct Facts {
     pub graph: String,
     /// Where the data come from, as given.
     pub data: Vec<String>,
+    /// What the model is worth, by axis.
+    pub verdicts: Vec<Verdict>,
     /// The scores of every prediction over all truths.
     pub scores: Vec<Score>,
+    /// The figures of the article beside ours, for a machine of the same kind.
+    pub published: Vec<Published>,
     /// What happened over time.
     pub course: Course,
+    /// How the errors of what is put out are spread, by axis.
+    pub errors: Vec<Errors>,
+    /// How features go with truths and residuals, against the lag.
+    pub lags: Vec<Lags>,
+    /// How estimators answer a change of one sensor.
+    pub responses: Vec<Responses>,
     /// What the correction is worth; none for a graph without a `compensate` node.
     pub worth: Option<Worth>,
     /// How the model was made.
@@ -62,6 +86,18 @@ pub fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
+/// A figure to three significant digits or more; a dash for none.
+fn figure(value: Option<f64>) -> String {
+    match value {
+        Some(value) if value.is_nan() => "–".to_owned(),
+        None => "–".to_owned(),
+        Some(value) if value.abs() >= 100.0 => format!("{value:.0}"),
+        Some(value) if value.abs() >= 10.0 => format!("{value:.1}"),
+        Some(value) if value.abs() >= 0.1 || value == 0.0 => format!("{value:.2}"),
+        Some(value) => format!("{value:.3}"),
+    }
+}
+
 /// Why there is no report.
 pub type ReportError = Box<dyn std::error::Error + Send + Sync>;
 
@@ -81,13 +117,20 @@ pub fn gather(
         &ScoreOptions::default(),
         &mut |_| {},
     )?;
+    let observation = observe(model, recording)?;
     let (course, track) = course::follow(model, recording)?;
     let worth = track
         .map(|mut track| worth::worth(&mut track))
         .transpose()?;
+    let verdict = |axis| Verdict::of(axis, &scores, worth.as_ref());
     Ok(Facts {
         graph: model.plan.name.clone().unwrap_or_default(),
         data,
+        verdicts: course.axes.iter().map(verdict).collect(),
+        published: published::published(&course),
+        errors: course.axes.iter().map(Errors::of).collect(),
+        lags: lags(model, recording, &observation)?,
+        responses: responses(model, &observation)?,
         scores,
         course,
         worth,
@@ -98,4 +141,5 @@ pub fn gather(
 /// What a model must be loaded with so that a report can tell the noise of the truth.
 pub const WANTED: Wanted = Wanted {
     standard_errors: true,
+    intervals: false,
 };

@@ -12,7 +12,7 @@ use athermal_core::time::Instant;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::course::Track;
+use super::track::Track;
 use super::{ReportError, Series};
 
 /// What a correction is worth.
@@ -40,8 +40,27 @@ pub struct Worth {
     pub set_point: Vec<f64>,
     /// The set point's unit.
     pub set_point_unit: Option<String>,
+    /// Share of the losses below the limit, without and with; none without losses.
+    pub below_limit: Option<(f64, f64)>,
     /// The changes of the set point, in order.
     pub settling: Vec<Settling>,
+    /// The largest loss after changes of one kind, first the time before any change.
+    pub steps: Vec<StepLoss>,
+}
+
+/// The largest losses in dB after all changes from one set point to another, until the next change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StepLoss {
+    /// The set point before.
+    pub from: f64,
+    /// The set point after; the same for the time before any change.
+    pub to: f64,
+    /// How many such changes there were.
+    pub changes: usize,
+    /// Largest loss without the correction.
+    pub largest_without: f64,
+    /// The same with it.
+    pub largest_with: f64,
 }
 
 /// A change of the set point.
@@ -175,8 +194,12 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
             .unwrap_or(LIMIT_DB),
         set_point: Vec::new(),
         set_point_unit: track.set_point.clone(),
+        below_limit: None,
         settling: Vec::new(),
+        steps: Vec::new(),
     };
+    // The change whose losses are counted, and the largest ones before any.
+    let (mut current, mut steady) = (None::<usize>, None::<StepLoss>);
     // For each way, which change it waits for.
     let mut waits: [Option<usize>; 2] = [None; 2];
     let (mut first, mut set_point) = (f64::NAN, f64::NAN);
@@ -212,19 +235,30 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
             worth.loss_without.push(at_s, without);
             worth.loss_with.push(at_s, with);
             worth.set_point.push(set_point);
-            if let Some(settling) = worth.settling.last_mut() {
-                settling.largest_without = settling.largest_without.max(without);
-                settling.largest_with = settling.largest_with.max(with);
-            }
+            let (largest_without, largest_with) = match current {
+                Some(nth) => {
+                    let settling = &mut worth.settling[nth];
+                    (&mut settling.largest_without, &mut settling.largest_with)
+                }
+                None => {
+                    let steady = steady.get_or_insert(StepLoss {
+                        from: set_point,
+                        to: set_point,
+                        changes: 0,
+                        largest_without: 0.0,
+                        largest_with: 0.0,
+                    });
+                    (&mut steady.largest_without, &mut steady.largest_with)
+                }
+            };
+            *largest_without = largest_without.max(without);
+            *largest_with = largest_with.max(with);
         }
         // The time since an unsettled change tells when that was, to the instant.
         let start_s = at_s - 60.0 * get(since);
-        let known = worth
-            .settling
-            .last()
-            .is_some_and(|last| (last.at_s - start_s).abs() < 1.0);
+        let known = current.is_some_and(|nth| (worth.settling[nth].at_s - start_s).abs() < 1.0);
         if get(since) > 0.0 && !known {
-            let from = worth.settling.last().map_or(first, |last| last.to);
+            let from = current.map_or(first, |nth| worth.settling[nth].to);
             worth.settling.push(Settling {
                 at_s: start_s,
                 from,
@@ -234,7 +268,8 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
                 largest_without: 0.0,
                 largest_with: 0.0,
             });
-            waits = [Some(worth.settling.len() - 1); 2];
+            current = Some(worth.settling.len() - 1);
+            waits = [current; 2];
         }
         for (way, place) in settled.into_iter().enumerate() {
             let time = get(place);
@@ -245,15 +280,83 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
                 *[&mut settling.without_min, &mut settling.with_min][way] = Some(time);
             }
         }
-        if let Some(settling) = worth.settling.last_mut()
-            && at_s - settling.at_s <= 600.0
+        if let Some(nth) = current
+            && at_s - worth.settling[nth].at_s <= 600.0
         {
-            settling.to = set_point;
+            worth.settling[nth].to = set_point;
         }
         if row.begins {
             engine.segment();
-            (first, set_point, waits) = (f64::NAN, f64::NAN, [None; 2]);
+            (first, set_point, waits, current) = (f64::NAN, f64::NAN, [None; 2], None);
         }
     }
+    let below = |losses: &[f64]| {
+        let low = losses.iter().filter(|loss| **loss < worth.loss_limit);
+        low.count() as f64 / losses.len() as f64
+    };
+    worth.below_limit = (!worth.loss_with.value.is_empty()).then(|| {
+        (
+            below(&worth.loss_without.value),
+            below(&worth.loss_with.value),
+        )
+    });
+    let change = track
+        .settled
+        .as_ref()
+        .map_or(0.0, |settled| settled.change.value);
+    worth.steps = steps(steady, &worth.settling, change);
     Ok(worth)
+}
+
+/// Changes between the same set points, up to half of what counts as a change, taken together.
+fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<StepLoss> {
+    let mut steps: Vec<StepLoss> = Vec::new();
+    for s in settling {
+        let same = |step: &&mut StepLoss| {
+            (step.from - s.from).abs() < 0.5 * change && (step.to - s.to).abs() < 0.5 * change
+        };
+        match steps.iter_mut().find(same) {
+            Some(step) => {
+                step.changes += 1;
+                step.largest_without = step.largest_without.max(s.largest_without);
+                step.largest_with = step.largest_with.max(s.largest_with);
+            }
+            None => steps.push(StepLoss {
+                from: s.from,
+                to: s.to,
+                changes: 1,
+                largest_without: s.largest_without,
+                largest_with: s.largest_with,
+            }),
+        }
+    }
+    steady.into_iter().chain(steps).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_between_the_same_set_points_are_one_kind_of_step() {
+        let change = |from, to, without, with| Settling {
+            at_s: 0.0,
+            from,
+            to,
+            without_min: None,
+            with_min: None,
+            largest_without: without,
+            largest_with: with,
+        };
+        let settling = [
+            change(20.001, 49.999, 2.0, 0.2),
+            change(50.0, 20.0, 1.0, 0.3),
+            change(20.0, 50.002, 3.0, 0.1),
+        ];
+        let found: Vec<_> = steps(None, &settling, 3.0)
+            .iter()
+            .map(|step| (step.changes, step.largest_without, step.largest_with))
+            .collect();
+        assert_eq!(found, [(2, 3.0, 0.2), (1, 1.0, 0.3)]);
+    }
 }

@@ -1,6 +1,12 @@
 //! Where times start again: windows and lags start afresh, what was learned stays.
 
-use super::workbench::{Bench, linear};
+use std::sync::Arc;
+
+use athermal::core::fit::{FitOptions, fit};
+use athermal::core::recording::Table;
+use athermal::core::score::{ScoreOptions, score};
+
+use super::workbench::{Bench, linear, plan, secs};
 use super::{SAMPLES, SLOPES};
 
 fn graph() -> String {
@@ -134,6 +140,86 @@ fn a_truth_never_belongs_to_a_run_of_another_segment() {
         assert_eq!(other.value("vote.Z").to_bits(), seen[nth]);
         nth += 1;
     });
+}
+
+/// A prediction of a position a minute ahead, and a vote that tells the newest truth it was told of. No window has to warm
+/// up, so that nothing but the break keeps a truth from a run before it.
+fn a_minute_ahead() -> String {
+    format!(
+        r#"{SAMPLES}
+[nodes.warm]
+type = "linear"
+inputs.features = "temperature.room"
+inputs.truth = "position.Z"
+ahead = "60s"
+[nodes.vote]
+type = "test_newest_arrival"
+inputs.voters = "warm"
+inputs.truth = "position.Z"
+[outputs]
+out = "vote"
+"#
+    )
+}
+
+/// Two segments of twenty ticks, the second of which goes on by the clock where the first ends.
+const SEGMENT: u32 = 20;
+/// Ticks within the horizon of a minute.
+const AHEAD: u32 = 6;
+
+#[test]
+fn no_truth_after_a_break_is_told_for_a_run_before_it_though_the_clock_goes_on() {
+    let warm = linear(&[("temperature.room", 1.0)], 0.0);
+    let mut bench = Bench::new(&a_minute_ahead(), &[("warm", warm)]);
+    let mut told = Vec::new();
+    for tick in 0..2 * SEGMENT {
+        if tick == SEGMENT {
+            bench.engine.segment();
+        }
+        let samples = [("temperature.room", 21.0), ("position.Z", 3.0)];
+        told.push(bench.tick(10.0 * f64::from(tick), &samples)[0]);
+    }
+    // A truth counts from the tick after the one that measured it; the first of a segment that has a run is the seventh.
+    let expected = (0..2 * SEGMENT).map(|tick| {
+        let newest = tick.saturating_sub(1);
+        let in_segment = |newest: u32| newest % SEGMENT >= AHEAD;
+        let newest = (0..=newest).rev().find(|&newest| in_segment(newest));
+        newest.map_or(-1.0, |newest| 10.0 * f64::from(newest))
+    });
+    assert_eq!(told, expected.collect::<Vec<_>>());
+}
+
+#[test]
+fn neither_fits_nor_scores_pair_over_a_break() {
+    let plan = plan(&a_minute_ahead());
+    let mut table = Table::default();
+    for tick in 0..2 * SEGMENT {
+        if tick == SEGMENT {
+            table.segment();
+        }
+        let wave = (0.7 * f64::from(tick)).sin();
+        let values = [21.0 + wave, f64::NAN, 100.0 * wave];
+        table.push(secs(10.0 * f64::from(tick)), &values);
+    }
+    let (fitted, report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    let within = u64::from(2 * (SEGMENT - AHEAD));
+    assert_eq!(report.estimators[0].rows, within);
+    assert_eq!(
+        report.estimators[0].dropped.without_run,
+        u64::from(2 * AHEAD)
+    );
+    let plan = Arc::clone(&plan);
+    let scores = score(
+        &plan,
+        &fitted,
+        &table,
+        &ScoreOptions::default(),
+        &mut |_| {},
+    )
+    .unwrap();
+    for score in scores.scores {
+        assert_eq!(score.n as u64, within, "{}", score.output);
+    }
 }
 
 #[test]

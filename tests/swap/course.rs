@@ -184,6 +184,68 @@ fn time_that_starts_again_does_not_confuse_the_shadow() {
     let verdict = control.verdict().unwrap();
     assert!(verdict.over);
     assert!((verdict.outputs[0].running_rmse - 2.0).abs() < 1e-9);
+    // Six ticks pass before a truth has a prediction, and six more in a segment before there is a first prediction.
+    assert_eq!(verdict.outputs[0].n, (10 - 6) + (30 - 6 - 6));
+}
+
+#[test]
+fn a_graph_that_reads_time_otherwise_is_refused_and_what_runs_goes_on() {
+    let running = constant(8.0);
+    let (mut stepper, mut control) = live(&running);
+    go(&mut stepper, 0, 30);
+    let mut other = constant(7.0);
+    let plan = std::sync::Arc::make_mut(&mut other.plan);
+    let athermal::core::document::TimeBase::Column { column, .. } = &mut plan.time;
+    column.push_str("_ms");
+    let refused = control.stage(&other, false).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "the new graph reads time from the column `t_ms` in steps of 1s and what runs from the column `t` in steps of 1s: \
+         let both have the same [time]"
+    );
+    assert_eq!(control.commit(), Err(StageError::NothingStaged));
+    assert_eq!(go(&mut stepper, 30, 3), vec![8f64.to_bits(); 3]);
+}
+
+/// Steps so many segment breaks that an engine on its way has missed more than are kept for it.
+fn leave_behind(stepper: &mut Stepper) {
+    for _ in 0..300 {
+        stepper.segment();
+    }
+}
+
+#[test]
+fn a_graph_that_comes_too_late_is_sent_back_and_can_be_committed_again() {
+    let (mut stepper, mut control) = live(&constant(8.0));
+    go(&mut stepper, 0, 30);
+    let staged = control.stage(&constant(7.0), false).unwrap();
+    let carry = staged.carry().to_vec();
+    control.commit().unwrap();
+    leave_behind(&mut stepper);
+    assert_eq!(go(&mut stepper, 30, 7)[6], 8f64.to_bits());
+    assert_eq!(control.pump(), [Notice::SentBack]);
+    assert_eq!(control.staged().unwrap().carry(), carry);
+    control.commit().unwrap();
+    assert_eq!(go(&mut stepper, 37, 3), vec![7f64.to_bits(); 3]);
+    let told = control.pump();
+    assert!(
+        matches!(told[..], [Notice::TookOver { tick: 38, .. }]),
+        "{told:?}"
+    );
+    let same = |control: &Control, stepper: &Stepper| {
+        let replica = control.replica().unwrap();
+        assert_eq!(replica.snapshot(), stepper.engine().snapshot());
+    };
+    same(&control, &stepper);
+    // The way back, too, may be too late at first.
+    control.rollback().unwrap();
+    leave_behind(&mut stepper);
+    assert_eq!(go(&mut stepper, 40, 7)[6], 7f64.to_bits());
+    assert_eq!(control.pump(), [Notice::SentBack]);
+    control.rollback().unwrap();
+    assert_eq!(go(&mut stepper, 47, 3), vec![8f64.to_bits(); 3]);
+    control.pump();
+    same(&control, &stepper);
 }
 
 #[test]

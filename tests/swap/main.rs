@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../workbench/mod.rs"]
+mod workbench;
+
 mod allocation;
 mod blending;
 mod course;
@@ -10,3 +13,4 @@ mod properties;
 mod random_graph;
 mod snapshots;
 mod threads;
+mod versions;

@@ -1,17 +1,16 @@
 //! Models from text, with coefficients made up rather than fitted.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 
 use athermal::Model;
-use athermal::core::compile::{PlannedRole, Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Disk, declare, load_text};
+use athermal::core::compile::PlannedRole;
 use athermal::core::engine::{Engine, fnv_1a};
 use athermal::core::node::Predictor;
 use athermal::{Duration, Instant};
 use serde_json::json;
+
+use super::workbench::Read;
 
 pub fn s(seconds: i64) -> Instant {
     Instant::from_ns(seconds * 1_000_000_000)
@@ -23,15 +22,9 @@ pub fn d(seconds: i64) -> Duration {
 
 /// A graph whose linear estimators have coefficients that follow from their names and `salt`.
 pub fn model(text: &str, salt: &str) -> Model {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/of-a-test.toml");
-    let document = load_text(name, text, &Disk, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph
-        .as_ref()
-        .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
-    let (Some(graph), Some(plan)) = (graph, plan) else {
-        panic!("{}\n{text}", diagnostics.render(&sources, false, 100));
+    let mut read = Read::new(text);
+    let (Some(graph), Some(plan)) = (read.graph.take(), read.plan.take()) else {
+        panic!("{}\n{text}", read.told());
     };
     let mut fitted = BTreeMap::new();
     for node in &plan.nodes {

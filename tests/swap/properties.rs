@@ -342,10 +342,11 @@ fn check_seed(seed: u64) {
     let data = happenings(&mut random, ROWS);
     let unswapped = run(&before, &feed(), &data);
     let from_the_start = run(&after, &feed(), &data);
-    let revision = |model: &Model| model.engine().unwrap().revision();
+    let revision = |model: &Model| model.engine().unwrap().revision().to_owned();
     let revisions = [revision(&before), revision(&after)];
     if cosmetic {
         assert_eq!(old.untouched(&new).len(), before.plan.nodes.len());
+        assert_eq!(revisions[0], revisions[1], "seed {seed}");
     }
     let unheard = chance(&mut random, 0.2).then(|| {
         let text = new.text(None);

@@ -5,19 +5,48 @@ use std::sync::Arc;
 
 use athermal::core::compile::{Plan, Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{self, Disk};
+use athermal::core::document::{self, Disk, GraphFile};
 use athermal::core::engine::Fitted;
 use athermal::core::node::Predictor;
 use athermal::{Engine, EngineError, Instant};
 
+/// A graph, as far as it can be read and compiled, and what was told of it.
+pub struct Read {
+    pub graph: Option<GraphFile>,
+    pub plan: Option<Plan>,
+    pub diagnostics: Diagnostics,
+    sources: Sources,
+}
+
+impl Read {
+    /// Reads a graph, which may extend those of this project.
+    pub fn new(text: &str) -> Self {
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/text.toml");
+        let graph = document::load_text(name, text, &Disk, &mut sources, &mut diagnostics)
+            .and_then(|read| document::declare(read, &mut diagnostics));
+        let plan = graph
+            .as_ref()
+            .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
+        Self {
+            graph,
+            plan,
+            diagnostics,
+            sources,
+        }
+    }
+
+    /// All that was told, as a user sees it.
+    pub fn told(&self) -> String {
+        self.diagnostics.render(&self.sources, false, 200)
+    }
+}
+
 /// Compiles a graph, which may extend those of this project, or tells what is wrong with it.
 pub fn compiled(text: &str) -> Result<Plan, String> {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/text.toml");
-    let graph = document::load_text(name, text, &Disk, &mut sources, &mut diagnostics)
-        .and_then(|read| document::declare(read, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    plan.ok_or_else(|| diagnostics.render(&sources, false, 200))
+    let mut read = Read::new(text);
+    let plan = read.plan.take();
+    plan.ok_or_else(|| read.told())
 }
 
 /// A graph that has to be right.

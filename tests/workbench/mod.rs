@@ -7,7 +7,7 @@ mod bench;
 mod program;
 mod simulated;
 
-pub use bench::{Bench, linear, plan, problems, secs, slot};
+pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
 pub use program::{Finished, Scratch, athermal, athermal_fed};
 pub use simulated::simulated;
 

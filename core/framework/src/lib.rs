@@ -42,6 +42,8 @@ pub mod quantity;
 pub mod recording;
 pub mod schema;
 pub mod score;
+#[cfg(feature = "testkit")]
+pub mod testkit;
 pub mod time;
 pub mod trial;
 pub mod unit;

@@ -209,6 +209,50 @@ impl Unit {
         }
     }
 
+    /// The unit of the same quantity in which a second, a metre or a kelvin is 1, and no scale has a zero of its own.
+    pub(crate) fn base(&self) -> Unit {
+        let [metre, second, gram, radian, kelvin, coulomb, candela] = self.dimension;
+        let named = [
+            ("m", metre),
+            ("s", second),
+            ("g", gram),
+            ("rad", radian),
+            ("K", kelvin),
+            ("C", coulomb),
+            ("cd", candela),
+        ];
+        let opaque = self
+            .opaque
+            .iter()
+            .map(|(name, &power)| (name.as_str(), power));
+        let named = named
+            .into_iter()
+            .map(|(name, power)| (name, i32::from(power)));
+        let factors = named.chain(opaque).filter(|(_, power)| *power != 0);
+        let text: Vec<_> = factors
+            .map(|(name, power)| format!("{name}{power}"))
+            .collect();
+        Unit {
+            text: if text.is_empty() {
+                "1".to_owned()
+            } else {
+                text.join(".")
+            },
+            ratio: Ratio::whole(1),
+            point: None,
+            ..self.clone()
+        }
+    }
+
+    /// A text that two units share exactly when they mean the same, up to the last digits of a factor.
+    pub(crate) fn meaning(&self) -> String {
+        let base = self.base();
+        let scale = self
+            .point
+            .map_or(String::new(), |scale| format!(" from {}", scale.zero()));
+        format!("{:.11e} {base}{scale}", self.ratio.value())
+    }
+
     /// This unit divided by `other`: nm per min is `nm/min`. Temperature scales are taken as differences.
     pub fn per(&self, other: &Unit) -> Unit {
         let (above, below) = (self.difference(), other.difference());
@@ -337,13 +381,22 @@ impl UnitError {
     }
 }
 
+/// The unit that a text in words means.
+fn of_words(text: &str) -> Option<String> {
+    let codes = spelling::without_words(text);
+    (codes != text && Unit::parse(&codes).is_ok()).then_some(codes)
+}
+
 fn unknown(text: &str, error: &ucum::UcumError) -> UnitError {
     match error {
         ucum::UcumError::UnknownAtom { code } => UnitError::Unknown {
             text: text.to_owned(),
             symbol: code.clone(),
-            suggestion: nearest(text, spelling::COMMON.iter().copied())
-                .map(str::to_owned)
+            suggestion: of_words(text)
+                .or_else(|| {
+                    let near = nearest(text, spelling::COMMON.iter().copied());
+                    near.map(str::to_owned)
+                })
                 .or_else(|| {
                     let symbol = nearest(code, spelling::COMMON.iter().copied())?;
                     Some(text.replace(code.as_str(), symbol))

@@ -21,7 +21,7 @@ pub struct Median {}
 pub struct Trimmed {
     /// The share of votes that is taken away at either end, 0 to below 0.5.
     #[serde(default = "quarter")]
-    #[schemars(range(min = 0.0, max = 0.5))]
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 0.5))]
     pub share: f64,
 }
 

@@ -165,11 +165,13 @@ impl Feature for Compensate {
                     "state",
                     "the states of a stability node: one, or one per rate",
                 )
+                .in_unit("1")
                 .or_none(),
                 InputPort::fresh(
                     "realigned",
                     "other than 0 where the machine has aligned itself anew: one, or one per rate",
                 )
+                .in_unit("1")
                 .or_none(),
             ]
         }

@@ -66,6 +66,23 @@ mod reason {
     pub(super) const RECOVERING: u8 = 7;
 }
 
+/// What a number of the port `reason` says; nothing for a number that says nothing.
+#[must_use]
+pub fn health_reason(number: f64) -> Option<&'static str> {
+    const REASONS: [&str; 8] = [
+        "healthy",
+        "out of range",
+        "changes too fast",
+        "stuck",
+        "too little noise",
+        "too much noise",
+        "silent",
+        "recovering",
+    ];
+    let known = number.fract() == 0.0 && (0.0..8.0).contains(&number);
+    known.then(|| REASONS[number as usize])
+}
+
 /// The limits in the unit of a channel and seconds; infinite or 0 where nothing is checked.
 #[derive(Debug, Clone, Copy)]
 struct Limits {

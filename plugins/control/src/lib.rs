@@ -10,7 +10,7 @@ mod stability;
 mod uncorrected;
 
 pub use compensate::{Compensate, Stop};
-pub use health::Health;
+pub use health::{Health, health_reason};
 pub use optical_loss::OpticalLoss;
 pub use safe_state::{Refuge, SafeState};
 pub use settled::Settled;

@@ -230,6 +230,7 @@ fn finding(finding: &Finding) -> Value {
         Wanted::Above(limit) => json!({ "above": number(limit) }),
         Wanted::Equal { value, within } => json!({ "equals": value, "within": within }),
         Wanted::Between(low, high) => json!({ "from": low, "to": high }),
+        Wanted::Nothing => json!({ "absent": true }),
     };
     let first = finding
         .first

@@ -45,7 +45,7 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
         let graph = read.and_then(|read| document::declare(read, &mut of_file));
         let planned = graph.and_then(|graph| {
             let mut plan = compile(&graph, Wanted::default(), &mut of_file)?;
-            let trials = trial::declare(&graph, &plan, &sources, &mut of_file)?;
+            let trials = trial::declare(&graph, &plan, &Disk, &mut sources, &mut of_file)?;
             trial::observe(&mut plan, &trials);
             Some((plan, trials))
         });

@@ -1,9 +1,10 @@
 //! Decides which predictions a combiner may put together.
 
 use super::conversion::{factor, mismatch};
+use super::estimator::{self, DEVIATION};
 use super::instance::Instance;
 use super::leak::Suspect;
-use super::plan::{PlannedRole, TruthLink};
+use super::plan::{Beside, PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
@@ -11,9 +12,6 @@ use crate::channel::Channel;
 use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;
 use crate::unit::Unit;
-
-/// The port of the weights.
-pub(super) const WEIGHTS: &str = "weights";
 
 impl Resolver<'_> {
     pub(super) fn combiner(
@@ -39,13 +37,7 @@ impl Resolver<'_> {
         let truth = truth?;
         let state = state?;
         let Some(&first) = voters.first() else {
-            let problem = CompileProblem::ChannelCount {
-                input: port.name,
-                found: Vec::new(),
-                expected: "one channel or more",
-            };
-            self.diagnostics
-                .report(instance.input_place(port.name), problem);
+            self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
         let mut agree = sound & self.votes_agree(instance, port.name, &voters);
@@ -102,19 +94,48 @@ impl Resolver<'_> {
         let reason = self.beside(first, combined.name.clone());
         let mut outputs = vec![OutputPort {
             name: "prediction",
-            channels: vec![combined],
+            channels: vec![combined.clone()],
         }];
+        let mut beside = Beside::default();
+        let mut next = self.channels.len() + 1;
         if combiner.weighs() {
             outputs.push(OutputPort {
-                name: WEIGHTS,
+                name: "weights",
                 channels: self.weights(&voters),
             });
+            beside.weights = Some(next);
+            next += voters.len();
         }
         if combiner.reasons() {
             outputs.push(OutputPort {
                 name: "reason",
                 channels: vec![reason],
             });
+            beside.reason = Some(next);
+            next += 1;
+        }
+        if combiner.covers().is_some() {
+            for name in ["lower", "upper"] {
+                outputs.push(OutputPort {
+                    name,
+                    channels: vec![combined.clone()],
+                });
+            }
+            beside.bounds = Some((next, next + 1));
+            next += 2;
+        }
+        if combiner.weighs()
+            && let Some(of_voters) = self.deviations(&voters)
+        {
+            let deviation = estimator::deviation_of(&combined);
+            let unit = deviation
+                .channels
+                .first()
+                .map(|channel| channel.unit.clone());
+            let lags = [Duration::ZERO];
+            let gather = self.gather(instance, &port, &of_voters, &lags, unit.as_ref())?;
+            outputs.push(deviation);
+            beside.deviation = Some((next, gather));
         }
         let channels = outputs.iter().map(|port| port.channels.len()).sum();
         let behind = vec![behind; channels];
@@ -122,9 +143,21 @@ impl Resolver<'_> {
             voters: gather,
             state,
             truth: link,
-            weights: false,
+            beside,
         };
         self.add(instance, outputs, role, behind, predicts)
+    }
+
+    /// The standard deviation that stands beside each of these predictions, where all have one.
+    fn deviations(&self, voters: &[usize]) -> Option<Vec<usize>> {
+        let beside = |&slot: &usize| {
+            let node = &self.nodes[self.channels[slot].node?];
+            let (_, predictions) = node.ports.first()?;
+            let (_, deviations) = node.ports.iter().find(|(name, _)| *name == DEVIATION)?;
+            let nth = slot.checked_sub(predictions.start)?;
+            (nth < deviations.len()).then(|| deviations.start + nth)
+        };
+        voters.iter().map(beside).collect()
     }
 
     /// A channel for the weight of each voter, named after the voter's node, or after the voter where that is not enough.

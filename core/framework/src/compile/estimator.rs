@@ -13,6 +13,21 @@ use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
+/// The port of the standard deviation of the truth about its prediction.
+pub(super) const DEVIATION: &str = "deviation";
+
+/// The port of the standard deviation of the truth about a prediction.
+pub(super) fn deviation_of(prediction: &Channel) -> OutputPort {
+    let channel = Channel {
+        unit: prediction.unit.difference(),
+        ..prediction.clone()
+    };
+    OutputPort {
+        name: DEVIATION,
+        channels: vec![channel],
+    }
+}
+
 impl Resolver<'_> {
     pub(super) fn estimator(
         &mut self,
@@ -49,7 +64,9 @@ impl Resolver<'_> {
         let mut regressors = Vec::new();
         let mut behind = Vec::new();
         let mut whole = sound;
-        if let Some(port) = features_port {
+        if let Some(port) = features_port
+            && !features.is_empty()
+        {
             let mut unit = Self::port_unit(&port);
             if port.name == "voters" {
                 whole &= self.votes_agree(instance, port.name, &features);
@@ -93,6 +110,17 @@ impl Resolver<'_> {
         if !lags.is_empty() {
             gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
         }
+        if regressors.is_empty() && !wanted.every_tick {
+            // An optional input that was left out, and nothing in its place.
+            let port = features_port.unwrap_or(truth_port);
+            let problem = CompileProblem::MissingInput {
+                kind: instance.kind.name,
+                input: port.name,
+                summary: port.summary,
+            };
+            self.diagnostics.report(instance.node.place, problem);
+            whole = false;
+        }
         let training = self.limits(instance, &link);
         let learning = self.learning(instance, estimator);
         if !whole {
@@ -109,14 +137,6 @@ impl Resolver<'_> {
             ahead: link.ahead,
             ..of.clone()
         };
-        let role = PlannedRole::Estimator {
-            regressors,
-            gathers,
-            every_tick: wanted.every_tick,
-            truth: link,
-            training,
-            learning,
-        };
         let mut ports = vec![OutputPort {
             name: "prediction",
             channels: vec![prediction.clone()],
@@ -126,6 +146,21 @@ impl Resolver<'_> {
             ports.push(learning::port(&prediction));
             behind.push(behind[0].clone());
         }
+        let mut deviation = None;
+        if estimator.deviates() {
+            deviation = Some(self.channels.len() + ports.len());
+            ports.push(deviation_of(&prediction));
+            behind.push(behind[0].clone());
+        }
+        let role = PlannedRole::Estimator {
+            regressors,
+            gathers,
+            every_tick: wanted.every_tick,
+            truth: link,
+            training,
+            learning,
+            deviation,
+        };
         self.add(instance, ports, role, behind, Some(truth))
     }
 
@@ -197,6 +232,10 @@ impl Resolver<'_> {
         Regressor {
             name,
             unit: from.channel.unit.to_string(),
+            sensors: self.provenance[slot]
+                .sources()
+                .map(|(source, _)| self.channels[source].name.clone())
+                .collect(),
         }
     }
 

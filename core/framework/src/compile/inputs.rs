@@ -62,18 +62,26 @@ impl Resolver<'_> {
         if let [slot] = slots[..] {
             return Some(slot);
         }
-        let found = slots
-            .iter()
-            .map(|&slot| self.channels[slot].name.clone())
-            .collect();
-        let problem = CompileProblem::ChannelCount {
-            input: port.name,
-            found,
-            expected: "one channel",
-        };
-        self.diagnostics
-            .report(instance.input_place(port.name), problem);
+        self.wrong_count(instance, port.name, &slots, "one channel");
         None
+    }
+
+    /// Tells that an input takes another number of channels than it is given.
+    pub(super) fn wrong_count(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &'static str,
+        slots: &[usize],
+        expected: &'static str,
+    ) {
+        let name = |&slot: &usize| self.channels[slot].name.clone();
+        let problem = CompileProblem::ChannelCount {
+            input,
+            found: slots.iter().map(name).collect(),
+            expected,
+        };
+        let place = instance.input_place(input);
+        self.diagnostics.report(place, problem);
     }
 
     /// How long a held value of each slot counts at an input.

@@ -101,7 +101,7 @@ impl Resolver<'_> {
                     .parts(&inputs, slot - slots.start, slots.len())
             });
         }
-        let entries = node.role.data().flat_map(entries);
+        let entries = node.role.inputs().flat_map(entries);
         entries.map(|entry| (entry.slot, entry.lag)).collect()
     }
 
@@ -111,7 +111,7 @@ impl Resolver<'_> {
             let entries = self.gathers[gather].entries.iter();
             entries.map(|entry| entry.slot).collect()
         };
-        node.role.data().map(slots).collect()
+        node.role.inputs().map(slots).collect()
     }
 
     /// Takes into account what loops bring back, until that changes nothing.

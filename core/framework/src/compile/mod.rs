@@ -6,7 +6,6 @@ mod conversion;
 mod diff;
 mod estimator;
 mod feature;
-mod identity;
 mod inputs;
 mod instance;
 mod leak;
@@ -20,16 +19,19 @@ mod resolver;
 mod scope;
 mod steps;
 
-pub use diff::{Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff};
+pub use diff::{
+    Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
+};
 pub(crate) use instance::EstimatorKeys;
 pub use plan::{
-    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode, PlannedOutput,
-    PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
+    Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode,
+    PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
 pub use provenance::smallest_lag;
 pub(crate) use reference::{Reference, is_pattern, matches};
+pub(crate) use scope::outermost;
 
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
@@ -39,6 +41,8 @@ use crate::document::GraphFile;
 pub struct Wanted {
     /// The standard errors of truths whose producers can give them (a port named `stderr`).
     pub standard_errors: bool,
+    /// The standard deviations of predictions whose makers can give them, and the bounds of intervals.
+    pub intervals: bool,
 }
 
 /// Compiles a graph. All mistakes are told; without one there is a plan.

@@ -168,6 +168,8 @@ pub enum PlannedRole {
         training: TrainingLimits,
         /// How it goes on learning while it runs, where it does.
         learning: Option<PlannedLearning>,
+        /// The slot of its standard deviation, where somebody reads it.
+        deviation: Option<usize>,
     },
     /// One prediction of several.
     Combiner {
@@ -177,14 +179,14 @@ pub enum PlannedRole {
         state: Option<usize>,
         /// What is predicted, where it learns from errors.
         truth: Option<TruthLink>,
-        /// Whether somebody reads its weights.
-        weights: bool,
+        /// What it gives beside its prediction.
+        beside: Beside,
     },
 }
 
 impl PlannedRole {
-    /// What the outputs are made of: the gathers, in the order of the ports.
-    pub fn data(&self) -> impl Iterator<Item = usize> + '_ {
+    /// What the input ports read as data: their gathers, in order.
+    pub fn inputs(&self) -> impl Iterator<Item = usize> + '_ {
         let (many, voters, state) = match self {
             Self::Feature { gathers, .. } | Self::Estimator { gathers, .. } => {
                 (&gathers[..], None, None)
@@ -194,13 +196,14 @@ impl PlannedRole {
         many.iter().copied().chain(voters).chain(state)
     }
 
-    /// All that is read at a tick: the data, and what freezes learning.
+    /// All that is read at a tick: the gathers of the input ports, then what else there is.
     pub fn gathers(&self) -> impl Iterator<Item = usize> + '_ {
-        let freeze = match self {
-            Self::Estimator { learning, .. } => learning.as_ref().and_then(|own| own.freeze),
-            Self::Feature { .. } | Self::Combiner { .. } => None,
+        let more = match self {
+            Self::Feature { .. } => None,
+            Self::Estimator { learning, .. } => learning.as_ref().and_then(|l| l.freeze),
+            Self::Combiner { beside, .. } => beside.deviation.map(|(_, of_voters)| of_voters),
         };
-        self.data().chain(freeze)
+        self.inputs().chain(more)
     }
 
     /// What is predicted, or compared with predictions.
@@ -212,6 +215,38 @@ impl PlannedRole {
             Self::Combiner { truth, .. } => truth.as_ref(),
         }
     }
+
+    /// The slots of both ends of its intervals, where it gives them.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(usize, usize)> {
+        match self {
+            Self::Feature { .. } | Self::Estimator { .. } => None,
+            Self::Combiner { beside, .. } => beside.bounds,
+        }
+    }
+
+    /// The slot of the standard deviation of its predictions, where somebody reads it.
+    #[must_use]
+    pub fn deviation(&self) -> Option<usize> {
+        match self {
+            Self::Feature { .. } => None,
+            Self::Estimator { deviation, .. } => *deviation,
+            Self::Combiner { beside, .. } => beside.deviation.map(|(slot, _)| slot),
+        }
+    }
+}
+
+/// What a combiner gives beside its prediction: the slots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Beside {
+    /// The first of the weights, where somebody reads them.
+    pub weights: Option<usize>,
+    /// Of the reason.
+    pub reason: Option<usize>,
+    /// Of both ends of its intervals.
+    pub bounds: Option<(usize, usize)>,
+    /// Of the standard deviation, where somebody reads it, and the gather of those of the voters.
+    pub deviation: Option<(usize, usize)>,
 }
 
 /// How an estimator goes on learning while it runs.

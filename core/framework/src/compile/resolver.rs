@@ -276,17 +276,8 @@ impl<'g> Resolver<'g> {
                 return;
             };
             if slots.len() != self.nodes[index].slots.len() {
-                let found = slots
-                    .iter()
-                    .map(|&slot| self.channels[slot].name.clone())
-                    .collect();
-                let problem = CompileProblem::ChannelCount {
-                    input: port.name,
-                    found,
-                    expected: "one channel, since it closes a loop,",
-                };
-                self.diagnostics
-                    .report(instance.input_place(port.name), problem);
+                let expected = "one channel, since it closes a loop,";
+                self.wrong_count(instance, port.name, &slots, expected);
             }
             gathers.push(gather);
         }

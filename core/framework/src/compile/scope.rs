@@ -1,6 +1,6 @@
 //! Decides which slots a reference names.
 
-use indexmap::IndexMap;
+use indexmap::{IndexMap, IndexSet};
 
 use super::problem::CompileProblem;
 use super::reference::{Reference, is_pattern, matches};
@@ -28,6 +28,13 @@ pub(crate) enum Found {
     Broken,
 }
 
+/// The names that a graph gives itself: an instance of a module stands for the nodes inside of it.
+pub(crate) fn outermost<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let outer = names.map(|name| name.split(['/', '[']).next().unwrap_or_default());
+    let outer: IndexSet<&str> = outer.collect();
+    outer.into_iter().map(str::to_owned).collect()
+}
+
 impl Scopes {
     pub(crate) fn declare(&mut self, name: &str) {
         self.scopes.entry(name.to_owned()).or_default();
@@ -47,11 +54,9 @@ impl Scopes {
             }
         }
         let Some(scope) = self.scopes.get(reference.node) else {
-            let known = self.scopes.keys().filter(|name| !name.contains('['));
-            let known = known.cloned().collect();
             return Err(Box::new(CompileProblem::UnknownNode {
                 node: reference.node.to_owned(),
-                known,
+                known: outermost(self.scopes.keys().map(String::as_str)),
             }));
         };
         if scope.broken {

@@ -3,11 +3,11 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::Wanted;
-use super::combiner::WEIGHTS;
-use super::plan::{Plan, PlannedRole, Step};
+use super::plan::{Plan, PlannedNode, PlannedRole, Step};
 use super::problem::CompileProblem;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
+use crate::node::Role;
 use crate::time::Duration;
 
 /// The steps: each gather right before its first reader, each node after those that it reads, captures last.
@@ -54,10 +54,31 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
 pub(super) fn warm_up(plan: &Plan) -> Duration {
     let mut of_slot = vec![Duration::ZERO; plan.channels.len()];
     for node in &plan.nodes {
-        let warm_up = plan.warm_up_of(&of_slot, node);
+        let warm_up = warm_up_of(plan, &of_slot, node);
         of_slot[node.slots.clone()].fill(warm_up);
     }
     of_slot.into_iter().max().unwrap_or(Duration::ZERO)
+}
+
+/// The time after which a node, started cold, knows all that it would know had it always run.
+fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Duration {
+    let entries = |gather: usize| &plan.gathers[gather].entries;
+    let before = || {
+        let all = node.role.gathers().flat_map(entries);
+        let ages = all.map(|entry| slot_warm_up[entry.slot] + entry.lag + entry.max_age);
+        ages.max().unwrap_or(Duration::ZERO)
+    };
+    match (&node.role, node.spec.role()) {
+        (PlannedRole::Feature { .. }, Role::Feature(feature)) => feature.memory() + before(),
+        (PlannedRole::Combiner { truth, .. }, Role::Combiner(combiner)) => {
+            let learned = truth.map_or(Duration::ZERO, |truth| {
+                truth.embargo() + truth.ahead + truth.limit
+            });
+            combiner.memory() + learned + before()
+        }
+        (PlannedRole::Estimator { .. }, _) => before(),
+        _ => unreachable!("a plan gives each node the role of its specification"),
+    }
 }
 
 /// Notes which ports of features somebody reads. The first is always computed.
@@ -68,11 +89,25 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wante
         .filter_map(|node| node.role.truth())
         .map(|truth| truth.slot)
         .collect();
-    for node in &mut plan.nodes {
+    let mut read = read.clone();
+    // Whoever is read comes before its readers, and a combination of deviations reads those of its voters.
+    for node in plan.nodes.iter_mut().rev() {
         let is_truth = truths.range(node.slots.clone()).next().is_some();
-        if let PlannedRole::Combiner { weights, .. } = &mut node.role {
-            let port = node.ports.iter().find(|(name, _)| *name == WEIGHTS);
-            *weights = port.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
+        if let PlannedRole::Combiner { voters, beside, .. } = &mut node.role {
+            let count = plan.gathers[*voters].entries.len();
+            beside.weights = beside
+                .weights
+                .filter(|&first| read.range(first..first + count).next().is_some());
+            beside.deviation = beside
+                .deviation
+                .filter(|(slot, _)| wanted.intervals || read.contains(slot));
+            if let Some((_, of_voters)) = beside.deviation {
+                let entries = &plan.gathers[of_voters].entries;
+                read.extend(entries.iter().map(|entry| entry.slot));
+            }
+        }
+        if let PlannedRole::Estimator { deviation, .. } = &mut node.role {
+            *deviation = deviation.filter(|slot| wanted.intervals || read.contains(slot));
         }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {

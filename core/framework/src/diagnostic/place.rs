@@ -100,6 +100,19 @@ impl Sources {
         (line, file.text[first.min(start)..start].chars().count() + 1)
     }
 
+    /// The text of a line, the first of which is 1, without its end.
+    pub fn line(&self, source: SourceId, line: usize) -> Place {
+        let Some(file) = self.get(source) else {
+            return Place::new(source, 0, 0);
+        };
+        let start = line.checked_sub(1).and_then(|nth| file.lines.get(nth));
+        let start = start.copied().unwrap_or(0);
+        let rest = &file.text[start as usize..];
+        let length = rest.lines().next().map_or(0, str::len);
+        let end = start.saturating_add(u32::try_from(length).unwrap_or(u32::MAX));
+        Place::new(source, start, end)
+    }
+
     /// A relative path as written at `place`: it starts at the folder of the file in which it stands.
     pub fn resolve(&self, place: Place, path: &str) -> PathBuf {
         match Path::new(self.path(place.source)).parent() {
@@ -166,6 +179,15 @@ mod tests {
         assert_eq!(at(8), (2, 2));
         assert_eq!(at(16), (3, 2));
         assert_eq!(at(1000), (3, 4));
+    }
+
+    #[test]
+    fn a_line_is_found_by_its_number_and_ends_before_its_end() {
+        let mut sources = Sources::new();
+        let id = sources.add("a.csv", "one\r\ntwo\n\nend");
+        let line = |number| sources.slice(sources.line(id, number));
+        assert_eq!([1, 2, 3, 4].map(line), ["one", "two", "", "end"]);
+        assert_eq!(sources.line(id, 99), sources.line(id, 1));
     }
 
     #[test]

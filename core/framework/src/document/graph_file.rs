@@ -1,5 +1,7 @@
 //! What a graph file declares, typed and expanded; whether it makes sense is decided by the compiler.
 
+use std::fmt;
+
 use indexmap::IndexMap;
 
 use super::tree::Value;
@@ -34,7 +36,7 @@ pub struct GraphFile {
 }
 
 /// How tabular sources give time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TimeBase {
     /// One column holds the time of each row.
     Column {
@@ -60,6 +62,20 @@ pub enum TimeForm {
         /// Time from one sample to the next; without it, one sample is carried as one second.
         step: Option<Duration>,
     },
+}
+
+impl fmt::Display for TimeBase {
+    /// "the column `time_s` in s", to stand in a sentence.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let TimeBase::Column { column, form } = self;
+        write!(f, "the column `{column}` ")?;
+        match form {
+            TimeForm::Numbers { unit } => write!(f, "in steps of {unit}"),
+            TimeForm::Rfc3339 => f.write_str("of dates and times"),
+            TimeForm::Samples { step: None } => f.write_str("of sample numbers"),
+            TimeForm::Samples { step: Some(step) } => write!(f, "of samples {step} apart"),
+        }
+    }
 }
 
 impl TimeBase {

@@ -21,6 +21,7 @@ pub use graph_file::{
 };
 pub use json::JsonError;
 pub use problem::DocumentProblem;
+pub(crate) use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, load, load_text};
 pub use tree::{Data, Entry, Table, Value};
 

@@ -327,7 +327,7 @@ impl Problem for DocumentProblem {
             Self::LongChain { limit } => format!("more than {limit} files extend one another"),
             Self::ExtendsLoop { chain } => format!(
                 "`extends` comes back to its own file: {}",
-                chain.join(" -> ")
+                chain.join(" → ")
             ),
             Self::SchemaMissing => "the file does not say which schema it follows".to_owned(),
             Self::SchemaUnknown { found } => format!("the schema is 1, found {found}"),
@@ -409,7 +409,7 @@ impl Problem for DocumentProblem {
             Self::ModuleLoop { path, limit } => {
                 let (last, before) = path.split_last().map_or(("", &[][..]), |(l, b)| (l, b));
                 if before.iter().any(|name| name == last) {
-                    format!("a module is part of itself: {}", path.join(" -> "))
+                    format!("a module is part of itself: {}", path.join(" → "))
                 } else {
                     format!("modules are nested more than {limit} deep")
                 }
@@ -425,7 +425,9 @@ impl Problem for DocumentProblem {
                 output,
                 module,
                 ..
-            } => format!("\"{node}\" has no output \"{output}\": module \"{module}\" has none"),
+            } => format!(
+                "\"{node}\" has no output \"{output}\": it is an instance of module \"{module}\""
+            ),
         }
     }
 
@@ -514,7 +516,7 @@ impl Problem for DocumentProblem {
                 }
             }
             Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => {
-                Some("use fewer members, or spread the graph over several files".to_owned())
+                Some("use fewer members, or split the graph into several".to_owned())
             }
             Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error
                 .advice()
@@ -531,6 +533,12 @@ impl Problem for DocumentProblem {
             Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
             Self::UnknownChannel { name, known, .. } => suggestion(name, known, "its channels are"),
             Self::EmptyList { .. } => Some("name at least one".to_owned()),
+            Self::TimeContradiction { key, .. } => {
+                Some(format!("leave out `{key}`, or write `unit = \"sample\"`"))
+            }
+            Self::ExtendsLoop { .. } => {
+                Some("one of these files must extend none of the others".to_owned())
+            }
             Self::UnknownModule { name, known } => suggestion(name, known, "the modules are")
                 .or_else(|| Some(format!("describe it under `[modules.{name}]`"))),
             Self::ModuleLoop { .. } => Some("take one of the modules apart".to_owned()),

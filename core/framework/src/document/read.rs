@@ -107,7 +107,7 @@ pub fn load(
                 None,
                 DocumentProblem::Unreadable {
                     path,
-                    reason: reason(&error),
+                    reason: unreadable(&error),
                 },
             );
             None
@@ -320,7 +320,7 @@ impl Chain<'_> {
                     place,
                     DocumentProblem::Unreadable {
                         path,
-                        reason: reason(&error),
+                        reason: unreadable(&error),
                     },
                 );
                 None
@@ -334,7 +334,8 @@ impl Chain<'_> {
     }
 }
 
-fn reason(error: &io::Error) -> String {
+/// Why a file cannot be read, in words.
+pub(crate) fn unreadable(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),

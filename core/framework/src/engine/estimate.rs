@@ -130,6 +130,19 @@ impl Estimate {
         prediction.is_finite().then_some((prediction, oldest))
     }
 
+    /// The standard deviation of the truth about the prediction that was made at this tick.
+    pub(crate) fn deviation(&self, now: Instant) -> f64 {
+        let deviation = match &self.learning {
+            Some(learning) => learning.deviation(&self.row, now),
+            None => self.predictor.deviation(&self.row),
+        };
+        if deviation.is_finite() {
+            deviation
+        } else {
+            f64::NAN
+        }
+    }
+
     /// What goes on learning.
     pub(crate) fn learning(&mut self) -> Option<&mut Learning> {
         self.learning.as_mut()
@@ -148,6 +161,16 @@ impl Estimate {
         match &mut self.learning {
             Some(learning) => learning.restore(state),
             None => Restored::Accepted,
+        }
+    }
+
+    /// Asks for the prediction from any values.
+    #[cfg(feature = "testkit")]
+    pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
+        let row: Vec<f64> = self.row.iter().map(|_| value()).collect();
+        self.predictor.predict(&row);
+        if let Some(learning) = &self.learning {
+            learning.predict(&row, Instant::from_ns(0));
         }
     }
 }

@@ -28,7 +28,7 @@ impl Engine {
         if state.revision != expected {
             return Err(RestoreError::OtherGraph {
                 found: state.revision,
-                expected,
+                expected: expected.to_owned(),
             });
         }
         let mut fresh = Self::new(Arc::clone(&self.plan), &self.fitted).map_err(|error| {
@@ -50,6 +50,7 @@ impl Engine {
     pub(crate) fn twin(&self) -> Result<Self, RestoreError> {
         let mut twin = Self::new(Arc::clone(&self.plan), &self.fitted)
             .expect("what was fitted belongs to the plan, or there would be no engine to copy");
+        twin.revision.clone_from(&self.revision);
         match twin.go_on(&self.state()) {
             None => Ok(twin),
             Some((node, reason)) => Err(RestoreError::Refused { node, reason }),
@@ -83,7 +84,7 @@ impl Engine {
         let sources = self.plan.sources.iter().zip(&self.rejected);
         EngineState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            revision: self.revision(),
+            revision: self.revision().to_owned(),
             tick: self.slots.tick,
             last: self.last,
             before_break: self.before_break,

@@ -67,6 +67,11 @@ impl Learning {
         self.learner.predict(row, now + self.withheld.link().ahead)
     }
 
+    pub(crate) fn deviation(&self, row: &[f64], now: Instant) -> f64 {
+        let of = now + self.withheld.link().ahead;
+        self.learner.deviation(row, of)
+    }
+
     /// The truth to look at after all outputs.
     pub(crate) fn truth(&self) -> usize {
         self.withheld.link().slot

@@ -7,6 +7,8 @@ mod error;
 mod estimate;
 mod gather;
 mod history;
+#[cfg(feature = "testkit")]
+mod idle;
 mod keep;
 mod learning;
 mod pairing;
@@ -17,7 +19,7 @@ mod vote;
 mod withheld;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 pub use carry::{Carry, NodeCarry};
 pub use error::EngineError;
@@ -47,6 +49,8 @@ pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
 pub struct Engine {
     plan: Arc<Plan>,
     fitted: Fitted,
+    /// Worked out when it is first asked for.
+    revision: OnceLock<Arc<str>>,
     slots: Slots,
     gathered: Vec<Gathered>,
     histories: Vec<Option<History>>,
@@ -150,12 +154,7 @@ impl Engine {
                     }
                 }
                 (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
-                    Running::Vote(Vote::new(
-                        spec.build(widths[*voters]),
-                        widths[*voters],
-                        *truth,
-                        spec.reasons(),
-                    ))
+                    Running::Vote(Vote::new(spec, widths[*voters], *truth))
                 }
                 _ => unreachable!("a plan gives each node the role of its specification"),
             });
@@ -203,6 +202,7 @@ impl Engine {
                 })
                 .collect(),
             fitted: fitted.clone(),
+            revision: OnceLock::new(),
             plan,
         })
     }
@@ -292,8 +292,9 @@ impl Engine {
 
     /// The revision of the graph that runs; see [`revision`].
     #[must_use]
-    pub fn revision(&self) -> String {
-        revision(&self.plan, &self.fitted)
+    pub fn revision(&self) -> &str {
+        self.revision
+            .get_or_init(|| revision(&self.plan, &self.fitted).into())
     }
 
     /// The next tick belongs to another segment: windows, lags and filters start afresh, what was learned stays.
@@ -354,7 +355,8 @@ impl Engine {
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.
-    pub(crate) fn gathered(&self, gather: usize) -> (&[f64], bool) {
+    #[must_use]
+    pub fn gathered(&self, gather: usize) -> (&[f64], bool) {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
     }
 
@@ -446,13 +448,21 @@ impl Engine {
                     .and_then(|estimate| estimate.run(&self.gathered, now, on));
                 let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
                 self.slots.set(node.slots.start, value, stamp);
+                if let (Some(estimate), Some(slot)) = (estimate, node.role.deviation()) {
+                    let known = if value.is_nan() {
+                        f64::NAN
+                    } else {
+                        estimate.deviation(now)
+                    };
+                    self.slots.set(slot, known, stamp);
+                }
             }
             Running::Vote(vote) => {
                 vote.release(now);
                 let PlannedRole::Combiner {
                     voters,
                     state,
-                    weights,
+                    beside,
                     ..
                 } = node.role
                 else {
@@ -469,15 +479,24 @@ impl Engine {
                 }
                 let (value, stamp) = vote.run(votes, now);
                 self.slots.set(node.slots.start, value, stamp);
-                let mut beside = node.slots.start + 1..node.slots.end;
-                if vote.reasons() {
-                    beside.end -= 1;
-                    self.slots.set(beside.end, vote.reason(votes), stamp);
+                if let Some(first) = beside.weights {
+                    let slots = first..first + votes.values.len();
+                    vote.weights(votes, &mut self.slots.values[slots.clone()]);
+                    self.slots.stamps[slots.clone()].fill(stamp);
+                    self.slots.written[slots].fill(self.slots.tick);
                 }
-                if weights {
-                    vote.weights(votes, &mut self.slots.values[beside.clone()]);
-                    self.slots.stamps[beside.clone()].fill(stamp);
-                    self.slots.written[beside].fill(self.slots.tick);
+                if let Some(slot) = beside.reason {
+                    self.slots.set(slot, vote.reason(votes), stamp);
+                }
+                if let Some((lower, upper)) = beside.bounds {
+                    let ends = vote.interval();
+                    self.slots.set(lower, ends[0], stamp);
+                    self.slots.set(upper, ends[1], stamp);
+                }
+                if let Some((slot, of_voters)) = beside.deviation {
+                    let of_voters = &self.gathered[of_voters].values;
+                    let deviation = vote.deviation(votes, of_voters, value);
+                    self.slots.set(slot, deviation, stamp);
                 }
             }
         }

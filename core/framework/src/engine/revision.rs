@@ -5,35 +5,18 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use super::Fitted;
-use crate::compile::Plan;
+use crate::compile::{Plan, meaning};
 
 /// The revision of a plan with what was fitted: the same for two files that mean the same.
 ///
-/// Sixteen hexadecimal digits: Fowler, Noll and Vo's hash (variant 1a, 64 bits) over the identities of all nodes, the
-/// outputs and the fits.
+/// Sixteen hexadecimal digits: Fowler, Noll and Vo's hash (variant 1a, 64 bits) over the [`meaning`] of the plan and the fits.
 #[must_use]
 pub fn revision(plan: &Plan, fitted: &Fitted) -> String {
-    let sources: BTreeMap<_, _> = (0..plan.sources.len())
-        .map(|slot| (&plan.channels[slot].name, plan.describe(slot)))
-        .collect();
-    let nodes: BTreeMap<_, _> = plan
-        .nodes
-        .iter()
-        .map(|node| (node.instance(), plan.identity(node)))
-        .collect();
-    let outputs: BTreeMap<_, _> = plan
-        .outputs
-        .iter()
-        .map(|output| {
-            let from = &plan.channels[output.slot].name;
-            (&output.name, json!([from, output.blend]))
-        })
-        .collect();
     let fitted: BTreeMap<_, _> = fitted
         .iter()
         .map(|(node, predictor)| (node, serde_json::to_value(predictor.as_ref()).ok()))
         .collect();
-    let whole = json!({ "sources": sources, "nodes": nodes, "outputs": outputs, "fitted": fitted });
+    let whole = json!({ "plan": meaning(plan), "fitted": fitted });
     format!("{:016x}", fnv_1a(whole.to_string().as_bytes()))
 }
 

@@ -3,39 +3,37 @@
 use super::gather::Gathered;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
+use crate::channel::ABSENT;
 use crate::compile::TruthLink;
-use crate::node::{Combine, Restored, Votes};
+use crate::node::{Combine, Combiner, Restored, Votes};
 use crate::time::{Duration, Instant};
 
 /// A combiner in a running plan, with the truths that the embargo still withholds from it.
 pub(crate) struct Vote {
     combine: Box<dyn Combine>,
     withheld: Option<Withheld>,
-    reasons: bool,
+    /// Both ends of the interval of this tick, for a combiner that gives intervals.
+    interval: Option<[f64; 2]>,
+    /// Room for the weights that deviations are combined by.
+    weights: Vec<f64>,
 }
 
 impl Vote {
-    pub(crate) fn new(
-        combine: Box<dyn Combine>,
-        voters: usize,
-        link: Option<TruthLink>,
-        reasons: bool,
-    ) -> Self {
+    pub(crate) fn new(spec: &dyn Combiner, voters: usize, link: Option<TruthLink>) -> Self {
+        let interval = spec.covers().map(|_| [f64::NAN; 2]);
+        // The interval that was given for a truth is written down with the votes for it.
+        let width = voters + interval.map_or(0, |ends| ends.len());
         Self {
-            combine,
-            withheld: link.map(|link| Withheld::new(link, voters)),
-            reasons,
+            combine: spec.build(voters),
+            withheld: link.map(|link| Withheld::new(link, width)),
+            interval,
+            weights: vec![f64::NAN; voters],
         }
     }
 
     /// Tells the combiner the state that it goes by.
     pub(crate) fn go_by(&mut self, state: f64, now: Instant) {
         self.combine.state(now, state);
-    }
-
-    /// Whether it gives reasons.
-    pub(crate) fn reasons(&self) -> bool {
-        self.reasons
     }
 
     /// Why the votes of this tick are combined as they are.
@@ -46,11 +44,16 @@ impl Vote {
     /// Hands over what the embargo lets through at `now`.
     pub(crate) fn release(&mut self, now: Instant) {
         let Self {
-            combine, withheld, ..
+            combine,
+            withheld,
+            weights,
+            ..
         } = self;
         if let Some(withheld) = withheld {
             let newest = withheld.newest(now);
-            withheld.release(newest, |released| tell(&mut **combine, released));
+            withheld.release(newest, |released| {
+                tell(&mut **combine, weights.len(), released)
+            });
             combine.advance(newest);
         }
     }
@@ -58,8 +61,17 @@ impl Vote {
     /// Combines the votes of this tick: the result and its stamp.
     pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
         let combined = self.combine.combine(Votes(&votes.values));
+        let combined = if combined.is_infinite() {
+            ABSENT
+        } else {
+            combined
+        };
+        if let Some(ends) = &mut self.interval {
+            *ends = self.combine.interval(Votes(&votes.values));
+        }
         if let Some(withheld) = &mut self.withheld {
-            withheld.run(now, [&votes.values[..]]);
+            let ends = self.interval.as_ref().map_or(&[][..], |ends| &ends[..]);
+            withheld.run(now, [&votes.values[..], ends]);
         }
         (combined, votes.oldest().unwrap_or(now))
     }
@@ -68,6 +80,48 @@ impl Vote {
     pub(crate) fn weights(&self, votes: &Gathered, weights: &mut [f64]) {
         weights.fill(f64::NAN);
         self.combine.weights(Votes(&votes.values), weights);
+    }
+
+    /// Both ends of the interval of this tick.
+    pub(crate) fn interval(&self) -> [f64; 2] {
+        self.interval.unwrap_or([f64::NAN; 2])
+    }
+
+    /// The standard deviation of the truth about the combination of this tick, from those about the votes.
+    ///
+    /// The truth is taken to follow one of the voters, each with the probability of its weight, so that the variance is
+    /// `Σ w_i (σ_i² + (ŷ_i − ŷ)²)`: what voters disagree about is uncertain too (Hoeting, Madigan, Raftery and Volinsky 1999,
+    /// section 2). NaN where a vote that counts has none, or the weights do not add up to 1.
+    pub(crate) fn deviation(&mut self, votes: &Gathered, of_votes: &[f64], combined: f64) -> f64 {
+        let mut weights = std::mem::take(&mut self.weights);
+        self.weights(votes, &mut weights);
+        let (mut sum, mut variance) = (0.0, 0.0);
+        for ((&weight, &vote), deviation) in weights.iter().zip(&votes.values).zip(of_votes) {
+            if weight != 0.0 && !vote.is_nan() {
+                sum += weight;
+                variance += weight * (deviation * deviation + (vote - combined).powi(2));
+            }
+        }
+        self.weights = weights;
+        // Written so that NaN fails.
+        if (sum - 1.0).abs() < 1e-9 && variance >= 0.0 && variance.is_finite() {
+            variance.sqrt()
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// Asks for the answer to any votes, all of them and all but the first.
+    #[cfg(feature = "testkit")]
+    pub(crate) fn ask_idly(&self, mut votes: Vec<f64>) {
+        self.combine.combine(Votes(&votes));
+        self.combine.interval(Votes(&votes));
+        self.combine
+            .weights(Votes(&votes), &mut vec![f64::NAN; votes.len()]);
+        if let Some(first) = votes.first_mut() {
+            *first = f64::NAN;
+        }
+        self.combine.combine(Votes(&votes));
     }
 
     /// The truth to look at after all outputs, if any.
@@ -85,10 +139,15 @@ impl Vote {
     /// The segment has ended with this tick.
     pub(crate) fn segment(&mut self, last: Instant) {
         let Self {
-            combine, withheld, ..
+            combine,
+            withheld,
+            weights,
+            ..
         } = self;
         if let Some(withheld) = withheld {
-            withheld.end_segment(last, |released| tell(&mut **combine, released));
+            withheld.end_segment(last, |released| {
+                tell(&mut **combine, weights.len(), released)
+            });
         }
     }
 
@@ -120,6 +179,10 @@ impl Vote {
     }
 }
 
-fn tell(combine: &mut dyn Combine, released: Released<'_>) {
-    combine.observe(Votes(released.row), released.truth, released.arrived);
+fn tell(combine: &mut dyn Combine, voters: usize, released: Released<'_>) {
+    let (votes, interval) = released.row.split_at(voters);
+    if let &[lower, upper] = interval {
+        combine.judge([lower, upper], released.truth);
+    }
+    combine.observe(Votes(votes), released.truth, released.arrived);
 }

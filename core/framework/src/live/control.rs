@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::handover::{Feed, Mark, Seated};
+use super::handover::{Feed, Happening, Mark, Seated};
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::{LiveOptions, Stepper};
 use crate::compile::Plan;
+use crate::document::TimeBase;
 use crate::engine::{Carry, Engine, EngineError, Heritage, NodeCarry, RestoreError};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
@@ -37,6 +38,8 @@ pub struct Control {
     previous: Option<Previous>,
     event: u64,
     last: Option<Instant>,
+    /// Whether learning is frozen on command.
+    frozen: bool,
     generation: u64,
     row: Vec<f64>,
 }
@@ -99,6 +102,13 @@ pub enum StageError {
         /// The channels.
         channels: Vec<String>,
     },
+    /// It reads time in another way.
+    OtherTime {
+        /// How what runs does.
+        running: TimeBase,
+        /// How the new graph does.
+        new: TimeBase,
+    },
     /// What was fitted does not belong to it.
     Engine(EngineError),
     /// Nothing is staged.
@@ -120,6 +130,10 @@ impl fmt::Display for StageError {
                 f,
                 "the new graph reads {}, for which no samples are given: name all graphs at the start, or add the channels",
                 channels.join(", ")
+            ),
+            Self::OtherTime { running, new } => write!(
+                f,
+                "the new graph reads time from {new} and what runs from {running}: let both have the same [time]"
             ),
             Self::Engine(error) => write!(f, "{error}"),
             Self::NothingStaged => write!(f, "no graph is staged: stage one first"),
@@ -176,6 +190,7 @@ pub(super) fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Cont
         previous: None,
         event: 0,
         last: None,
+        frozen: false,
         generation: 0,
     };
     Ok((stepper, control))
@@ -208,10 +223,17 @@ impl Control {
         if self.committed.is_some() {
             return Err(StageError::Busy);
         }
+        if model.plan.time != self.running.time {
+            return Err(StageError::OtherTime {
+                running: self.running.time.clone(),
+                new: model.plan.time.clone(),
+            });
+        }
         let engine =
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;
         let mut seated = Seated::new(engine, &self.feed, 0)
             .map_err(|channels| StageError::MissingChannels { channels })?;
+        seated.engine.freeze(self.frozen);
         let mut warmed = false;
         self.retained.for_each(|time, samples| match time {
             Some(time) => warmed |= seated.step(time, samples).is_ok(),
@@ -360,9 +382,10 @@ impl Control {
             self.lose(missed, notices);
         }
         self.event = mark.event;
-        match mark.time {
-            None => self.segment(),
-            Some(time) => self.tick(mark, time, samples, notices),
+        match mark.what {
+            Happening::Break => self.segment(),
+            Happening::Freeze(frozen) => self.freeze(frozen),
+            Happening::Tick(time) => self.tick(mark, time, samples, notices),
         }
     }
 
@@ -377,6 +400,11 @@ impl Control {
         {
             shadow.segment();
         }
+    }
+
+    fn freeze(&mut self, frozen: bool) {
+        self.frozen = frozen;
+        self.for_all(|seated| seated.freeze(frozen));
     }
 
     fn tick(&mut self, mark: Mark, time: Instant, samples: &[f64], notices: &mut Vec<Notice>) {

@@ -76,6 +76,18 @@ impl Model {
             path: path.to_owned(),
             source,
         })?;
+        Self::read(path, text, wanted)
+    }
+
+    /// Reads the text of a model; `name` stands for its path.
+    ///
+    /// # Errors
+    /// As [`Model::load`].
+    pub fn from_text(name: impl AsRef<Path>, text: String) -> Result<Self, ModelError> {
+        Self::read(name.as_ref(), text, Wanted::default())
+    }
+
+    fn read(path: &Path, text: String, wanted: Wanted) -> Result<Self, ModelError> {
         let not_a_model = |source| ModelError::NotAModel {
             path: path.to_owned(),
             source,

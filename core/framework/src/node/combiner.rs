@@ -65,6 +65,11 @@ pub trait Combiner: Debug + Send + Sync {
         false
     }
 
+    /// The share of truths that its intervals are to cover, for kinds that give intervals: the ports `lower` and `upper`.
+    fn covers(&self) -> Option<f64> {
+        None
+    }
+
     /// How long what was learned counts; the engine keeps so much of the past for warming up.
     fn memory(&self) -> Duration {
         Duration::ZERO
@@ -81,6 +86,15 @@ pub trait Combine: Send {
 
     /// The weights by which these votes would be combined, for kinds that weigh; NaN for a vote that is not there.
     fn weights(&self, _votes: Votes<'_>, _weights: &mut [f64]) {}
+
+    /// Both ends of the interval about the combination of these votes, for kinds that give intervals; NaN where there is none.
+    fn interval(&self, _votes: Votes<'_>) -> [f64; 2] {
+        [f64::NAN; 2]
+    }
+
+    /// A truth, and both ends of the interval that was given for it, for kinds that give intervals: called before
+    /// [`observe`](Combine::observe).
+    fn judge(&mut self, _interval: [f64; 2], _truth: f64) {}
 
     /// Why these votes are combined as they are, for kinds that give reasons; the kind's documentation says what each
     /// number means.

@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 use super::{InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
+use crate::channel::ABSENT;
 use crate::engine::Gathered;
 use crate::time::{Duration, Instant};
 
@@ -173,14 +174,14 @@ impl Outputs<'_> {
         self.set_stamped(index, value, self.default_stamp);
     }
 
-    /// Gives a value with a stamp of its own, such as a window's newest sample.
+    /// Gives a value with a stamp of its own, such as a window's newest sample. What is infinite is no value.
     pub fn set_stamped(&mut self, index: usize, value: f64, stamp: Instant) {
-        self.values[index] = value;
+        self.values[index] = if value.is_infinite() { ABSENT } else { value };
         self.stamps[index] = stamp;
         self.written[index] = self.tick;
     }
 
-    /// Gives values with one stamp to channels side by side: the answer is to be filled with them.
+    /// Gives values with one stamp to channels side by side: the answer is to be filled with them, none of them infinite.
     pub fn fill_stamped(&mut self, range: Range<usize>, stamp: Instant) -> &mut [f64] {
         self.stamps[range.clone()].fill(stamp);
         self.written[range.clone()].fill(self.tick);

@@ -91,6 +91,11 @@ pub trait Learner: Debug + Send {
     /// The prediction of the truth that will be measured at `of`, from present values of the used regressors.
     fn predict(&self, regressors: &[f64], of: Instant) -> f64;
 
+    /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known.
+    fn deviation(&self, _regressors: &[f64], _of: Instant) -> f64 {
+        f64::NAN
+    }
+
     /// A truth, measured at `at`, and the regressors of the run that it belongs to. Instants never go back.
     ///
     /// Nothing is allocated here.

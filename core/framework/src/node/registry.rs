@@ -18,6 +18,11 @@ pub trait NodeSpec: Debug + Send + Sync {
 
     /// The parameters as data, with defaults filled in: two equal ones behave alike.
     fn parameters(&self) -> serde_json::Value;
+
+    /// The name of the kind, as graph files use it.
+    fn kind_name() -> &'static str
+    where
+        Self: Sized;
 }
 
 /// A specification as what it is.
@@ -138,6 +143,10 @@ macro_rules! register {
 
             fn parameters(&self) -> $crate::__private::serde_json::Value {
                 $crate::__private::serde_json::to_value(self).unwrap_or_default()
+            }
+
+            fn kind_name() -> &'static str {
+                $name
             }
         }
 

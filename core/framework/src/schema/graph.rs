@@ -69,8 +69,7 @@ pub fn graph_schema() -> Value {
             "else": { "const": false }
         }),
     );
-    let name = "^\\p{L}[\\p{L}\\p{N}_-]*$";
-    let names_of = |what: &str| json!({ "description": what, "pattern": name });
+    definitions.insert("Module".to_owned(), module(&names));
     let members = json!({
         "description": "The members.",
         "type": "array",
@@ -106,7 +105,8 @@ pub fn graph_schema() -> Value {
             "modules": {
                 "description": "Groups of nodes with inputs, outputs and parameters, for use by several nodes.",
                 "type": "object",
-                "additionalProperties": { "type": "object" }
+                "propertyNames": names_of("A module's name."),
+                "additionalProperties": { "$ref": "#/definitions/Module" }
             },
             "nodes": {
                 "description": "What computes.",
@@ -123,7 +123,11 @@ pub fn graph_schema() -> Value {
             "tests": { "description": "What must hold, for `athermal test`.", "type": "array", "items": test },
             "source": { "description": "Where live measurements come from.", "type": "object" },
             "sinks": { "description": "Where live outputs go.", "type": "object", "additionalProperties": { "type": "object" } },
-            "runtime": { "description": "How the graph runs live.", "type": "object" },
+            "runtime": {
+                "description": "How the graph runs live.",
+                "type": "object",
+                "properties": { "heartbeat": described(&duration, "The time between two empty ticks, so that silence is noticed.") }
+            },
             "model": { "description": "The fitted model that runs, relative to this file.", "type": "string" }
         },
         "definitions": definitions
@@ -309,6 +313,51 @@ fn inputs(kind: &Kind) -> Value {
     };
     let ports: Map<String, Value> = (kind.inputs)().iter().map(port).collect();
     json!({ "description": "What the node reads.", "type": "object", "properties": ports, "additionalProperties": false })
+}
+
+/// A module, or what is laid over one of another file. Its nodes have parameters of the module in the place of any value, so that
+/// little can be said of them here.
+fn module(kinds: &[&str]) -> Value {
+    let list = |what: &str| json!({ "description": what, "type": "array", "items": { "type": "string", "minLength": 1 }, "uniqueItems": true });
+    json!({
+        "type": "object",
+        "additionalProperties": false,
+        "properties": {
+            "inputs": list("What it reads, named as `{input}` inside."),
+            "required": list("Its parameters without a default."),
+            "parameters": { "description": "Its parameters with a default, named as `{parameter}` inside.", "type": "object" },
+            "outputs": {
+                "description": "What it gives: a node inside, or a port of one. The first is the default.",
+                "type": "object",
+                "propertyNames": names_of("An output's name."),
+                "additionalProperties": { "type": "string", "minLength": 1 }
+            },
+            "nodes": {
+                "description": "Its nodes.",
+                "type": "object",
+                "propertyNames": names_of("A node's name."),
+                "additionalProperties": {
+                    "type": "object",
+                    "properties": {
+                        "type": { "description": "The kind of node.", "anyOf": [{ "enum": kinds }, { "type": "string", "pattern": "\\{" }] },
+                        "module": { "description": "The module that the node is an instance of, in place of `type`.", "type": "string" },
+                        "inputs": { "description": "What the node reads.", "type": "object" }
+                    }
+                }
+            },
+            "modules": {
+                "description": "Modules that its nodes see beside those of the graph.",
+                "type": "object",
+                "additionalProperties": { "$ref": "#/definitions/Module" }
+            },
+            "from": { "description": "The file that the module is taken from, relative to this one; other keys are laid over it.", "type": "string" },
+            "module": { "description": "Its name in that file, if it is another.", "type": "string" }
+        }
+    })
+}
+
+fn names_of(what: &str) -> Value {
+    json!({ "description": what, "pattern": "^\\p{L}[\\p{L}\\p{N}_-]*$" })
 }
 
 fn input(duration: &Value) -> Value {

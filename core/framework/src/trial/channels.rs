@@ -1,6 +1,6 @@
 //! Decides which channels of a plan a test's reference names.
 
-use crate::compile::{CompileProblem, Plan, Reference, is_pattern, matches};
+use crate::compile::{CompileProblem, Plan, Reference, is_pattern, matches, outermost};
 
 /// The slots of a reference, in the order of the plan. The names of outputs (`predicted.Z1`) are understood too.
 pub(super) fn look_up(plan: &Plan, text: &str) -> Result<Vec<usize>, CompileProblem> {
@@ -108,14 +108,11 @@ fn ports(plan: &Plan, slot: usize) -> Vec<&'static str> {
 
 /// What a reference may begin with.
 fn names(plan: &Plan) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
     let channels = plan.channels.iter().map(|channel| channel.name.as_str());
     let outputs = plan.outputs.iter().map(|output| output.name.as_str());
-    for name in channels.chain(outputs) {
-        let node = Reference::parse(name).node;
-        if names.last().is_none_or(|last| last != node) && !names.iter().any(|name| name == node) {
-            names.push(node.to_owned());
-        }
-    }
-    names
+    outermost(
+        channels
+            .chain(outputs)
+            .map(|name| Reference::parse(name).node),
+    )
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::machine::{Setup, Simulated, UnknownMachine, machine};
+use crate::machine::{Schedule, Setup, Simulated, UnknownMachine, machine};
 use crate::recording::Recording;
 
 /// Data that can be read as often as needed.
@@ -15,7 +15,7 @@ pub enum DataSet {
 }
 
 /// A simulated machine and how much of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
     /// The machine's name, which is known.
     pub machine: &'static str,
@@ -23,6 +23,8 @@ pub struct Simulation {
     pub days: f64,
     /// The seed.
     pub seed: u64,
+    /// Set points over time; none is the machine's own schedule.
+    pub schedule: Option<Schedule>,
 }
 
 impl DataSet {
@@ -40,7 +42,7 @@ impl DataSet {
                 let setup = Setup {
                     days: simulation.days,
                     seed: simulation.seed,
-                    schedule: None,
+                    schedule: simulation.schedule.clone(),
                 };
                 Box::new(Simulated::new(machine(simulation.machine)?.machine, setup))
             }

@@ -9,9 +9,11 @@ use super::shape;
 use super::table::SimulationTable;
 use crate::compile::{Plan, PlannedRole};
 use crate::diagnostic::{Diagnostics, Place, Sources};
-use crate::document::{Data, DocumentProblem, GraphFile, Table, Value, decode, known_keys};
+use crate::document::{
+    Data, DocumentProblem, FileReader, GraphFile, Table, Value, decode, known_keys, unreadable,
+};
 use crate::fault::{FaultSpec, Faults};
-use crate::machine::{LONGEST_DAYS, machines};
+use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -43,11 +45,12 @@ pub enum On {
     Synthetic(Synthetic),
 }
 
-/// What the tests of a graph are; `None` after any mistake, all of which are told.
+/// What the tests of a graph are; `None` after any mistake, all of which are told. Schedules are read, and added to `sources`.
 pub fn declare(
     graph: &GraphFile,
     plan: &Plan,
-    sources: &Sources,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<Trial>> {
     let Some(tests) = graph.tests.as_ref().and_then(Value::as_list) else {
@@ -79,6 +82,7 @@ pub fn declare(
         let trial = diagnostics.within(context, |diagnostics| {
             Declaring {
                 plan,
+                reader,
                 sources,
                 diagnostics,
             }
@@ -115,7 +119,8 @@ pub fn observe(plan: &mut Plan, trials: &[Trial]) {
 /// Reads one test; what it expects is read in a file of its own.
 pub(super) struct Declaring<'a> {
     pub(super) plan: &'a Plan,
-    sources: &'a Sources,
+    reader: &'a dyn FileReader,
+    sources: &'a mut Sources,
     pub(super) diagnostics: &'a mut Diagnostics,
 }
 
@@ -224,13 +229,12 @@ impl Declaring<'_> {
         let what = format!("\"{key}\"");
         let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
         let place = place_of(value, "simulate");
-        let Some(known) = machines().get(table.simulate.as_str()) else {
-            let problem = TrialProblem::UnknownMachine {
-                machine: table.simulate,
-                known: machines().keys().copied().collect(),
-            };
-            self.diagnostics.report(place, problem);
-            return None;
+        let known = match machine(&table.simulate) {
+            Ok(known) => known,
+            Err(unknown) => {
+                self.diagnostics.report(place, unknown_machine(unknown));
+                return None;
+            }
         };
         let channels = known.machine.channels();
         let measures = |name: &str| channels.iter().find(|channel| channel.reference() == name);
@@ -263,11 +267,45 @@ impl Declaring<'_> {
             let found = table.days.to_string();
             self.range(value, "days", found, "above 0 and at most 3653");
         }
+        let schedule = match &table.schedule {
+            Some(path) => Some(self.schedule(path, place_of(value, "schedule"), known.machine)?),
+            None => None,
+        };
         Some(DataSet::Simulated(Simulation {
             machine: known.machine.name(),
             days: table.days,
             seed: table.seed,
+            schedule,
         }))
+    }
+
+    /// A schedule from its file, in which its mistakes are told.
+    fn schedule(&mut self, path: &str, place: Place, machine: &dyn Machine) -> Option<Schedule> {
+        let path = self.sources.resolve(place, path);
+        let shown = path.display().to_string();
+        let text: std::sync::Arc<str> = match self.reader.read(&path) {
+            Ok(text) => text.into(),
+            Err(error) => {
+                let reason = unreadable(&error);
+                let problem = TrialProblem::ScheduleUnreadable {
+                    path: shown,
+                    reason,
+                };
+                self.diagnostics.report(place, problem);
+                return None;
+            }
+        };
+        let errors = match Schedule::parse(&text, machine.set_points()) {
+            Ok(schedule) => return Some(schedule),
+            Err(errors) => errors,
+        };
+        let file = self.sources.add(shown, std::sync::Arc::clone(&text));
+        for error in errors {
+            let place = self.sources.line(file, error.line);
+            self.diagnostics
+                .report(place, TrialProblem::Schedule(error.reason));
+        }
+        None
     }
 
     fn inputs(&mut self, value: &Value) -> Option<Synthetic> {
@@ -398,6 +436,19 @@ impl Declaring<'_> {
 pub(super) fn place_of(table: &Value, key: &str) -> Place {
     let value = table.as_table().and_then(|keys| keys.get(key));
     value.map_or(table.place, |value| value.place)
+}
+
+fn unknown_machine(unknown: UnknownMachine) -> TrialProblem {
+    match unknown {
+        UnknownMachine::None { name, known, .. } => TrialProblem::UnknownMachine {
+            machine: name,
+            known,
+        },
+        UnknownMachine::Several { name, packages } => TrialProblem::MachineTwice {
+            machine: name,
+            packages,
+        },
+    }
 }
 
 fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {

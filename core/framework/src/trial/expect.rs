@@ -66,6 +66,7 @@ impl Declaring<'_> {
         checks.extend(equals.map(|equals| Check::Equals(equals, tolerance)));
         let between = table.between.clone();
         checks.extend(between.map(|(low, high)| Check::Between(low, high)));
+        checks.extend(table.absent.map(|_| Check::Absent));
         checks.extend(table.max_step_below.clone().map(Check::MaxStepBelow));
         checks
     }
@@ -73,7 +74,19 @@ impl Declaring<'_> {
     /// Keys that need or exclude each other, and numbers out of their range.
     fn check_keys(&mut self, value: &Value, table: &ExpectTable) {
         let at = table.at.is_some();
-        let one_value = table.equals.is_some() || table.between.is_some();
+        let of_values = [
+            ("equals", table.equals.is_some()),
+            ("between", table.between.is_some()),
+            ("max_step_below", table.max_step_below.is_some()),
+            ("valid_above", table.valid_above.is_some()),
+            ("given_above", table.given_above.is_some()),
+            ("rmse_below", table.rmse_below.is_some()),
+            ("r2_above", table.r2_above.is_some()),
+            ("beats", table.beats.is_some()),
+        ];
+        let absent = table.absent.is_some();
+        let value_beside = of_values.iter().find(|(_, stated)| *stated);
+        let one_value = table.equals.is_some() || table.between.is_some() || absent;
         let period = table.from.is_some() || table.to.is_some();
         let of_truths = table.rmse_below.is_some()
             || table.r2_above.is_some()
@@ -99,6 +112,12 @@ impl Declaring<'_> {
                 "rmse_below",
                 false,
             ),
+            (
+                absent && value_beside.is_some(),
+                "absent",
+                value_beside.map_or("", |(key, _)| key),
+                true,
+            ),
         ];
         for (_, key, with, excluded) in wrong.into_iter().filter(|(wrong, ..)| *wrong) {
             let problem = TrialProblem::Keys {
@@ -107,6 +126,10 @@ impl Declaring<'_> {
                 excluded,
             };
             self.diagnostics.report(place_of(value, key), problem);
+        }
+        if table.absent == Some(false) {
+            let found = "false".to_owned();
+            self.range(value, "absent", found, "true, or left out");
         }
         for (key, share) in [
             ("valid_above", table.valid_above),
@@ -186,7 +209,8 @@ impl Declaring<'_> {
                     quantities.push(("between", high, unit.clone()));
                 }
                 Check::Beats(rivals) => self.check_rivals(value, rivals, slot),
-                Check::R2Above(_) | Check::ValidAbove(_) | Check::GivenAbove(_) => {}
+                Check::R2Above(_) | Check::ValidAbove(_) | Check::GivenAbove(_) | Check::Absent => {
+                }
             }
         }
         if let (Some(limit), Some(truth)) = (&table.abs_truth_below, truth) {

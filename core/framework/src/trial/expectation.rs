@@ -12,7 +12,7 @@ pub struct Expectation {
     pub abs_truth_below: Option<Quantity>,
     /// When.
     pub period: Period,
-    /// The time of the one value that `equals` and `between` look at.
+    /// The time of the one value that `equals` and `between` look at, and of the tick that `absent` looks at.
     pub at: Option<Duration>,
     /// What is checked of each channel.
     pub checks: Vec<Check>,
@@ -52,6 +52,8 @@ pub enum Check {
     Equals(Quantity, Tolerance),
     /// The values lie between.
     Between(Quantity, Quantity),
+    /// There is no value.
+    Absent,
     /// Changes from one value to the next are below.
     MaxStepBelow(Quantity),
 }
@@ -88,6 +90,7 @@ impl Check {
             Self::GivenAbove(_) => "given_above",
             Self::Equals(..) => "equals",
             Self::Between(..) => "between",
+            Self::Absent => "absent",
             Self::MaxStepBelow(_) => "max_step_below",
         }
     }
@@ -96,14 +99,5 @@ impl Check {
     #[must_use]
     pub fn is_of_predictions(&self) -> bool {
         matches!(self, Self::RmseBelow(_) | Self::R2Above(_) | Self::Beats(_))
-    }
-
-    /// Whether it looks at values one by one.
-    #[must_use]
-    pub fn is_of_values(&self) -> bool {
-        matches!(
-            self,
-            Self::Equals(..) | Self::Between(..) | Self::MaxStepBelow(_)
-        )
     }
 }

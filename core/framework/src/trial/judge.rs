@@ -47,6 +47,8 @@ pub enum Wanted {
     },
     /// From one to the other, both included.
     Between(f64, f64),
+    /// No value at all.
+    Nothing,
 }
 
 impl Wanted {
@@ -58,6 +60,7 @@ impl Wanted {
             Self::Above(limit) => found > limit,
             Self::Equal { value, within } => (found - value).abs() <= within,
             Self::Between(low, high) => low <= found && found <= high,
+            Self::Nothing => false,
         }
     }
 }
@@ -66,7 +69,11 @@ impl Finding {
     /// Whether the expectation holds.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.first.is_none() && self.found.is_some_and(|found| self.wanted.admits(found))
+        match self.wanted {
+            // Where no tick was looked at, nothing has been shown.
+            Wanted::Nothing => self.found.is_none() && self.instants > 0,
+            wanted => self.first.is_none() && self.found.is_some_and(|found| wanted.admits(found)),
+        }
     }
 }
 
@@ -141,8 +148,7 @@ impl Judge<'_> {
                 self.share(check, *share, valid, of)
             }
             Check::GivenAbove(share) => {
-                let within = |time: &&Duration| self.expectation.period.contains(**time);
-                let ticks = self.observed.ticks.iter().filter(within).count();
+                let ticks = self.ticks();
                 let given = self.values().filter(|value| !value.2.is_nan()).count();
                 self.share(check, *share, given, ticks)
             }
@@ -166,6 +172,7 @@ impl Judge<'_> {
             Check::Between(low, high) => {
                 self.each_value(check, Wanted::Between(value(low), value(high)))
             }
+            Check::Absent => self.nothing(check),
             Check::MaxStepBelow(limit) => self.largest_step(check, Wanted::Below(size(limit))),
         };
         vec![finding]
@@ -184,7 +191,9 @@ impl Judge<'_> {
             Check::RmseBelow(_) | Check::Beats(_) | Check::MaxStepBelow(_) => {
                 planned.channel.unit.difference().to_string()
             }
-            Check::Equals(..) | Check::Between(..) => planned.channel.unit.to_string(),
+            Check::Equals(..) | Check::Between(..) | Check::Absent => {
+                planned.channel.unit.to_string()
+            }
         };
         Finding {
             of: planned.name.clone(),
@@ -304,6 +313,32 @@ impl Judge<'_> {
             .filter(|(_, time, _)| self.expectation.period.contains(*time))
     }
 
+    /// How many ticks there are in the period.
+    fn ticks(&self) -> usize {
+        let within = |time: &&Duration| self.expectation.period.contains(**time);
+        self.observed.ticks.iter().filter(within).count()
+    }
+
+    /// The first value where there should be none, or the one of the last tick at or before a time.
+    fn nothing(&self, check: &Check) -> Finding {
+        let tick = self.expectation.at.map(|at| {
+            let ticks = self.observed.ticks.iter().copied();
+            ticks.filter(|tick| *tick <= at).max()
+        });
+        let mut given = self.values().filter(|value| !value.2.is_nan());
+        let (value, instants) = match tick {
+            Some(tick) => (
+                given.find(|value| Some(value.1) == tick),
+                usize::from(tick.is_some()),
+            ),
+            None => (given.next(), self.ticks()),
+        };
+        Finding {
+            first: value.map(|value| (value.1, value.2)),
+            ..self.finding(check, value.map(|value| value.2), Wanted::Nothing, instants)
+        }
+    }
+
     /// Every value, or the one at a time.
     fn each_value(&self, check: &Check, wanted: Wanted) -> Finding {
         if let Some(at) = self.expectation.at {
@@ -367,6 +402,7 @@ impl fmt::Display for Wanted {
             Self::Equal { value, within: 0.0 } => write!(f, "exactly {value}"),
             Self::Equal { value, within } => write!(f, "{value} ± {within}"),
             Self::Between(low, high) => write!(f, "between {low} and {high}"),
+            Self::Nothing => f.write_str("none"),
         }
     }
 }
@@ -382,6 +418,7 @@ impl fmt::Display for Finding {
             Wanted::Below(limit) | Wanted::Above(limit) => limit,
             Wanted::Equal { value, .. } => value,
             Wanted::Between(low, _) => low,
+            Wanted::Nothing => f64::NAN,
         };
         write!(f, "{}: {}: ", self.of, self.check)?;
         match self.found {
@@ -409,6 +446,7 @@ impl fmt::Display for Finding {
                     figure(limit, f64::NAN)
                 )
             }
+            (_, Wanted::Nothing) => f.write_str(", wanted none"),
             (_, wanted) => write!(f, ", wanted {wanted}{unit}"),
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::diagnostic::{Place, Problem, nearest};
 use crate::fault::FaultError;
+use crate::machine::schedule::Reason;
 use crate::unit::Unit;
 
 /// A mistake in `[[tests]]`.
@@ -21,6 +22,15 @@ pub enum TrialProblem {
         machine: String,
         known: Vec<&'static str>,
     },
+    /// A machine that several crates bring.
+    MachineTwice {
+        machine: String,
+        packages: Vec<&'static str>,
+    },
+    /// A schedule that cannot be read.
+    ScheduleUnreadable { path: String, reason: String },
+    /// A mistake in a schedule.
+    Schedule(Reason),
     /// A machine that lacks what the graph measures.
     MachineLacks {
         machine: &'static str,
@@ -86,7 +96,7 @@ impl Problem for TrialProblem {
             Self::NoData | Self::TwoData { .. } => "A070",
             Self::NothingExpected { .. } => "A071",
             Self::DuplicateName { .. } => "A072",
-            Self::UnknownMachine { .. } => "A073",
+            Self::UnknownMachine { .. } | Self::MachineTwice { .. } => "A073",
             Self::MachineLacks { .. } => "A074",
             Self::Units { .. } => "A075",
             Self::NotAPrediction { .. } | Self::NoRival { .. } => "A076",
@@ -96,6 +106,7 @@ impl Problem for TrialProblem {
             Self::NotMeasured { .. } => "A080",
             Self::ChannelTwice { .. } => "A081",
             Self::BareSample { .. } => "A082",
+            Self::ScheduleUnreadable { .. } | Self::Schedule(_) => "A170",
         }
     }
 
@@ -108,6 +119,16 @@ impl Problem for TrialProblem {
             Self::UnknownMachine { machine, .. } => {
                 format!("there is no simulated machine `{machine}`")
             }
+            Self::MachineTwice { machine, packages } => {
+                format!(
+                    "the machine `{machine}` is in {}",
+                    packages.join(" and in ")
+                )
+            }
+            Self::ScheduleUnreadable { path, reason } => {
+                format!("the schedule {path} cannot be read: {reason}")
+            }
+            Self::Schedule(reason) => reason.to_string(),
             Self::MachineLacks {
                 machine, channels, ..
             } => format!(
@@ -166,6 +187,9 @@ impl Problem for TrialProblem {
             Self::NothingExpected { .. } => "nothing is expected",
             Self::DuplicateName { .. } => "the name is taken",
             Self::UnknownMachine { .. } => "no such machine",
+            Self::MachineTwice { .. } => "which of them?",
+            Self::ScheduleUnreadable { .. } => "named here",
+            Self::Schedule(_) => "in this line",
             Self::MachineLacks { .. } => "lacks a channel",
             Self::Units { .. } => "another unit",
             Self::NotAPrediction { .. } => "not a prediction",
@@ -192,7 +216,7 @@ impl Problem for TrialProblem {
                 "run over data (`on`) in one test and over `inputs` in another".to_owned()
             }
             Self::NothingExpected { .. } => {
-                "say what must hold, such as `rmse_below`, `beats`, `valid_above`, `equals` or `between`"
+                "say what must hold, such as `rmse_below`, `beats`, `valid_above`, `equals`, `between` or `absent`"
                     .to_owned()
             }
             Self::DuplicateName { .. } => "give each test a name of its own".to_owned(),
@@ -202,13 +226,19 @@ impl Problem for TrialProblem {
                     None => format!("there are {}", listed(known)),
                 }
             }
+            Self::MachineTwice { .. } => {
+                "leave one of these crates out of the program, or rename its machine".to_owned()
+            }
+            Self::ScheduleUnreadable { .. } => {
+                "give the path of a schedule, which starts at the file in which it stands".to_owned()
+            }
             Self::MachineLacks { has, .. } => format!(
                 "it measures {}; a signal may call channels `optional`",
                 listed(has)
             ),
             Self::Units { expected, .. } => format!("write it in {expected}"),
             Self::NotAPrediction { .. } => {
-                "`equals`, `between`, `max_step_below`, `valid_above` and `given_above` work for every channel"
+                "`equals`, `between`, `absent`, `max_step_below`, `valid_above` and `given_above` work for every channel"
                     .to_owned()
             }
             Self::NoRival { .. } => {
@@ -224,7 +254,7 @@ impl Problem for TrialProblem {
             Self::NoShape => {
                 "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`".to_owned()
             }
-            Self::Range { .. } | Self::Fault(_) => return None,
+            Self::Range { .. } | Self::Fault(_) | Self::Schedule(_) => return None,
             Self::NotMeasured { known, .. } => format!("measured are {}", listed(known)),
             Self::ChannelTwice { .. } => "let each channel stand once".to_owned(),
             Self::BareSample { .. } => "only `nan`, for no value, stands without a unit".to_owned(),

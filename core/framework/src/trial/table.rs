@@ -56,6 +56,8 @@ pub(super) struct SimulationTable {
     /// The seed: the same one gives the same data.
     #[serde(default = "first_seed")]
     pub(super) seed: u64,
+    /// A file of set points over time, as `athermal simulate --schedule` takes it, relative to the file in which it stands; without it the machine's own schedule.
+    pub(super) schedule: Option<String>,
 }
 
 fn one_day() -> f64 {
@@ -140,6 +142,8 @@ pub(super) struct ExpectTable {
     pub(super) within: Option<Within>,
     /// Every value, or the one `at` a time, lies between these, both included.
     pub(super) between: Option<(Quantity, Quantity)>,
+    /// `true`: there is no value, at any tick or, `at` a time, at the last tick at or before it.
+    pub(super) absent: Option<bool>,
     /// From one value to the next the change is always below.
     pub(super) max_step_below: Option<Quantity>,
     /// The time of the one value that `equals` and `between` look at: the last one computed at or before it.

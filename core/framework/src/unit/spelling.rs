@@ -47,6 +47,88 @@ pub(super) const COMMON: [&str; 60] = [
     "um/min", "L", "L/min", "Ohm",
 ];
 
+/// Units as words, without a prefix, and their codes.
+const WORDS: [(&str, &str); 32] = [
+    ("meter", "m"),
+    ("metre", "m"),
+    ("micron", "um"),
+    ("second", "s"),
+    ("sec", "s"),
+    ("minute", "min"),
+    ("hour", "h"),
+    ("hr", "h"),
+    ("day", "d"),
+    ("kelvin", "K"),
+    ("celsius", "Cel"),
+    ("centigrade", "Cel"),
+    ("fahrenheit", "[degF]"),
+    ("volt", "V"),
+    ("watt", "W"),
+    ("ampere", "A"),
+    ("amp", "A"),
+    ("ohm", "Ohm"),
+    ("pascal", "Pa"),
+    ("newton", "N"),
+    ("joule", "J"),
+    ("hertz", "Hz"),
+    ("gram", "g"),
+    ("gramme", "g"),
+    ("liter", "L"),
+    ("litre", "L"),
+    ("radian", "rad"),
+    ("degree", "deg"),
+    ("arcsecond", "''"),
+    ("arcminute", "'"),
+    ("decibel", "dB"),
+    ("percent", "%"),
+];
+
+/// Prefixes as words.
+const PREFIX_WORDS: [(&str, &str); 7] = [
+    ("nano", "n"),
+    ("micro", "u"),
+    ("milli", "m"),
+    ("centi", "c"),
+    ("kilo", "k"),
+    ("mega", "M"),
+    ("pico", "p"),
+];
+
+/// The code of a unit that is written as a word: `nm` for `nanometers`.
+fn of_word(word: &str) -> Option<String> {
+    let word = word.to_lowercase();
+    let singular = word.strip_suffix('s').unwrap_or(&word);
+    let known = |word: &str| WORDS.iter().find(|(name, _)| *name == word);
+    for word in [word.as_str(), singular] {
+        if let Some((_, code)) = known(word) {
+            return Some((*code).to_owned());
+        }
+        for (prefix, short) in PREFIX_WORDS {
+            if let Some((_, code)) = word.strip_prefix(prefix).and_then(known) {
+                return Some(format!("{short}{code}"));
+            }
+        }
+    }
+    None
+}
+
+/// The text with codes in the place of words: `nm/min` for `nanometers/minute`.
+pub(super) fn without_words(text: &str) -> String {
+    let mut codes = String::new();
+    let mut rest = text;
+    while let Some(first) = rest.chars().next() {
+        let in_word = |c: char| c.is_alphabetic() == first.is_alphabetic();
+        let end = rest.find(|c| !in_word(c)).unwrap_or(rest.len());
+        let (part, after) = rest.split_at(end);
+        match of_word(part) {
+            Some(code) => codes.push_str(&code),
+            None => codes.push_str(part),
+        }
+        rest = after;
+    }
+    codes
+}
+
 /// Metric prefixes and their powers of ten.
 const PREFIXES: [(&str, i32); 20] = [
     ("da", 1),

@@ -190,3 +190,19 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn units_in_words_are_not_taken_and_the_codes_are_suggested() {
+    for (words, code) in [
+        ("nanometer", "nm"),
+        ("Nanometers/minute", "nm/min"),
+        ("micrometres", "um"),
+        ("kelvin", "K"),
+        ("celsius", "Cel"),
+        ("millikelvin/second", "mK/s"),
+        ("percent", "%"),
+    ] {
+        let error = Unit::parse(words).unwrap_err();
+        assert_eq!(error.advice(), Some(code), "{words}: {error}");
+    }
+}

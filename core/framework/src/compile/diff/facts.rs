@@ -1,6 +1,7 @@
 //! Decides which properties of a plan count, and when two of them mean the same.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::OnceLock;
 
 use indexmap::IndexMap;
 use serde_json::Value;
@@ -8,7 +9,7 @@ use serde_json::Value;
 use super::ParameterChange;
 use crate::compile::plan::{Plan, PlannedNode, PlannedRole, TruthLink};
 use crate::document::{TimeBase, TimeForm};
-use crate::node::{FREEZE, Read, Role, TruthLags};
+use crate::node::{FREEZE, Kind, Read, Role, TruthLags, kinds};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -47,6 +48,16 @@ impl Facts {
             value if measured => self.measured(path, value),
             value => self.plain(path, value),
         }
+    }
+
+    /// The properties as data, which are the same where [`Self::changes_to`] finds nothing.
+    pub(super) fn meaning(self, texts: &mut Texts) -> Value {
+        let meaning = |(path, fact): (String, Fact)| match fact {
+            Fact::Plain(value) => (path, value),
+            Fact::Measured(value) => (path, texts.meaning(value)),
+        };
+        let sorted: BTreeMap<_, _> = self.0.into_iter().map(meaning).collect();
+        sorted.into_iter().collect()
     }
 
     /// What differs, in the order of what there is now, then what is gone.
@@ -114,6 +125,42 @@ fn same_quantity(a: &Quantity, b: &Quantity) -> bool {
         .is_some_and(|a| a == b.value || (a - b.value).abs() <= 2.0 * f64::EPSILON * b.value.abs())
 }
 
+/// What texts that may be units or quantities mean; each is read once.
+#[derive(Default)]
+pub(super) struct Texts(HashMap<String, String>);
+
+impl Texts {
+    fn meaning(&mut self, value: Value) -> Value {
+        match value {
+            Value::Array(values) => {
+                let values: Vec<_> = values.into_iter().map(|v| self.meaning(v)).collect();
+                match values.first() {
+                    // Each channel's own, differently spelt, is one for all.
+                    Some(one @ Value::String(_)) if values.iter().all(|value| value == one) => {
+                        one.clone()
+                    }
+                    _ => Value::Array(values),
+                }
+            }
+            Value::String(text) => {
+                let read = self.0.entry(text).or_insert_with_key(|text| of_text(text));
+                read.as_str().into()
+            }
+            other => other,
+        }
+    }
+}
+
+fn of_text(text: &str) -> String {
+    if let Ok(quantity) = text.parse::<Quantity>() {
+        let base = quantity.unit.base();
+        let value = quantity.in_unit(&base).unwrap_or(quantity.value);
+        // Neither zero has a sign here.
+        return format!("{:.11e} {base}", value + 0.0);
+    }
+    Unit::parse(text).map_or_else(|_| text.to_owned(), |unit| unit.meaning())
+}
+
 pub(super) fn time(plan: &Plan) -> Facts {
     let mut facts = Facts::default();
     let TimeBase::Column { column, form } = &plan.time;
@@ -170,17 +217,31 @@ pub(super) fn outputs(plan: &Plan) -> IndexMap<String, Facts> {
 }
 
 pub(super) fn nodes(plan: &Plan) -> IndexMap<String, Facts> {
-    let mut schemas = HashMap::new();
-    let nodes = plan.nodes.iter().map(|node| {
-        let schema = schemas
-            .entry(node.kind.name)
-            .or_insert_with(|| Value::from((node.kind.schema)()));
-        (node.instance(), node_facts(plan, node, schema))
-    });
-    nodes.collect()
+    let nodes = plan.nodes.iter();
+    nodes
+        .map(|node| (node.instance(), node_facts(plan, node)))
+        .collect()
 }
 
-fn node_facts(plan: &Plan, node: &PlannedNode, schema: &Value) -> Facts {
+/// The parameters of each kind that have units or quantities anywhere in them.
+fn measured_parameters(kind: &'static Kind) -> &'static [String] {
+    static KNOWN: OnceLock<HashMap<(&str, &str), Vec<String>>> = OnceLock::new();
+    let known = KNOWN.get_or_init(|| {
+        let of = |kind: &&'static Kind| {
+            let schema = Value::from((kind.schema)());
+            let parameters = schema["properties"].as_object().into_iter().flatten();
+            let measured = parameters.filter(|(_, schema)| is_measured(schema));
+            let measured = measured.map(|(name, _)| name.clone()).collect();
+            ((kind.package, kind.name), measured)
+        };
+        kinds().values().flatten().map(of).collect()
+    });
+    known
+        .get(&(kind.package, kind.name))
+        .map_or(&[], Vec::as_slice)
+}
+
+fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     let mut facts = Facts::default();
     facts.plain("type", node.kind.name);
     if let PlannedRole::Estimator {
@@ -207,7 +268,7 @@ fn node_facts(plan: &Plan, node: &PlannedNode, schema: &Value) -> Facts {
     }
     if let Value::Object(parameters) = node.spec.parameters() {
         for (key, value) in parameters {
-            let measured = is_measured(&schema["properties"][&key]);
+            let measured = measured_parameters(node.kind).contains(&key);
             facts.parameters(&key, value, measured);
         }
     }
@@ -238,7 +299,7 @@ fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
             let first = gathers.first().filter(|_| reads_features(node));
             (first.copied().into_iter().collect(), Some(*truth))
         }
-        role => (role.gathers().collect::<Vec<_>>(), role.truth().copied()),
+        role => (role.inputs().collect::<Vec<_>>(), role.truth().copied()),
     };
     let ports = (node.kind.inputs)();
     let data = ports
@@ -317,5 +378,44 @@ fn one_or_all(texts: Vec<String>) -> Value {
     match texts.first() {
         Some(first) if texts.iter().all(|text| text == first) => first.as_str().into(),
         _ => texts.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn texts_mean_the_same_exactly_where_they_measure_the_same() {
+        let texts = [
+            "150 nm/min",
+            "0.15 um/min",
+            "2.5 nm/s",
+            "20 Cel",
+            "293.15 K",
+            "20 K",
+            "0 nm",
+            "-0 nm",
+            "0 K",
+            "K",
+            "Cel",
+            "mK/min",
+            "mK.min-1",
+            "uK/min",
+            "1 dB",
+            "ridge",
+            "lasso",
+        ];
+        for a in texts {
+            for b in texts {
+                let alike = measures(&a.into(), &b.into());
+                assert_eq!(of_text(a) == of_text(b), alike, "{a} and {b}");
+            }
+        }
+        let meaning = |value: Value| Texts::default().meaning(value);
+        assert_eq!(meaning(json!(["1 K", "1000 mK"])), meaning(json!("1 K")));
+        assert_ne!(meaning(json!(["1 K", "2 K"])), meaning(json!("1 K")));
     }
 }

@@ -6,9 +6,11 @@
 
 mod facts;
 
+use std::collections::BTreeMap;
+
 use indexmap::IndexMap;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::plan::Plan;
 use facts::Facts;
@@ -117,6 +119,25 @@ pub fn diff(from: &Plan, to: &Plan) -> PlanDiff {
             .map(|(output, change)| OutputChange { output, change })
             .collect(),
     }
+}
+
+/// What a plan means, as data: the same for two plans between which [`diff`] finds nothing.
+///
+/// Units and quantities stand in base units, in twelve significant digits, so that a rounding in converting them is none here.
+#[must_use]
+pub fn meaning(plan: &Plan) -> Value {
+    let mut texts = facts::Texts::default();
+    let mut all = |facts: IndexMap<String, Facts>| -> BTreeMap<String, Value> {
+        let meaning = |(name, facts): (String, Facts)| (name, facts.meaning(&mut texts));
+        facts.into_iter().map(meaning).collect()
+    };
+    let time = IndexMap::from([("base".to_owned(), facts::time(plan))]);
+    json!({
+        "time": all(time),
+        "signals": all(facts::signals(plan)),
+        "nodes": all(facts::nodes(plan)),
+        "outputs": all(facts::outputs(plan)),
+    })
 }
 
 fn changes(

@@ -11,7 +11,7 @@ pub struct Code {
     pub title: &'static str,
     /// Why it is a mistake and what to do.
     pub explanation: &'static str,
-    /// A graph file with the mistake, called `graph.toml`; `base.toml` beside it is any graph.
+    /// A graph file with the mistake, called `graph.toml`; `base.toml` beside it is any graph, `chuck.csv` a schedule.
     pub wrong: &'static str,
     /// A graph file without.
     pub right: &'static str,
@@ -29,8 +29,8 @@ macro_rules! code {
     };
 }
 
-/// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 for their tests,
-/// A110 and above for learning while they run.
+/// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for their tests,
+/// A110 for learning while they run.
 pub const CODES: &[Code] = &[
     code!(
         "A001",
@@ -371,6 +371,11 @@ pub const CODES: &[Code] = &[
         "A110",
         "estimator that does not learn",
         "`learn` lets an estimator go on learning while it runs. Not every kind can, and some only with certain parameters."
+    ),
+    code!(
+        "A170",
+        "schedule of a machine",
+        "`schedule` names a file of set points over time, the same as `athermal simulate --schedule` takes; every mistake in it is told where it stands."
     ),
 ];
 

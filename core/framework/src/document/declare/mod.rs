@@ -70,7 +70,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let expanded = modules::expand(root, &sets, diagnostics);
     let nodes = nodes::declare(&expanded.nodes, &sets, sample, diagnostics);
     let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
-    let mut tests = root.get("tests").cloned();
+    let mut tests = expanded.tests;
     if let Some(tests) = &mut tests {
         nodes::convert_samples_but(tests, "name", sample, diagnostics);
     }

@@ -5,9 +5,9 @@ use std::path::Path;
 use super::*;
 use crate::diagnostic::{Diagnostics, Sources};
 
+mod any_text;
 mod extending;
 mod modules;
-mod mutations;
 mod texts;
 
 /// What reading the first of `files` gives and reports.

@@ -85,40 +85,45 @@ pub enum Reason {
 
 impl fmt::Display for ScheduleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}: ", self.line)?;
-        match &self.reason {
-            Reason::Empty => f.write_str("no line of names, such as `time_h,chuck_degC`"),
-            Reason::TimeColumn { found } => write!(
+        write!(f, "line {}: {}", self.line, self.reason)
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => f.write_str("no line of names, such as `time_h,chuck_degC`"),
+            Self::TimeColumn { found } => write!(
                 f,
                 "the first column is `{found}`; it must be `time_s`, `time_min` or `time_h`"
             ),
-            Reason::UnknownColumn { found, known } => write!(
+            Self::UnknownColumn { found, known } => write!(
                 f,
                 "no set point has the column `{found}`; there are {}",
                 known.join(", ")
             ),
-            Reason::RepeatedColumn { found } => write!(f, "the column `{found}` stands twice"),
-            Reason::NoSetPoint => f.write_str("no column sets anything"),
-            Reason::NoRow => f.write_str("no row of values follows the names"),
-            Reason::Cells { found, expected } => {
+            Self::RepeatedColumn { found } => write!(f, "the column `{found}` stands twice"),
+            Self::NoSetPoint => f.write_str("no column sets anything"),
+            Self::NoRow => f.write_str("no row of values follows the names"),
+            Self::Cells { found, expected } => {
                 write!(f, "{found} cells where {expected} are named")
             }
-            Reason::Number { column, found } => {
+            Self::Number { column, found } => {
                 write!(f, "`{found}` in `{column}` is not a finite number")
             }
-            Reason::Start { found } => write!(f, "the first row is at {found}; it must be at 0"),
-            Reason::Order { found } => write!(
+            Self::Start { found } => write!(f, "the first row is at {found}; it must be at 0"),
+            Self::Order { found } => write!(
                 f,
                 "the time {found} must be after that of the row before, and within {LONGEST_DAYS} days"
             ),
-            Reason::Open { column } => write!(f, "the first row must set `{column}`"),
-            Reason::Range {
+            Self::Open { column } => write!(f, "the first row must set `{column}`"),
+            Self::Range {
                 column,
                 found,
                 range: [low, high],
             } => write!(f, "{found} in `{column}` is outside {low} to {high}"),
-            Reason::NothingToRepeat => f.write_str("`repeat` needs a row of values before it"),
-            Reason::AfterRepeat => f.write_str("nothing may follow the row that says `repeat`"),
+            Self::NothingToRepeat => f.write_str("`repeat` needs a row of values before it"),
+            Self::AfterRepeat => f.write_str("nothing may follow the row that says `repeat`"),
         }
     }
 }

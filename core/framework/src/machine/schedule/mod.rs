@@ -103,7 +103,7 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    const SET_POINTS: [SetPoint; 2] = [
+    pub(super) const SET_POINTS: [SetPoint; 2] = [
         SetPoint {
             name: "chuck",
             default: 20.0,

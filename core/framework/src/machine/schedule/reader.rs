@@ -198,20 +198,8 @@ fn number(cell: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::SET_POINTS;
     use super::*;
-
-    const SET_POINTS: [SetPoint; 2] = [
-        SetPoint {
-            name: "chuck",
-            default: 20.0,
-            range: [0.0, 150.0],
-        },
-        SetPoint {
-            name: "room",
-            default: 21.5,
-            range: [15.0, 30.0],
-        },
-    ];
 
     fn mistakes(text: &str) -> Vec<String> {
         match read(text, &SET_POINTS) {

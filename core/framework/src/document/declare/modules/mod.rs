@@ -84,6 +84,8 @@ pub(super) struct Expanded {
     pub(super) nodes: Vec<Placed>,
     /// The section `[outputs]`, its references leading to nodes of the whole graph.
     pub(super) outputs: Option<Value>,
+    /// The same of `[[tests]]`.
+    pub(super) tests: Option<Value>,
 }
 
 /// Expands the modules of a graph file.
@@ -91,6 +93,7 @@ pub(super) fn expand(root: &Table, sets: &Sets, diagnostics: &mut Diagnostics) -
     let mut expanded = Expanded {
         nodes: Vec::new(),
         outputs: root.get("outputs").cloned(),
+        tests: root.get("tests").cloned(),
     };
     let Some(nodes) = root
         .get("nodes")
@@ -121,8 +124,13 @@ pub(super) fn expand(root: &Table, sets: &Sets, diagnostics: &mut Diagnostics) -
             expansion.place(name, entry.clone(), &level);
         }
     }
-    if has_modules && let Some(outputs) = &mut expanded.outputs {
-        expansion.outputs(outputs, &level);
+    if has_modules {
+        if let Some(outputs) = &mut expanded.outputs {
+            expansion.outputs(outputs, &level);
+        }
+        if let Some(tests) = &mut expanded.tests {
+            expansion.tests(tests, &level);
+        }
     }
     expanded.nodes = expansion.placed;
     expanded

@@ -158,6 +158,34 @@ impl Expansion<'_> {
             }
         }
     }
+
+    /// What the tests expect, and of what; what is no reference stays as it is.
+    pub(super) fn tests(&mut self, tests: &mut Value, level: &Level<'_>) {
+        let tests = tables(tests).filter_map(|test| test.get_mut("expect"));
+        for expectation in tests.flat_map(tables) {
+            if let Some(of) = expectation.get_mut("of") {
+                *of = self.input(of, level);
+            }
+            let rivals = expectation.get_mut("beats");
+            if let Some(Data::List(rivals)) = rivals.map(|rivals| &mut rivals.data) {
+                for rival in rivals {
+                    // These two are no nodes.
+                    if !matches!(rival.as_text(), Some("zero" | "persistence")) {
+                        *rival = self.input(rival, level);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The tables of a list.
+fn tables(list: &mut Value) -> impl Iterator<Item = &mut Table> {
+    let values = match &mut list.data {
+        Data::List(values) => values.as_mut_slice(),
+        _ => &mut [],
+    };
+    values.iter_mut().filter_map(Value::as_table_mut)
 }
 
 /// What an output of a module stands for.

@@ -134,11 +134,13 @@ extends = "../a.toml"
     assert_eq!(
         rendered(&files),
         r#"
-error[A005]: `extends` comes back to its own file: a.toml -> x/b.toml -> a.toml
+error[A005]: `extends` comes back to its own file: a.toml → x/b.toml → a.toml
  --> x/b.toml:2:11
   |
 2 | extends = "../a.toml"
   |           ^^^^^^^^^^^ extends this file
+  |
+  = help: one of these files must extend none of the others
 "#
     );
 }

@@ -145,6 +145,8 @@ error[A024]: `step` has no meaning with unit = "ms"
   |
 4 | step = "1s"
   | ^^^^
+  |
+  = help: leave out `step`, or write `unit = "sample"`
 "#
     );
 }

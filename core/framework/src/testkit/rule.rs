@@ -1,0 +1,135 @@
+//! Decides which rules there are, and what to do about a broken one; how each is tried is decided by its module.
+
+use std::fmt;
+
+/// What every node must do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Rule {
+    /// The kind, its ports and its parameters are explained, and bare numbers have no unit hidden in their names.
+    Explained,
+    /// A case compiles, and something comes out of the node in it.
+    Answers,
+    /// The parameters written out and read back are the same.
+    ReadsBack,
+    /// A parameter out of the range that its schema states is refused by its name, as is one that is no number; all that the
+    /// schema allows is taken.
+    Ranges,
+    /// The same samples give the same bits, again and on another thread.
+    Deterministic,
+    /// Beside another instance, tick by tick, the same bits come out as in one long run over a recording.
+    LongRun,
+    /// What goes on from a snapshot gives the same bits as what never stopped.
+    Restores,
+    /// A snapshot of another version, kind or shape is migrated or refused with a reason.
+    Versions,
+    /// What has never been measured is not answered, and gaps anywhere do no harm.
+    Absence,
+    /// Huge and infinite samples do no harm that outlasts them, and nothing infinite comes out.
+    Infinity,
+    /// A new segment starts afresh, at whatever time it begins.
+    Segments,
+    /// The same samples in other units give the same outputs in theirs.
+    Units,
+    /// Once warm, a tick allocates nothing.
+    Allocation,
+    /// An answer that is asked for leaves no trace.
+    NoTrace,
+    /// A fit is the same with any number of threads; data that allow none are an error in words.
+    Fits,
+    /// A fitted estimator written into a model and read back predicts with the same bits.
+    Models,
+}
+
+impl Rule {
+    /// The name by which reports call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Explained => "explained",
+            Self::Answers => "answers",
+            Self::ReadsBack => "reads back",
+            Self::Ranges => "ranges",
+            Self::Deterministic => "deterministic",
+            Self::LongRun => "long run",
+            Self::Restores => "restores",
+            Self::Versions => "versions",
+            Self::Absence => "absence",
+            Self::Infinity => "infinity",
+            Self::Segments => "segments",
+            Self::Units => "units",
+            Self::Allocation => "allocation",
+            Self::NoTrace => "no trace",
+            Self::Fits => "fits",
+            Self::Models => "models",
+        }
+    }
+
+    /// What to do where it is broken.
+    #[must_use]
+    pub fn advice(self) -> &'static str {
+        match self {
+            Self::Explained => {
+                "write a doc comment of a sentence or more; it is what `athermal nodes KIND` prints. Give times as `Duration` \
+                 and sizes as `Quantity`, so that the unit stands in the graph file"
+            }
+            Self::Answers => {
+                "give the case parameters and inputs with which the node has something to say (`Case::input`, `Case::between`)"
+            }
+            Self::ReadsBack => {
+                "let `Serialize` and `Deserialize` of the parameters be each other's inverse, defaults included"
+            }
+            Self::Ranges => {
+                "say the range in the schema (`#[schemars(range(min = 0.0, max = 1.0))]`, or `#[schemars(extend(\"exclusiveMinimum\" \
+                 = 0.0))]`), and refuse everything outside with a `Mistake::at(\"name\", …)`, written so that NaN fails: \
+                 `!(0.0..=1.0).contains(&x)`"
+            }
+            Self::Deterministic => {
+                "take no time, no random number without a seed, no order of a hash map and no address into account"
+            }
+            Self::LongRun => {
+                "keep all that the node knows in its operator: no `static`, no `thread_local!`, nothing shared by two instances"
+            }
+            Self::Restores => {
+                "put all that later outputs depend on into the state that `snapshot` gives, and take all of it in `restore`"
+            }
+            Self::Versions => {
+                "name the state `kind/1`; in `restore`, answer `Restored::cold(reason)` to a state that is not `known`, or whose \
+                 lists have other lengths than this node's"
+            }
+            Self::Absence => {
+                "where an input is NaN, set no output or NaN, never 0. Ports that have something to say of nothing are named by \
+                 `Case::speaks_without_input`"
+            }
+            Self::Infinity => {
+                "give NaN where a result is not finite, and keep no such value: begin again where `!value.is_finite()`"
+            }
+            Self::Segments => {
+                "clear in `segment` all that `step` has gathered, the last instant included; what was learned may stay"
+            }
+            Self::Units => {
+                "convert parameters given with a unit into the unit of the channel (`Quantity::in_unit`), state the right unit for \
+                 each output, and have no bare thresholds"
+            }
+            Self::Allocation => {
+                "make room in `build` and `restore` (`vec![…; n]`, `reserve`), and use it again at every tick"
+            }
+            Self::NoTrace => {
+                "let `predict` and `combine` change nothing, not even behind a `Cell`, that later answers depend on"
+            }
+            Self::Fits => {
+                "in `Trainer::finish`, answer `TrainingError` where there are too few rows or no solution, and start random numbers \
+                 from a seed"
+            }
+            Self::Models => {
+                "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \
+                 one may be infinite or NaN"
+            }
+        }
+    }
+}
+
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}

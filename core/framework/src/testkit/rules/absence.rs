@@ -1,0 +1,105 @@
+//! Decides whether missing, huge and infinite samples do harm.
+
+use super::super::compared::{Course, course};
+use super::super::samples::{Coming, samples};
+use super::Subject;
+use crate::channel::ABSENT;
+use crate::recording::{Event, Table};
+
+/// Ticks that measure nothing, each channel missing for a while and for all time, and gaps of hours.
+pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
+    let fixture = &subject.fixture;
+    let mut nothing = subject.table.clone();
+    for (_, row) in nothing.events_mut() {
+        row.fill(ABSENT);
+    }
+    let silent = course(fixture, &mut subject.engine(), nothing.events());
+    for number in 0..fixture.slots().len() {
+        let port = fixture.port(fixture.slots().start + number);
+        let speaks = subject.case.without_input.iter().any(|name| name == port);
+        if let Some(value) = silent.values(number).find(|value| !value.is_nan())
+            && !speaks
+        {
+            let name = subject.name(number);
+            return Err(format!(
+                "`{name}` is {value} although nothing has ever been measured"
+            ));
+        }
+    }
+    for channel in 0..fixture.plan.sources.len() {
+        for missing in [0..subject.events().len(), 200..400] {
+            let mut table = subject.table.clone();
+            for (_, row) in &mut table.events_mut()[missing] {
+                row[channel] = ABSENT;
+            }
+            finite(
+                subject,
+                &course(fixture, &mut subject.engine(), table.events()),
+            )?;
+        }
+    }
+    let mut late = Table::default();
+    for (nth, (event, row)) in subject.events().iter().enumerate() {
+        if let Event::Row(now) = event {
+            let gap_s = 7_200 * (nth / 150) as i64;
+            late.push(
+                *now + crate::time::Duration::from_ns(gap_s * 1_000_000_000),
+                row,
+            );
+        }
+    }
+    finite(
+        subject,
+        &course(fixture, &mut subject.engine(), late.events()),
+    )
+}
+
+/// Samples of any size for a while; afterwards the node comes back, by itself and in a new segment.
+pub(super) fn infinity(subject: &Subject<'_>) -> Result<(), String> {
+    let fixture = &subject.fixture;
+    let ordinary = samples(subject.kind, &subject.given, 600, Coming::Always);
+    let expected = course(fixture, &mut subject.engine(), ordinary.events());
+    let sizes = [f64::INFINITY, f64::MAX, 1e300, f64::MIN_POSITIVE];
+    for (nth, size) in sizes.into_iter().enumerate() {
+        let mut table = ordinary.clone();
+        for (tick, (_, row)) in table.events_mut()[100..140].iter_mut().enumerate() {
+            for (channel, sample) in row.iter_mut().enumerate() {
+                if (tick + channel + nth) % 3 == 0 {
+                    *sample = if tick % 2 == 0 { size } else { -size };
+                }
+            }
+        }
+        let mut engine = subject.engine();
+        let met = course(fixture, &mut engine, table.events());
+        engine.segment();
+        let after = course(fixture, &mut engine, ordinary.events());
+        for (course, when) in [(met, "in the same segment"), (after, "in the next segment")] {
+            finite(subject, &course)
+                .map_err(|found| format!("with samples of ±{size:e}, {found}"))?;
+            for number in 0..fixture.slots().len() {
+                let answers = |course: &Course| course.values(number).skip(500).any(f64::is_finite);
+                if answers(&expected) && !answers(&course) {
+                    let name = subject.name(number);
+                    return Err(format!(
+                        "after samples of ±{size:e} `{name}` does not come back {when}"
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn finite(subject: &Subject<'_>, course: &Course) -> Result<(), String> {
+    for number in 0..subject.fixture.slots().len() {
+        let infinite = course
+            .instants()
+            .zip(course.values(number))
+            .find(|(_, value)| value.is_infinite());
+        if let Some((now, value)) = infinite {
+            let (name, at) = (subject.name(number), now.as_ns() as f64 / 1e9);
+            return Err(format!("`{name}` is {value} at {at} s"));
+        }
+    }
+    Ok(())
+}

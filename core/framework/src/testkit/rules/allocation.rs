@@ -1,0 +1,32 @@
+//! Decides whether the steady state allocates.
+
+use super::super::samples::{Coming, samples};
+use super::Subject;
+use crate::recording::Event;
+
+/// Ticks that warm the node.
+const WARM: usize = 1_500;
+/// Ticks that must not allocate.
+const STEADY: usize = 300;
+
+pub(super) fn allocation(subject: &Subject<'_>) -> Result<(), String> {
+    let mut engine = subject.engine();
+    let table = samples(subject.kind, &subject.given, WARM + STEADY, Coming::Always);
+    let (warm, steady) = table.events().split_at(WARM);
+    let mut step = |events: &[(Event, Vec<f64>)]| {
+        for (event, values) in events {
+            if let Event::Row(now) = event {
+                let _ = engine.step(*now, values);
+            }
+        }
+    };
+    step(warm);
+    let allocated = allocation_counter::measure(|| step(steady));
+    match allocated.count_total {
+        0 => Ok(()),
+        count => Err(format!(
+            "{count} allocations, {} bytes, in {STEADY} ticks after {WARM} that warmed it",
+            allocated.bytes_total
+        )),
+    }
+}

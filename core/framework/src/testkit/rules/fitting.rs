@@ -1,0 +1,133 @@
+//! Decides whether an estimator can be fitted, on good data and bad, and keeps what it learned in a model.
+
+use super::super::compared::course;
+use super::Subject;
+use crate::channel::ABSENT;
+use crate::engine::Fitted;
+use crate::fit::{FitOptions, fit};
+use crate::model::Model;
+use crate::recording::Table;
+
+pub(super) fn fits(subject: &Subject<'_>) -> Result<(), String> {
+    if !subject.is_fitted() {
+        return Ok(());
+    }
+    let one = written(&subject.fitted)?;
+    for threads in [1, 3] {
+        let again = written(&subject.fit(&subject.table, threads)?)?;
+        if again != one {
+            return Err(format!(
+                "fitted again, with {threads} threads, it is another: {one} and {again}"
+            ));
+        }
+    }
+    for (table, what) in unusable(&subject.table) {
+        survives(subject, &table, &FitOptions::default())
+            .map_err(|found| format!("fitted on {what}, {found}"))?;
+    }
+    let streamed = FitOptions {
+        memory: 1,
+        ..FitOptions::default()
+    };
+    survives(subject, &subject.table, &streamed)
+        .map_err(|found| format!("fitted on rows that are streamed rather than kept, {found}"))
+}
+
+/// Data that allow no fit, or hardly one.
+fn unusable(table: &Table) -> [(Table, &'static str); 5] {
+    let changed = |change: &dyn Fn(usize, &mut [f64])| {
+        let mut table = table.clone();
+        for (tick, (_, row)) in table.events_mut().iter_mut().enumerate() {
+            change(tick, row);
+        }
+        table
+    };
+    [
+        (Table::default(), "no ticks"),
+        (
+            changed(&|_, row| row.fill(ABSENT)),
+            "ticks that measure nothing",
+        ),
+        (
+            changed(&|tick, row| row.fill(if tick < 12 { tick as f64 } else { ABSENT })),
+            "a dozen rows",
+        ),
+        (
+            changed(&|_, row| row.fill(20.5)),
+            "channels that never change",
+        ),
+        (
+            changed(&|tick, row| row.fill((tick % 7) as f64)),
+            "channels that are all the same",
+        ),
+    ]
+}
+
+/// A fit may fail in words; what it gives must be written, read and run, and predict nothing infinite.
+fn survives(subject: &Subject<'_>, table: &Table, options: &FitOptions) -> Result<(), String> {
+    let (fitted, _) = fit(&subject.fixture.plan, table, options, &mut |_| ())
+        .map_err(|error| error.to_string())?;
+    let fitted = through_a_model(subject, &fitted)?;
+    let mut engine = subject.fixture.engine(&fitted);
+    let course = course(&subject.fixture, &mut engine, subject.events());
+    let infinite = (0..subject.fixture.slots().len())
+        .any(|number| course.values(number).any(f64::is_infinite));
+    if infinite {
+        Err("it predicts infinity".to_owned())
+    } else {
+        Ok(())
+    }
+}
+
+pub(super) fn models(subject: &Subject<'_>) -> Result<(), String> {
+    if !subject.is_fitted() {
+        return Ok(());
+    }
+    let fixture = &subject.fixture;
+    let read = through_a_model(subject, &subject.fitted)?;
+    let before = course(fixture, &mut subject.engine(), subject.events());
+    let after = course(fixture, &mut fixture.engine(&read), subject.events());
+    match before.difference(&after, fixture) {
+        None => Ok(()),
+        Some(difference) => Err(format!(
+            "read back from its model, it predicts otherwise: {difference}"
+        )),
+    }
+}
+
+/// What was fitted, written into a model and read back.
+fn through_a_model(subject: &Subject<'_>, fitted: &Fitted) -> Result<Fitted, String> {
+    let model = Model {
+        graph: subject.fixture.graph.clone(),
+        plan: subject.fixture.plan.clone(),
+        fitted: fitted.clone(),
+        card: None,
+    };
+    let text = model
+        .to_text()
+        .map_err(|error| format!("its model cannot be written: {error}"))?;
+    let read = Model::from_text("model.json", text.clone())
+        .map_err(|error| format!("its model cannot be read back: {error}"))?;
+    let again = read.to_text().map_err(|error| error.to_string())?;
+    if again == text {
+        Ok(read.fitted)
+    } else {
+        Err(format!(
+            "its model, read back, is written otherwise: {text} and {again}"
+        ))
+    }
+}
+
+/// What was fitted, as a model holds it.
+fn written(fitted: &Fitted) -> Result<String, String> {
+    let of = |(node, predictor): (&String, &std::sync::Arc<dyn crate::node::Predictor>)| {
+        serde_json::to_string(&**predictor)
+            .map(|text| format!("{node}: {text}"))
+            .map_err(|error| format!("what was fitted cannot be written: {error}"))
+    };
+    Ok(fitted
+        .iter()
+        .map(of)
+        .collect::<Result<Vec<_>, _>>()?
+        .join("\n"))
+}

@@ -1,0 +1,89 @@
+//! Decides whether the same samples give the same bits: again, elsewhere, beside others, after a break.
+
+use super::super::compared::{Course, course};
+use super::Subject;
+use crate::fit::drive;
+use crate::recording::{Event, Table};
+use crate::time::{Duration, Instant};
+
+pub(super) fn deterministic(subject: &Subject<'_>) -> Result<(), String> {
+    let run = || course(&subject.fixture, &mut subject.engine(), subject.events());
+    let first = run();
+    let again = run();
+    let elsewhere = std::thread::scope(|scope| scope.spawn(run).join());
+    let elsewhere = elsewhere.map_err(|_| "it panics on another thread".to_owned())?;
+    for (other, which) in [(again, "run again"), (elsewhere, "run on another thread")] {
+        if let Some(difference) = first.difference(&other, &subject.fixture) {
+            return Err(format!("{which}, it gives other bits: {difference}"));
+        }
+    }
+    Ok(())
+}
+
+/// One run over a recording, against one tick by tick beside another instance that is fed something else.
+pub(super) fn long_run(subject: &Subject<'_>) -> Result<(), String> {
+    let fixture = &subject.fixture;
+    let (mut engine, mut long) = (subject.engine(), Course::default());
+    drive(&mut engine, &subject.table, |engine, event| {
+        if let Event::Row(now) = event {
+            long.note(fixture, engine, now);
+        }
+    })
+    .map_err(|error| error.to_string())?;
+    let (mut engine, mut beside) = (subject.engine(), subject.engine());
+    let mut by_ticks = Course::default();
+    let others = subject.events().iter().rev();
+    for ((now, values), (_, other)) in rows(subject.events()).zip(others) {
+        beside.step(now, other).map_err(|error| error.to_string())?;
+        engine
+            .step(now, values)
+            .map_err(|error| error.to_string())?;
+        by_ticks.note(fixture, &engine, now);
+    }
+    match long.difference(&by_ticks, fixture) {
+        None => Ok(()),
+        Some(difference) => Err(format!(
+            "tick by tick beside another instance it gives other bits than in one long run: {difference}"
+        )),
+    }
+}
+
+/// What a feature gives after a break is what a new one gives, at other times too; others must live through it.
+pub(super) fn segments(subject: &Subject<'_>) -> Result<(), String> {
+    let fixture = &subject.fixture;
+    let half = subject.events().len() / 2;
+    let (before, after) = subject.events().split_at(half);
+    for (shift_s, when) in [(0, "goes on"), (-1_000_000, "starts again in the past")] {
+        let shift = Duration::from_ns(shift_s * 1_000_000_000);
+        let after = shifted(after, shift);
+        let mut engine = subject.engine();
+        course(fixture, &mut engine, before);
+        engine.segment();
+        let broken_off = course(fixture, &mut engine, after.events());
+        if !subject.is_feature() {
+            continue;
+        }
+        let afresh = course(fixture, &mut subject.engine(), after.events());
+        if let Some(difference) = afresh.difference(&broken_off, fixture) {
+            return Err(format!(
+                "in a segment whose time {when} it gives other outputs than a new node: {difference}"
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn rows(events: &[(Event, Vec<f64>)]) -> impl Iterator<Item = (Instant, &[f64])> {
+    events.iter().filter_map(|(event, values)| match event {
+        Event::Row(now) => Some((*now, values.as_slice())),
+        Event::Segment => None,
+    })
+}
+
+fn shifted(events: &[(Event, Vec<f64>)], by: Duration) -> Table {
+    let mut table = Table::default();
+    for (now, values) in rows(events) {
+        table.push(now + by, values);
+    }
+    table
+}

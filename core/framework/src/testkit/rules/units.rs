@@ -1,0 +1,127 @@
+//! Decides whether a node keeps its answers when what it reads comes in other units.
+
+use super::super::case::Given;
+use super::super::compared::course;
+use super::super::fixture::Fixture;
+use super::Subject;
+use crate::recording::Table;
+use crate::unit::Unit;
+
+/// How far outputs may be apart, as a share of their largest.
+const ROUNDING: f64 = 1e-7;
+
+pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
+    let given: Vec<Given> = subject.given.iter().map(in_another_unit).collect();
+    if given
+        .iter()
+        .zip(&subject.given)
+        .all(|(new, old)| new.unit == old.unit)
+    {
+        return Ok(());
+    }
+    let told: Vec<_> = given
+        .iter()
+        .zip(&subject.given)
+        .filter(|(new, old)| new.unit != old.unit)
+        .map(|(new, old)| format!("{} in {} rather than {}", new.port, new.unit, old.unit))
+        .collect();
+    let told = told.join(", ");
+    let fixture = Fixture::new(subject.kind, &subject.parameters, &given)
+        .map_err(|error| format!("with {told} the graph is refused: {error}"))?;
+    let table = converted(&subject.table, &subject.given, &given)?;
+    let other = Subject {
+        kind: subject.kind,
+        case: subject.case,
+        parameters: subject.parameters.clone(),
+        given,
+        fixture,
+        fitted: crate::engine::Fitted::new(),
+        table,
+    };
+    let fitted = other
+        .fit(&other.table, 1)
+        .map_err(|found| format!("with {told}, {found}"))?;
+    let other = Subject { fitted, ..other };
+    let one = course(&subject.fixture, &mut subject.engine(), subject.events());
+    let two = course(&other.fixture, &mut other.engine(), other.events());
+    for (number, slot) in subject.fixture.slots().enumerate() {
+        let unit = &subject.fixture.plan.channels[slot].channel.unit;
+        let other_unit = &other.fixture.plan.channels[slot].channel.unit;
+        let largest = one
+            .values(number)
+            .filter(|value| value.is_finite())
+            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let pairs = one
+            .instants()
+            .zip(one.values(number).zip(two.values(number)));
+        for (now, (expected, found)) in pairs {
+            let found = if found.is_nan() {
+                Some(found)
+            } else {
+                other_unit.convert(found, unit)
+            };
+            let Some(found) = found else {
+                return Err(format!(
+                    "with {told}, `{}` is in {other_unit} rather than {unit}",
+                    subject.name(number)
+                ));
+            };
+            let close = (expected - found).abs() <= ROUNDING * largest;
+            if !(close || (expected.is_nan() && found.is_nan())) {
+                return Err(format!(
+                    "with {told}, `{}` is {found} {unit} rather than {expected} {unit} at {} s",
+                    subject.name(number),
+                    now.as_ns() as f64 / 1e9
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The same input in a unit of the same kind, where there is one.
+fn in_another_unit(given: &Given) -> Given {
+    let Ok(unit) = Unit::parse(&given.unit) else {
+        return given.clone();
+    };
+    let other = ["m", "k"]
+        .map(|prefix| format!("{prefix}{}", given.unit))
+        .into_iter()
+        .chain(OTHERS.map(str::to_owned))
+        .filter_map(|text| Some((Unit::parse(&text).ok()?, text)))
+        .find(|(other, _)| {
+            other.measures_same(&unit) && unit.convert(1.0, other).is_some_and(|one| one != 1.0)
+        });
+    let (low, high) = given.range();
+    match other {
+        Some((other, text)) => Given {
+            unit: text,
+            range: unit.convert(low, &other).zip(unit.convert(high, &other)),
+            ..given.clone()
+        },
+        None => given.clone(),
+    }
+}
+
+/// Units to choose from where a prefix alone makes no unit.
+const OTHERS: [&str; 12] = [
+    "K", "um", "mm", "nm/s", "um/min", "mK/min", "K/s", "B", "%", "min", "mV", "kW",
+];
+
+fn converted(table: &Table, from: &[Given], to: &[Given]) -> Result<Table, String> {
+    let mut units = Vec::new();
+    for (from, to) in from.iter().zip(to) {
+        let unit = |given: &Given| Unit::parse(&given.unit).map_err(|error| error.reason());
+        let pair = (unit(from)?, unit(to)?);
+        units.extend(std::iter::repeat_n(pair, from.channels));
+    }
+    let mut table = table.clone();
+    for (_, row) in table.events_mut() {
+        for (value, (from, to)) in row.iter_mut().zip(&units) {
+            if !value.is_nan() {
+                *value = from.convert(*value, to).unwrap_or(*value);
+            }
+        }
+    }
+    Ok(table)
+}

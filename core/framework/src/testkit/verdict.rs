@@ -1,0 +1,132 @@
+//! Decides in what order rules are tried, and how broken ones are told.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::rules::{self, Subject};
+use super::{Case, Examined, Rule};
+use crate::node::{Kind, NodeSpec, kinds};
+
+/// A rule that a kind breaks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Broken {
+    /// The rule.
+    pub rule: Rule,
+    /// The parameters of the case, where it is not broken in all.
+    pub case: Option<String>,
+    /// What was found.
+    pub found: String,
+}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {}", self.rule, indented(&self.found))?;
+        if let Some(case) = &self.case {
+            writeln!(f, "  in the case: {}", indented(case))?;
+        }
+        write!(f, "  to do: {}", self.rule.advice())
+    }
+}
+
+fn indented(text: &str) -> String {
+    text.trim().replace('\n', "\n  ")
+}
+
+/// All the rules that a kind breaks in any of the cases.
+#[must_use]
+pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
+    let name = T::kind_name();
+    let same = kinds().get(name).map_or(&[][..], Vec::as_slice);
+    let [kind] = same else {
+        let packages: Vec<_> = same.iter().map(|kind| kind.package).collect();
+        let found = format!("`{name}` is registered by {packages:?}, and has to be by one crate");
+        return vec![broken_in(Rule::Explained, None, found)];
+    };
+    let mut broken: Vec<Broken> = rules::explained(kind)
+        .into_iter()
+        .map(|found| broken_in(Rule::Explained, None, found))
+        .collect();
+    let mut subjects = Vec::new();
+    for case in cases {
+        match tried(|| Subject::new(kind, case)) {
+            Ok(subject) => subjects.push(subject),
+            Err(found) => broken.push(broken_in(Rule::Answers, Some(case), found)),
+        }
+    }
+    for subject in &subjects {
+        for (rule, check) in rules::ALL {
+            if subject.case.asks_for(rule)
+                && let Err(found) = tried(|| check(subject, &subjects))
+            {
+                broken.push(broken_in(rule, Some(subject.case), found));
+            }
+        }
+    }
+    broken
+}
+
+fn broken_in(rule: Rule, case: Option<&Case>, found: String) -> Broken {
+    Broken {
+        rule,
+        case: case.map(|case| case.parameters.clone()),
+        found,
+    }
+}
+
+/// What a check finds; a panic in it is a finding too.
+fn tried<T>(check: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(check)).unwrap_or_else(|panic| {
+        let said = panic
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| panic.downcast_ref::<&str>().copied());
+        Err(format!(
+            "it panics: {}",
+            said.unwrap_or("without a message")
+        ))
+    })
+}
+
+/// Fails with all that is wrong, if anything is; [`conformance!`](crate::conformance) makes use of it.
+///
+/// # Panics
+/// Where a rule is broken.
+pub fn assert_conforms<T: NodeSpec>(cases: &[Case]) {
+    let broken = broken::<T>(cases);
+    if !broken.is_empty() {
+        let told: Vec<_> = broken.iter().map(ToString::to_string).collect();
+        panic!(
+            "`{}` breaks {} of the rules that every node keeps\n\n{}\n",
+            T::kind_name(),
+            broken.len(),
+            told.join("\n\n")
+        );
+    }
+}
+
+/// Fails where a kind of a crate has no [`conformance!`](crate::conformance) in this test program.
+///
+/// # Panics
+/// Where there is such a kind, or none at all.
+pub fn assert_every_kind_conforms(package: &str) {
+    let of_package = |kind: &&&Kind| kind.package == package;
+    let registered: BTreeSet<&str> = kinds()
+        .values()
+        .flatten()
+        .filter(of_package)
+        .map(|kind| kind.name)
+        .collect();
+    let examined: BTreeSet<&str> = inventory::iter::<Examined>()
+        .map(|examined| (examined.kind)())
+        .collect();
+    assert!(
+        !registered.is_empty(),
+        "{package} registers no kind that this test program links"
+    );
+    let missing: Vec<_> = registered.difference(&examined).collect();
+    assert!(
+        missing.is_empty(),
+        "no `conformance!` for {missing:?} of {package}"
+    );
+}

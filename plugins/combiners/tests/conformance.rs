@@ -1,0 +1,95 @@
+//! Every kind of this crate through the rules that every node keeps.
+
+use athermal_combiners::{
+    Adwin, AutoWeighted, Best, Fallback, Guard, Mean, Median, PageHinkley, Trimmed,
+};
+use athermal_core::conformance;
+use athermal_core::testkit::{Case, assert_every_kind_conforms};
+
+conformance!(Mean, Case::new(""));
+
+conformance!(
+    Median,
+    Case::new(""),
+    Case::new("").input("voters", 4, "nm")
+);
+
+conformance!(
+    Trimmed,
+    Case::new(""),
+    Case::new("share = 0.4").input("voters", 7, "nm"),
+);
+
+conformance!(Fallback, Case::new(""));
+
+conformance!(Best, Case::new(r#"memory = "10min""#));
+
+conformance!(
+    Guard,
+    Case::new(r#"memory = "10min""#).input("voters", 1, "nm"),
+    Case::new(
+        r#"
+        memory = "2min"
+        min_truths = 1
+        "#
+    )
+    .input("voters", 2, "nm"),
+);
+
+conformance!(
+    AutoWeighted,
+    Case::new(r#"memory = "15min""#),
+    Case::new(
+        r#"
+        memory = "1min"
+        power = 1.0
+        "#
+    )
+    .input("voters", 2, "nm"),
+    Case::new(
+        r#"
+        memory = "5min"
+        weights = "as_printed"
+        "#
+    ),
+    Case::new(
+        r#"
+        memory = "5min"
+        weights = "as_printed_raw"
+        "#
+    ),
+);
+
+conformance!(
+    PageHinkley,
+    Case::new("first = 5"),
+    Case::new(
+        r#"
+        first = 5
+        watch = "size"
+        threshold = 2.0
+        every = "30s"
+        hold = "2min"
+        "#
+    )
+    .input("voters", 1, "nm"),
+);
+
+conformance!(
+    Adwin,
+    Case::new("first = 5"),
+    Case::new(
+        r#"
+        first = 5
+        clock = 1
+        confidence = 0.1
+        watch = "size"
+        "#
+    )
+    .input("voters", 1, "nm"),
+);
+
+#[test]
+fn every_kind_of_this_crate_conforms() {
+    assert_every_kind_conforms(env!("CARGO_PKG_NAME"));
+}

@@ -1,0 +1,108 @@
+//! Every kind of this crate through the rules that every node keeps.
+
+use athermal_core::conformance;
+use athermal_core::testkit::{Case, assert_every_kind_conforms};
+use athermal_estimators::{Ar, Arx, Linear, Persistence, Rls, Zero};
+
+conformance!(
+    Zero,
+    Case::new(r#"ahead = "1min""#).speaks_without_input(&["prediction"]),
+);
+
+conformance!(
+    Persistence,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(r#"ahead = "0s""#),
+);
+
+conformance!(
+    Linear,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        solver = { type = "ols" }
+        selection = { method = "forward", folds = 3, tolerance = 1e-3, most = 2 }
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        solver = { type = "sgd", alpha = 1e-4, eta0 = 0.01, power = 0.25, epochs = 3 }
+        "#
+    )
+    .input("features", 1, "Cel"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        solver = { type = "sgd", power = 0.0 }
+        learn = { outliers = 8.0, margin = 0.5 }
+        "#
+    )
+    .input("freeze", 1, "1"),
+);
+
+conformance!(
+    Ar,
+    Case::new(
+        r#"
+        ahead = "1min"
+        lags = ["0s", "30s"]
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "0s"
+        lags = ["30s"]
+        solver = { type = "ridge", alpha = 0.1 }
+        "#
+    ),
+);
+
+conformance!(
+    Arx,
+    Case::new(
+        r#"
+        ahead = "1min"
+        lags = ["0s", "30s"]
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        lags = ["30s"]
+        feature_lags = ["0s", "30s"]
+        solver = { type = "ols" }
+        selection = { method = "forward" }
+        "#
+    ),
+);
+
+conformance!(
+    Rls,
+    Case::new(r#"ahead = "10s""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        lags = ["30s"]
+        forgetting = { type = "variable", memory = 100.0, lowest = 0.8 }
+        learn = { margin = 1.0 }
+        "#
+    )
+    .input("features", 2, "K")
+    .input("freeze", 1, "1"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        learn = false
+        alpha = 0.1
+        selection = { method = "forward", most = 2 }
+        "#
+    )
+    .input("features", 3, "Cel"),
+);
+
+#[test]
+fn every_kind_of_this_crate_conforms() {
+    assert_every_kind_conforms(env!("CARGO_PKG_NAME"));
+}

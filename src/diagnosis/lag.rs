@@ -1,0 +1,329 @@
+//! Decides how features are compared with truths and residuals over a range of lags (Mandelli, Dankwart and Napoli, Fig. 3).
+//!
+//! Features, truths and residuals are sampled on one regular grid, each value held as long as it counts. At a positive lag the
+//! truth follows the feature, so that the feature can tell of it beforehand.
+
+use athermal_core::compile::{Plan, PlannedRole};
+use athermal_core::engine::Engine;
+use athermal_core::fit::FitError;
+use athermal_core::model::Model;
+use athermal_core::recording::{Event, Recording};
+use athermal_core::score::{TruthTrace, trace};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{autocorrelation, cross_correlation, cross_correlation_error};
+use serde::Serialize;
+
+use super::observation::{Observation, main_prediction};
+
+/// Lags to either side, at most.
+const MOST_LAGS: i64 = 60;
+const FEWEST_LAGS: i64 = 20;
+/// Instants of the grid, at most.
+const MOST_INSTANTS: i64 = 20_000;
+/// Autocorrelations reach so many times further than the lags, since bounds are sums over all of them.
+const REACH: usize = 4;
+
+/// A truth's correlations with every feature that its estimators are offered.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Lags {
+    /// The truth: `drift.Z1`.
+    pub truth: String,
+    /// The prediction whose residuals are meant.
+    pub prediction: String,
+    /// The lags in s; at a positive one the truth follows the feature.
+    pub lag_s: Vec<f64>,
+    /// Every feature, in the order of the graph.
+    pub features: Vec<FeatureLags>,
+}
+
+/// A feature's correlations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FeatureLags {
+    /// The channel: `gradients.chuck@150s`.
+    pub feature: String,
+    /// With the truth: where the feature says something of it, and when.
+    pub truth: Correlogram,
+    /// With what the prediction left of it (measured less predicted): beyond its bound, the feature says something that the
+    /// model does not use.
+    pub residual: Correlogram,
+}
+
+/// A correlation against the lag.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Correlogram {
+    /// The correlation at each lag; NaN (null in JSON) where there is none.
+    pub r: Vec<f64>,
+    /// Its standard error if the two had nothing to do with each other, their own smoothness considered.
+    pub error: f64,
+    /// The lag in s at which it is largest in size.
+    pub best_lag_s: f64,
+    /// The correlation there.
+    pub best: f64,
+}
+
+impl Correlogram {
+    /// How many standard errors the largest correlation lies from none.
+    #[must_use]
+    pub fn significance(&self) -> f64 {
+        self.best.abs() / self.error
+    }
+}
+
+/// Works out the correlations of every truth of a model. Truths without a feature are left out.
+///
+/// # Errors
+/// When the recording cannot be read, or the fit does not belong to the graph.
+pub fn lags(
+    model: &Model,
+    recording: &dyn Recording,
+    observation: &Observation,
+) -> Result<Vec<Lags>, FitError> {
+    let plan = &*model.plan;
+    let features: Vec<Vec<usize>> = observation
+        .trace
+        .truths
+        .iter()
+        .map(|truth| features(plan, truth.slot))
+        .collect();
+    let mut slots: Vec<usize> = features.iter().flatten().copied().collect();
+    slots.sort_unstable();
+    slots.dedup();
+    let truths = &observation.trace.truths;
+    let intervals = truths.iter().filter_map(Observation::interval);
+    let Some(interval) = intervals.min().filter(|_| !slots.is_empty()) else {
+        return Ok(Vec::new());
+    };
+    let longest = Duration::from_ns(observation.length().as_ns() / MOST_INSTANTS);
+    let reach = Duration::from_ns(plan.warm_up.as_ns() / MOST_LAGS);
+    let step = interval.max(longest).max(reach).max(Duration::from_ns(1));
+    let count = (plan.warm_up.as_ns() / step.as_ns()).clamp(FEWEST_LAGS, MOST_LAGS) as usize;
+    let mut grid = Grid::new(plan, slots, step, count);
+    trace(
+        &model.plan,
+        &model.fitted,
+        recording,
+        &mut |engine, event| {
+            grid.look(engine, event);
+        },
+    )?;
+    let smoothness: Vec<Vec<f64>> = grid
+        .series
+        .iter()
+        .map(|series| autocorrelation(series, REACH * count))
+        .collect();
+    let lag_s: Vec<f64> = (-(count as i64)..=count as i64)
+        .map(|lag| lag as f64 * step.secs())
+        .collect();
+    let with_features = truths.iter().zip(&features);
+    let facts = with_features
+        .filter(|(_, features)| !features.is_empty())
+        .filter_map(|(truth, features)| {
+            let main = &truth.predictions[main_prediction(plan, truth)?];
+            let left: Vec<f64> = truth
+                .values
+                .iter()
+                .zip(&main.values)
+                .map(|(y, p)| y - p)
+                .collect();
+            let sides = [&truth.values, &left].map(|values| {
+                let series = grid.place(plan, truth, values);
+                let smooth = autocorrelation(&series, REACH * count);
+                (series, smooth)
+            });
+            let of = |slot: usize, (y, y_smooth): &(Vec<f64>, Vec<f64>)| {
+                let place = grid.place_of(slot);
+                let (x, x_smooth) = (&grid.series[place], &smoothness[place]);
+                correlogram(x, x_smooth, y, y_smooth, &lag_s)
+            };
+            let features = features.iter().map(|&slot| FeatureLags {
+                feature: plan.channels[slot].name.clone(),
+                truth: of(slot, &sides[0]),
+                residual: of(slot, &sides[1]),
+            });
+            Some(Lags {
+                truth: plan.channels[truth.slot].name.clone(),
+                prediction: plan.channels[main.slot].name.clone(),
+                lag_s: lag_s.clone(),
+                features: features.collect(),
+            })
+        });
+    Ok(facts.collect())
+}
+
+fn correlogram(
+    x: &[f64],
+    x_smooth: &[f64],
+    y: &[f64],
+    y_smooth: &[f64],
+    lag_s: &[f64],
+) -> Correlogram {
+    let r = cross_correlation(x, y, lag_s.len() / 2);
+    let pairs = x.iter().zip(y).filter(|(x, y)| !(*x + *y).is_nan());
+    let error = cross_correlation_error(x_smooth, y_smooth, pairs.count());
+    let present = (0..r.len()).filter(|&lag| !r[lag].is_nan());
+    let best = present.max_by(|&a, &b| r[a].abs().total_cmp(&r[b].abs()));
+    Correlogram {
+        best_lag_s: best.map_or(f64::NAN, |best| lag_s[best]),
+        best: best.map_or(f64::NAN, |best| r[best]),
+        r,
+        error,
+    }
+}
+
+/// The channels that estimators of a truth are offered, the truth itself left out.
+fn features(plan: &Plan, truth: usize) -> Vec<usize> {
+    let mut slots = Vec::new();
+    for node in &plan.nodes {
+        let PlannedRole::Estimator {
+            gathers, truth: of, ..
+        } = &node.role
+        else {
+            continue;
+        };
+        let entries = gathers
+            .iter()
+            .flat_map(|&gather| &plan.gathers[gather].entries);
+        for entry in entries.filter(|entry| of.slot == truth && entry.slot != truth) {
+            if !slots.contains(&entry.slot) {
+                slots.push(entry.slot);
+            }
+        }
+    }
+    slots
+}
+
+/// Slots sampled at regular instants.
+struct Grid {
+    step: Duration,
+    /// Instants without values between segments, so that no pair reaches across.
+    apart: usize,
+    slots: Vec<usize>,
+    max_age: Vec<Duration>,
+    held: Vec<(f64, Instant)>,
+    next: Option<Instant>,
+    /// For each segment its first instant and where it stands on the grid.
+    begins: Vec<(Instant, usize)>,
+    series: Vec<Vec<f64>>,
+    segment: usize,
+}
+
+impl Grid {
+    fn new(plan: &Plan, slots: Vec<usize>, step: Duration, apart: usize) -> Self {
+        let max_age = |&slot: &usize| {
+            let own = plan.channels[slot].channel.default_max_age();
+            own.unwrap_or(step).max(step)
+        };
+        Self {
+            step,
+            apart,
+            max_age: slots.iter().map(max_age).collect(),
+            held: vec![(f64::NAN, Instant::MIN); slots.len()],
+            next: None,
+            begins: Vec::new(),
+            series: vec![Vec::new(); slots.len()],
+            slots,
+            segment: 0,
+        }
+    }
+
+    fn place_of(&self, slot: usize) -> usize {
+        self.slots.binary_search(&slot).unwrap_or(0)
+    }
+
+    fn len(&self) -> usize {
+        self.series.first().map_or(0, Vec::len)
+    }
+
+    fn look(&mut self, engine: &Engine, event: Event) {
+        let Event::Row(now) = event else {
+            self.held.fill((f64::NAN, Instant::MIN));
+            let empty = self.len() + self.apart;
+            self.series
+                .iter_mut()
+                .for_each(|series| series.resize(empty, f64::NAN));
+            self.next = None;
+            self.segment += 1;
+            return;
+        };
+        if self.next.is_none() {
+            self.next = Some(now);
+            // A segment may have no row, and then has no place.
+            let place = (now, self.len());
+            self.begins.resize(self.segment + 1, place);
+            self.begins[self.segment] = place;
+        }
+        self.sample(now - Duration::from_ns(1));
+        for (held, &slot) in self.held.iter_mut().zip(&self.slots) {
+            if engine.ran(slot) {
+                *held = (engine.value(slot), now);
+            }
+        }
+        self.sample(now);
+    }
+
+    /// Writes down what is held at every instant of the grid up to one.
+    fn sample(&mut self, until: Instant) {
+        while let Some(at) = self.next.filter(|&at| at <= until) {
+            let columns = self.series.iter_mut().zip(&self.held).zip(&self.max_age);
+            for ((series, &(value, since)), &max_age) in columns {
+                let counts = !value.is_nan() && at - since <= max_age;
+                series.push(if counts { value } else { f64::NAN });
+            }
+            self.next = Some(at + self.step);
+        }
+    }
+
+    /// Values of a truth's instants, each held as long as it counts.
+    fn place(&self, plan: &Plan, truth: &TruthTrace, values: &[f64]) -> Vec<f64> {
+        let mut placed = vec![f64::NAN; self.len()];
+        let own = plan.channels[truth.slot].channel.default_max_age();
+        let held = own.unwrap_or(self.step).max(self.step);
+        let step = self.step.as_ns();
+        for (nth, (&(segment, at), &value)) in truth.times.iter().zip(values).enumerate() {
+            let Some(&(begin, place)) = self.begins.get(segment as usize) else {
+                continue;
+            };
+            let next = truth.times.get(nth + 1);
+            let until = match next {
+                Some(&(of, next)) if of == segment => next.min(at + held),
+                _ => at + held,
+            };
+            let first = (at - begin).as_ns().div_euclid(step)
+                + i64::from((at - begin).as_ns().rem_euclid(step) > 0);
+            let end = (until - begin).as_ns().div_euclid(step)
+                + i64::from((until - begin).as_ns().rem_euclid(step) > 0);
+            let room = self.segment_end(segment as usize).min(placed.len());
+            let from = (place + first.max(0) as usize).min(room);
+            let to = (place + end.max(0) as usize).min(room);
+            if from < to {
+                placed[from..to].fill(value);
+            }
+        }
+        placed
+    }
+
+    fn segment_end(&self, segment: usize) -> usize {
+        let next = self.begins.get(segment + 1);
+        next.map_or(self.len(), |&(_, place)| place.saturating_sub(self.apart))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_correlation_is_told_with_its_lag_and_its_bound() {
+        // A square wave of irregular periods, and the same three instants later.
+        let x: Vec<f64> = (0..500_u64)
+            .map(|i| if (i * i / 40) % 3 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        let y: Vec<f64> = (0..500).map(|i| -2.0 * x[(i + 497) % 500]).collect();
+        let lag_s: Vec<f64> = (-20..=20).map(|lag| 10.0 * f64::from(lag)).collect();
+        let smooth = autocorrelation(&x, 80);
+        let found = correlogram(&x, &smooth, &y, &smooth, &lag_s);
+        assert_eq!(found.best_lag_s, 30.0);
+        assert!((found.best + 1.0).abs() < 0.02, "{}", found.best);
+        assert!(found.error >= 1.0 / 500.0_f64.sqrt() && found.significance() > 3.0);
+    }
+}

@@ -1,0 +1,117 @@
+//! Decides what is written down of one pass of a model over a recording; not what follows from it.
+
+use athermal_core::compile::Plan;
+use athermal_core::engine::Engine;
+use athermal_core::fit::FitError;
+use athermal_core::model::Model;
+use athermal_core::recording::{Event, Recording};
+use athermal_core::score::{Trace, TruthTrace, trace};
+use athermal_core::time::{Duration, Instant};
+
+/// A model's pass over a recording.
+#[derive(Debug, Clone)]
+pub struct Observation {
+    /// Every truth and its predictions.
+    pub trace: Trace,
+    /// Every measured channel.
+    pub sources: Vec<SourceStatistics>,
+    /// First and last instant of each segment that has a row.
+    pub segments: Vec<Option<(Instant, Instant)>>,
+}
+
+/// What can be said of a measured channel without its course.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SourceStatistics {
+    /// Valid samples.
+    pub samples: u64,
+    /// Their mean.
+    pub mean: f64,
+    squares: f64,
+    /// The sum and the number of the times between samples.
+    gaps: (Duration, i64),
+    last: Option<Instant>,
+}
+
+impl SourceStatistics {
+    fn look(&mut self, now: Instant, value: f64) {
+        self.samples += 1;
+        let before = value - self.mean;
+        self.mean += before / self.samples as f64;
+        self.squares += before * (value - self.mean);
+        if let Some(last) = self.last.replace(now) {
+            self.gaps = (self.gaps.0 + (now - last), self.gaps.1 + 1);
+        }
+    }
+
+    /// The standard deviation of the samples; 0 of none.
+    #[must_use]
+    pub fn deviation(&self) -> f64 {
+        (self.squares / self.samples.max(1) as f64).sqrt()
+    }
+
+    /// The mean time between samples; none for less than two.
+    #[must_use]
+    pub fn interval(&self) -> Option<Duration> {
+        let (sum, count) = self.gaps;
+        (count > 0).then(|| Duration::from_ns(sum.as_ns() / count))
+    }
+}
+
+/// Steps a model over a recording, cold, and writes down what the diagnoses start from.
+///
+/// # Errors
+/// When the recording cannot be read, or the fit does not belong to the graph.
+pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, FitError> {
+    let count = model.plan.sources.len();
+    let mut sources = vec![SourceStatistics::default(); count];
+    let mut segments = vec![None];
+    let mut look = |engine: &Engine, event: Event| match event {
+        Event::Segment => {
+            segments.push(None);
+            sources.iter_mut().for_each(|source| source.last = None);
+        }
+        Event::Row(now) => {
+            if let Some(period) = segments.last_mut() {
+                let (from, _) = period.unwrap_or((now, now));
+                *period = Some((from, now));
+            }
+            for (slot, source) in sources.iter_mut().enumerate() {
+                let value = engine.value(slot);
+                if !value.is_nan() {
+                    source.look(now, value);
+                }
+            }
+        }
+    };
+    let trace = trace(&model.plan, &model.fitted, recording, &mut look)?;
+    Ok(Observation {
+        trace,
+        sources,
+        segments,
+    })
+}
+
+impl Observation {
+    /// The mean time between two values of a truth, breaks and gaps of the recording included; none for less than two.
+    pub(super) fn interval(truth: &TruthTrace) -> Option<Duration> {
+        let pairs = truth.times.windows(2);
+        let gaps = pairs.filter(|pair| pair[0].0 == pair[1].0);
+        let (sum, count) = gaps.fold((0, 0), |(sum, count), pair| {
+            (sum + (pair[1].1 - pair[0].1).as_ns(), count + 1)
+        });
+        (count > 0).then(|| Duration::from_ns(sum / count))
+    }
+
+    /// How long the recording is, breaks left out.
+    pub(super) fn length(&self) -> Duration {
+        let each = self.segments.iter().flatten();
+        each.fold(Duration::ZERO, |sum, &(from, to)| sum + (to - from))
+    }
+}
+
+/// Which prediction of a truth the graph is about: the first that it puts out, else the last one.
+pub(super) fn main_prediction(plan: &Plan, truth: &TruthTrace) -> Option<usize> {
+    let out = |slot: usize| plan.outputs.iter().any(|output| output.slot == slot);
+    let first = truth.predictions.iter().position(|of| out(of.slot));
+    first.or(truth.predictions.len().checked_sub(1))
+}

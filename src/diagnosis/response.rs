@@ -1,0 +1,230 @@
+//! Decides how a fitted estimator answers a change of one sensor: step and impulse responses, reconstructed from the frame.
+//!
+//! The impulse response of a linear estimator is `Γ = Σ c_k e_k`, its coefficients times what each feature makes of an impulse
+//! (Mandelli, Dankwart and Napoli, section 3.2). It is found by asking the graph itself: all sensors rest at their means, one of
+//! them steps, and the engine runs. So it holds for whatever features a graph has, lags and other frames included, and for an
+//! estimator that is not linear it is the answer to a change of one standard deviation.
+
+use std::sync::Arc;
+
+use athermal_core::compile::{Plan, PlannedRole};
+use athermal_core::engine::{Engine, EngineError};
+use athermal_core::fit::FitError;
+use athermal_core::model::Model;
+use athermal_core::time::{Duration, Instant};
+use serde::Serialize;
+
+use super::observation::Observation;
+use super::of_truths;
+
+/// Instants of a response, at most.
+const MOST_INSTANTS: i64 = 2_000;
+/// A step response below this share of the largest of its estimator is none.
+const NOTHING: f64 = 1e-9;
+/// The share of an answer that must have come for it to have settled.
+const SETTLED: f64 = 0.9;
+
+/// How one estimator answers its sensors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Responses {
+    /// The estimator: `thermal.Z1`.
+    pub node: String,
+    /// What it predicts.
+    pub truth: String,
+    /// The unit of the truth.
+    pub unit: String,
+    /// The sensors that it answers.
+    pub sensors: Vec<Response>,
+}
+
+/// How an estimator answers one sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Response {
+    /// The measured channel: `temperature.chuck`.
+    pub sensor: String,
+    /// The unit of a change of it.
+    pub sensor_unit: String,
+    /// Time in s from the change to the instant that is predicted.
+    pub time_s: Vec<f64>,
+    /// What is predicted at each time after a step of one unit, in the unit of the truth.
+    pub step: Vec<f64>,
+    /// What is predicted at each time after an impulse of one unit times one minute, in the unit of the truth.
+    pub impulse: Vec<f64>,
+    /// The sum of the step response over time, in the unit of the truth times minutes: of a drift per minute, how far a step of
+    /// one unit moves the axis in the end.
+    pub total: f64,
+    /// The time in s at which the step response is largest in size.
+    pub peak_s: f64,
+    /// The step response there.
+    pub peak: f64,
+    /// The time in s from which on the sum stays within a tenth of its total; none where it does not.
+    pub settled_s: Option<f64>,
+    /// By how much the answers to a step up and a step down differ, as a share of their size: 0 for a linear estimator.
+    pub asymmetry: f64,
+}
+
+/// The responses of every estimator that answers any sensor.
+///
+/// # Errors
+/// When the fit does not belong to the graph.
+pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Responses>, FitError> {
+    let plan = &*model.plan;
+    let estimators: Vec<usize> = (0..plan.nodes.len())
+        .filter(|&node| matches!(plan.nodes[node].role, PlannedRole::Estimator { .. }))
+        .collect();
+    let slots: Vec<usize> = estimators
+        .iter()
+        .map(|&node| plan.nodes[node].slots.start)
+        .collect();
+    let of_truth = of_truths(plan);
+    let Some(probe) = Probe::new(model, observation) else {
+        return Ok(Vec::new());
+    };
+    let mut sensors: Vec<Vec<Response>> = vec![Vec::new(); slots.len()];
+    for source in (0..plan.sources.len()).filter(|&source| !of_truth[source]) {
+        let size = match observation.sources[source].deviation() {
+            spread if spread > 0.0 => spread,
+            _ => continue,
+        };
+        let up = probe.run(&slots, source, size)?;
+        let down = probe.run(&slots, source, -size)?;
+        for (nth, (up, down)) in up.iter().zip(&down).enumerate() {
+            let ahead = plan.channels[slots[nth]].channel.ahead;
+            let answer = Answer { up, down, size };
+            if let Some(response) = answer.response(plan, source, ahead, probe.step) {
+                sensors[nth].push(response);
+            }
+        }
+    }
+    let facts = estimators.iter().zip(sensors).map(|(&node, mut sensors)| {
+        let node = &plan.nodes[node];
+        let truth = plan.channels[node.slots.start].predicts;
+        let truth = truth.map(|slot| &plan.channels[slot]);
+        let largest = sensors.iter().map(|of| of.peak.abs()).fold(0.0, f64::max);
+        sensors.retain(|of| of.peak.abs() > NOTHING * largest);
+        Responses {
+            node: node.instance(),
+            truth: truth.map_or_else(String::new, |of| of.name.clone()),
+            unit: truth.map_or_else(String::new, |of| of.channel.unit.to_string()),
+            sensors,
+        }
+    });
+    Ok(facts.filter(|of| !of.sensors.is_empty()).collect())
+}
+
+/// A graph at rest that is about to be disturbed.
+struct Probe<'a> {
+    model: &'a Model,
+    /// The mean of every measured channel.
+    rest: Vec<f64>,
+    step: Duration,
+    /// Ticks at rest, and after the step.
+    ticks: (i64, i64),
+}
+
+impl<'a> Probe<'a> {
+    /// None where nothing was measured often enough to say at which rate.
+    fn new(model: &'a Model, observation: &Observation) -> Option<Self> {
+        let sources = &observation.sources;
+        let intervals = sources.iter().filter_map(|source| source.interval());
+        let warm_up = model.plan.warm_up;
+        let widest = Duration::from_ns(warm_up.as_ns() / MOST_INSTANTS);
+        let step = intervals.min()?.max(widest).max(Duration::from_ns(1));
+        let ticks = (warm_up.as_ns() / step.as_ns() + 2).min(MOST_INSTANTS);
+        let rest = sources
+            .iter()
+            .map(|of| if of.samples > 0 { of.mean } else { f64::NAN });
+        Some(Self {
+            model,
+            rest: rest.collect(),
+            step,
+            ticks: (ticks, ticks),
+        })
+    }
+
+    /// How slots change from the instant on at which a source steps by `size`, tick by tick; NaN where there is no value.
+    fn run(&self, slots: &[usize], source: usize, size: f64) -> Result<Vec<Vec<f64>>, EngineError> {
+        let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
+        let mut samples = self.rest.clone();
+        let mut before = vec![f64::NAN; slots.len()];
+        let mut found = vec![Vec::new(); slots.len()];
+        let (resting, answering) = self.ticks;
+        for tick in 0..resting + answering {
+            if tick == resting {
+                samples[source] += size;
+            }
+            engine.step(Instant::from_ns(tick * self.step.as_ns()), &samples)?;
+            for (nth, &slot) in slots.iter().enumerate() {
+                let value = engine.value(slot);
+                if tick < resting {
+                    before[nth] = value;
+                } else {
+                    found[nth].push(value - before[nth]);
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// What a slot did after a step up and a step down.
+struct Answer<'a> {
+    up: &'a [f64],
+    down: &'a [f64],
+    size: f64,
+}
+
+impl Answer<'_> {
+    /// None where there was no answer.
+    fn response(
+        &self,
+        plan: &Plan,
+        source: usize,
+        ahead: Duration,
+        every: Duration,
+    ) -> Option<Response> {
+        let pairs = self.up.iter().zip(self.down);
+        let step: Vec<f64> = pairs
+            .clone()
+            .map(|(up, down)| (up - down) / (2.0 * self.size))
+            .collect();
+        let asymmetric = pairs.map(|(up, down)| (up + down).abs() / (2.0 * self.size));
+        let asymmetric = asymmetric.fold(0.0, f64::max);
+        let largest = (0..step.len()).max_by(|&a, &b| step[a].abs().total_cmp(&step[b].abs()))?;
+        let peak = step[largest];
+        if step.iter().any(|value| value.is_nan()) || peak == 0.0 {
+            return None;
+        }
+        let minutes = every.secs() / 60.0;
+        let time_s: Vec<f64> = (0..step.len())
+            .map(|tick| tick as f64 * every.secs() + ahead.secs())
+            .collect();
+        let before = std::iter::once(0.0).chain(step.iter().copied());
+        let impulse = step
+            .iter()
+            .zip(before)
+            .map(|(now, before)| (now - before) / minutes);
+        let sums: Vec<f64> = step
+            .iter()
+            .scan(0.0, |sum, value| {
+                *sum += value * minutes;
+                Some(*sum)
+            })
+            .collect();
+        let total = *sums.last()?;
+        let outside = |sum: &f64| (sum - total).abs() > (1.0 - SETTLED) * total.abs();
+        let settled = sums.iter().rposition(outside).map_or(0, |last| last + 1);
+        Some(Response {
+            sensor: plan.sources[source].name.clone(),
+            sensor_unit: plan.channels[source].channel.unit.difference().to_string(),
+            impulse: impulse.collect(),
+            total,
+            peak_s: time_s[largest],
+            peak,
+            settled_s: time_s.get(settled).copied(),
+            asymmetry: asymmetric / peak.abs(),
+            time_s,
+            step,
+        })
+    }
+}

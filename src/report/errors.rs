@@ -1,0 +1,103 @@
+//! Decides how the errors of a prediction are summarised: their spread and how long they last.
+
+use serde::Serialize;
+
+use super::{Axis, rms};
+
+/// Lags of the autocorrelation that are worked out.
+const LAGS: usize = 40;
+const BINS: usize = 41;
+
+/// The errors of an axis: histogram and autocorrelation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Errors {
+    /// The axis.
+    pub axis: String,
+    /// Errors, prediction minus truth, that there are.
+    pub count: usize,
+    /// The middles of the bins of the histogram, in the unit of the axis.
+    pub centres: Vec<f64>,
+    /// How many errors lie in each; the outermost take what lies beyond.
+    pub counts: Vec<f64>,
+    /// Lags in truths, from 1.
+    pub lags: Vec<f64>,
+    /// The autocorrelation at each lag; pairs of which one is absent do not count.
+    pub autocorrelation: Vec<f64>,
+    /// Beyond this an autocorrelation is no chance: 1.96 / √n.
+    pub bound: f64,
+}
+
+impl Axis {
+    /// Prediction minus truth of what is put out, for each truth.
+    #[must_use]
+    pub fn errors(&self) -> Vec<f64> {
+        let main = &self.voters[self.main].value;
+        main.iter()
+            .zip(&self.truth.value)
+            .map(|(p, y)| p - y)
+            .collect()
+    }
+}
+
+impl Errors {
+    pub(super) fn of(axis: &Axis) -> Self {
+        let errors = axis.errors();
+        let present: Vec<f64> = errors.iter().copied().filter(|e| e.is_finite()).collect();
+        let largest = present.iter().fold(0.0_f64, |edge, e| edge.max(e.abs()));
+        // Nearly all errors are small, and a few large ones would leave them in one bin.
+        let edge = largest
+            .min(5.0 * rms(present.iter().copied()).unwrap_or(1.0))
+            .max(1e-12);
+        let width = 2.0 * edge / BINS as f64;
+        let mut counts = vec![0.0; BINS];
+        for error in &present {
+            let bin = ((error + edge) / width).floor();
+            counts[bin.clamp(0.0, BINS as f64 - 1.0) as usize] += 1.0;
+        }
+        Self {
+            axis: axis.name.clone(),
+            count: present.len(),
+            centres: (0..BINS)
+                .map(|bin| (bin as f64 + 0.5) * width - edge)
+                .collect(),
+            counts,
+            lags: (1..=LAGS).map(|lag| lag as f64).collect(),
+            autocorrelation: autocorrelation(&errors),
+            bound: 1.96 / (present.len() as f64).sqrt(),
+        }
+    }
+}
+
+/// `Σ (e_i − ē)(e_{i+k} − ē) / Σ (e_i − ē)²`, over the pairs of which both are there.
+fn autocorrelation(errors: &[f64]) -> Vec<f64> {
+    let there = || errors.iter().filter(|e| e.is_finite());
+    let mean = there().sum::<f64>() / there().count() as f64;
+    let about: Vec<f64> = errors
+        .iter()
+        .map(|e| if e.is_finite() { e - mean } else { 0.0 })
+        .collect();
+    let total: f64 = about.iter().map(|e| e * e).sum();
+    let at = |lag: usize| {
+        about
+            .iter()
+            .zip(about.iter().skip(lag))
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / total
+    };
+    (1..=LAGS).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn autocorrelation_is_that_of_the_definition_and_gaps_do_not_count() {
+        // Mean 0: squares add up to 10, neighbours to 1·2 + 2·(−2) + (−2)·(−1) = 0, next but one to −2 − 2 = −4.
+        let found = autocorrelation(&[1.0, 2.0, -2.0, -1.0]);
+        assert_eq!(&found[..3], [0.0, -0.4, -0.1]);
+        let with_gap = autocorrelation(&[1.0, 2.0, f64::NAN, -2.0, -1.0]);
+        assert_eq!(&with_gap[..2], [0.4, -0.4]);
+    }
+}

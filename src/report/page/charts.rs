@@ -1,0 +1,185 @@
+//! Decides which pictures there are of an axis and of a correction; how one is drawn is decided by [`crate::chart`].
+
+use super::super::{Axis, Errors, Facts, Worth};
+use crate::chart::{Chart, Layer, Mark};
+
+const COLOUR: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
+
+/// Stretches that are quasi-stable or transient, run together where they follow each other.
+fn bands(axis: &Axis) -> Vec<(f64, f64, &'static str)> {
+    let Some((stable, transient)) = axis.states else {
+        return Vec::new();
+    };
+    let mut bands: Vec<(f64, f64, &'static str)> = Vec::new();
+    let pairs = axis.truth.time_s.windows(2).zip(&axis.truth.value);
+    for (times, y) in pairs {
+        let class = match y.abs() {
+            size if size >= transient => "s2",
+            size if size >= stable => "s1",
+            _ => continue,
+        };
+        let to = times[1].min(times[0] + 600.0);
+        match bands.last_mut() {
+            Some(last) if last.2 == class && times[0] - last.1 < 600.0 => last.1 = to,
+            _ => bands.push((times[0], to, class)),
+        }
+    }
+    bands
+}
+
+fn over_time(axis: &Axis, title: &str) -> Chart<'static> {
+    Chart {
+        title: format!("{title} of {}", axis.name),
+        x_label: "hours",
+        y_label: format!("{} in {}", axis.name, axis.unit),
+        height: 220.0,
+        time: true,
+        ..Chart::default()
+    }
+}
+
+/// Drift measured, predicted, and what is left of it.
+pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> Chart<'a> {
+    let main = &axis.voters[axis.main];
+    let time_s = &axis.truth.time_s;
+    let corrected = facts.worth.as_ref().and_then(|worth| {
+        let i = worth.axes.iter().position(|name| *name == axis.name)?;
+        Some(&worth.drift_with[i])
+    });
+    Chart {
+        height: 260.0,
+        layers: vec![
+            Layer::line(time_s, &axis.truth.value, "c1", "measured"),
+            Layer::line(
+                time_s,
+                &main.value,
+                "c2",
+                format!("predicted ({})", main.node),
+            ),
+            match corrected {
+                Some(with) => Layer::line(&with.time_s, &with.value, "c3", "left after correction"),
+                None => Layer::line(time_s, errors, "c3", "residual"),
+            },
+        ],
+        bands: bands(axis),
+        ..over_time(axis, "Drift")
+    }
+}
+
+/// What each voter says.
+pub(super) fn votes(axis: &Axis) -> Chart<'_> {
+    let voters = axis.voters.iter().zip(COLOUR.iter().cycle());
+    Chart {
+        layers: voters
+            .map(|(voter, class)| {
+                Layer::line(&axis.truth.time_s, &voter.value, class, voter.node.as_str())
+            })
+            .collect(),
+        ..over_time(axis, "Predictions")
+    }
+}
+
+/// How much each voter counts; none where nothing is weighed.
+pub(super) fn weights(axis: &Axis) -> Option<Chart<'_>> {
+    let first = axis.weights.first()?;
+    let colour = |name: &str| {
+        let nth = axis.voters.iter().position(|voter| voter.node == name);
+        COLOUR[nth.unwrap_or(0) % COLOUR.len()]
+    };
+    Some(Chart {
+        y_label: format!("{} weights in {}", axis.name, first.node),
+        height: 160.0,
+        layers: axis
+            .weights
+            .iter()
+            .map(|weight| {
+                Layer::line(
+                    &axis.truth.time_s,
+                    &weight.value,
+                    colour(&weight.voter),
+                    weight.voter.as_str(),
+                )
+            })
+            .collect(),
+        y_range: Some((0.0, 1.0)),
+        ..over_time(axis, "Weights")
+    })
+}
+
+fn small<'a>(
+    title: String,
+    x_label: &'a str,
+    y_label: String,
+    x: &'a [f64],
+    y: &'a [f64],
+    mark: Mark,
+) -> Chart<'a> {
+    Chart {
+        title,
+        x_label,
+        y_label,
+        height: 420.0,
+        layers: vec![Layer {
+            x,
+            y,
+            class: "c2",
+            label: String::new(),
+            mark,
+        }],
+        ..Chart::default()
+    }
+}
+
+/// Predictions against truths, and the spread and memory of the errors.
+pub(super) fn errors<'a>(axis: &'a Axis, errors: &'a Errors) -> [(&'static str, Chart<'a>); 3] {
+    let name = &axis.name;
+    let scatter = small(
+        format!("Predicted against measured, {name}"),
+        "measured",
+        format!("{name} predicted, {}", axis.unit),
+        &axis.truth.value,
+        &axis.voters[axis.main].value,
+        Mark::Dots,
+    );
+    let histogram = small(
+        format!("Errors of {name}"),
+        "predicted − measured",
+        format!("{name} errors, count"),
+        &errors.centres,
+        &errors.counts,
+        Mark::Bars,
+    );
+    let mut correlation = small(
+        format!("Autocorrelation of the errors of {name}"),
+        "lag in truths",
+        format!("{name} autocorrelation"),
+        &errors.lags,
+        &errors.autocorrelation,
+        Mark::Bars,
+    );
+    correlation.limits = vec![-errors.bound, errors.bound];
+    [
+        ("scatter", scatter),
+        ("histogram", histogram),
+        ("autocorrelation", correlation),
+    ]
+}
+
+/// Optical loss without and with the correction; none without losses.
+pub(super) fn loss(worth: &Worth) -> Option<Chart<'_>> {
+    let (without, with) = (&worth.loss_without, &worth.loss_with);
+    (!with.value.is_empty()).then(|| Chart {
+        title: "Optical loss over five minutes".into(),
+        x_label: "hours",
+        y_label: "loss in dB".into(),
+        height: 260.0,
+        layers: vec![
+            Layer::line(&without.time_s, &without.value, "c1", "without correction"),
+            Layer::line(&with.time_s, &with.value, "c3", "with correction"),
+        ],
+        limits: vec![worth.loss_limit],
+        y_range: Some((0.0, 10.0 * worth.loss_limit)),
+        time: true,
+        ..Chart::default()
+    })
+}

@@ -1,0 +1,263 @@
+//! Decides what stands on the page and in which order; how a picture is drawn is decided by [`crate::chart`].
+
+mod charts;
+mod curves;
+mod style;
+mod tables;
+
+use std::fmt::Write as _;
+
+use super::{Facts, Worth, figure};
+use crate::chart::{COLOURS, Chart, STYLE, escaped};
+
+/// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
+#[must_use]
+pub fn page(facts: &Facts) -> String {
+    let title = escaped(&facts.graph);
+    let mut html = format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <title>{title} report</title><link rel=\"icon\" href=\"data:,\"><style>:root{{color-scheme:light dark}}{COLOURS}{STYLE}{}</style></head><body><h1>{title}</h1>",
+        style::STYLE
+    );
+    verdicts(&mut html, facts);
+    if let Some(worth) = &facts.worth {
+        worth_section(&mut html, worth);
+    }
+    html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
+    html.push_str(&tables::scores(&facts.scores));
+    published(&mut html, facts);
+    over_time(&mut html, facts);
+    votes(&mut html, facts);
+    chosen(&mut html, facts);
+    html.push_str("<h2>Sensors</h2>");
+    html.push_str(&tables::sensors(&facts.course.sensors));
+    card(&mut html, facts);
+    let _ = write!(html, "<script>{}</script></body></html>", style::SCRIPT);
+    html
+}
+
+fn verdicts(html: &mut String, facts: &Facts) {
+    let data: Vec<String> = facts.data.iter().map(|path| escaped(path)).collect();
+    let (from, to) = facts.course.period_s.unwrap_or((0.0, 0.0));
+    let _ = write!(
+        html,
+        "<p class=\"muted\">On {}: {} ticks over {:.1} days.</p><ul>",
+        data.join(", "),
+        facts.course.ticks,
+        (to - from) / 86400.0
+    );
+    for verdict in &facts.verdicts {
+        let class = if verdict.is_good() {
+            ""
+        } else {
+            " class=\"bad\""
+        };
+        let _ = write!(
+            html,
+            "<li{class}><b>{}</b>: {}</li>",
+            escaped(&verdict.axis),
+            escaped(&verdict.sentence())
+        );
+    }
+    html.push_str("</ul>");
+}
+
+fn worth_section(html: &mut String, worth: &Worth) {
+    html.push_str("<h2>What the correction is worth</h2>");
+    if let (Some((without, with)), Some(chart)) = (worth.below_limit, charts::loss(worth)) {
+        let worst = |losses: &[f64]| figure(Some(losses.iter().copied().fold(0.0, f64::max)));
+        let _ = write!(
+            html,
+            "<p>Five-minute losses below {} dB: <b>{:.1} %</b> without, <b class=\"good\">{:.1} %</b> with correction. \
+             Largest loss {} dB without, {} dB with (the picture ends at {} dB).</p><div class=\"wide\">{}</div>",
+            worth.loss_limit,
+            100.0 * without,
+            100.0 * with,
+            worst(&worth.loss_without.value),
+            worst(&worth.loss_with.value),
+            10.0 * worth.loss_limit,
+            chart.svg()
+        );
+    }
+    if !worth.settling.is_empty() {
+        html.push_str("<h3>Settle time and largest loss per change of the set point</h3>");
+        html.push_str(&tables::settling(worth));
+        html.push_str("<p class=\"muted\">From the change to the start of the first ten minutes that are stable throughout.</p>");
+    }
+    if !worth.steps.is_empty() {
+        html.push_str("<h3>Largest loss per temperature step</h3>");
+        html.push_str(&tables::steps(worth));
+    }
+}
+
+fn published(html: &mut String, facts: &Facts) {
+    let Some(ahead) = facts.course.axes.first().map(|axis| axis.ahead_s) else {
+        return;
+    };
+    if facts.published.is_empty() {
+        return;
+    }
+    let _ = write!(
+        html,
+        "<h3>Beside the published figures</h3><p class=\"muted\">Root mean square errors in nm/min of Mandelli, Dankwart and Napoli \
+         on their machine, which was another one, and of this model on these data, on instants below the same drift. Here \
+         the predictions look {:.1} minutes ahead.</p>{}",
+        ahead / 60.0,
+        tables::published(&facts.published)
+    );
+}
+
+fn over_time(html: &mut String, facts: &Facts) {
+    html.push_str("<h2>Drift over time</h2><p class=\"muted screen\">Drag across a picture to look closer, double-click for all; the wheel with Ctrl or Shift zooms.</p>");
+    let axes = &facts.course.axes;
+    if let Some((axis, (stable, transient))) =
+        axes.iter().find_map(|axis| Some((axis, axis.states?)))
+    {
+        let _ = write!(
+            html,
+            "<p class=\"muted\">Shaded: quasi-stable from {stable}, transient from {transient} {}.</p>",
+            escaped(&axis.unit)
+        );
+    }
+    for axis in axes {
+        let errors = axis.errors();
+        wide(html, &charts::drift(axis, &errors, facts));
+    }
+}
+
+fn wide(html: &mut String, chart: &Chart<'_>) {
+    let _ = write!(html, "<div class=\"wide\">{}</div>", chart.svg());
+}
+
+fn votes(html: &mut String, facts: &Facts) {
+    html.push_str(
+        "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
+         An impulse is one kelvin, or unit of the sensor, for one minute.</p>",
+    );
+    for (axis, errors) in facts.course.axes.iter().zip(&facts.errors) {
+        let _ = write!(html, "<details><summary>{}</summary>", escaped(&axis.name));
+        wide(html, &charts::votes(axis));
+        if let Some(chart) = charts::weights(axis) {
+            wide(html, &chart);
+        }
+        html.push_str("<div class=\"pair\">");
+        for curves in curves::of(axis, facts) {
+            html.push_str(&curves.chart().svg());
+        }
+        for (_, chart) in charts::errors(axis, errors) {
+            html.push_str(&chart.svg());
+        }
+        html.push_str("</div></details>");
+    }
+}
+
+fn chosen(html: &mut String, facts: &Facts) {
+    let estimators = facts.card.iter().flat_map(|card| &card.estimators);
+    let mut chosen = estimators
+        .filter(|e| !e.report.selection.is_empty())
+        .peekable();
+    if chosen.peek().is_none() {
+        return;
+    }
+    html.push_str(
+        "<h2>Chosen features</h2><p class=\"muted\">Sensor and window, in the order chosen, with the cross-validated R² after each. The window is the time constant that the feature sees.</p>",
+    );
+    for estimator in chosen {
+        let steps = estimator
+            .report
+            .selection
+            .iter()
+            .map(|step| format!("{} ({:.3})", escaped(&step.regressor), step.score));
+        let _ = write!(
+            html,
+            "<p><b>{}</b>: {}</p>",
+            escaped(&estimator.node),
+            steps.collect::<Vec<_>>().join(", ")
+        );
+    }
+}
+
+fn card(html: &mut String, facts: &Facts) {
+    let Some(card) = &facts.card else {
+        html.push_str("<h2>Model card</h2><p>A graph without a fit.</p>");
+        return;
+    };
+    let _ = write!(
+        html,
+        "<h2>Model card</h2><p>Made by athermal {}",
+        escaped(&card.athermal)
+    );
+    if let Some(created) = &card.created {
+        let _ = write!(html, " on {}", escaped(created));
+    }
+    let _ = write!(html, " from {} ticks", card.ticks);
+    if let Some(period) = card.period {
+        let _ = write!(
+            html,
+            " over {:.1} days",
+            (period.to_s - period.from_s) / 86400.0
+        );
+    }
+    html.push_str(".</p><ul>");
+    for data in &card.data {
+        let _ = write!(
+            html,
+            "<li>{}: {} rows, {} bytes, checksum {}</li>",
+            escaped(&data.path),
+            data.rows,
+            data.bytes,
+            escaped(&data.hash)
+        );
+    }
+    html.push_str("</ul>");
+    html.push_str(&tables::estimators(&card.estimators));
+}
+
+/// A picture as files.
+#[derive(Debug, Clone)]
+pub struct Plot {
+    /// Its name, without ending.
+    pub name: String,
+    /// As SVG.
+    pub svg: String,
+    /// As PNG.
+    #[cfg(feature = "png")]
+    pub png: Vec<u8>,
+}
+
+/// Every picture of the page as files of its own; those with nothing to draw are left out.
+#[must_use]
+pub fn plots(facts: &Facts) -> Vec<Plot> {
+    let mut plots = Vec::new();
+    let mut add = |name: String, chart: &Chart<'_>| {
+        #[cfg(feature = "png")]
+        let Some(png) = chart.png() else { return };
+        plots.push(Plot {
+            name,
+            svg: chart.file(),
+            #[cfg(feature = "png")]
+            png,
+        });
+    };
+    for (axis, spread) in facts.course.axes.iter().zip(&facts.errors) {
+        let (errors, name) = (axis.errors(), &axis.name);
+        add(
+            format!("drift-{name}"),
+            &charts::drift(axis, &errors, facts),
+        );
+        add(format!("votes-{name}"), &charts::votes(axis));
+        if let Some(chart) = charts::weights(axis) {
+            add(format!("weights-{name}"), &chart);
+        }
+        for curves in curves::of(axis, facts) {
+            add(format!("{}-{name}", curves.kind), &curves.chart());
+        }
+        for (kind, chart) in charts::errors(axis, spread) {
+            add(format!("{kind}-{name}"), &chart);
+        }
+    }
+    if let Some(chart) = facts.worth.as_ref().and_then(charts::loss) {
+        add("loss".to_owned(), &chart);
+    }
+    plots
+}

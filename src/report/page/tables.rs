@@ -1,0 +1,214 @@
+//! Decides the columns of the page's tables.
+
+use std::fmt::Write as _;
+
+use athermal_core::model::EstimatorCard;
+use athermal_core::score::Score;
+
+use super::super::{Published, SensorFacts, Worth, figure};
+use crate::chart::escaped;
+
+fn table(header: &[&str], rows: &str) -> String {
+    let header: String = header
+        .iter()
+        .map(|cell| format!("<th>{cell}</th>"))
+        .collect();
+    format!("<div class=\"wide\"><table><tr>{header}</tr>{rows}</table></div>")
+}
+
+pub(super) fn scores(scores: &[Score]) -> String {
+    let mut rows = String::new();
+    for score in scores {
+        let worse = if score.is_worse_than_nothing() {
+            " class=\"bad\""
+        } else {
+            ""
+        };
+        let valid = score
+            .valid
+            .map_or("–".to_owned(), |valid| format!("{:.1} %", 100.0 * valid));
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td><td>{}</td><td{worse}>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{valid}</td></tr>",
+            escaped(&score.output),
+            escaped(&score.unit),
+            figure(score.rmse),
+            figure(score.baseline_zero),
+            figure(score.baseline_persistence),
+            figure(score.truth_noise),
+            figure(score.r2_zero),
+            figure(score.bias),
+            figure(score.max_abs),
+        );
+    }
+    let header = [
+        "prediction",
+        "unit",
+        "RMSE",
+        "no model",
+        "persistence",
+        "noise of truth",
+        "R²",
+        "bias",
+        "largest",
+        "valid",
+    ];
+    table(&header, &rows)
+}
+
+/// The article's figures, ours below.
+pub(super) fn published(tables: &[Published]) -> String {
+    let mut html = String::new();
+    for published in tables {
+        let mut rows = String::new();
+        for row in &published.rows {
+            let node = row
+                .node
+                .as_deref()
+                .map_or(String::new(), |node| format!(" ({})", escaped(node)));
+            let cells = |figures: &mut dyn Iterator<Item = Option<f64>>| -> String {
+                figures
+                    .map(|value| format!("<td>{}</td>", figure(value)))
+                    .collect()
+            };
+            let _ = write!(
+                rows,
+                "<tr><td>{}, published</td>{}</tr><tr><td>{0}, here{node}</td>{}</tr>",
+                row.name,
+                cells(&mut row.published.iter().map(|value| Some(*value))),
+                cells(&mut row.ours.iter().copied()),
+            );
+        }
+        let mut header = vec![published.source];
+        header.extend(&published.axes);
+        html += &table(&header, &rows);
+    }
+    html
+}
+
+pub(super) fn settling(worth: &Worth) -> String {
+    let unit = escaped(worth.set_point_unit.as_deref().unwrap_or_default());
+    let mut rows = String::new();
+    for s in &worth.settling {
+        let minutes =
+            |m: Option<f64>| m.map_or("not settled".to_owned(), |m| format!("{m:.1} min"));
+        let _ = write!(
+            rows,
+            "<tr><td>{:.1} h</td><td>{:.1} {unit}</td><td>{:.1} {unit}</td><td>{}</td><td>{}</td><td>{} dB</td><td>{} dB</td></tr>",
+            s.at_s / 3600.0,
+            s.from,
+            s.to,
+            minutes(s.without_min),
+            minutes(s.with_min),
+            figure(Some(s.largest_without)),
+            figure(Some(s.largest_with))
+        );
+    }
+    let header = [
+        "at",
+        "from",
+        "to",
+        "settle time without",
+        "with",
+        "largest loss without",
+        "with",
+    ];
+    table(&header, &rows)
+}
+
+pub(super) fn steps(worth: &Worth) -> String {
+    let unit = escaped(worth.set_point_unit.as_deref().unwrap_or_default());
+    let mut rows = String::new();
+    for step in &worth.steps {
+        let name = match step.changes {
+            0 => format!("at {:.0} {unit}, before any step", step.to),
+            _ => format!("{:.0} → {:.0} {unit}", step.from, step.to),
+        };
+        let _ = write!(
+            rows,
+            "<tr><td>{name}</td><td>{}</td><td>{} dB</td><td>{} dB</td></tr>",
+            step.changes,
+            figure(Some(step.largest_without)),
+            figure(Some(step.largest_with))
+        );
+    }
+    table(
+        &["step", "how often", "largest loss without", "with"],
+        &rows,
+    )
+}
+
+pub(super) fn sensors(sensors: &[SensorFacts]) -> String {
+    let mut rows = String::new();
+    for sensor in sensors {
+        let (low, high) = sensor.range.unwrap_or((f64::NAN, f64::NAN));
+        let remarks = sensor.remarks();
+        let remarks = if remarks.is_empty() {
+            "<td class=\"left good\">in order</td>".to_owned()
+        } else {
+            format!(
+                "<td class=\"left bad\">{}</td>",
+                escaped(&remarks.join("; "))
+            )
+        };
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td>{remarks}<td>{}</td><td>{}</td><td>{:.1} s</td><td>{:.0} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escaped(&sensor.name),
+            sensor.samples,
+            sensor.rejected,
+            sensor.mean_gap_s,
+            sensor.longest_gap_s,
+            figure(sensor.noise),
+            figure(Some(low)),
+            figure(Some(high)),
+            escaped(&sensor.unit),
+        );
+    }
+    let header = [
+        "channel",
+        "health",
+        "samples",
+        "rejected",
+        "mean gap",
+        "longest gap",
+        "noise",
+        "lowest",
+        "highest",
+        "unit",
+    ];
+    table(&header, &rows)
+}
+
+/// How the fit of each estimator went.
+pub(super) fn estimators(estimators: &[EstimatorCard]) -> String {
+    let mut rows = String::new();
+    for estimator in estimators {
+        let dropped = &estimator.dropped;
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td><td class=\"left\">{} of {}</td><td>{}</td><td>{}</td><td>{} {}</td><td>{}</td><td class=\"left\">{}</td></tr>",
+            escaped(&estimator.node),
+            escaped(&estimator.kind),
+            escaped(&estimator.truth),
+            estimator.rows,
+            dropped.without_run + dropped.outside_limits + dropped.incomplete,
+            figure(estimator.report.in_sample_rmse),
+            escaped(&estimator.unit),
+            figure(estimator.report.condition),
+            escaped(&estimator.report.notes.join(" ")),
+        );
+    }
+    table(
+        &[
+            "estimator",
+            "kind",
+            "rows",
+            "left out",
+            "RMSE of the fit",
+            "condition",
+            "notes",
+        ],
+        &rows,
+    )
+}

@@ -1,0 +1,234 @@
+//! Decides which figures of the article stand beside ours, and for which machines.
+
+use serde::Serialize;
+
+use super::course::{Axis, Course};
+use super::rms;
+
+/// A table of the article beside the same figures here.
+#[derive(Debug, Clone, Serialize)]
+pub struct Published {
+    /// Where it stands.
+    pub source: &'static str,
+    /// Only instants with an absolute drift below count here, in nm/min.
+    pub limit_nm_per_min: f64,
+    /// The axes, in the order of the figures.
+    pub axes: Vec<&'static str>,
+    /// Its rows.
+    pub rows: Vec<PublishedRow>,
+}
+
+/// One row: root mean square errors in nm/min.
+#[derive(Debug, Clone, Serialize)]
+pub struct PublishedRow {
+    /// What predicts, as the article names it.
+    pub name: &'static str,
+    /// The node that is the same here.
+    pub node: Option<String>,
+    /// The figures of the article, by axis.
+    pub published: Vec<f64>,
+    /// Ours, by axis.
+    pub ours: Vec<Option<f64>>,
+}
+
+struct Table {
+    source: &'static str,
+    limit: f64,
+    axes: &'static [&'static str],
+    rows: &'static [(&'static str, &'static str, &'static [f64])],
+}
+
+/// Mandelli, Dankwart and Napoli; the kind of node beside the article's name of it.
+const TABLES: [Table; 3] = [
+    Table {
+        source: "Table 2, single axis system",
+        limit: 100.0,
+        axes: &["X", "Y", "Z"],
+        rows: &[
+            ("no model", "", &[11.18, 22.99, 20.87]),
+            ("thermal regression", "linear", &[8.13, 11.64, 17.89]),
+            ("AR", "ar", &[6.81, 9.41, 13.72]),
+            ("ARX", "arx", &[6.55, 8.81, 13.67]),
+            (
+                "auto-weighted voting",
+                "auto_weighted",
+                &[6.31, 8.69, 13.17],
+            ),
+        ],
+    },
+    Table {
+        source: "Table 3, die tester, drift below 250 nm/min",
+        limit: 250.0,
+        axes: &["X1", "Y1", "Z1", "X2", "Y2", "Z2"],
+        rows: &[
+            ("no model", "", &[11.54, 12.29, 53.34, 14.38, 13.53, 47.55]),
+            (
+                "thermal regression",
+                "linear",
+                &[10.75, 12.26, 20.07, 14.54, 13.30, 22.22],
+            ),
+            ("AR", "ar", &[9.83, 14.08, 15.12, 14.48, 15.21, 15.59]),
+            ("ARX", "arx", &[9.03, 12.87, 13.33, 13.94, 15.16, 13.72]),
+            (
+                "auto-weighted voting",
+                "auto_weighted",
+                &[8.45, 12.39, 10.25, 12.74, 13.15, 12.96],
+            ),
+        ],
+    },
+    Table {
+        source: "Table 4, die tester, drift below 850 nm/min",
+        limit: 850.0,
+        axes: &["X1", "Y1", "Z1", "X2", "Y2", "Z2"],
+        rows: &[
+            (
+                "no model",
+                "",
+                &[58.99, 50.19, 153.42, 20.91, 56.30, 140.96],
+            ),
+            (
+                "auto-weighted voting",
+                "auto_weighted",
+                &[48.65, 46.75, 20.67, 22.84, 52.49, 27.52],
+            ),
+        ],
+    },
+];
+
+/// The tables about machines with the axes of this one, and drifts in the same unit.
+pub(super) fn published(course: &Course) -> Vec<Published> {
+    let of_same_kind = |table: &&Table| {
+        let found = course.axes.iter().map(|axis| axis.name.as_str());
+        found.eq(table.axes.iter().copied()) && course.axes.iter().all(|axis| axis.unit == "nm/min")
+    };
+    TABLES
+        .iter()
+        .filter(of_same_kind)
+        .map(|table| beside(table, course))
+        .collect()
+}
+
+fn beside(table: &Table, course: &Course) -> Published {
+    let first = &course.axes[0];
+    let known: Vec<(&str, Option<usize>)> = table
+        .rows
+        .iter()
+        .map(|(_, kind, _)| {
+            (
+                *kind,
+                first.voters.iter().position(|voter| voter.kind == *kind),
+            )
+        })
+        .collect();
+    let nodes: Vec<usize> = known.iter().filter_map(|(_, nth)| *nth).collect();
+    let row = |(&(name, kind, figures), nth): (&(&'static str, &str, &[f64]), Option<usize>)| {
+        let ours = |axis: &Axis| match nth {
+            None if kind.is_empty() => error(axis, None, &nodes, table.limit),
+            None => None,
+            Some(nth) => error(axis, Some(nth), &nodes, table.limit),
+        };
+        PublishedRow {
+            name,
+            node: nth.map(|nth| first.voters[nth].node.clone()),
+            published: figures.to_vec(),
+            ours: course.axes.iter().map(ours).collect(),
+        }
+    };
+    Published {
+        source: table.source,
+        limit_nm_per_min: table.limit,
+        axes: table.axes.to_vec(),
+        rows: table
+            .rows
+            .iter()
+            .zip(known.iter().map(|(_, nth)| *nth))
+            .map(row)
+            .collect(),
+    }
+}
+
+/// The error of a voter, or of predicting nothing, where the truth is below the limit and all that are compared are there.
+fn error(axis: &Axis, voter: Option<usize>, compared: &[usize], limit: f64) -> Option<f64> {
+    let there = |i: &usize| {
+        let all = compared
+            .iter()
+            .all(|&nth| !axis.voters[nth].value[*i].is_nan());
+        all && axis.truth.value[*i].abs() < limit
+    };
+    let counted = (0..axis.truth.value.len()).filter(there);
+    rms(counted.map(|i| voter.map_or(0.0, |nth| axis.voters[nth].value[i]) - axis.truth.value[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Series, Voter};
+    use super::*;
+
+    fn axis(name: &str, truth: &[f64], voters: &[(&'static str, &[f64])]) -> Axis {
+        let voter = |(kind, value): &(&'static str, &[f64])| Voter {
+            node: (*kind).to_owned(),
+            kind,
+            value: value.to_vec(),
+        };
+        Axis {
+            name: name.to_owned(),
+            unit: "nm/min".to_owned(),
+            truth: Series {
+                time_s: (0..truth.len()).map(|i| i as f64).collect(),
+                value: truth.to_vec(),
+            },
+            voters: voters.iter().map(voter).collect(),
+            main: 0,
+            ahead_s: 300.0,
+            weights: Vec::new(),
+            states: None,
+        }
+    }
+
+    #[test]
+    fn a_machine_with_other_axes_has_no_published_figures() {
+        let course = |names: &[&str]| Course {
+            axes: names.iter().map(|name| axis(name, &[], &[])).collect(),
+            ..Course::default()
+        };
+        assert!(published(&course(&["Z"])).is_empty());
+        assert!(published(&course(&["X", "Z", "Y"])).is_empty());
+        assert_eq!(published(&course(&["X", "Y", "Z"])).len(), 1);
+    }
+
+    #[test]
+    fn our_figures_are_those_below_the_limit_at_which_all_are_there() {
+        let nan = f64::NAN;
+        let truth = [3.0, 4.0, 100.0, 50.0];
+        let of = |name| {
+            axis(
+                name,
+                &truth,
+                &[
+                    ("linear", &[2.0, 2.0, 0.0, 0.0]),
+                    ("arx", &[3.0, 5.0, 0.0, nan]),
+                ],
+            )
+        };
+        let course = Course {
+            axes: ["X", "Y", "Z"].map(of).into(),
+            ..Course::default()
+        };
+        let table = &published(&course)[0];
+        let ours: Vec<_> = table
+            .rows
+            .iter()
+            .map(|row| (row.name, row.ours[0]))
+            .collect();
+        // The third truth is not below 100, the fourth has no ARX.
+        let expected = [
+            ("no model", Some((25.0_f64 / 2.0).sqrt())),
+            ("thermal regression", Some((5.0_f64 / 2.0).sqrt())),
+            ("AR", None),
+            ("ARX", Some((1.0_f64 / 2.0).sqrt())),
+            ("auto-weighted voting", None),
+        ];
+        assert_eq!(ours, expected);
+        assert_eq!(table.rows[3].published, [6.55, 8.81, 13.67]);
+    }
+}

@@ -1,0 +1,201 @@
+//! Decides what is told of a measured channel: gaps, rejected samples, noise, and what a `health` node found.
+
+use std::collections::BTreeMap;
+
+use athermal_core::compile::{Plan, PlannedRole};
+use athermal_core::engine::Engine;
+use serde::Serialize;
+
+/// As many samples with the very same value look stuck, where the channel changes otherwise.
+const STUCK: u64 = 20;
+/// The share of samples that differ from the one before in a channel that changes.
+const CHANGES: f64 = 0.9;
+
+/// What can be said of a measured channel.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SensorFacts {
+    /// The channel: `temperature.plate1`.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Samples taken.
+    pub samples: u64,
+    /// Samples rejected, as infinite or out of range.
+    pub rejected: u64,
+    /// Those of them that were infinite.
+    pub infinite: u64,
+    /// The longest time in s between two samples.
+    pub longest_gap_s: f64,
+    /// The mean time in s between two samples.
+    pub mean_gap_s: f64,
+    /// The time in s after which a sample is too old to count.
+    pub max_age_s: Option<f64>,
+    /// Gaps longer than that, or, where there is none, than five times the mean.
+    pub gaps: u64,
+    /// The most samples in a row with the very same value.
+    pub most_unchanged: u64,
+    /// The noise of single samples, `sqrt(mean of squared successive differences / 2)`: real changes from one sample to the next count in.
+    pub noise: Option<f64>,
+    /// Lowest and highest sample.
+    pub range: Option<(f64, f64)>,
+    /// Ticks by what a `health` node of the graph said of the channel; empty where none watches it.
+    pub health: BTreeMap<&'static str, u64>,
+    #[serde(skip)]
+    looking: Looking,
+}
+
+/// What is needed to go on.
+#[derive(Debug, Clone, Default)]
+struct Looking {
+    last: Option<(f64, f64)>,
+    unchanged: u64,
+    changes: u64,
+    squares: f64,
+    lengths: Vec<f64>,
+    /// The channel's range in the graph.
+    limits: (f64, f64),
+    /// The slot in which a `health` node says what is wrong.
+    reason: Option<usize>,
+}
+
+/// One for each measured channel.
+pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
+    let reasons = reasons(plan);
+    let facts = |(slot, source): (usize, &athermal_core::compile::SourceChannel)| SensorFacts {
+        name: source.name.clone(),
+        unit: plan.channels[slot].channel.unit.to_string(),
+        max_age_s: plan.channels[slot].channel.max_age.map(|age| age.secs()),
+        looking: Looking {
+            limits: source.range,
+            reason: reasons.get(&slot).copied(),
+            ..Looking::default()
+        },
+        ..SensorFacts::default()
+    };
+    plan.sources.iter().enumerate().map(facts).collect()
+}
+
+/// Has every `health` node say what is wrong, whether or not the graph reads it.
+pub(super) fn ask_for_reasons(plan: &mut Plan) {
+    for node in &mut plan.nodes {
+        if node.kind.name == "health"
+            && let PlannedRole::Feature { wanted, .. } = &mut node.role
+        {
+            wanted.fill(true);
+        }
+    }
+}
+
+/// The slots of the ports `reason`, by the measured channels that they are about.
+fn reasons(plan: &Plan) -> BTreeMap<usize, usize> {
+    let mut reasons = BTreeMap::new();
+    for node in plan.nodes.iter().filter(|node| node.kind.name == "health") {
+        let PlannedRole::Feature { gathers, .. } = &node.role else {
+            continue;
+        };
+        let (Some(&watched), Some((_, slots))) = (gathers.first(), node.ports.get(1)) else {
+            continue;
+        };
+        let watched = plan.gathers[watched].entries.iter().map(|entry| entry.slot);
+        reasons.extend(
+            watched
+                .zip(slots.clone())
+                .filter(|(slot, _)| *slot < plan.sources.len()),
+        );
+    }
+    reasons
+}
+
+impl SensorFacts {
+    pub(super) fn look(&mut self, now_s: f64, value: f64, engine: &Engine) {
+        if let Some(slot) = self.looking.reason {
+            let reason = athermal_control::health_reason(engine.value(slot));
+            if let Some(reason) = reason {
+                *self.health.entry(reason).or_default() += 1;
+            }
+        }
+        let (low, high) = self.looking.limits;
+        if value.is_nan() {
+            return;
+        }
+        if !(low..=high).contains(&value) || value.is_infinite() {
+            self.rejected += 1;
+            self.infinite += u64::from(value.is_infinite());
+            return;
+        }
+        let looking = &mut self.looking;
+        looking.unchanged += 1;
+        if let Some((last_s, last)) = looking.last {
+            let gap = now_s - last_s;
+            looking.lengths.push(gap);
+            self.longest_gap_s = self.longest_gap_s.max(gap);
+            self.mean_gap_s += (gap - self.mean_gap_s) / looking.lengths.len() as f64;
+            looking.squares += (value - last) * (value - last);
+            if value != last {
+                looking.changes += 1;
+                looking.unchanged = 1;
+            }
+        }
+        self.most_unchanged = self.most_unchanged.max(looking.unchanged);
+        self.samples += 1;
+        let (lowest, highest) = self.range.unwrap_or((value, value));
+        self.range = Some((lowest.min(value), highest.max(value)));
+        looking.last = Some((now_s, value));
+    }
+
+    /// Another segment begins.
+    pub(super) fn segment(&mut self) {
+        self.looking.last = None;
+        self.looking.unchanged = 0;
+    }
+
+    /// Counts what can be counted only once all is known.
+    pub(super) fn finish(&mut self) {
+        let lengths = std::mem::take(&mut self.looking.lengths);
+        let limit = self.max_age_s.unwrap_or(5.0 * self.mean_gap_s);
+        self.gaps = lengths.iter().filter(|gap| **gap > limit).count() as u64;
+        let pairs = lengths.len() as f64;
+        self.noise = (pairs > 0.0).then(|| (0.5 * self.looking.squares / pairs).sqrt());
+    }
+
+    /// What somebody should look at.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if self.samples == 0 {
+            remarks.push("no sample".to_owned());
+        }
+        let beyond = self.rejected - self.infinite;
+        for (count, what) in [(beyond, "out of range"), (self.infinite, "infinite")] {
+            if count > 0 {
+                remarks.push(format!("{count} {what}"));
+            }
+        }
+        if self.gaps > 0 {
+            let plural = if self.gaps == 1 { "" } else { "s" };
+            remarks.push(format!(
+                "{} gap{plural}, the longest {}",
+                self.gaps,
+                minutes(self.longest_gap_s)
+            ));
+        }
+        let moving = self.looking.changes as f64 + self.most_unchanged as f64;
+        if self.most_unchanged >= STUCK && moving > CHANGES * self.samples as f64 {
+            remarks.push(format!("the same value {} times", self.most_unchanged));
+        }
+        let faults = self
+            .health
+            .iter()
+            .filter(|(reason, _)| **reason != "healthy");
+        remarks.extend(faults.map(|(reason, ticks)| format!("{reason} at {ticks} ticks")));
+        remarks
+    }
+}
+
+fn minutes(seconds: f64) -> String {
+    match seconds {
+        s if s >= 7200.0 => format!("{:.1} h", s / 3600.0),
+        s if s >= 120.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{s:.0} s"),
+    }
+}

@@ -1,0 +1,162 @@
+//! Decides what of a report is told on a terminal, 80 columns wide.
+
+use std::fmt::Write as _;
+
+use super::{Facts, Published, Worth, figure};
+
+/// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
+#[must_use]
+pub fn text(facts: &Facts) -> String {
+    let mut text = String::new();
+    for verdict in &facts.verdicts {
+        let sentence = format!("{}: {}", verdict.axis, verdict.sentence());
+        text.push_str(&filled(&sentence, "   "));
+    }
+    facts
+        .published
+        .iter()
+        .for_each(|table| published(&mut text, table));
+    if let Some(worth) = &facts.worth {
+        loss(&mut text, worth);
+    }
+    let sensors = facts.course.sensors.iter();
+    let odd: Vec<_> = sensors
+        .map(|sensor| (sensor, sensor.remarks()))
+        .filter(|(_, remarks)| !remarks.is_empty())
+        .collect();
+    if !odd.is_empty() {
+        text.push_str("\nSensors to look at:\n");
+        for (sensor, remarks) in odd {
+            text.push_str(&filled(
+                &format!("  {}: {}", sensor.name, remarks.join("; ")),
+                "    ",
+            ));
+        }
+    }
+    text
+}
+
+/// Errors in nm/min, the article's before ours in each row.
+fn published(text: &mut String, table: &Published) {
+    let _ = write!(
+        text,
+        "\n{}, in nm/min: published | here\n{:<21}",
+        table.source, ""
+    );
+    let width = if table.axes.len() > 3 { 9 } else { 14 };
+    for axis in &table.axes {
+        let _ = write!(text, "{axis:>width$}");
+    }
+    text.push('\n');
+    for row in &table.rows {
+        let _ = write!(text, "{:<21}", row.name);
+        for (published, ours) in row.published.iter().zip(&row.ours) {
+            let short = |value: Option<f64>| match value {
+                Some(value) if value < 10.0 => format!("{value:.1}"),
+                Some(value) => format!("{value:.0}"),
+                None => "-".to_owned(),
+            };
+            let both = format!("{}|{}", short(Some(*published)), short(*ours));
+            let _ = write!(text, "{both:>width$}");
+        }
+        text.push('\n');
+    }
+}
+
+fn loss(text: &mut String, worth: &Worth) {
+    let Some((without, with)) = worth.below_limit else {
+        return;
+    };
+    let _ = writeln!(
+        text,
+        "\nFive-minute losses below {} dB: {:.1} % without, {:.1} % with correction.",
+        worth.loss_limit,
+        100.0 * without,
+        100.0 * with
+    );
+    if worth.settling.is_empty() {
+        return;
+    }
+    let unit = worth.set_point_unit.as_deref().unwrap_or_default();
+    let _ = writeln!(
+        text,
+        "\n{:>27}{:>21}{:>27}\n{:>6}{:>9}{:>9}{:>15}{:>9}{:>17}{:>9}",
+        format!("set point in {unit}"),
+        "settled after, min",
+        "largest loss, dB",
+        "hour",
+        "from",
+        "to",
+        "without",
+        "with",
+        "without",
+        "with"
+    );
+    let minutes = |m: Option<f64>| m.map_or("never".to_owned(), |m| format!("{m:.1}"));
+    for s in &worth.settling {
+        let _ = writeln!(
+            text,
+            "{:>6.1}{:>9.1}{:>9.1}{:>15}{:>9}{:>17}{:>9}",
+            s.at_s / 3600.0,
+            s.from,
+            s.to,
+            minutes(s.without_min),
+            minutes(s.with_min),
+            figure(Some(s.largest_without)),
+            figure(Some(s.largest_with)),
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\n{:<32}{:>28}",
+        "largest loss per step, dB", "without     with"
+    );
+    for step in &worth.steps {
+        let name = match step.changes {
+            0 => format!("{:.0} {unit}, before any step", step.to),
+            1 => format!("{:.0} to {:.0} {unit}", step.from, step.to),
+            n => format!("{:.0} to {:.0} {unit}, {n} times", step.from, step.to),
+        };
+        let _ = writeln!(
+            text,
+            "{name:<32}{:>19}{:>9}",
+            figure(Some(step.largest_without)),
+            figure(Some(step.largest_with))
+        );
+    }
+}
+
+/// Words on lines of at most 80 letters; lines after the first begin with `indent`.
+fn filled(words: &str, indent: &str) -> String {
+    let lead = words.len() - words.trim_start().len();
+    let mut text = " ".repeat(lead);
+    let mut column = lead;
+    for (nth, word) in words.split_whitespace().enumerate() {
+        let length = word.chars().count();
+        if nth > 0 && column + 1 + length > 80 {
+            text.push('\n');
+            text.push_str(indent);
+            column = indent.len();
+        } else if nth > 0 {
+            text.push(' ');
+            column += 1;
+        }
+        text.push_str(word);
+        column += length;
+    }
+    text + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_broken_before_the_edge_and_keep_their_indent() {
+        let words = "  a ".to_owned() + &"word ".repeat(30);
+        let text = filled(&words, "    ");
+        assert!(text.starts_with("  a word") && text.contains("\n    word"));
+        assert!(text.lines().all(|line| line.chars().count() <= 80));
+        assert_eq!(text.split_whitespace().count(), 31);
+    }
+}

@@ -1,0 +1,133 @@
+//! Decides where a graph's correction comes from and what it acts on, and writes both down.
+
+use athermal_control::{OpticalLoss, Settled};
+use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
+use athermal_core::engine::Engine;
+use athermal_core::time::{Duration, Instant};
+
+/// What the correction was and what it acts on, for working out its worth.
+#[derive(Debug)]
+pub(super) struct Track {
+    /// Names of the axes.
+    pub(super) axes: Vec<String>,
+    /// Unit of position and of drift.
+    pub(super) units: (String, String),
+    pub(super) span: Duration,
+    pub(super) loss: Option<OpticalLoss>,
+    pub(super) settled: Option<Settled>,
+    /// The unit of the set point.
+    pub(super) set_point: Option<String>,
+    pub(super) rows: Vec<TrackRow>,
+}
+
+/// One instant at which something was measured.
+#[derive(Debug)]
+pub(super) struct TrackRow {
+    pub(super) at: Instant,
+    pub(super) position: Vec<f64>,
+    pub(super) correction: Vec<f64>,
+    pub(super) set_point: f64,
+    /// Whether another segment begins here.
+    pub(super) begins: bool,
+}
+
+/// Where to look for what a correction does.
+pub(super) struct Places {
+    positions: Vec<usize>,
+    corrections: Vec<usize>,
+    factor: f64,
+    set_point: Option<usize>,
+}
+
+pub(super) fn parameters<T: serde::de::DeserializeOwned>(plan: &Plan, kind: &str) -> Option<T> {
+    let node = plan.nodes.iter().find(|node| node.kind.name == kind)?;
+    serde_json::from_value(node.spec.parameters()).ok()
+}
+
+fn first_input(plan: &Plan, node: &PlannedNode, port: usize, nth: usize) -> Option<usize> {
+    let PlannedRole::Feature { gathers, .. } = &node.role else {
+        return None;
+    };
+    let gather = plan.gathers.get(*gathers.get(port)?)?;
+    gather.entries.get(nth).map(|entry| entry.slot)
+}
+
+/// Finds the correction, the positions that it acts on, and how its worth is judged.
+pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
+    let mut places = Places {
+        positions: Vec::new(),
+        corrections: Vec::new(),
+        factor: f64::NAN,
+        set_point: None,
+    };
+    let mut of_drift = None;
+    for node in plan
+        .nodes
+        .iter()
+        .filter(|node| node.kind.name == "compensate")
+    {
+        for (nth, correction) in node.ports.first()?.1.clone().enumerate() {
+            let rate = first_input(plan, node, 0, nth)?;
+            let truth = plan.channels[rate].predicts?;
+            let slope = &plan.nodes[plan.channels[truth].node?];
+            let position = first_input(plan, slope, 0, truth - slope.slots.start)?;
+            let unit = &plan.channels[position].channel.unit;
+            places.factor = plan.channels[correction].channel.unit.factor_to(unit)?;
+            places.positions.push(position);
+            places.corrections.push(correction);
+            of_drift = Some((truth, position));
+        }
+    }
+    let (truth, position) = of_drift?;
+    let settled = plan.nodes.iter().find(|node| node.kind.name == "settled");
+    places.set_point = settled.and_then(|node| first_input(plan, node, 1, 0));
+    let drift = &plan.channels[truth].channel;
+    let track = Track {
+        axes: places
+            .corrections
+            .iter()
+            .map(|&slot| plan.channels[slot].channel.name.clone())
+            .collect(),
+        units: (
+            plan.channels[position].channel.unit.to_string(),
+            drift.unit.to_string(),
+        ),
+        span: drift.span,
+        loss: parameters(plan, "optical_loss"),
+        settled: parameters(plan, "settled"),
+        set_point: places
+            .set_point
+            .map(|slot| plan.channels[slot].channel.unit.to_string()),
+        rows: Vec::new(),
+    };
+    Some((places, track))
+}
+
+impl Track {
+    pub(super) fn look(&mut self, places: &Places, engine: &Engine, now: Instant, begins: bool) {
+        let position: Vec<f64> = places
+            .positions
+            .iter()
+            .map(|&slot| engine.value(slot))
+            .collect();
+        let set_point = places.set_point.map_or(f64::NAN, |slot| engine.value(slot));
+        if begins && let Some(row) = self.rows.last_mut() {
+            // Kept on the row before, so that it is seen even where nothing is measured at the break.
+            row.begins = true;
+        }
+        if position.iter().all(|value| value.is_nan()) && set_point.is_nan() {
+            return;
+        }
+        let correction = places
+            .corrections
+            .iter()
+            .map(|&slot| engine.value(slot) * places.factor);
+        self.rows.push(TrackRow {
+            at: now,
+            position,
+            correction: correction.collect(),
+            set_point,
+            begins: false,
+        });
+    }
+}

@@ -1,0 +1,160 @@
+//! Decides what is said of each axis in a sentence.
+
+use std::fmt::Write as _;
+
+use athermal_core::score::Score;
+use serde::Serialize;
+
+use super::{Axis, Worth, figure, rms};
+
+/// What a model is worth on an axis. Figures are root mean squares in the unit of the axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The axis.
+    pub axis: String,
+    /// The node that predicts it.
+    pub node: String,
+    /// The unit.
+    pub unit: String,
+    /// Error of the prediction; none where it gave nothing.
+    pub error: Option<f64>,
+    /// The drift itself on the same instants: the error of no model.
+    pub no_model: Option<f64>,
+    /// The noise of the measured drift.
+    pub noise: Option<f64>,
+    /// Drift over all that is corrected, without the correction.
+    pub without_correction: Option<f64>,
+    /// The same with the correction.
+    pub with_correction: Option<f64>,
+}
+
+impl Verdict {
+    pub(super) fn of(axis: &Axis, scores: &[Score], worth: Option<&Worth>) -> Self {
+        let errors = axis.errors();
+        let both = || {
+            axis.truth
+                .value
+                .iter()
+                .zip(&errors)
+                .filter(|(_, e)| !e.is_nan())
+        };
+        let node = &axis.voters[axis.main].node;
+        let score = scores
+            .iter()
+            .find(|score| score.node == *node && is_channel(&score.truth, &axis.name));
+        let corrected = worth.and_then(|worth| {
+            let i = worth.axes.iter().position(|name| *name == axis.name)?;
+            let pairs = worth.drift_without[i]
+                .value
+                .iter()
+                .zip(&worth.drift_with[i].value);
+            let both: Vec<_> = pairs.filter(|(y, r)| !y.is_nan() && !r.is_nan()).collect();
+            rms(both.iter().map(|b| *b.0)).zip(rms(both.iter().map(|b| *b.1)))
+        });
+        Self {
+            axis: axis.name.clone(),
+            node: node.clone(),
+            unit: axis.unit.clone(),
+            error: rms(both().map(|(_, e)| *e)),
+            no_model: rms(both().map(|(y, _)| *y)),
+            noise: score.and_then(|score| score.truth_noise),
+            without_correction: corrected.map(|both| both.0),
+            with_correction: corrected.map(|both| both.1),
+        }
+    }
+
+    /// Whether the prediction is better than none, and the correction, where there is one, too.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        let better = |with: Option<f64>, without: Option<f64>| {
+            with.zip(without)
+                .is_some_and(|(with, without)| with < without)
+        };
+        better(self.error, self.no_model)
+            && (self.with_correction.is_none()
+                || better(self.with_correction, self.without_correction))
+    }
+
+    /// The sentence, after the name of the axis.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let (Some(error), Some(no_model)) = (self.error, self.no_model) else {
+            return format!("{} gave no prediction on these data.", self.node);
+        };
+        let mut text = format!(
+            "{} predicts the drift of {} {} RMS to {}",
+            self.node,
+            figure(Some(no_model)),
+            self.unit,
+            figure(Some(error)),
+        );
+        let less = |with: f64, without: f64| 100.0 * (1.0 - with / without);
+        let _ = if error < no_model {
+            write!(text, ", {:.0} % less than no model", less(error, no_model))
+        } else {
+            write!(text, ", worse than no model")
+        };
+        if let Some(noise) = self.noise {
+            let _ = write!(
+                text,
+                " (the measurement's own noise is {})",
+                figure(Some(noise))
+            );
+        }
+        if let (Some(without), Some(with)) = (self.without_correction, self.with_correction) {
+            let _ = write!(
+                text,
+                "; corrected, {} of {} remain",
+                figure(Some(with)),
+                figure(Some(without))
+            );
+            let _ = if with < without {
+                write!(text, ", {:.0} % less", less(with, without))
+            } else {
+                write!(text, ": worse than without")
+            };
+        }
+        text.push('.');
+        text
+    }
+}
+
+/// Whether a reference such as `drift.Z1` or `drift:slope.Z1` names a channel.
+pub(super) fn is_channel(reference: &str, channel: &str) -> bool {
+    let node_and_port = reference.strip_suffix(channel);
+    node_and_port.is_some_and(|rest| rest.ends_with('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_says_what_is_left_and_calls_worse_worse() {
+        let mut verdict = Verdict {
+            axis: "Z1".into(),
+            node: "vote".into(),
+            unit: "nm/min".into(),
+            error: Some(20.0),
+            no_model: Some(50.0),
+            noise: Some(3.85),
+            without_correction: Some(60.0),
+            with_correction: Some(15.0),
+        };
+        assert!(verdict.is_good());
+        assert_eq!(
+            verdict.sentence(),
+            "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the measurement's own noise is 3.85); \
+             corrected, 15.0 of 60.0 remain, 75 % less."
+        );
+        verdict.with_correction = Some(61.0);
+        assert!(
+            !verdict.is_good()
+                && verdict
+                    .sentence()
+                    .ends_with("61.0 of 60.0 remain: worse than without.")
+        );
+        verdict.error = None;
+        assert_eq!(verdict.sentence(), "vote gave no prediction on these data.");
+    }
+}

@@ -1,0 +1,311 @@
+//! Replacing the graph of `athermal run`, as a user does it: at a time of the data, after a comparison, or when a file changes.
+//! Decides nothing about what the engine makes of it.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use workbench::{Finished, Scratch, athermal};
+
+/// Two predictions of a drift, of which the graph shows one.
+const GRAPH: &str = r#"
+schema = 1
+name = "shown"
+[time]
+column = "time_s"
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+max_age = "3min"
+[modules.model]
+from = "model.toml"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["30s"]
+unit = "nm/min"
+[nodes.model]
+module = "model"
+inputs.truth = "drift.Z"
+[outputs]
+predicted = "model"
+"#;
+
+/// The module of a file of its own: the truth at the smallest lag, and nothing at all.
+fn module(shown: &str) -> String {
+    format!(
+        "schema = 1\n[modules.model]\ninputs = [\"truth\"]\noutputs = {{ shown = \"{shown}\", same = \"same\", still = \"still\" }}\n\
+         nodes.same = {{ type = \"persistence\", inputs.truth = \"{{truth}}\", ahead = \"30s\" }}\n\
+         nodes.still = {{ type = \"zero\", inputs.truth = \"{{truth}}\", ahead = \"30s\" }}\n"
+    )
+}
+
+/// A folder with the graph, one that shows zero in place of the last drift, and five minutes of an uneven drift.
+fn desk(test: &str) -> Scratch {
+    let scratch = Scratch::new(&format!("swap-commands-{test}"));
+    scratch.file("model.toml", module("same"));
+    scratch.file("graph.toml", GRAPH);
+    let still = "schema = 1\nextends = \"graph.toml\"\nname = \"still\"\noutputs.predicted = \"model:still\"\n";
+    scratch.file("still.toml", still);
+    scratch.file("data.csv", format!("time_s,Z\n{}", rows(1000, 31)));
+    scratch
+}
+
+/// Rows ten seconds apart from an instant on.
+fn rows(from: u32, count: u32) -> String {
+    let row = |nth: u32| {
+        let place = 10.0 * f64::from(nth) + 7.0 * (0.9 * f64::from(nth)).sin();
+        format!("{},{place:.3}\n", from + 10 * nth)
+    };
+    (0..count).map(row).collect()
+}
+
+fn run(scratch: &Scratch, arguments: &[&str]) -> Finished {
+    let (graph, data) = (scratch.path("graph.toml"), scratch.path("data.csv"));
+    let mut all: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"run", &graph, &"--input", &data];
+    all.extend(arguments.iter().map(|argument| argument as &dyn AsRef<_>));
+    athermal(&all)
+}
+
+/// Time, prediction and revision of each row.
+fn table(finished: &Finished) -> Vec<(f64, String, String)> {
+    let mut lines = finished.out.lines();
+    assert_eq!(lines.next(), Some("time_s,predicted.Z,revision"));
+    let row = |line: &str| {
+        let cells: Vec<_> = line.split(',').collect();
+        (cells[0].parse().unwrap(), cells[1].into(), cells[2].into())
+    };
+    lines.map(row).collect()
+}
+
+fn swap(scratch: &Scratch, at: &str, graph: &str) -> String {
+    format!("--swap-at={at}={}", scratch.path(graph).display())
+}
+
+#[test]
+fn the_new_graph_makes_the_rows_from_the_stated_time_on() {
+    let scratch = desk("at");
+    // As the data write it, and so long after the first row.
+    for at in ["1200", "200s"] {
+        let finished = run(&scratch, &[&swap(&scratch, at, "still.toml")]).ended(0);
+        finished.tells(&[
+            "3 of 3 nodes go on as they were",
+            "took over before tick 21",
+        ]);
+        let table = table(&finished);
+        assert_eq!(table.len(), 31, "no row is lost");
+        for (time, predicted, revision) in &table {
+            assert_eq!(*revision == table[0].2, *time < 1200.0, "at {time} s");
+            assert_eq!(predicted == "0.0", *time >= 1200.0, "at {time} s");
+        }
+    }
+}
+
+#[test]
+fn outputs_that_only_one_graph_has_are_empty_while_another_runs() {
+    let scratch = desk("columns");
+    let more = "schema = 1\nextends = \"graph.toml\"\n[outputs]\nstill = \"model:still\"\n";
+    scratch.file("more.toml", more);
+    let out = run(&scratch, &[&swap(&scratch, "1200", "more.toml")])
+        .ended(0)
+        .out;
+    let mut lines = out.lines();
+    assert_eq!(lines.next(), Some("time_s,predicted.Z,still.Z,revision"));
+    for line in lines {
+        let cells: Vec<_> = line.split(',').collect();
+        let swapped = cells[0].parse::<f64>().unwrap() >= 1200.0;
+        assert_eq!(cells[2].is_empty(), !swapped, "{line}");
+    }
+}
+
+#[test]
+fn a_worse_graph_is_refused_with_figures_and_a_margin_lets_it_pass() {
+    let scratch = desk("shadow");
+    let at = swap(&scratch, "1100", "still.toml");
+    let refused = run(&scratch, &[&at, "--shadow", "2min"]).ended(0);
+    refused.tells(&[
+        "in the shadow:\n  predicted.Z: RMSE ",
+        " over 9 instants\n  new to running: ",
+        "still.toml does not take over: its error is larger",
+    ]);
+    let revisions = |finished: &Finished| {
+        let mut revisions: Vec<_> = table(finished).into_iter().map(|row| row.2).collect();
+        revisions.dedup();
+        revisions.len()
+    };
+    assert_eq!(revisions(&refused), 1);
+    let taken = run(&scratch, &[&at, "--shadow", "2min", "--margin", "10000%"]).ended(0);
+    taken.tells(&["took over before tick 23"]);
+    assert_eq!(revisions(&taken), 2);
+    let early = run(&scratch, &[&at, "--shadow", "10s"]).ended(0);
+    early.tells(&["does not take over: there was nothing to compare"]);
+    let late = run(&scratch, &[&at, "--shadow", "1h"]).ended(0);
+    late.tells(&["still.toml did not take over: the data ended before"]);
+}
+
+#[test]
+fn what_cannot_be_swapped_is_told_before_the_first_row() {
+    let scratch = desk("refused");
+    let other_time = "schema = 1\nextends = \"still.toml\"\ntime = { unit = \"ms\" }\n";
+    scratch.file("other-time.toml", other_time);
+    for (arguments, told) in [
+        (
+            vec![swap(&scratch, "1200", "other-time.toml")],
+            "the new graph reads time from the column `time_s` in steps of 1ms and what runs from the column `time_s` in steps of 1s",
+        ),
+        (
+            vec![swap(&scratch, "noon", "still.toml")],
+            "\"noon\" is no time of these data: write it as they do, or as a duration such as 6h",
+        ),
+        (
+            vec!["--swap-at=1200".to_owned()],
+            "--swap-at takes TIME=GRAPH, such as 3600=new.toml or 1h=new.toml, found \"1200\"",
+        ),
+        (vec![swap(&scratch, "1200", "nowhere.toml")], "nowhere.toml"),
+        (
+            vec![
+                swap(&scratch, "1200", "still.toml"),
+                "--margin=5".to_owned(),
+            ],
+            "expected a percentage such as \"5%\", found \"5\"",
+        ),
+        (
+            vec![
+                swap(&scratch, "1200", "still.toml"),
+                "--shadow=0s".to_owned(),
+            ],
+            "expected some time such as \"30min\", found \"0s\"",
+        ),
+    ] {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let finished = run(&scratch, &arguments).ended(2);
+        finished.tells(&[told]);
+        assert_eq!(finished.out, "", "{told}");
+    }
+}
+
+#[test]
+fn a_time_after_the_data_is_told_at_the_end() {
+    let scratch = desk("never");
+    let finished = run(&scratch, &[&swap(&scratch, "9000", "still.toml")]).ended(0);
+    finished.tells(&["still.toml did not take over: the data ended before"]);
+}
+
+/// A run that is fed row by row while its files change.
+struct Live {
+    child: std::process::Child,
+    rows: std::process::ChildStdin,
+    out: BufReader<std::process::ChildStdout>,
+    time: u32,
+}
+
+impl Live {
+    fn new(graph: &Path) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+            .arg("run")
+            .arg(graph)
+            .args(["--input", "-", "--output", "-", "--watch"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut rows = child.stdin.take().unwrap();
+        rows.write_all(b"time_s,Z\n").unwrap();
+        let mut live = Self {
+            rows,
+            out: BufReader::new(child.stdout.take().unwrap()),
+            child,
+            time: 0,
+        };
+        live.row();
+        assert_eq!(live.line(), "time_s,predicted.Z,revision");
+        live.line();
+        live
+    }
+
+    fn row(&mut self) {
+        self.time += 10;
+        writeln!(self.rows, "{},{}", self.time, self.time).unwrap();
+        self.rows.flush().unwrap();
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.out.read_line(&mut line).unwrap();
+        line.trim_end().to_owned()
+    }
+
+    fn revision(&mut self) -> String {
+        self.row();
+        self.line().rsplit(',').next().unwrap().to_owned()
+    }
+
+    /// Feeds rows until another revision makes them.
+    fn until_swapped(&mut self, before: &str) -> String {
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_secs(60) {
+            let now = self.revision();
+            if now != before {
+                return now;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        panic!("revision {before} goes on");
+    }
+
+    fn told(self) -> String {
+        drop(self.rows);
+        let output = self.child.wait_with_output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    }
+}
+
+#[test]
+fn a_watched_graph_is_taken_over_when_any_of_its_files_changes() {
+    let scratch = desk("watch");
+    let own = scratch.file(
+        "own.toml",
+        "schema = 1\nextends = \"graph.toml\"\nname = \"own\"\n",
+    );
+    let mut live = Live::new(&own);
+    let first = live.revision();
+    // The file that it extends; then one from which that takes a module; then its own.
+    let slower = GRAPH.replace("windows = [\"30s\"]", "windows = [\"20s\"]");
+    scratch.file("graph.toml", &slower);
+    let second = live.until_swapped(&first);
+    scratch.file("model.toml", module("still"));
+    let third = live.until_swapped(&second);
+    // A mistake is told, and putting it right is noticed.
+    scratch.file("model.toml", "schema = 1\n[modules.model\n");
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_millis(600) {
+        assert_eq!(live.revision(), third);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    scratch.file("model.toml", module("same"));
+    assert_eq!(live.until_swapped(&third), second, "the same graph again");
+    scratch.file(
+        "own.toml",
+        "schema = 1\nextends = \"graph.toml\"\n[outputs]\nmore = \"drift\"\n",
+    );
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_millis(600) {
+        assert_eq!(live.revision(), second);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let told = live.told();
+    for part in [
+        "error[A001]",
+        "own.toml is not taken over; what runs goes on",
+        "own.toml has the output `more.Z`, for which there is no column; what runs goes on",
+    ] {
+        assert!(told.contains(part), "`{part}` is not in\n{told}");
+    }
+}
