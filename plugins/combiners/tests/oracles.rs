@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use athermal_combiners::{AutoWeighted, Fading, Hedge, LastTruths, Memory, Weighting};
-use athermal_core::node::{Combine, Combiner, Votes};
+use athermal_core::node::{Combiner, Votes};
 use athermal_core::time::{Duration, Instant};
 
 fn table(file: &str) -> Vec<Vec<f64>> {

@@ -205,6 +205,7 @@ mod tests {
         let regressor = |i: usize| Regressor {
             name: format!("voter{i}"),
             unit: "nm/min".to_owned(),
+            sensors: Vec::new(),
         };
         let setup = TrainingSetup {
             regressors: (0..rows[0].0.len()).map(regressor).collect(),
