@@ -3,7 +3,7 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use athermal_estimators::{
-    Ar, Arx, ElasticNet, Huber, Lasso, Linear, Persistence, Polynomial, Rls, Zero,
+    Ar, Arx, ElasticNet, Huber, Lasso, Linear, Persistence, Polynomial, Rls, Stack, Zero,
 };
 
 conformance!(
@@ -175,6 +175,12 @@ conformance!(
         "#
     )
     .input("features", 3, "Cel"),
+);
+
+conformance!(
+    Stack,
+    Case::new(r#"ahead = "0s""#),
+    Case::new(r#"ahead = "0s""#).input("voters", 1, "nm"),
 );
 
 #[test]
