@@ -3,12 +3,14 @@
 //! Decides where things stand in a picture; not how numbers fall on an axis (`scale`), nor how shapes are written (`svg`, `png`).
 
 mod colours;
+mod plot;
 #[cfg(feature = "png")]
 mod png;
 mod scale;
 mod svg;
 
 pub use colours::{COLOURS, STYLE};
+pub use plot::Plot;
 pub(crate) use svg::escaped;
 
 use scale::{decimated, label, range, ticks};

@@ -15,7 +15,7 @@ mod worth;
 
 pub use course::{Axis, Course, Voter, Weight};
 pub use errors::Errors;
-pub use page::{Plot, page, plots};
+pub use page::{page, plots};
 pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
 pub use text::text;

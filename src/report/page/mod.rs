@@ -8,7 +8,7 @@ mod tables;
 use std::fmt::Write as _;
 
 use super::{Facts, Worth, figure};
-use crate::chart::{COLOURS, Chart, STYLE, escaped};
+use crate::chart::{COLOURS, Chart, Plot, STYLE, escaped};
 
 /// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
 #[must_use]
@@ -212,32 +212,11 @@ fn card(html: &mut String, facts: &Facts) {
     html.push_str(&tables::estimators(&card.estimators));
 }
 
-/// A picture as files.
-#[derive(Debug, Clone)]
-pub struct Plot {
-    /// Its name, without ending.
-    pub name: String,
-    /// As SVG.
-    pub svg: String,
-    /// As PNG.
-    #[cfg(feature = "png")]
-    pub png: Vec<u8>,
-}
-
 /// Every picture of the page as files of its own; those with nothing to draw are left out.
 #[must_use]
 pub fn plots(facts: &Facts) -> Vec<Plot> {
     let mut plots = Vec::new();
-    let mut add = |name: String, chart: &Chart<'_>| {
-        #[cfg(feature = "png")]
-        let Some(png) = chart.png() else { return };
-        plots.push(Plot {
-            name,
-            svg: chart.file(),
-            #[cfg(feature = "png")]
-            png,
-        });
-    };
+    let mut add = |name: String, chart: &Chart<'_>| plots.extend(Plot::of(name, chart));
     for (axis, spread) in facts.course.axes.iter().zip(&facts.errors) {
         let (errors, name) = (axis.errors(), &axis.name);
         add(
