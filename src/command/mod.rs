@@ -1,5 +1,6 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
+mod build;
 mod check;
 mod compare;
 mod completions;
@@ -11,6 +12,7 @@ mod evaluate;
 mod explain;
 mod fit;
 mod init;
+mod new;
 mod nodes;
 mod report;
 mod run;
@@ -62,6 +64,10 @@ pub enum Command {
     Test(test::Test),
     /// Write the JSON Schema of graph files, for editors
     Schema(schema::Schema),
+    /// Begin something of your own: a plugin crate
+    New(new::New),
+    /// Build this program with plugin crates of your choice
+    Build(build::Build),
 }
 
 impl Command {
@@ -88,6 +94,8 @@ impl Command {
             Self::Simulate(command) => command.run(terminal),
             Self::Test(command) => command.run(terminal),
             Self::Schema(command) => command.run(terminal),
+            Self::New(command) => command.run(terminal),
+            Self::Build(command) => command.run(terminal),
         }
     }
 }

@@ -57,6 +57,7 @@ fn list(terminal: &Terminal) {
         println!("{role}s");
         for kind in kinds().values().flatten().filter(|kind| kind.role == role) {
             println!("  {:<14} {}", kind.name, kind.summary());
+            println!("  {:<14} from {} {}", "", kind.package, kind.version);
         }
     }
 }

@@ -98,6 +98,15 @@ fn figure(value: Option<f64>) -> String {
     }
 }
 
+/// A unit as people write it.
+fn spelled(unit: &str) -> &str {
+    match unit {
+        "Cel" => "°C",
+        "[degF]" => "°F",
+        unit => unit,
+    }
+}
+
 /// Why there is no report.
 pub type ReportError = Box<dyn std::error::Error + Send + Sync>;
 
