@@ -46,3 +46,14 @@ use athermal_combiners as _;
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_simulation as _;
+
+/// The pages of the guide, so that their code is compiled and run as tests.
+#[cfg(doctest)]
+mod guide {
+    #[doc = include_str!("../docs/src/feature.md")]
+    struct Feature;
+    #[doc = include_str!("../docs/src/estimator.md")]
+    struct Estimator;
+    #[doc = include_str!("../docs/src/combiner.md")]
+    struct Combiner;
+}

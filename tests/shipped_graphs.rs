@@ -94,6 +94,26 @@ fn every_shipped_graph_checks_without_a_warning() {
 }
 
 #[test]
+fn every_experiment_checks_and_those_that_are_wrong_on_purpose_are_warned_of() {
+    let folder = graph("experiments/x").parent().unwrap().to_owned();
+    let mut warned = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            let checks = athermal(&[&"check", &path]).ended(0);
+            if checks.told.contains("warning[A065]") {
+                warned.push(path.file_stem().unwrap().to_str().unwrap().to_owned());
+            }
+        }
+    }
+    warned.sort();
+    assert_eq!(
+        warned,
+        ["settle-time-forecast", "settle-time-virtual-sensor"]
+    );
+}
+
+#[test]
 fn every_kind_goes_through_the_conformance_kit() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let plugins = std::fs::read_dir(root.join("plugins")).unwrap();

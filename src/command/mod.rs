@@ -2,9 +2,11 @@
 
 mod build;
 mod check;
+mod compare;
 mod completions;
 mod data;
 mod demo;
+mod diagnose;
 mod diff;
 mod evaluate;
 mod explain;
@@ -46,6 +48,10 @@ pub enum Command {
     Fit(fit::Fit),
     /// Score a model's predictions on recorded data
     Evaluate(evaluate::Evaluate),
+    /// Fit several graphs on the same data and score them on others, in one table
+    Compare(compare::Compare),
+    /// Show why a model predicts as well as it does, and what would make it better
+    Diagnose(diagnose::Diagnose),
     /// Show what a model is worth on recorded data, as one page
     Report(report::Report),
     /// Run a model: rows in, predictions out
@@ -81,6 +87,8 @@ impl Command {
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
+            Self::Compare(command) => command.run(terminal),
+            Self::Diagnose(command) => command.run(terminal),
             Self::Report(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),

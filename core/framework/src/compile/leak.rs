@@ -97,13 +97,9 @@ impl Resolver<'_> {
             Role::Feature(feature) => feature.delay(),
             Role::Estimator(_) | Role::Combiner(_) => Duration::ZERO,
         };
-        let gathers = match &node.role {
-            PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
-                &gathers[..]
-            }
-            PlannedRole::Combiner { voters, .. } => std::slice::from_ref(voters),
-        };
-        let entries = gathers
+        let entries = node
+            .role
+            .gathers()
             .iter()
             .flat_map(|&gather| &self.gathers[gather].entries);
         entries.map(|entry| (entry.slot, entry.lag + own)).collect()

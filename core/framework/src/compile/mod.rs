@@ -16,6 +16,7 @@ mod provenance;
 mod reference;
 mod resolver;
 mod scope;
+mod slot_set;
 mod steps;
 
 pub use diff::{

@@ -178,6 +178,34 @@ pub enum PlannedRole {
     },
 }
 
+impl PlannedRole {
+    /// The gathers that it reads.
+    pub(crate) fn gathers(&self) -> &[usize] {
+        match self {
+            Self::Feature { gathers, .. } | Self::Estimator { gathers, .. } => gathers,
+            Self::Combiner { voters, .. } => std::slice::from_ref(voters),
+        }
+    }
+
+    /// The slot of the truth that it predicts or learns from.
+    pub(crate) fn truth(&self) -> Option<usize> {
+        match self {
+            Self::Feature { .. } => None,
+            Self::Estimator { truth, .. } => Some(truth.slot),
+            Self::Combiner { truth, .. } => truth.map(|truth| truth.slot),
+        }
+    }
+}
+
+impl Plan {
+    /// The slots that a node reads, with its truth.
+    pub(crate) fn reads<'a>(&'a self, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
+        let gathers = node.role.gathers().iter();
+        let entries = gathers.flat_map(|&gather| &self.gathers[gather].entries);
+        entries.map(|entry| entry.slot).chain(node.role.truth())
+    }
+}
+
 /// A truth and how predictions are paired with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TruthLink {

@@ -1,10 +1,11 @@
 //! Decides the steps of a tick, which ports are computed at all, and what nobody uses.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
 use super::Wanted;
 use super::plan::{Plan, PlannedNode, PlannedRole, Step};
 use super::problem::CompileProblem;
+use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 use crate::node::Role;
@@ -25,13 +26,14 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
                 ..
             }
         );
-        let gathers = gathers(&node.role);
+        let gathers = node.role.gathers();
         if closes_loops {
             late.push((index, gathers));
         } else {
             steps.extend(
                 gathers
-                    .into_iter()
+                    .iter()
+                    .copied()
                     .filter(|&gather| gathered.insert(gather))
                     .map(Step::Gather),
             );
@@ -41,7 +43,8 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
     for (index, gathers) in late {
         steps.extend(
             gathers
-                .into_iter()
+                .iter()
+                .copied()
                 .filter(|&gather| gathered.insert(gather))
                 .map(Step::Gather),
         );
@@ -83,43 +86,25 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
     }
 }
 
-fn gathers(role: &PlannedRole) -> Vec<usize> {
-    match role {
-        PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
-            gathers.clone()
-        }
-        PlannedRole::Combiner { voters, .. } => vec![*voters],
-    }
-}
-
 /// Notes which ports of features somebody reads. The first is always computed.
-pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wanted) {
-    let truths: BTreeSet<usize> = plan
+pub(super) fn mark_wanted(plan: &mut Plan, read: &SlotSet, wanted: Wanted) {
+    let truths: SlotSet = plan
         .nodes
         .iter()
-        .filter_map(|node| truth(&node.role))
+        .filter_map(|node| node.role.truth())
         .collect();
     for node in &mut plan.nodes {
-        let is_truth = truths.range(node.slots.clone()).next().is_some();
+        let is_truth = truths.has_any(node.slots.clone());
         if let PlannedRole::Combiner { weights, .. } = &mut node.role {
             let ports = node.ports.get(1);
-            *weights = ports.is_some_and(|(_, slots)| read.range(slots.clone()).next().is_some());
+            *weights = ports.is_some_and(|(_, slots)| read.has_any(slots.clone()));
         }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
                 let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
-                ports[index] =
-                    index == 0 || error_of_truth || read.range(slots.clone()).next().is_some();
+                ports[index] = index == 0 || error_of_truth || read.has_any(slots.clone());
             }
         }
-    }
-}
-
-fn truth(role: &PlannedRole) -> Option<usize> {
-    match role {
-        PlannedRole::Estimator { truth, .. } => Some(truth.slot),
-        PlannedRole::Combiner { truth, .. } => truth.map(|truth| truth.slot),
-        PlannedRole::Feature { .. } => None,
     }
 }
 
@@ -132,7 +117,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
     let fed = fed(plan);
     let owner = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
     let mut dry = HashMap::new();
-    for column in plan.outputs.iter().filter(|c| !fed.contains(&c.slot)) {
+    for column in plan.outputs.iter().filter(|c| !fed.contains(c.slot)) {
         dry.entry(owner(&column.name))
             .or_insert_with(|| column.name.clone());
     }
@@ -143,10 +128,10 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         }
     }
     let used = used(plan);
-    let used_nodes: BTreeSet<&str> = plan
+    let used_nodes: HashSet<&str> = plan
         .nodes
         .iter()
-        .filter(|node| used.range(node.slots.clone()).next().is_some())
+        .filter(|node| used.has_any(node.slots.clone()))
         .map(|node| node.name.as_str())
         .collect();
     for node in graph
@@ -164,7 +149,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         }
     }
     let used_signals: HashSet<String> = (0..plan.sources.len())
-        .filter(|slot| used.contains(slot))
+        .filter(|&slot| used.contains(slot))
         .map(|slot| owner(&plan.channels[slot].name))
         .collect();
     for signal in &graph.signals {
@@ -179,45 +164,36 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
     }
 }
 
-/// The slots that a node reads, with its truth.
-fn reads(plan: &Plan, node: usize) -> impl Iterator<Item = usize> + '_ {
-    let role = &plan.nodes[node].role;
-    let data = gathers(role)
-        .into_iter()
-        .flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
-    data.chain(truth(role))
-}
-
 /// Every slot that a measured channel reaches.
-fn fed(plan: &Plan) -> BTreeSet<usize> {
-    let mut fed: BTreeSet<usize> = (0..plan.sources.len()).collect();
+fn fed(plan: &Plan) -> SlotSet {
+    let mut fed: SlotSet = (0..plan.sources.len()).collect();
     loop {
-        let before = fed.len();
-        for (index, node) in plan.nodes.iter().enumerate() {
-            if reads(plan, index).any(|slot| fed.contains(&slot)) {
-                fed.extend(node.slots.clone());
+        let mut more = false;
+        for node in &plan.nodes {
+            if plan.reads(node).any(|slot| fed.contains(slot)) {
+                for slot in node.slots.clone() {
+                    more |= fed.insert(slot);
+                }
             }
         }
         // A second round is needed only where a loop is closed from behind.
-        if fed.len() == before {
+        if !more {
             return fed;
         }
     }
 }
 
 /// Every slot that some output depends on.
-fn used(plan: &Plan) -> BTreeSet<usize> {
-    let mut used = BTreeSet::new();
+fn used(plan: &Plan) -> SlotSet {
+    let mut used = SlotSet::default();
     let mut open: Vec<usize> = plan.outputs.iter().map(|output| output.slot).collect();
-    let mut seen = BTreeSet::new();
+    let mut seen = vec![false; plan.nodes.len()];
     while let Some(slot) = open.pop() {
-        if !used.insert(slot) {
-            continue;
-        }
-        if let Some(node) = plan.channels[slot].node
-            && seen.insert(node)
+        if used.insert(slot)
+            && let Some(node) = plan.channels[slot].node
+            && !std::mem::replace(&mut seen[node], true)
         {
-            open.extend(reads(plan, node));
+            open.extend(plan.reads(&plan.nodes[node]));
         }
     }
     used

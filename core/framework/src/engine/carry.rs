@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::{Engine, Fitted};
-use crate::compile::{Change, Plan, PlannedNode, PlannedRole, diff};
+use crate::compile::{Change, Plan, diff};
 
 /// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
@@ -117,7 +117,7 @@ impl Heritage {
             if !touched.nodes[index] {
                 return Begin::AsItWas;
             }
-            let read = reads(plan, node).find(|&slot| touched.slots[slot]);
+            let read = plan.reads(node).find(|&slot| touched.slots[slot]);
             let reason = match (&own[index], read) {
                 (Some(own), _) => own.reason().to_owned(),
                 (None, Some(slot)) => {
@@ -201,7 +201,7 @@ impl Touched {
         slots[..signals.len()].copy_from_slice(signals);
         let mut readers = vec![Vec::new(); plan.channels.len()];
         for (index, node) in plan.nodes.iter().enumerate() {
-            for slot in reads(plan, node) {
+            for slot in plan.reads(node) {
                 readers[slot].push(index);
             }
         }
@@ -229,19 +229,4 @@ fn same_fit(old: &Fitted, new: &Fitted, instance: &str) -> bool {
             .map(|fit| serde_json::to_value(fit.as_ref()).ok())
     };
     as_value(old) == as_value(new)
-}
-
-/// The slots that a node reads, with its truth.
-pub(super) fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
-    let (gathers, truth): (&[usize], Option<usize>) = match &node.role {
-        PlannedRole::Feature { gathers, .. } => (gathers, None),
-        PlannedRole::Estimator { gathers, truth, .. } => (gathers, Some(truth.slot)),
-        PlannedRole::Combiner { voters, truth, .. } => {
-            (std::slice::from_ref(voters), truth.map(|truth| truth.slot))
-        }
-    };
-    let entries = gathers
-        .iter()
-        .flat_map(|&gather| &plan.gathers[gather].entries);
-    entries.map(|entry| entry.slot).chain(truth)
 }
