@@ -22,7 +22,7 @@
 //! | [`schema`] | the JSON Schema of graph files, for editors |
 //! | [`trial`] | the tests in a graph file: what they mean, running one, judging it |
 //! | [`live`] | sources, sinks, running from one to the other; replacing a graph while it runs |
-| `testkit`, a feature | what every node must do, for the tests of those who write nodes |
+//! | `testkit`, a feature | what every node must do, for the tests of those who write nodes |
 //!
 //! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
 //! [`register!`]. Whoever writes one implements one trait, of which each has a whole example:
