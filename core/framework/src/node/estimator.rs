@@ -76,6 +76,10 @@ use crate::time::{Duration, Instant};
 /// athermal_core::register!(Mean, Estimator, "mean_of_fit");
 /// # fn main() {}
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no estimator",
+    label = "implement `athermal_core::node::Estimator` for it, or register it in the role that it has"
+)]
 pub trait Estimator: Debug + Send + Sync {
     /// The input ports: `truth`, and where features are taken, `features`.
     fn inputs() -> &'static [InputPort]
