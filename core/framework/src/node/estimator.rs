@@ -76,6 +76,10 @@ use crate::time::{Duration, Instant};
 /// athermal_core::register!(Mean, Estimator, "mean_of_fit");
 /// # fn main() {}
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no estimator",
+    label = "implement `athermal_core::node::Estimator` for it, or register it in the role that it has"
+)]
 pub trait Estimator: Debug + Send + Sync {
     /// The input ports: `truth`, and where features are taken, `features`.
     fn inputs() -> &'static [InputPort]
@@ -264,6 +268,15 @@ pub struct SelectionStep {
     pub candidates: Vec<CandidateScore>,
 }
 
+impl SelectionStep {
+    /// The name, with a minus before one that was taken out.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let sign = if self.removed { "− " } else { "" };
+        format!("{sign}{}", self.regressor)
+    }
+}
+
 /// A candidate of a selection step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CandidateScore {
@@ -282,6 +295,11 @@ pub trait Predictor: Debug + Send + Sync {
 
     /// The prediction, from present values of the used regressors.
     fn predict(&self, regressors: &[f64]) -> f64;
+
+    /// Whether it predicts from the regressors that are there, NaN standing for the others, while there is any.
+    fn takes_absent(&self) -> bool {
+        false
+    }
 
     /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
     /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
