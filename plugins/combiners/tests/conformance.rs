@@ -1,6 +1,6 @@
 //! Every kind of this crate through the rules that every node keeps.
 
-use athermal_combiners::{AutoWeighted, Best, Fallback, Guard, Mean, Median, Trimmed};
+use athermal_combiners::{AutoWeighted, Best, Conformal, Fallback, Guard, Mean, Median, Trimmed};
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 
@@ -56,6 +56,19 @@ conformance!(
         weights = "as_printed_raw"
         "#
     ),
+);
+
+conformance!(
+    Conformal,
+    Case::new(r#"memory = "10min""#).input("prediction", 1, "nm"),
+    Case::new(
+        r#"
+        memory = "2min"
+        coverage = 0.6
+        gain = 0.1
+        "#
+    )
+    .input("prediction", 2, "nm"),
 );
 
 #[test]

@@ -2,7 +2,7 @@
 
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
-use athermal_estimators::{Ar, Arx, Linear, Persistence, Zero};
+use athermal_estimators::{Ar, Arx, Kalman, Linear, Persistence, Zero};
 
 conformance!(
     Zero,
@@ -68,6 +68,28 @@ conformance!(
         selection = { method = "forward" }
         "#
     ),
+);
+
+conformance!(
+    Kalman,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        trend = true
+        every = "30s"
+        penalty = 0.5
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        learn = false
+        noises = { observation = "4 nm", level = "10 nm", per = "1h" }
+        "#
+    )
+    .input("features", 1, "K"),
 );
 
 #[test]
