@@ -132,7 +132,7 @@ fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Fa
     let dataset = Data::of(vec![test.to_owned()]).dataset();
     let options = ScoreOptions {
         abs_truth_below: LIMIT.parse().ok(),
-        each_on_its_own: false,
+        ..ScoreOptions::default()
     };
     let mut progress = terminal.progress("evaluating");
     let scores = score(

@@ -39,6 +39,9 @@ pub struct Evaluate {
     /// Score each prediction on all instants of its own
     #[arg(long)]
     each_on_its_own: bool,
+    /// Let nothing learn on the way; otherwise, what learns does so after each truth has been predicted
+    #[arg(long)]
+    frozen: bool,
 }
 
 impl Evaluate {
@@ -59,6 +62,7 @@ impl Evaluate {
         let options = ScoreOptions {
             abs_truth_below: self.abs_truth_below.clone(),
             each_on_its_own: self.each_on_its_own,
+            frozen: self.frozen,
         };
         let mut progress = terminal.progress("evaluating");
         let scores = score(

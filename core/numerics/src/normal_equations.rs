@@ -15,7 +15,7 @@ pub(crate) struct Problem {
     scales: Vec<f64>,
     intercept: bool,
     /// `Xᵀ X`, scaled.
-    gram: Mat<f64>,
+    pub(crate) gram: Mat<f64>,
     /// `Xᵀ y`, scaled.
     pub(crate) target: Vec<f64>,
     /// `yᵀ y`.

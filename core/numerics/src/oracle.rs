@@ -56,3 +56,14 @@ pub(crate) fn text(file: &str) -> Option<String> {
 pub(crate) fn table(file: &str) -> Option<Table> {
     text(file).map(|text| Table::parse(&text))
 }
+
+/// The text of a file under this project's own `tests/oracles/`.
+pub(crate) fn own_text(file: &str) -> String {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles");
+    std::fs::read_to_string(root.join(file)).unwrap()
+}
+
+/// A CSV file under this project's own `tests/oracles/`.
+pub(crate) fn own_table(file: &str) -> Table {
+    Table::parse(&own_text(file))
+}

@@ -1,7 +1,9 @@
 //! Recursive least squares with forgetting. Decides one step and what keeps it sound over millions of them; does not decide
 //! how regressors are scaled (they should be standardised), nor which rows are learned from.
 
-use crate::NumericsError;
+use crate::{Gram, NumericsError};
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};
 
 /// How fast the past is forgotten.
@@ -167,18 +169,15 @@ impl Rls {
     }
 
     /// The variance of the model's value, in units of the noise variance: `xᵀPx`, what is not known of the coefficients.
-    ///
-    /// # Panics
-    /// When `x` has not one value per coefficient.
+    /// `x(i)` is the value of regressor `i`.
     #[must_use]
-    pub fn spread(&self, x: &[f64]) -> f64 {
-        assert_eq!(
-            x.len(),
-            self.coefficients.len(),
-            "a row has a value per coefficient"
-        );
-        let rows = self.covariance.chunks_exact(x.len().max(1));
-        rows.zip(x).map(|(row, x_i)| x_i * dot(row, x)).sum()
+    pub fn spread(&self, x: impl Fn(usize) -> f64) -> f64 {
+        let rows = self.covariance.chunks_exact(self.coefficients.len().max(1));
+        let spread = rows.enumerate().map(|(i, row)| {
+            let below: f64 = (0..i).map(|j| row[j] * x(j)).sum();
+            x(i) * (2.0 * below + row[i] * x(i))
+        });
+        spread.sum::<f64>().max(0.0)
     }
 
     /// Learns from one row, without allocating: its error before. A row after which the coefficients would not be finite is
@@ -223,6 +222,19 @@ impl Rls {
         error
     }
 
+    /// Goes on with other options.
+    #[must_use]
+    pub fn with(mut self, options: RlsOptions) -> Self {
+        self.options = options;
+        self
+    }
+
+    /// How the recursion runs.
+    #[must_use]
+    pub fn options(&self) -> RlsOptions {
+        self.options
+    }
+
     /// The coefficients, one per regressor.
     #[must_use]
     pub fn coefficients(&self) -> &[f64] {
@@ -239,6 +251,48 @@ impl Rls {
     #[must_use]
     pub fn seen(&self) -> u64 {
         self.seen
+    }
+}
+
+/// The covariance of the standardised columns' coefficients and, last, the intercept's, in units of the noise variance, when
+/// the rows in `gram` count as if there were `rows` of them: `(rows/n · ZᵀZ + αI)⁻¹`. A start for [`Rls::starting_at`].
+///
+/// # Errors
+/// [`NumericsError::NoConvergence`] when that cannot be inverted.
+pub fn covariance_of(
+    gram: &Gram,
+    columns: &[usize],
+    scales: &[f64],
+    alpha: f64,
+    rows: f64,
+) -> Result<Vec<f64>, NumericsError> {
+    let moments = gram.moments();
+    let share = rows / gram.weight();
+    // What the rows do not determine at all must not make the whole unsolvable.
+    let alpha = alpha.max(1e-9 * rows);
+    let order = columns.len() + 1;
+    let known = Mat::from_fn(order, order, |i, j| {
+        match (columns.get(i), columns.get(j)) {
+            (Some(&a), Some(&b)) => {
+                let penalty = if i == j { alpha } else { 0.0 };
+                share * moments[(a, b)] / (scales[a] * scales[b]) + penalty
+            }
+            (None, None) => rows,
+            _ => 0.0,
+        }
+    });
+    let factor = known
+        .llt(Side::Lower)
+        .map_err(|_| NumericsError::NoConvergence)?;
+    let inverse = factor.solve(Mat::<f64>::identity(order, order));
+    let lower = |i: usize, j: usize| inverse[(i.max(j), i.min(j))];
+    let whole: Vec<f64> = (0..order * order)
+        .map(|at| lower(at / order, at % order))
+        .collect();
+    if whole.iter().all(|value| value.is_finite()) {
+        Ok(whole)
+    } else {
+        Err(NumericsError::NoConvergence)
     }
 }
 
@@ -305,6 +359,33 @@ mod tests {
     }
 
     #[test]
+    fn variable_forgetting_follows_the_oracle() {
+        let rows = oracle::own_table("rls_variable/rows.csv").numbers();
+        let expected = oracle::own_table("rls_variable/expected.csv").numbers();
+        let variable = RlsOptions {
+            forgetting: Forgetting::Variable {
+                memory: 200.0,
+                noise: 0.1,
+                lowest: 0.8,
+            },
+            most_trace: f64::INFINITY,
+        };
+        let mut rls = Rls::new(3, 100.0, variable).unwrap();
+        for (row, expected) in rows.iter().zip(&expected) {
+            let error = rls.step(&row[..3], row[3]);
+            assert!(
+                (error - expected[1]).abs() < 1e-8,
+                "{error} {}",
+                expected[1]
+            );
+            for (found, wanted) in rls.coefficients().iter().zip(&expected[2..5]) {
+                assert!((found - wanted).abs() < 1e-8, "{found} {wanted}");
+            }
+        }
+        assert_eq!(expected.len(), 250);
+    }
+
+    #[test]
     fn a_million_rows_leave_the_covariance_symmetric_and_positive() {
         for factor in [1.0, 0.999, 0.9] {
             let width = 8;
@@ -338,6 +419,38 @@ mod tests {
             );
             assert!(rls.seen() > 900_000);
         }
+    }
+
+    #[test]
+    fn a_start_from_rows_is_where_the_recursion_over_them_ends() {
+        let mut state = 11;
+        let rows: Vec<[f64; 4]> = (0..200)
+            .map(|_| [(); 4].map(|()| random(&mut state)))
+            .collect();
+        let mut gram = Gram::new(3);
+        for row in &rows {
+            gram.push(&row[..3], row[3]);
+        }
+        let means = gram.means();
+        let scales = crate::Standardization::of(&gram).scales;
+        let started = covariance_of(&gram, &[2, 0], &scales, 1.0, 200.0).unwrap();
+        // A prior of variance 1 is a penalty of 1; the intercept is free.
+        let mut prior = vec![0.0; 9];
+        (prior[0], prior[4], prior[8]) = (1.0, 1.0, 1e12);
+        let mut rls = Rls::starting_at(vec![0.0; 3], prior, TEXTBOOK).unwrap();
+        for row in &rows {
+            let z = |column: usize| (row[column] - means[column]) / scales[column];
+            rls.step(&[z(2), z(0), 1.0], row[3]);
+        }
+        for (found, wanted) in started.iter().zip(rls.covariance()) {
+            assert!(
+                (found - wanted).abs() < 1e-9,
+                "{started:?} {:?}",
+                rls.covariance()
+            );
+        }
+        let by_hand: f64 = rls.covariance().iter().sum();
+        assert!((rls.spread(|_| 1.0) - by_hand).abs() < 1e-12);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Combiner nodes of athermal: votes that weigh estimators, by their recent error or alike, and choices among them.
+//! Combiner nodes of athermal: votes that weigh estimators, by their recent error or alike, choices among them, and watches
+//! over them.
 
 mod auto_weighted;
 mod choose;
@@ -11,6 +12,7 @@ mod median;
 mod memory;
 mod share;
 mod state_gate;
+mod watch;
 
 pub use auto_weighted::{AutoWeighted, Weighting};
 pub use choose::{Best, Fallback};
@@ -21,3 +23,4 @@ pub use mean::Mean;
 pub use median::{Median, Trimmed};
 pub use memory::{Fading, LastTruths, Memory};
 pub use state_gate::StateGate;
+pub use watch::{Adwin, PageHinkley, Watched};

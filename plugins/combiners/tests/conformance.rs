@@ -1,6 +1,8 @@
 //! Every kind of this crate through the rules that every node keeps.
 
-use athermal_combiners::{AutoWeighted, Best, Conformal, Fallback, Guard, Mean, Median, Trimmed};
+use athermal_combiners::{
+    Adwin, AutoWeighted, Best, Conformal, Fallback, Guard, Mean, Median, PageHinkley, Trimmed,
+};
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 
@@ -69,6 +71,35 @@ conformance!(
         "#
     )
     .input("prediction", 2, "nm"),
+);
+
+conformance!(
+    PageHinkley,
+    Case::new("first = 5"),
+    Case::new(
+        r#"
+        first = 5
+        watch = "size"
+        threshold = 2.0
+        every = "30s"
+        hold = "2min"
+        "#
+    )
+    .input("voters", 1, "nm"),
+);
+
+conformance!(
+    Adwin,
+    Case::new("first = 5"),
+    Case::new(
+        r#"
+        first = 5
+        clock = 1
+        confidence = 0.1
+        watch = "size"
+        "#
+    )
+    .input("voters", 1, "nm"),
 );
 
 #[test]

@@ -1,13 +1,15 @@
 //! The endogenous estimator: drift from past drift.
 
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Solver, lag_mistakes};
+use crate::lags::lag_mistakes;
+use crate::regression::LinearTrainer;
+use crate::solver::Solver;
 
 /// Autoregression: linear regression of the truth on its own past.
 ///
@@ -28,7 +30,12 @@ pub struct Ar {
 
 impl Estimator for Ar {
     fn inputs() -> &'static [InputPort] {
-        const { &[InputPort::truth("what is predicted, from its own past")] }
+        const {
+            &[
+                InputPort::truth("what is predicted, from its own past"),
+                InputPort::freeze(),
+            ]
+        }
     }
 
     fn regressors(&self) -> Regressors {
@@ -43,6 +50,10 @@ impl Estimator for Ar {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        self.solver.learns()
     }
 
     fn deviates(&self) -> bool {

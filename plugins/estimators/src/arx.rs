@@ -1,13 +1,16 @@
 //! The estimator with both: drift from past drift and temperatures.
 
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Selection, Solver, lag_mistakes};
+use crate::lags::lag_mistakes;
+use crate::regression::LinearTrainer;
+use crate::selection::Selection;
+use crate::solver::Solver;
 
 /// Autoregression with exogenous inputs: linear regression of the truth on features and on its own past.
 ///
@@ -41,6 +44,7 @@ impl Estimator for Arx {
             &[
                 InputPort::held("features", "what the prediction is made of beside the past"),
                 InputPort::truth("what is predicted, from its own past and the features"),
+                InputPort::freeze(),
             ]
         }
     }
@@ -59,6 +63,10 @@ impl Estimator for Arx {
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
         mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        self.solver.learns()
     }
 
     fn deviates(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
-use athermal_estimators::{Ar, Arx, Kalman, Linear, Persistence, Zero};
+use athermal_estimators::{Ar, Arx, Kalman, Linear, Persistence, Rls, Zero};
 
 conformance!(
     Zero,
@@ -32,6 +32,14 @@ conformance!(
         "#
     )
     .input("features", 1, "Cel"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        solver = { type = "sgd", power = 0.0 }
+        learn = { outliers = 8.0, margin = 0.5 }
+        "#
+    )
+    .input("freeze", 1, "1"),
 );
 
 conformance!(
@@ -90,6 +98,30 @@ conformance!(
         "#
     )
     .input("features", 1, "K"),
+);
+
+conformance!(
+    Rls,
+    Case::new(r#"ahead = "10s""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        lags = ["30s"]
+        forgetting = { type = "variable", memory = 100.0, lowest = 0.8 }
+        learn = { margin = 1.0 }
+        "#
+    )
+    .input("features", 2, "K")
+    .input("freeze", 1, "1"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        learn = false
+        alpha = 0.1
+        selection = { method = "forward", most = 2 }
+        "#
+    )
+    .input("features", 3, "Cel"),
 );
 
 #[test]

@@ -105,6 +105,17 @@ impl Resolver<'_> {
         if !lags.is_empty() {
             gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
         }
+        if regressors.is_empty() && !wanted.every_tick {
+            // An optional input that was left out, and nothing in its place.
+            let port = features_port.unwrap_or(truth_port);
+            let problem = CompileProblem::MissingInput {
+                kind: instance.kind.name,
+                input: port.name,
+                summary: port.summary,
+            };
+            self.diagnostics.report(instance.node.place, problem);
+            whole = false;
+        }
         let training = self.limits(instance, &link);
         let learning = self.learning(instance, estimator);
         if !whole {
@@ -190,6 +201,10 @@ impl Resolver<'_> {
         Regressor {
             name,
             unit: from.channel.unit.to_string(),
+            sensors: self.provenance[slot]
+                .sources()
+                .map(|(source, _)| self.channels[source].name.clone())
+                .collect(),
         }
     }
 

@@ -164,5 +164,8 @@ impl Estimate {
     pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = self.row.iter().map(|_| value()).collect();
         self.predictor.predict(&row);
+        if let Some(learning) = &self.learning {
+            learning.predict(&row, Instant::from_ns(0));
+        }
     }
 }

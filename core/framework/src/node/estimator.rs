@@ -139,6 +139,9 @@ pub struct Regressor {
     pub name: String,
     /// The unit of its values.
     pub unit: String,
+    /// The measured channels that it is made from, in the order of the plan: `temperature.room`.
+    #[serde(default)]
+    pub sensors: Vec<String>,
 }
 
 /// What a trainer knows before the first row.
@@ -220,6 +223,9 @@ pub struct Trained {
 pub struct TrainingReport {
     /// The regressors chosen, in the order in which they were, with the score after each.
     pub selection: Vec<SelectionStep>,
+    /// The step at which selection stopped, since it was not worth it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<SelectionStep>,
     /// Condition number of the standardised design.
     #[serde(
         default,
@@ -239,17 +245,33 @@ pub struct TrainingReport {
     pub notes: Vec<String>,
 }
 
-/// A regressor chosen by selection.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A regressor, or a sensor with all its regressors, chosen or taken out again by selection.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SelectionStep {
     /// Its name.
     pub regressor: String,
-    /// The cross-validation score with it and all before it: the mean over the folds.
+    /// Whether it was taken out.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub removed: bool,
+    /// The cross-validation score after the step: the mean over the folds.
     #[serde(with = "crate::model::number")]
     pub score: f64,
     /// The score of each fold.
     #[serde(default, with = "crate::model::numbers")]
     pub folds: Vec<f64>,
+    /// What was tried at this step, the best first; this one is among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub candidates: Vec<CandidateScore>,
+}
+
+/// A candidate of a selection step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CandidateScore {
+    /// Its name.
+    pub name: String,
+    /// The score that the step would have had with it.
+    #[serde(with = "crate::model::number")]
+    pub score: f64,
 }
 
 /// A fitted estimator. Predicting never changes what was learned.

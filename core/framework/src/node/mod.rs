@@ -15,8 +15,8 @@ mod state;
 
 pub use combiner::{Combine, Combiner, Votes};
 pub use estimator::{
-    Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup, TruthLags,
+    CandidateScore, Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer,
+    TrainingError, TrainingReport, TrainingSetup, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use learner::{Learner, Learns, TrainedRange};

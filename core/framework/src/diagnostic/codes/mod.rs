@@ -30,7 +30,7 @@ macro_rules! code {
 }
 
 /// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for their tests,
-/// A110 and above for learning while they run.
+/// A110 for learning while they run.
 pub const CODES: &[Code] = &[
     code!(
         "A001",
