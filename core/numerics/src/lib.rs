@@ -35,6 +35,7 @@ mod gram;
 mod huber;
 mod kalman;
 mod least_squares;
+mod non_negative;
 mod normal_equations;
 mod orthogonal;
 mod penalty;
@@ -63,6 +64,7 @@ pub use kalman::{
 pub use least_squares::{
     DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
 };
+pub use non_negative::non_negative_least_squares;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
 pub use prediction_variance::PredictionVariance;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};

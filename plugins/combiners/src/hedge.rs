@@ -33,7 +33,7 @@ use crate::share::raise;
 pub struct Hedge {
     /// How fast weights follow errors that are scaled by their own size, above 0, up to 100; without it, the rate is found on the way.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 100.0))]
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub rate: Option<f64>,
     /// The time after which an error counts half, for voters that take turns at being best; without it nothing is forgotten, and
     /// only then do the bounds hold.

@@ -1,7 +1,8 @@
 //! Every kind of this crate through the rules that every node keeps.
 
 use athermal_combiners::{
-    Adwin, AutoWeighted, Best, Conformal, Fallback, Guard, Mean, Median, PageHinkley, Trimmed,
+    Adwin, AutoWeighted, Best, Conformal, Fallback, Guard, Hedge, Mean, Median, PageHinkley,
+    StateGate, Trimmed,
 };
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
@@ -22,7 +23,36 @@ conformance!(
 
 conformance!(Fallback, Case::new(""));
 
-conformance!(Best, Case::new(r#"memory = "10min""#));
+conformance!(
+    Best,
+    Case::new(r#"memory = "10min""#),
+    Case::new("memory = { truths = 5 }"),
+    Case::new(r#"memory = { half_life = "2min" }"#),
+);
+
+conformance!(
+    Hedge,
+    Case::new(""),
+    Case::new(
+        r#"
+        rate = 0.5
+        half_life = "5min"
+        floor = 0.1
+        "#
+    )
+    .input("voters", 4, "nm"),
+);
+
+conformance!(
+    StateGate,
+    Case::new("")
+        .input("state", 1, "1")
+        .between("state", 0.0, 2.0),
+    Case::new(r#"dwell = "1min""#)
+        .input("voters", 2, "nm")
+        .input("state", 1, "1")
+        .between("state", 0.0, 2.0),
+);
 
 conformance!(
     Guard,
@@ -56,6 +86,13 @@ conformance!(
         r#"
         memory = "5min"
         weights = "as_printed_raw"
+        "#
+    ),
+    Case::new(
+        r#"
+        memory = { half_life = "5min" }
+        shrinkage = 0.3
+        floor = 0.2
         "#
     ),
 );

@@ -18,6 +18,7 @@ mod regression;
 mod rls;
 mod selection;
 mod solver;
+mod stack;
 mod zero;
 
 pub use ar::Ar;
@@ -36,4 +37,5 @@ pub use regression::LinearPredictor;
 pub use rls::{Forgetting, Rls};
 pub use selection::{By, CrossValidated, Selection};
 pub use solver::Solver;
+pub use stack::Stack;
 pub use zero::Zero;

@@ -2,7 +2,7 @@
 
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
-use athermal_estimators::{Ar, Arx, Kalman, Linear, Persistence, Rls, Zero};
+use athermal_estimators::{Ar, Arx, Kalman, Linear, Persistence, Rls, Stack, Zero};
 
 conformance!(
     Zero,
@@ -122,6 +122,12 @@ conformance!(
         "#
     )
     .input("features", 3, "Cel"),
+);
+
+conformance!(
+    Stack,
+    Case::new(r#"ahead = "0s""#),
+    Case::new(r#"ahead = "0s""#).input("voters", 1, "nm"),
 );
 
 #[test]

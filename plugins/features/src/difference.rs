@@ -1,6 +1,6 @@
 //! How much a value has changed.
 
-use athermal_core::channel::{Channel, is_unchanged};
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::engine::History;
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
@@ -119,6 +119,7 @@ impl Operator for Differencing {
             if is_unchanged(value) {
                 continue;
             }
+            let value = if value.is_finite() { value } else { ABSENT };
             channel.history.push(tick.now, value, stamp);
             if value.is_nan() {
                 continue;

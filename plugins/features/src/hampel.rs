@@ -34,7 +34,7 @@ pub struct Hampel {
     pub window: Duration,
     /// How many standard deviations from the median a sample may lie, above 0.
     #[serde(default = "three_deviations")]
-    #[schemars(range(min = 0.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub threshold: f64,
     /// A distance from the median within which no sample is an outlier: `"5 mK"`; none by default.
     #[serde(default)]

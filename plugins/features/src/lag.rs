@@ -1,6 +1,6 @@
 //! Values as they were some time ago.
 
-use athermal_core::channel::{Channel, is_unchanged};
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::engine::History;
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
@@ -135,6 +135,7 @@ impl Operator for LookingBack {
             if is_unchanged(value) {
                 continue;
             }
+            let value = if value.is_finite() { value } else { ABSENT };
             channel.history.push(tick.now, value, stamp);
             if value.is_nan() {
                 continue;

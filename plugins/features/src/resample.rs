@@ -161,7 +161,7 @@ impl Operator for Resampling {
         self.known.end = end;
         let inputs = tick.port(0).iter().zip(tick.stamps(0));
         for (period, (&value, &stamp)) in self.known.channels.iter_mut().zip(inputs) {
-            if !value.is_nan() {
+            if value.is_finite() {
                 period.count += 1.0;
                 period.mean += (value - period.mean) / period.count;
                 (period.last, period.stamp) = (value, stamp);

@@ -3,6 +3,7 @@
 use super::conversion::{factor, mismatch};
 use super::estimator::{self, DEVIATION};
 use super::instance::Instance;
+use super::leak::Suspect;
 use super::plan::{Beside, PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
@@ -39,10 +40,7 @@ impl Resolver<'_> {
             self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
-        let mut agree = sound;
-        for &other in &voters[1..] {
-            agree &= self.agree(instance, port.name, first, other, true);
-        }
+        let mut agree = sound & self.votes_agree(instance, port.name, &voters);
         let ahead = self.channels[first].channel.ahead;
         let link: Option<TruthLink> = match truth {
             Some(truth) => {
@@ -68,6 +66,21 @@ impl Resolver<'_> {
             unit,
             ..self.channels[first].channel.clone()
         };
+        if let (Some((port, slot)), Some(predicts)) = (state, predicts) {
+            let link = TruthLink {
+                slot: predicts,
+                ahead,
+                span: self.channels[predicts].channel.span,
+                limit: Duration::ZERO,
+            };
+            self.suspects.push(Suspect {
+                place: instance.input_place(port.name),
+                context: instance.context(),
+                features: vec![slot],
+                lag: Duration::ZERO,
+                link,
+            });
+        }
         let slots = voters.iter().copied().chain(state.map(|(_, slot)| slot));
         let behind = Provenance::of(slots.map(|slot| (&self.provenance[slot], Duration::ZERO)));
         let state = match state {
@@ -179,8 +192,22 @@ impl Resolver<'_> {
         }
     }
 
+    /// Whether predictions may be put together.
+    pub(super) fn votes_agree(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        voters: &[usize],
+    ) -> bool {
+        let mut agree = true;
+        for &other in voters.iter().skip(1) {
+            agree &= self.agree(instance, input, voters[0], other, true);
+        }
+        agree
+    }
+
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.
-    fn agree(
+    pub(super) fn agree(
         &mut self,
         instance: &Instance<'_>,
         input: &str,

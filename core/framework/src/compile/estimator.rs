@@ -67,7 +67,12 @@ impl Resolver<'_> {
         if let Some(port) = features_port
             && !features.is_empty()
         {
-            let unit = Self::port_unit(&port);
+            let mut unit = Self::port_unit(&port);
+            if port.name == "voters" {
+                whole &= self.votes_agree(instance, port.name, &features);
+                whole &= self.votes_fit(instance, port.name, &features, &link);
+                unit = Some(self.channels[truth].channel.unit.clone());
+            }
             for &lag in &wanted.feature_lags {
                 for &slot in &features {
                     let mut regressor = self.regressor(slot, lag, false);
@@ -157,6 +162,32 @@ impl Resolver<'_> {
             deviation,
         };
         self.add(instance, ports, role, behind, Some(truth))
+    }
+
+    /// Whether predictions are of the truth that is predicted from them, as far ahead.
+    fn votes_fit(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        voters: &[usize],
+        link: &TruthLink,
+    ) -> bool {
+        let Some(&first) = voters.first() else {
+            return true;
+        };
+        let voter = &self.channels[first];
+        if voter.channel.ahead != link.ahead {
+            let problem = CompileProblem::Horizons {
+                first: voter.name.clone(),
+                first_ahead: voter.channel.ahead,
+                second: instance.node.name.clone(),
+                second_ahead: link.ahead,
+            };
+            self.diagnostics
+                .report(instance.input_place(input), problem);
+            return false;
+        }
+        self.agree(instance, input, first, link.slot, false)
     }
 
     /// A truth as predictions `ahead` of it are paired with it.

@@ -17,6 +17,7 @@ pub(crate) struct Estimate {
     /// Where the regressors that it uses are: gather and place within it.
     places: Vec<(usize, usize)>,
     row: Vec<f64>,
+    takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
     pub(super) learning: Option<Learning>,
 }
@@ -78,13 +79,14 @@ impl Estimate {
         };
         Ok(Self {
             row: vec![0.0; places.len()],
+            takes_absent: predictor.takes_absent(),
             predictor,
             places,
             learning,
         })
     }
 
-    /// The prediction and its stamp, the oldest among the values used; none where one of them is missing.
+    /// The prediction and its stamp, the oldest among the values used; none where one of them is missing that is needed.
     ///
     /// `on` says whether learning goes on.
     pub(crate) fn run(
@@ -102,12 +104,15 @@ impl Estimate {
         for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
             let from = &gathered[gather];
             *value = from.values[place];
-            if value.is_nan() {
+            if !value.is_nan() {
+                oldest = oldest.min(from.stamps[place]);
+            } else if !self.takes_absent {
                 whole = false;
                 break;
             }
-            oldest = oldest.min(from.stamps[place]);
         }
+        // Where none of several regressors is there, none had a stamp.
+        whole &= oldest < Instant::MAX;
         if let Some(learning) = &mut self.learning {
             if !whole {
                 // Nothing of earlier runs may stand in it.

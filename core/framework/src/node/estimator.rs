@@ -283,6 +283,11 @@ pub trait Predictor: Debug + Send + Sync {
     /// The prediction, from present values of the used regressors.
     fn predict(&self, regressors: &[f64]) -> f64;
 
+    /// Whether it predicts from the regressors that are there, NaN standing for the others, while there is any.
+    fn takes_absent(&self) -> bool {
+        false
+    }
+
     /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
     /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
     fn deviation(&self, _regressors: &[f64]) -> f64 {
