@@ -4,6 +4,9 @@ use std::fmt::Write as _;
 
 use athermal::Duration;
 
+/// How wide tables may be, in characters.
+const WIDTH: usize = 80;
+
 /// A number to about four significant digits, without an exponent where that is readable.
 #[must_use]
 pub fn number(value: f64) -> String {
@@ -92,6 +95,40 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     text
 }
 
+/// A table with a row and a column for each of many; columns that do not fit into [`WIDTH`] go on below.
+#[must_use]
+pub fn matrix(corner: &str, columns: &[String], rows: &[(String, Vec<String>)]) -> String {
+    let long = |texts: &mut dyn Iterator<Item = &String>| {
+        let lengths = texts.map(|text| text.chars().count());
+        lengths.max().unwrap_or(0)
+    };
+    let label = long(&mut rows.iter().map(|(label, _)| label)).max(corner.chars().count()) + 2;
+    let mut text = String::new();
+    let mut from = 0;
+    while from < columns.len() {
+        let (mut to, mut used) = (from, label);
+        while to < columns.len() {
+            let cells = rows.iter().filter_map(|(_, cells)| cells.get(to));
+            used += 2 + long(&mut cells.chain([&columns[to]]));
+            if used > WIDTH && to > from {
+                break;
+            }
+            to += 1;
+        }
+        let first = format!("  {corner}");
+        let header = std::iter::once(first.as_str());
+        let header = header.chain(columns[from..to].iter().map(String::as_str));
+        let line = |(label, cells): &(String, Vec<String>)| {
+            let label = std::iter::once(format!("  {label}"));
+            label.chain(cells[from..to].iter().cloned()).collect()
+        };
+        let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
+        text.push_str(&table(&header.collect::<Vec<_>>(), &lines));
+        from = to;
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,6 +140,19 @@ mod tests {
         assert_eq!(number(1234.6), "1235");
         assert_eq!(number(1e-9), "1.00e-9");
         assert_eq!(number(f64::NAN), "NaN");
+    }
+
+    #[test]
+    fn columns_that_do_not_fit_go_on_below() {
+        let columns: Vec<String> = (0..20).map(|n| format!("column{n}")).collect();
+        let cells = (0..20).map(|n| n.to_string()).collect();
+        let text = matrix("of", &columns, &[("row".to_owned(), cells)]);
+        assert!(
+            text.lines().all(|line| line.chars().count() <= WIDTH),
+            "{text}"
+        );
+        assert_eq!(text.matches("  of ").count(), 3, "{text}");
+        assert!(text.contains("column19") && text.trim_end().ends_with("19"));
     }
 
     #[test]

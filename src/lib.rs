@@ -21,12 +21,39 @@ pub use athermal_core::model::{Model, ModelError};
 pub use athermal_core::time::{Duration, Instant};
 pub use athermal_files as files;
 
+#[macro_use]
+mod output;
+
 pub mod chart;
+mod checkout;
+mod command;
 pub mod diagnosis;
+mod drawing;
+mod figures;
+mod invocation;
+mod program;
 pub mod report;
+mod starter;
+mod terminal;
+
+pub use program::command_line;
+
+// The commands use what the library offers to everybody by the name that everybody uses.
+extern crate self as athermal;
 
 // A plugin that no code names is left out by the linker.
 use athermal_combiners as _;
 use athermal_estimators as _;
 use athermal_features as _;
 use athermal_simulation as _;
+
+/// The pages of the guide, so that their code is compiled and run as tests.
+#[cfg(doctest)]
+mod guide {
+    #[doc = include_str!("../docs/src/feature.md")]
+    struct Feature;
+    #[doc = include_str!("../docs/src/estimator.md")]
+    struct Estimator;
+    #[doc = include_str!("../docs/src/combiner.md")]
+    struct Combiner;
+}

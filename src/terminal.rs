@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::fit::FitError;
+use athermal::core::live::RunError;
 use athermal::files::FileError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -296,13 +297,27 @@ impl From<FileError> for Failure {
     }
 }
 
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Source(error) | RunError::Sink(error) => outside(error),
+            RunError::Engine(error) => Self::Request(error.to_string()),
+        }
+    }
+}
+
+/// What went wrong with a source, a sink or a recording: of a file, what its error says.
+pub fn outside(error: Box<dyn std::error::Error + Send + Sync>) -> Failure {
+    match error.downcast::<FileError>() {
+        Ok(error) => (*error).into(),
+        Err(error) => Failure::Outside(error.to_string()),
+    }
+}
+
 impl From<FitError> for Failure {
     fn from(error: FitError) -> Self {
         match error {
-            FitError::Recording(error) => match error.downcast::<FileError>() {
-                Ok(error) => (*error).into(),
-                Err(error) => Self::Outside(error.to_string()),
-            },
+            FitError::Recording(error) => outside(error),
             FitError::Engine(error) => Self::Request(error.to_string()),
         }
     }

@@ -2,11 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
 use athermal::core::fit::{FitOptions, fit};
+use athermal::core::node::kinds;
 use athermal::core::recording::Table;
 use athermal::{Instant, Model};
 
@@ -61,8 +63,10 @@ fn fitted(path: &Path) -> Model {
 fn a_tick_of_every_shipped_graph_allocates_nothing_once_warm() {
     let graphs = graphs();
     assert!(!graphs.is_empty());
+    let mut stepped = BTreeSet::new();
     for path in graphs {
         let model = fitted(&path);
+        stepped.extend(model.plan.nodes.iter().map(|node| node.kind.name));
         let mut engine = model.engine().unwrap();
         let ticks: Vec<_> = (0..4_000)
             .map(|tick| (Instant::from_ns(tick * STEP_NS), samples(&model.plan, tick)))
@@ -88,6 +92,15 @@ fn a_tick_of_every_shipped_graph_allocates_nothing_once_warm() {
             0,
             "{}: {allocated:?}",
             path.display()
+        );
+    }
+    // What stands between a prediction and a motor is shown in full.
+    let of_control = kinds().values().flatten();
+    for kind in of_control.filter(|kind| kind.package == "athermal-control") {
+        assert!(
+            stepped.contains(kind.name),
+            "no shipped graph has a `{}`",
+            kind.name
         );
     }
 }

@@ -12,9 +12,9 @@ use athermal::files::{Dataset, Options};
 use athermal::report::{Facts, Worth, gather, rms};
 use workbench::{Read, data};
 
-fn facts(data: &Path) -> Facts {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut model = Model::load(root.join("graphs/die-tester-control.toml")).unwrap();
+fn facts(graph: &str, data: &Path) -> Facts {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");
+    let mut model = Model::load(root.join(graph)).unwrap();
     let set = |name: &str| Dataset::new(vec![data.join(name)], Options::default());
     let (fitted, _) = fit(
         &model.plan,
@@ -44,7 +44,7 @@ fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
     let Some(data) = data().map(|data| data.join("die-tester")) else {
         return;
     };
-    let worth = facts(&data).worth.unwrap();
+    let worth = facts("die-tester-compensate.toml", &data).worth.unwrap();
     for axis in worth.axes.clone() {
         for limit in [250.0, f64::INFINITY] {
             let (without, with) = left(&worth, &axis, limit);
@@ -101,6 +101,19 @@ fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
     }
     assert!(with[6] <= 0.5 * without[6], "{without:?} → {with:?}");
     assert!(with[3] <= 10.0, "{with:?}");
+}
+
+#[test]
+fn on_a_recording_without_a_correction_both_graphs_of_the_die_tester_are_worth_the_same() {
+    let Some(data) = data().map(|data| data.join("die-tester")) else {
+        return;
+    };
+    let worth = |graph| serde_json::to_string(&facts(graph, &data).worth).unwrap();
+    let (compensate, control) = (
+        worth("die-tester-compensate.toml"),
+        worth("die-tester-control.toml"),
+    );
+    assert!(compensate == control, "the two graphs differ");
 }
 
 /// What is told of the die tester's graph when the correction's rate looks another time ahead.

@@ -105,18 +105,29 @@ fn what_a_correction_is_worth_agrees_with_a_calculation_by_hand() {
     for (i, axis) in AXES.iter().enumerate() {
         let position = &measured[&format!("{axis}_nm")];
         let correction = &run[&format!("correction.{axis}")];
-        let there = || (0..position.len()).filter(|&row| !position[row].is_nan());
+        // Without a prediction, in the first minutes, there is no correction to be judged.
+        let begun = run[&format!("why.{axis}")]
+            .iter()
+            .position(|why| *why != 1.0)
+            .unwrap();
+        let there = |with: f64| {
+            (0..position.len())
+                .filter(move |&row| !position[row].is_nan() && (with == 0.0 || row >= begun))
+        };
         let at = |row: usize, with: f64| {
             (
                 measured["time_s"][row],
-                position[row] + with * correction[row],
+                // The correction is in µm.
+                position[row] + 1000.0 * with * correction[row],
             )
         };
         let ways =
-            [0.0, 1.0].map(|with| drift(&there().map(|row| at(row, with)).collect::<Vec<_>>()));
+            [0.0, 1.0].map(|with| drift(&there(with).map(|row| at(row, with)).collect::<Vec<_>>()));
         for (way, name) in ["drift_without", "drift_with"].iter().enumerate() {
             let expected: Vec<f64> = ways[way].iter().map(|d| d.1).collect();
-            close(&numbers(&worth[name][i]["value"]), &expected, 1e-6);
+            let given = numbers(&worth[name][i]["value"]);
+            let given: Vec<f64> = given.into_iter().filter(|v| !v.is_nan()).collect();
+            close(&given, &expected, 1e-6);
             for (t, v) in &ways[way] {
                 *losses[way].entry(*t as i64).or_insert(0.0) += LOSS[i % 3] * (v / 1000.0).powi(2);
             }
@@ -125,12 +136,16 @@ fn what_a_correction_is_worth_agrees_with_a_calculation_by_hand() {
         assert_eq!(verdict["axis"], *axis);
         let figures =
             ["without_correction", "with_correction"].map(|name| verdict[name].as_f64().unwrap());
-        close(
-            &figures,
-            &[0, 1].map(|way| rms(ways[way].iter().map(|d| d.1))),
-            1e-6,
-        );
+        // Both over the instants at which there is a correction.
+        let first = ways[1][0].0;
+        let expected = [0, 1].map(|way| {
+            let compared = ways[way].iter().filter(|d| d.0 >= first);
+            rms(compared.map(|d| d.1))
+        });
+        close(&figures, &expected, 1e-6);
     }
+    let first = *losses[1].keys().next().unwrap();
+    losses[0].retain(|t, _| *t >= first);
     for (way, name) in ["loss_without", "loss_with"].iter().enumerate() {
         let expected: Vec<f64> = losses[way].values().copied().collect();
         close(&numbers(&worth[name]["value"]), &expected, 1e-5);
@@ -220,6 +235,7 @@ fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
         "Drift over time",
         "Votes, features and errors",
         "Correlation of Z1 with features",
+        "Step responses of rate.Z1",
         "Impulse responses of rate.Z1",
         "Z1 weights in vote",
         "Chosen features",
@@ -301,7 +317,7 @@ fn weights_of_a_vote_add_up_to_one_at_every_truth() {
     // Its axes are those of the article's single axis system, and it has no correction.
     assert_eq!(
         facts["published"][0]["source"],
-        "Table 2, single axis system"
+        "Table 2, single axis system, drift below 100 nm/min"
     );
     assert!(facts["worth"].is_null());
 }
@@ -359,9 +375,9 @@ fn a_sensor_that_failed_is_told_with_what_was_wrong() {
     assert!((ticks - 330.0).abs() < 3.0, "{ticks}");
     assert!(stuck["most_unchanged"].as_f64().unwrap() >= 360.0);
     assert_eq!(sound["health"].as_object().unwrap().len(), 1);
-    // The air's noise is 1 mK beside its own turbulence.
-    let noise = sound["noise"].as_f64().unwrap();
-    assert!((0.9e-3..0.02).contains(&noise), "{noise}");
+    // The column is slow, so that what differs from sample to sample is the noise of 1 mK.
+    let noise = sensor("t3")["noise"].as_f64().unwrap();
+    assert!((0.9e-3..1.1e-3).contains(&noise), "{noise}");
     assert_eq!(sensor("t3")["rejected"], 3);
 }
 

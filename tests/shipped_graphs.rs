@@ -109,3 +109,51 @@ fn every_shipped_graph_checks_without_a_warning() {
     }
     assert!(checked >= 8, "{checked}");
 }
+
+#[test]
+fn every_experiment_checks_and_those_that_are_wrong_on_purpose_are_warned_of() {
+    let folder = graph("experiments/x").parent().unwrap().to_owned();
+    let mut warned = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            let checks = athermal(&[&"check", &path]).ended(0);
+            if checks.told.contains("warning[A065]") {
+                warned.push(path.file_stem().unwrap().to_str().unwrap().to_owned());
+            }
+        }
+    }
+    warned.sort();
+    assert_eq!(
+        warned,
+        ["settle-time-forecast", "settle-time-virtual-sensor"]
+    );
+}
+
+#[test]
+fn every_kind_goes_through_the_conformance_kit() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let plugins = std::fs::read_dir(root.join("plugins")).unwrap();
+    let folders: Vec<_> = plugins.map(|entry| entry.unwrap().path()).collect();
+    for kind in kinds().values().flatten() {
+        let named = format!("name = \"{}\"", kind.package);
+        let of_package = |folder: &&std::path::PathBuf| {
+            std::fs::read_to_string(folder.join("Cargo.toml"))
+                .is_ok_and(|manifest| manifest.lines().any(|line| line == named))
+        };
+        let folder = folders.iter().find(of_package).unwrap_or_else(|| {
+            panic!(
+                "`{}` comes from {}, which is no plugin",
+                kind.name, kind.package
+            )
+        });
+        let tests = std::fs::read_to_string(folder.join("tests/conformance.rs"));
+        assert!(
+            tests.is_ok_and(|tests| {
+                tests.contains("\n    assert_every_kind_conforms(env!(\"CARGO_PKG_NAME\"));")
+            }),
+            "{} has no tests/conformance.rs that asks for every kind of it",
+            kind.package
+        );
+    }
+}

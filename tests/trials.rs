@@ -314,6 +314,9 @@ expect = [
     let scratch = Scratch::new("modules-tested");
     let path = scratch.file("graph.toml", text);
     athermal(&[&"test", &path]).ended(0);
+    athermal(&[&"check", &path])
+        .ended(0)
+        .tells(&["or leave it out of the module"]);
     for (right, wrong, told) in [
         (
             "of = \"model.X\"",
@@ -328,7 +331,7 @@ expect = [
         (
             "of = \"model.Z\"",
             "of = \"zzz\"",
-            "there are `position`, `model`, `none`, `out`",
+            "the graph has `position`, `model`, `none`, `out`",
         ),
     ] {
         let path = scratch.file("wrong.toml", text.replace(right, wrong));

@@ -3,22 +3,26 @@
 //! Decides where things stand in a picture; not how numbers fall on an axis (`scale`), nor how shapes are written (`svg`, `png`).
 
 mod colours;
+mod plot;
 #[cfg(feature = "png")]
 mod png;
 mod scale;
 mod svg;
 
 pub use colours::{COLOURS, STYLE};
+pub use plot::Plot;
 pub(crate) use svg::escaped;
 
 use scale::{decimated, label, range, ticks};
 
-/// Outer size and inner frame in user units.
-const WIDTH: f64 = 900.0;
+/// What is left free about the frame, in user units.
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 12.0;
-/// Above the frame stands the legend.
+/// Above the frame stands the legend, in as many rows as it needs.
 const TOP: f64 = 26.0;
+const ROW: f64 = 16.0;
+/// The width of a letter, about.
+const LETTER: f64 = 7.4;
 const BOTTOM: f64 = 30.0;
 /// Stretches of x of which the extremes are kept.
 const BUCKETS: usize = 1500;
@@ -63,7 +67,7 @@ impl<'a> Layer<'a> {
 }
 
 /// A chart to be drawn.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Chart<'a> {
     /// What it shows, for those who cannot see it.
     pub title: String,
@@ -71,7 +75,9 @@ pub struct Chart<'a> {
     pub x_label: &'a str,
     /// What y is, with its unit.
     pub y_label: String,
-    /// Its height; it is 900 wide.
+    /// Its width in user units, in which letters are 13 high.
+    pub width: f64,
+    /// Its height, a row of the legend included.
     pub height: f64,
     /// What is drawn, one over the other.
     pub layers: Vec<Layer<'a>>,
@@ -83,6 +89,23 @@ pub struct Chart<'a> {
     pub y_range: Option<(f64, f64)>,
     /// Whether x is in seconds and shown in hours, and can be zoomed.
     pub time: bool,
+}
+
+impl Default for Chart<'_> {
+    fn default() -> Self {
+        Self {
+            title: String::new(),
+            x_label: "",
+            y_label: String::new(),
+            width: 900.0,
+            height: 220.0,
+            layers: Vec::new(),
+            bands: Vec::new(),
+            limits: Vec::new(),
+            y_range: None,
+            time: false,
+        }
+    }
 }
 
 /// Something drawn, in user units of the picture. The class gives colour and line.
@@ -129,6 +152,7 @@ enum Anchor {
 #[derive(Debug)]
 struct Scene {
     title: String,
+    width: f64,
     height: f64,
     /// The frame: x, y, width, height.
     frame: (f64, f64, f64, f64),
@@ -184,30 +208,35 @@ impl Chart<'_> {
     }
 
     fn scene(&self) -> Option<Scene> {
-        let (x0, x1) = range(self.layers.iter().flat_map(|layer| layer.x.iter().copied()))?;
+        let (x0, x1) = range(self.layers.iter().flat_map(Layer::edges))?;
         let x1 = if x1 > x0 { x1 } else { x0 + 1.0 };
         let (y0, y1) = self.y_span();
-        let (width, height) = (WIDTH - LEFT - RIGHT, self.height - TOP - BOTTOM);
+        let (around, rows) = self.legend();
+        let top = TOP + ROW * rows as f64;
+        let whole = self.height + ROW * rows as f64;
+        let (right, width) = (self.width - RIGHT, self.width - LEFT - RIGHT);
+        let height = self.height - TOP - BOTTOM;
         let px = |x: f64| (x - x0) / (x1 - x0) * width;
         let py = |y: f64| (y1 - y.clamp(y0, y1)) / (y1 - y0) * height;
         let mut scene = Scene {
             title: self.title.clone(),
-            height: self.height,
-            frame: (LEFT, TOP, width, height),
+            width: self.width,
+            height: whole,
+            frame: (LEFT, top, width, height),
             zoom: self.time.then_some((x0, x1)),
             behind: Vec::new(),
             inside: Vec::new(),
             ticks: Vec::new(),
-            around: Vec::new(),
+            around,
         };
         let marks = ticks(y0, y1, 5);
         let step = step_of(&marks);
         for y in marks {
-            let at = TOP + py(y);
+            let at = top + py(y);
             scene.behind.push(Shape::Line {
                 class: "grid",
                 from: (LEFT, at),
-                to: (WIDTH - RIGHT, at),
+                to: (right, at),
             });
             scene
                 .behind
@@ -235,41 +264,42 @@ impl Chart<'_> {
         let scale = if self.time { 3600.0 } else { 1.0 };
         let marks = ticks(x0 / scale, x1 / scale, 8);
         let step = step_of(&marks);
-        let foot = self.height - BOTTOM + 15.0;
+        let foot = whole - BOTTOM + 15.0;
         for x in marks {
             let at = LEFT + px(x * scale);
             scene
                 .ticks
                 .push(text(at, foot, Anchor::Middle, label(x, step)));
         }
-        self.legend(&mut scene.around);
-        Some(scene)
-    }
-
-    fn legend(&self, shapes: &mut Vec<Shape>) {
-        let foot = self.height - 2.0;
-        shapes.push(text(
-            WIDTH - RIGHT,
-            foot,
+        scene.around.push(text(
+            right,
+            whole - 4.0,
             Anchor::End,
             self.x_label.to_owned(),
         ));
-        shapes.push(text(LEFT, TOP - 9.0, Anchor::Start, self.y_label.clone()));
-        let mut x = LEFT + 7.6 * self.y_label.chars().count() as f64 + 16.0;
+        Some(scene)
+    }
+
+    /// The legend, and how many rows it has beyond the first.
+    fn legend(&self) -> (Vec<Shape>, usize) {
+        let mut shapes = vec![text(LEFT, TOP - 9.0, Anchor::Start, self.y_label.clone())];
+        let length = |text: &str| LETTER * text.chars().count() as f64;
+        let (mut x, mut row) = (LEFT + length(&self.y_label) + 16.0, 0);
         for layer in self.layers.iter().filter(|layer| !layer.label.is_empty()) {
+            let end = x + 23.0 + length(&layer.label);
+            if end > self.width - RIGHT && x > LEFT {
+                (x, row) = (LEFT, row + 1);
+            }
+            let y = TOP - 9.0 + ROW * row as f64;
             shapes.push(Shape::Key {
                 class: layer.class,
                 x,
-                y: TOP - 13.0,
+                y: y - 4.0,
             });
-            shapes.push(text(
-                x + 23.0,
-                TOP - 9.0,
-                Anchor::Start,
-                layer.label.clone(),
-            ));
-            x += 23.0 + 7.6 * layer.label.chars().count() as f64 + 18.0;
+            shapes.push(text(x + 23.0, y, Anchor::Start, layer.label.clone()));
+            x += 23.0 + length(&layer.label) + 18.0;
         }
+        (shapes, row)
     }
 }
 
@@ -285,6 +315,20 @@ fn step_of(marks: &[f64]) -> f64 {
 }
 
 impl Layer<'_> {
+    /// How far apart bars stand.
+    fn pitch(&self) -> f64 {
+        match self.x {
+            [first, second, ..] if self.mark == Mark::Bars => second - first,
+            _ => 0.0,
+        }
+    }
+
+    /// All x; of bars both their sides.
+    fn edges(&self) -> impl Iterator<Item = f64> {
+        let half = 0.5 * self.pitch();
+        self.x.iter().flat_map(move |x| [x - half, x + half])
+    }
+
     fn draw(
         &self,
         shapes: &mut Vec<Shape>,
@@ -293,8 +337,8 @@ impl Layer<'_> {
         zero: f64,
     ) {
         if self.mark == Mark::Bars {
-            let width = match self.x {
-                [first, second, ..] => px(*second) - px(*first),
+            let width = match self.pitch() {
+                pitch if pitch > 0.0 => px(pitch) - px(0.0),
                 _ => 20.0,
             };
             let bar = |(&x, &y): (&f64, &f64)| Shape::Rect {

@@ -7,7 +7,7 @@ use tiny_skia::{
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 use super::colours::light;
-use super::{Anchor, Scene, Shape, WIDTH};
+use super::{Anchor, Scene, Shape};
 
 const SCALE: f32 = 2.0;
 /// Size of letters in user units.
@@ -24,7 +24,7 @@ struct Canvas<'a> {
 impl Scene {
     /// The picture; none where it would be beyond all size.
     pub(super) fn png(&self) -> Option<Vec<u8>> {
-        let (width, height) = (WIDTH as f32 * SCALE, self.height as f32 * SCALE);
+        let (width, height) = (self.width as f32 * SCALE, self.height as f32 * SCALE);
         let mut canvas = Canvas {
             pixels: Pixmap::new(width as u32, height as u32)?,
             face: Face::parse(UBUNTU_LIGHT, 0).ok()?,

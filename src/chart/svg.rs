@@ -2,14 +2,15 @@
 
 use std::fmt::Write as _;
 
-use super::{Anchor, Scene, Shape, WIDTH};
+use super::{Anchor, Scene, Shape};
 
 impl Scene {
     pub(super) fn svg(&self) -> String {
         let mut svg = String::new();
         let _ = write!(
             svg,
-            "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {}\" role=\"img\" aria-label=\"{}\">",
+            "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
+            self.width,
             self.height,
             escaped(&self.title)
         );
@@ -59,7 +60,10 @@ impl Shape {
                 dots,
             } => {
                 let dotted = if *dots { "dots " } else { "" };
-                let _ = write!(svg, "<path class=\"{dotted}{class}\" d=\"");
+                let _ = write!(
+                    svg,
+                    "<path class=\"{dotted}{class}\" transform=\"scale(.1)\" d=\""
+                );
                 path(svg, points, *dots);
                 svg.write_str("\"/>")
             }
@@ -83,19 +87,23 @@ impl Shape {
     }
 }
 
+/// Points as steps in tenths of a unit, which is half as long as coordinates.
 fn path(svg: &mut String, points: &[(f64, f64)], dots: bool) {
-    let mut drawing = false;
+    let (mut drawing, mut last) = (false, (0, 0));
     for &(x, y) in points {
         if y.is_nan() {
             drawing = false;
             continue;
         }
-        let _ = if dots {
-            write!(svg, "M{x:.1} {y:.1}h0")
-        } else {
-            write!(svg, "{}{x:.1} {y:.1}", if drawing { 'L' } else { 'M' })
-        };
-        drawing = true;
+        let at = ((10.0 * x).round() as i64, (10.0 * y).round() as i64);
+        let (dx, dy) = (at.0 - last.0, at.1 - last.1);
+        let command = if drawing && !dots { 'l' } else { 'm' };
+        let gap = if dy < 0 { "" } else { " " };
+        let _ = write!(svg, "{command}{dx}{gap}{dy}");
+        if dots {
+            svg.push_str("h0");
+        }
+        (drawing, last) = (true, at);
     }
 }
 
@@ -122,9 +130,9 @@ mod tests {
         let gap = (2.0, f64::NAN);
         path(
             &mut svg,
-            &[(0.0, 1.0), (1.0, 2.0), gap, (3.0, 4.0), (4.0, 5.0)],
+            &[(0.0, 1.0), (1.0, 2.0), gap, (3.0, 4.0), (4.0, 3.5)],
             false,
         );
-        assert_eq!(svg, "M0.0 1.0L1.0 2.0M3.0 4.0L4.0 5.0");
+        assert_eq!(svg, "m0 10l10 10m20 20l10-5");
     }
 }

@@ -23,7 +23,7 @@ impl Completions {
     /// When it cannot be written.
     pub fn run(&self, _terminal: &Terminal) -> Result<Answer, Failure> {
         let mut script = Vec::new();
-        let mut command = crate::Arguments::command();
+        let mut command = crate::program::Arguments::command();
         clap_complete::generate(self.shell, &mut command, "athermal", &mut script);
         crate::terminal::print(&script)?;
         Ok(Answer::Fine)

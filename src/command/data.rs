@@ -30,6 +30,15 @@ impl Data {
         }
     }
 
+    /// Other files, read in the same way.
+    #[must_use]
+    pub fn others(&self, files: Vec<PathBuf>) -> Self {
+        Self {
+            files,
+            lenient: self.lenient,
+        }
+    }
+
     /// The data set.
     #[must_use]
     pub fn dataset(&self) -> Dataset {

@@ -57,7 +57,9 @@ impl Evaluate {
                 intervals: true,
             },
         )?;
-        self.check_limit(&model)?;
+        if let Some(limit) = &self.abs_truth_below {
+            check_limit(limit, &model)?;
+        }
         let dataset = self.data.dataset();
         let options = ScoreOptions {
             abs_truth_below: self.abs_truth_below.clone(),
@@ -102,27 +104,28 @@ impl Evaluate {
         }
         Ok(Answer::Fine)
     }
+}
 
-    fn check_limit(&self, model: &Model) -> Result<(), Failure> {
-        let Some(limit) = &self.abs_truth_below else {
-            return Ok(());
-        };
-        let truths = model
-            .plan
-            .channels
-            .iter()
-            .filter_map(|channel| channel.predicts);
-        for slot in truths {
-            let truth = &model.plan.channels[slot];
-            if limit.in_unit(&truth.channel.unit).is_none() {
-                return Err(Failure::Request(format!(
-                    "--abs-truth-below is in {}, and `{}` is in {}",
-                    limit.unit, truth.name, truth.channel.unit
-                )));
-            }
+/// Whether a limit can be compared with every truth of a model.
+///
+/// # Errors
+/// When a truth is in a unit that measures something else.
+pub fn check_limit(limit: &Quantity, model: &Model) -> Result<(), Failure> {
+    let truths = model
+        .plan
+        .channels
+        .iter()
+        .filter_map(|channel| channel.predicts);
+    for slot in truths {
+        let truth = &model.plan.channels[slot];
+        if limit.in_unit(&truth.channel.unit).is_none() {
+            return Err(Failure::Request(format!(
+                "--abs-truth-below is in {}, and `{}` is in {}",
+                limit.unit, truth.name, truth.channel.unit
+            )));
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// A model in which everything that needs a fit has one.

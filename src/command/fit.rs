@@ -149,14 +149,13 @@ pub fn fit_on(
 /// What is told of a step of a selection.
 fn tell_step(text: &mut String, nth: &str, step: &SelectionStep, candidates: bool) {
     use std::fmt::Write as _;
-    let name = if step.removed {
-        format!("− {}", step.regressor)
-    } else {
-        step.regressor.clone()
-    };
     let folds: Vec<String> = step.folds.iter().map(|r2| format!("{r2:.3}")).collect();
     let folds = folds.join(" ");
-    let line = format!("  {nth:>3} {name:<38} R² {:.4}  {folds}", step.score);
+    let line = format!(
+        "  {nth:>3} {:<38} R² {:.4}  {folds}",
+        step.label(),
+        step.score
+    );
     let _ = writeln!(text, "{}", line.trim_end());
     if candidates {
         for tried in &step.candidates {

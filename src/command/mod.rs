@@ -1,15 +1,20 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
+mod build;
 mod check;
+mod compare;
 mod completions;
 mod data;
 mod demo;
+mod diagnose;
 mod diff;
 mod evaluate;
 mod explain;
 mod fit;
 mod init;
+mod new;
 mod nodes;
+mod parameters;
 mod report;
 mod run;
 mod schema;
@@ -44,6 +49,10 @@ pub enum Command {
     Fit(fit::Fit),
     /// Score a model's predictions on recorded data
     Evaluate(evaluate::Evaluate),
+    /// Fit several graphs on the same data and score them on others, in one table
+    Compare(compare::Compare),
+    /// Show why a model predicts as well as it does, and what would make it better
+    Diagnose(diagnose::Diagnose),
     /// Show what a model is worth on recorded data, as one page
     Report(report::Report),
     /// Run a model: rows in, predictions out
@@ -56,6 +65,10 @@ pub enum Command {
     Test(test::Test),
     /// Write the JSON Schema of graph files, for editors
     Schema(schema::Schema),
+    /// Begin something of your own: a plugin crate
+    New(new::New),
+    /// Build this program with plugin crates of your choice
+    Build(build::Build),
 }
 
 impl Command {
@@ -75,11 +88,15 @@ impl Command {
             Self::Nodes(command) => command.run(terminal),
             Self::Fit(command) => command.run(terminal),
             Self::Evaluate(command) => command.run(terminal),
+            Self::Compare(command) => command.run(terminal),
+            Self::Diagnose(command) => command.run(terminal),
             Self::Report(command) => command.run(terminal),
             Self::Run(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),
             Self::Test(command) => command.run(terminal),
             Self::Schema(command) => command.run(terminal),
+            Self::New(command) => command.run(terminal),
+            Self::Build(command) => command.run(terminal),
         }
     }
 }

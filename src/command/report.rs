@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use athermal::report::{Plot, WANTED, gather, page, plots, text};
+use athermal::chart::Plot;
+use athermal::report::{WANTED, gather, page, plots, text};
 use clap::Args;
 
 use super::data::Data;
@@ -80,19 +81,17 @@ impl Report {
             }
         }
         if let Some(folder) = &self.plots {
-            let plots = plots(&facts);
-            write_plots(folder, &plots)?;
-            terminal.note(format_args!(
-                "wrote {} pictures to {}",
-                plots.len(),
-                folder.display()
-            ));
+            write_plots(terminal, folder, &plots(&facts))?;
         }
         Ok(Answer::Fine)
     }
 }
 
-fn write_plots(folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
+/// Writes pictures into a folder.
+///
+/// # Errors
+/// When the folder or a file cannot be written.
+pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::Outside(format!("cannot make {}: {error}", folder.display())))?;
     for plot in plots {
@@ -101,6 +100,11 @@ fn write_plots(folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
         #[cfg(feature = "png")]
         write(&folder.join(format!("{name}.png")), &plot.png)?;
     }
+    terminal.note(format_args!(
+        "wrote {} pictures to {}",
+        plots.len(),
+        folder.display()
+    ));
     Ok(())
 }
 

@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
-use athermal::core::live::{LiveOptions, pair};
-use athermal::files::{Flush, Options, Reader, Row, Writer, layout};
-use athermal::{Engine, Instant, Model};
+use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair};
+use athermal::core::recording::Event;
+use athermal::files::{Flush, Options, Reader, WithRevision, Writer, layout};
+use athermal::{Engine, Model};
 use clap::Args;
 
 use super::data;
 use super::evaluate::load_fitted;
 use super::swap;
-use crate::terminal::{Answer, Failure, Terminal};
+use crate::terminal::{Answer, Failure, Terminal, outside};
 
 /// Run a model: rows in, predictions out
 ///
@@ -67,15 +68,7 @@ impl Run {
             .map(|output| output.name.clone())
             .collect();
         let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
-        let mut row = Row::default();
-        while reader.next_into(&mut row)? {
-            match engine.step(Instant::from_ns(row.time_ns), &row.values) {
-                Ok(outputs) => writer.write_row(&row.time_text, row.time_ns, outputs)?,
-                Err(athermal::EngineError::NotAfter { .. }) => {}
-                Err(error) => return Err(Failure::Request(error.to_string())),
-            }
-        }
-        writer.finish()?;
+        live::run(&mut engine, &mut reader, &mut writer)?;
         self.tell(terminal, &engine, &reader);
         Ok(Answer::Fine)
     }
@@ -112,13 +105,17 @@ impl Run {
         let mut shown = vec![f64::NAN; columns.len()];
         let names = columns.clone();
         columns.push("revision".to_owned());
-        let mut writer = Writer::create(&self.output, &column, &columns, self.flush())?;
-        let mut row = Row::default();
+        let writer = Writer::create(&self.output, &column, &columns, self.flush())?;
+        let mut writer = WithRevision(writer);
+        let mut samples = Samples::default();
         let mut places = (String::new(), Vec::new());
-        while reader.next_into(&mut row)? {
-            let now = Instant::from_ns(row.time_ns);
-            course.before(&mut control, now)?;
-            let stepped = match stepper.step(now, &row.values) {
+        while let Some(event) = reader.next(&mut samples).map_err(outside)? {
+            let Event::Row(time) = event else {
+                stepper.segment();
+                continue;
+            };
+            course.before(&mut control, time)?;
+            let stepped = match stepper.step(time, &samples.values) {
                 Ok(stepped) => stepped,
                 Err(athermal::EngineError::NotAfter { .. }) => continue,
                 Err(error) => return Err(Failure::Request(error.to_string())),
@@ -136,9 +133,15 @@ impl Run {
             for (shown, place) in shown.iter_mut().zip(&places.1) {
                 *shown = place.map_or(f64::NAN, |place| stepped.outputs[place]);
             }
-            writer.write_labelled_row(&row.time_text, row.time_ns, &shown, stepped.revision)?;
+            let frame = Frame {
+                time,
+                time_text: &samples.time_text,
+                revision: stepped.revision,
+                outputs: &shown,
+            };
+            writer.put(&frame).map_err(outside)?;
         }
-        writer.finish()?;
+        writer.finish().map_err(outside)?;
         course.end(&mut control);
         let engine = stepper.engine();
         self.tell(terminal, engine, &reader);

@@ -55,7 +55,8 @@ pub struct Correlogram {
     pub r: Vec<f64>,
     /// Its standard error if the two had nothing to do with each other, their own smoothness considered.
     pub error: f64,
-    /// The lag in s at which it is largest in size.
+    /// The lag in s at which it is largest in size: of a residual, of those at which the feature was known when the prediction
+    /// was made.
     pub best_lag_s: f64,
     /// The correlation there.
     pub best: f64,
@@ -130,15 +131,15 @@ pub fn lags(
                 let smooth = autocorrelation(&series, REACH * count);
                 (series, smooth)
             });
-            let of = |slot: usize, (y, y_smooth): &(Vec<f64>, Vec<f64>)| {
+            let of = |slot: usize, (y, y_smooth): &(Vec<f64>, Vec<f64>), from_s: f64| {
                 let place = grid.place_of(slot);
                 let (x, x_smooth) = (&grid.series[place], &smoothness[place]);
-                correlogram(x, x_smooth, y, y_smooth, &lag_s)
+                correlogram((x, x_smooth), (y, y_smooth), &lag_s, from_s)
             };
             let features = features.iter().map(|&slot| FeatureLags {
                 feature: plan.channels[slot].name.clone(),
-                truth: of(slot, &sides[0]),
-                residual: of(slot, &sides[1]),
+                truth: of(slot, &sides[0], f64::NEG_INFINITY),
+                residual: of(slot, &sides[1], main.ahead.secs()),
             });
             Some(Lags {
                 truth: plan.channels[truth.slot].name.clone(),
@@ -150,17 +151,17 @@ pub fn lags(
     Ok(facts.collect())
 }
 
+/// Of two series, each with its autocorrelation; the largest is looked for at lags from `from_s` on.
 fn correlogram(
-    x: &[f64],
-    x_smooth: &[f64],
-    y: &[f64],
-    y_smooth: &[f64],
+    (x, x_smooth): (&[f64], &[f64]),
+    (y, y_smooth): (&[f64], &[f64]),
     lag_s: &[f64],
+    from_s: f64,
 ) -> Correlogram {
     let r = cross_correlation(x, y, lag_s.len() / 2);
     let pairs = x.iter().zip(y).filter(|(x, y)| !(*x + *y).is_nan());
     let error = cross_correlation_error(x_smooth, y_smooth, pairs.count());
-    let present = (0..r.len()).filter(|&lag| !r[lag].is_nan());
+    let present = (0..r.len()).filter(|&lag| !r[lag].is_nan() && lag_s[lag] >= from_s);
     let best = present.max_by(|&a, &b| r[a].abs().total_cmp(&r[b].abs()));
     Correlogram {
         best_lag_s: best.map_or(f64::NAN, |best| lag_s[best]),
@@ -321,9 +322,12 @@ mod tests {
         let y: Vec<f64> = (0..500).map(|i| -2.0 * x[(i + 497) % 500]).collect();
         let lag_s: Vec<f64> = (-20..=20).map(|lag| 10.0 * f64::from(lag)).collect();
         let smooth = autocorrelation(&x, 80);
-        let found = correlogram(&x, &smooth, &y, &smooth, &lag_s);
+        let all = f64::NEG_INFINITY;
+        let found = correlogram((&x, &smooth), (&y, &smooth), &lag_s, all);
         assert_eq!(found.best_lag_s, 30.0);
         assert!((found.best + 1.0).abs() < 0.02, "{}", found.best);
+        let later = correlogram((&x, &smooth), (&y, &smooth), &lag_s, 50.0);
+        assert!(later.best_lag_s >= 50.0 && later.r == found.r);
         assert!(found.error >= 1.0 / 500.0_f64.sqrt() && found.significance() > 3.0);
     }
 }

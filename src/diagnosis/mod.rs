@@ -3,13 +3,119 @@
 //! [`observe`] steps a model over a recording once; each of the modules works out one kind of fact from that and, where it
 //! must, from further passes. All of them step the same engine that runs live.
 
+pub mod comparison;
+pub mod day;
 pub mod lag;
 mod observation;
+mod plot;
+pub mod regressor;
+pub mod residual;
 pub mod response;
+pub mod sensor;
+pub mod window;
 
 pub use observation::{Observation, SourceStatistics, observe};
+pub use plot::plots;
 
 use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
+use athermal_core::fit::FitError;
+use athermal_core::model::Model;
+use athermal_core::recording::Recording;
+use athermal_core::time::Duration;
+use serde::Serialize;
+
+use observation::main_prediction;
+
+/// All that a diagnosis says.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnosis {
+    /// The graph's name.
+    pub graph: String,
+    /// For each truth the prediction that the graph is about.
+    pub main: Vec<Main>,
+    /// What every prediction leaves.
+    pub residuals: Vec<residual::Residuals>,
+    /// Features against truths and residuals.
+    pub lags: Vec<lag::Lags>,
+    /// How estimators answer their sensors.
+    pub responses: Vec<response::Responses>,
+    /// How well the data determine the estimators.
+    pub designs: Vec<regressor::Design>,
+    /// What each sensor contributes.
+    pub contributions: Vec<sensor::Contribution>,
+    /// What fits on some days are worth on others; none where it was not asked for, or there are too few days or too many.
+    pub days: Option<day::Days>,
+    /// How many days the recording has.
+    pub day_count: usize,
+    /// Drifts against their windows, where that was asked for.
+    pub windows: Vec<window::Windows>,
+}
+
+/// A truth and the prediction that the graph is about: the first that it puts out, else the last one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Main {
+    /// The truth: `drift.Z1`.
+    pub truth: String,
+    /// Its name within its node: `Z1`.
+    pub name: String,
+    /// The unit of the truth.
+    pub unit: String,
+    /// The prediction: `vote.Z1`.
+    pub prediction: String,
+}
+
+/// What is diagnosed beside what always is.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// How long a day is of which fits are made and scored; none leaves fits out.
+    pub day: Option<Duration>,
+    /// Whether drifts are set against their windows.
+    pub windows: bool,
+}
+
+/// Diagnoses a model on a recording. `progress` is told how many fits of how many are done.
+///
+/// # Errors
+/// When the recording cannot be read, or the fit does not belong to the graph.
+pub fn diagnose(
+    model: &Model,
+    recording: &dyn Recording,
+    options: &Options,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<(Diagnosis, Observation), FitError> {
+    let plan = &*model.plan;
+    let observation = observe(model, recording)?;
+    let main = observation.trace.truths.iter().filter_map(|truth| {
+        let of = &truth.predictions[main_prediction(plan, truth)?];
+        let channel = &plan.channels[truth.slot];
+        Some(Main {
+            truth: channel.name.clone(),
+            name: channel.channel.name.clone(),
+            unit: channel.channel.unit.to_string(),
+            prediction: plan.channels[of.slot].name.clone(),
+        })
+    });
+    let diagnosis = Diagnosis {
+        graph: plan.name.clone().unwrap_or_default(),
+        main: main.collect(),
+        residuals: residual::residuals(plan, &observation),
+        lags: lag::lags(model, recording, &observation)?,
+        responses: response::responses(model, &observation)?,
+        designs: regressor::designs(model, recording)?,
+        contributions: sensor::contributions(model, recording, &observation)?,
+        days: match options.day {
+            Some(day) => day::days(model, recording, &observation, day, progress)?,
+            None => None,
+        },
+        day_count: options.day.map_or(0, |day| day::count(&observation, day)),
+        windows: if options.windows {
+            window::windows(model, recording)?
+        } else {
+            Vec::new()
+        },
+    };
+    Ok((diagnosis, observation))
+}
 
 /// The measured channels from which a slot follows, by their number.
 fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {

@@ -21,6 +21,8 @@ use super::of_truths;
 const MOST_INSTANTS: i64 = 2_000;
 /// A step response below this share of the largest of its estimator is none.
 const NOTHING: f64 = 1e-9;
+/// A step response that ends above this share of its largest value has not come to an end.
+const LASTS: f64 = 0.01;
 /// The share of an answer that must have come for it to have settled.
 const SETTLED: f64 = 0.9;
 
@@ -51,8 +53,8 @@ pub struct Response {
     /// What is predicted at each time after an impulse of one unit times one minute, in the unit of the truth.
     pub impulse: Vec<f64>,
     /// The sum of the step response over time, in the unit of the truth times minutes: of a drift per minute, how far a step of
-    /// one unit moves the axis in the end.
-    pub total: f64,
+    /// one unit moves the axis in the end. None where the step response does not come to an end.
+    pub total: Option<f64>,
     /// The time in s at which the step response is largest in size.
     pub peak_s: f64,
     /// The step response there.
@@ -61,6 +63,15 @@ pub struct Response {
     pub settled_s: Option<f64>,
     /// By how much the answers to a step up and a step down differ, as a share of their size: 0 for a linear estimator.
     pub asymmetry: f64,
+}
+
+impl Response {
+    /// Leaves out what comes later, where nothing does.
+    fn end_after(&mut self, count: usize) {
+        for series in [&mut self.time_s, &mut self.step, &mut self.impulse] {
+            series.truncate(count);
+        }
+    }
 }
 
 /// The responses of every estimator that answers any sensor.
@@ -102,6 +113,9 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         let truth = truth.map(|slot| &plan.channels[slot]);
         let largest = sensors.iter().map(|of| of.peak.abs()).fold(0.0, f64::max);
         sensors.retain(|of| of.peak.abs() > NOTHING * largest);
+        let last = |of: &Response| of.step.iter().rposition(|y| y.abs() > NOTHING * largest);
+        let last = sensors.iter().filter_map(last).max().unwrap_or(0);
+        sensors.iter_mut().for_each(|of| of.end_after(last + 2));
         Responses {
             node: node.instance(),
             truth: truth.map_or_else(String::new, |of| of.name.clone()),
@@ -212,16 +226,17 @@ impl Answer<'_> {
             })
             .collect();
         let total = *sums.last()?;
+        let ends = step.last()?.abs() <= LASTS * peak.abs();
         let outside = |sum: &f64| (sum - total).abs() > (1.0 - SETTLED) * total.abs();
         let settled = sums.iter().rposition(outside).map_or(0, |last| last + 1);
         Some(Response {
             sensor: plan.sources[source].name.clone(),
             sensor_unit: plan.channels[source].channel.unit.difference().to_string(),
             impulse: impulse.collect(),
-            total,
+            total: ends.then_some(total),
             peak_s: time_s[largest],
             peak,
-            settled_s: time_s.get(settled).copied(),
+            settled_s: time_s.get(settled).copied().filter(|_| ends),
             asymmetry: asymmetric / peak.abs(),
             time_s,
             step,

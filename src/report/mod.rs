@@ -15,7 +15,7 @@ mod worth;
 
 pub use course::{Axis, Course, Voter, Weight};
 pub use errors::Errors;
-pub use page::{Plot, page, plots};
+pub use page::{page, plots};
 pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
 pub use text::text;
@@ -95,6 +95,15 @@ fn figure(value: Option<f64>) -> String {
         Some(value) if value.abs() >= 10.0 => format!("{value:.1}"),
         Some(value) if value.abs() >= 0.1 || value == 0.0 => format!("{value:.2}"),
         Some(value) => format!("{value:.3}"),
+    }
+}
+
+/// A unit as people write it.
+fn spelled(unit: &str) -> &str {
+    match unit {
+        "Cel" => "°C",
+        "[degF]" => "°F",
+        unit => unit,
     }
 }
 

@@ -41,7 +41,7 @@ struct Table {
 /// Mandelli, Dankwart and Napoli; the kind of node beside the article's name of it.
 const TABLES: [Table; 3] = [
     Table {
-        source: "Table 2, single axis system",
+        source: "Table 2, single axis system, drift below 100 nm/min",
         limit: 100.0,
         axes: &["X", "Y", "Z"],
         rows: &[

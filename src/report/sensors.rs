@@ -34,7 +34,7 @@ pub struct SensorFacts {
     pub gaps: u64,
     /// The most samples in a row with the very same value.
     pub most_unchanged: u64,
-    /// The noise of single samples, `sqrt(mean of squared successive differences / 2)`: real changes from one sample to the next count in.
+    /// The noise of single samples, `sqrt(mean of squared second differences / 6)`, which a steady change leaves alone.
     pub noise: Option<f64>,
     /// Lowest and highest sample.
     pub range: Option<(f64, f64)>,
@@ -48,12 +48,17 @@ pub struct SensorFacts {
 #[derive(Debug, Clone, Default)]
 struct Looking {
     last: Option<(f64, f64)>,
+    /// The difference between the last two samples.
+    difference: Option<f64>,
     unchanged: u64,
     changes: u64,
-    squares: f64,
+    /// Squared second differences, and how many.
+    squares: (f64, u64),
     lengths: Vec<f64>,
     /// The channel's range in the graph.
     limits: (f64, f64),
+    /// Whether data may lack it, such as what a machine reports as applied, which may rest.
+    optional: bool,
     /// The slot in which a `health` node says what is wrong.
     reason: Option<usize>,
 }
@@ -67,6 +72,7 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
         max_age_s: plan.channels[slot].channel.max_age.map(|age| age.secs()),
         looking: Looking {
             limits: source.range,
+            optional: source.optional,
             reason: reasons.get(&slot).copied(),
             ..Looking::default()
         },
@@ -75,10 +81,10 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
     plan.sources.iter().enumerate().map(facts).collect()
 }
 
-/// Has every `health` node say what is wrong, whether or not the graph reads it.
+/// Has every `health` node say what is wrong and every `compensate` what holds it back, whether or not the graph reads it.
 pub(super) fn ask_for_reasons(plan: &mut Plan) {
     for node in &mut plan.nodes {
-        if node.kind.name == "health"
+        if matches!(node.kind.name, "health" | "compensate")
             && let PlannedRole::Feature { wanted, .. } = &mut node.role
         {
             wanted.fill(true);
@@ -130,7 +136,11 @@ impl SensorFacts {
             looking.lengths.push(gap);
             self.longest_gap_s = self.longest_gap_s.max(gap);
             self.mean_gap_s += (gap - self.mean_gap_s) / looking.lengths.len() as f64;
-            looking.squares += (value - last) * (value - last);
+            let difference = value - last;
+            if let Some(before) = looking.difference.replace(difference) {
+                looking.squares.0 += (difference - before).powi(2);
+                looking.squares.1 += 1;
+            }
             if value != last {
                 looking.changes += 1;
                 looking.unchanged = 1;
@@ -145,7 +155,7 @@ impl SensorFacts {
 
     /// Another segment begins.
     pub(super) fn segment(&mut self) {
-        self.looking.last = None;
+        (self.looking.last, self.looking.difference) = (None, None);
         self.looking.unchanged = 0;
     }
 
@@ -154,15 +164,15 @@ impl SensorFacts {
         let lengths = std::mem::take(&mut self.looking.lengths);
         let limit = self.max_age_s.unwrap_or(5.0 * self.mean_gap_s);
         self.gaps = lengths.iter().filter(|gap| **gap > limit).count() as u64;
-        let pairs = lengths.len() as f64;
-        self.noise = (pairs > 0.0).then(|| (0.5 * self.looking.squares / pairs).sqrt());
+        let (sum, count) = self.looking.squares;
+        self.noise = (count > 0).then(|| (sum / (6.0 * count as f64)).sqrt());
     }
 
     /// What somebody should look at.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        if self.samples == 0 {
+        if self.samples == 0 && !self.looking.optional {
             remarks.push("no sample".to_owned());
         }
         let beyond = self.rejected - self.infinite;
@@ -180,7 +190,10 @@ impl SensorFacts {
             ));
         }
         let moving = self.looking.changes as f64 + self.most_unchanged as f64;
-        if self.most_unchanged >= STUCK && moving > CHANGES * self.samples as f64 {
+        if !self.looking.optional
+            && self.most_unchanged >= STUCK
+            && moving > CHANGES * self.samples as f64
+        {
             remarks.push(format!("the same value {} times", self.most_unchanged));
         }
         let faults = self

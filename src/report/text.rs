@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Facts, Published, Worth, figure};
+use super::{Facts, Published, Worth, figure, spelled};
 
 /// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
 #[must_use]
@@ -12,10 +12,11 @@ pub fn text(facts: &Facts) -> String {
         let sentence = format!("{}: {}", verdict.axis, verdict.sentence());
         text.push_str(&filled(&sentence, "   "));
     }
-    facts
-        .published
-        .iter()
-        .for_each(|table| published(&mut text, table));
+    let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
+    for table in &facts.published {
+        let _ = writeln!(text, "\n{}; here {} min ahead", table.source, ahead / 60.0);
+        published(&mut text, table);
+    }
     if let Some(worth) = &facts.worth {
         loss(&mut text, worth);
     }
@@ -36,48 +37,40 @@ pub fn text(facts: &Facts) -> String {
     text
 }
 
-/// Errors in nm/min, the article's before ours in each row.
+/// The article's errors, and ours under them.
 fn published(text: &mut String, table: &Published) {
-    let _ = write!(
-        text,
-        "\n{}, in nm/min: published | here\n{:<21}",
-        table.source, ""
-    );
-    let width = if table.axes.len() > 3 { 9 } else { 14 };
+    let _ = write!(text, "{:<32}", "errors in nm/min");
     for axis in &table.axes {
-        let _ = write!(text, "{axis:>width$}");
+        let _ = write!(text, "{axis:>8}");
     }
     text.push('\n');
-    for row in &table.rows {
-        let _ = write!(text, "{:<21}", row.name);
-        for (published, ours) in row.published.iter().zip(&row.ours) {
-            let short = |value: Option<f64>| match value {
-                Some(value) if value < 10.0 => format!("{value:.1}"),
-                Some(value) => format!("{value:.0}"),
-                None => "-".to_owned(),
-            };
-            let both = format!("{}|{}", short(Some(*published)), short(*ours));
-            let _ = write!(text, "{both:>width$}");
+    let mut line = |name: &str, whose: &str, figures: &mut dyn Iterator<Item = Option<f64>>| {
+        let _ = write!(text, "{name:<22}{whose:<10}");
+        for value in figures {
+            let _ = write!(text, "{:>8}", figure(value));
         }
         text.push('\n');
+    };
+    for row in &table.rows {
+        line(
+            row.name,
+            "published",
+            &mut row.published.iter().map(|value| Some(*value)),
+        );
+        line("", "here", &mut row.ours.iter().copied());
     }
 }
 
 fn loss(text: &mut String, worth: &Worth) {
-    let Some((without, with)) = worth.below_limit else {
+    let Some(headline) = worth.headline() else {
         return;
     };
-    let _ = writeln!(
-        text,
-        "\nFive-minute losses below {} dB: {:.1} % without, {:.1} % with correction.",
-        worth.loss_limit,
-        100.0 * without,
-        100.0 * with
-    );
+    text.push('\n');
+    text.push_str(&filled(&headline, ""));
     if worth.settling.is_empty() {
         return;
     }
-    let unit = worth.set_point_unit.as_deref().unwrap_or_default();
+    let unit = spelled(worth.set_point_unit.as_deref().unwrap_or_default());
     let _ = writeln!(
         text,
         "\n{:>27}{:>21}{:>27}\n{:>6}{:>9}{:>9}{:>15}{:>9}{:>17}{:>9}",

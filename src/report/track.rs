@@ -5,6 +5,9 @@ use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal_core::engine::Engine;
 use athermal_core::time::{Duration, Instant};
 
+/// The number in the port `why` of a correction without a valid prediction.
+const INVALID: f64 = 1.0;
+
 /// What the correction was and what it acts on, for working out its worth.
 #[derive(Debug)]
 pub(super) struct Track {
@@ -18,6 +21,8 @@ pub(super) struct Track {
     /// The unit of the set point.
     pub(super) set_point: Option<String>,
     pub(super) rows: Vec<TrackRow>,
+    /// Which axes have had a valid prediction: before, there is no correction to be judged.
+    begun: Vec<bool>,
 }
 
 /// One instant at which something was measured.
@@ -35,6 +40,8 @@ pub(super) struct TrackRow {
 pub(super) struct Places {
     positions: Vec<usize>,
     corrections: Vec<usize>,
+    /// Where each correction says what holds it back.
+    why: Vec<usize>,
     factor: f64,
     set_point: Option<usize>,
 }
@@ -57,6 +64,7 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
     let mut places = Places {
         positions: Vec::new(),
         corrections: Vec::new(),
+        why: Vec::new(),
         factor: f64::NAN,
         set_point: None,
     };
@@ -75,6 +83,7 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
             places.factor = plan.channels[correction].channel.unit.factor_to(unit)?;
             places.positions.push(position);
             places.corrections.push(correction);
+            places.why.push(node.ports.get(1)?.1.start + nth);
             of_drift = Some((truth, position));
         }
     }
@@ -99,6 +108,7 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
             .set_point
             .map(|slot| plan.channels[slot].channel.unit.to_string()),
         rows: Vec::new(),
+        begun: vec![false; places.corrections.len()],
     };
     Some((places, track))
 }
@@ -111,6 +121,9 @@ impl Track {
             .map(|&slot| engine.value(slot))
             .collect();
         let set_point = places.set_point.map_or(f64::NAN, |slot| engine.value(slot));
+        if begins {
+            self.begun.fill(false);
+        }
         if begins && let Some(row) = self.rows.last_mut() {
             // Kept on the row before, so that it is seen even where nothing is measured at the break.
             row.begins = true;
@@ -118,10 +131,14 @@ impl Track {
         if position.iter().all(|value| value.is_nan()) && set_point.is_nan() {
             return;
         }
-        let correction = places
-            .corrections
-            .iter()
-            .map(|&slot| engine.value(slot) * places.factor);
+        for (begun, &why) in self.begun.iter_mut().zip(&places.why) {
+            *begun |= engine.value(why) != INVALID;
+        }
+        let there = places.corrections.iter().zip(&self.begun);
+        let correction = there.map(|(&slot, begun)| match begun {
+            true => engine.value(slot) * places.factor,
+            false => f64::NAN,
+        });
         self.rows.push(TrackRow {
             at: now,
             position,

@@ -82,6 +82,34 @@ pub struct Settling {
     pub largest_with: f64,
 }
 
+impl Worth {
+    /// What the correction does for light and waiting, in a sentence; none without losses.
+    #[must_use]
+    pub fn headline(&self) -> Option<String> {
+        let (without, with) = self.below_limit?;
+        let mut text = format!(
+            "Five-minute losses below {} dB: {:.1} % without, {:.1} % with correction",
+            self.loss_limit,
+            100.0 * without,
+            100.0 * with
+        );
+        if !self.settling.is_empty() {
+            let waits = |pick: fn(&Settling) -> Option<f64>| self.settling.iter().map(pick);
+            let longest = |pick| match waits(pick).try_fold(0.0_f64, |most, m| Some(most.max(m?))) {
+                Some(most) => format!("{most:.0} min"),
+                None => "never settling".to_owned(),
+            };
+            let _ = write!(
+                text,
+                "; longest wait after a change of the set point: {} without, {} with",
+                longest(|s| s.without_min),
+                longest(|s| s.with_min)
+            );
+        }
+        Some(text + ".")
+    }
+}
+
 /// The limit where no `settled` node gives one: that of the article.
 const LIMIT_DB: f64 = 0.2;
 
@@ -336,6 +364,40 @@ fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<St
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wait_that_never_ends_is_the_longest() {
+        let settling = |without_min, with_min| Settling {
+            at_s: 0.0,
+            from: 20.0,
+            to: 30.0,
+            without_min,
+            with_min,
+            largest_without: 1.0,
+            largest_with: 0.1,
+        };
+        let worth = Worth {
+            axes: Vec::new(),
+            unit: String::new(),
+            drift_without: Vec::new(),
+            drift_with: Vec::new(),
+            correction: Vec::new(),
+            correction_unit: String::new(),
+            loss_without: Series::default(),
+            loss_with: Series::default(),
+            loss_limit: 0.2,
+            set_point: Vec::new(),
+            set_point_unit: None,
+            below_limit: Some((0.5, 0.975)),
+            settling: vec![settling(Some(82.0), Some(32.4)), settling(None, Some(0.0))],
+            steps: Vec::new(),
+        };
+        assert_eq!(
+            worth.headline().unwrap(),
+            "Five-minute losses below 0.2 dB: 50.0 % without, 97.5 % with correction; \
+             longest wait after a change of the set point: never settling without, 32 min with."
+        );
+    }
 
     #[test]
     fn changes_between_the_same_set_points_are_one_kind_of_step() {

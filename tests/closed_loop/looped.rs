@@ -57,7 +57,8 @@ impl Looped {
             seed,
             schedule: schedule.cloned(),
         };
-        let faults = fault.iter().map(|fault| fault.parse().unwrap()).collect();
+        let faults = fault.iter().flat_map(|faults| faults.split(' '));
+        let faults = faults.map(|fault| fault.parse().unwrap()).collect();
         let simulation = Simulated::new(self.machine, setup)
             .with_faults(faults)
             .start()
@@ -65,7 +66,7 @@ impl Looped {
         ClosedLoop::new(self.machine, simulation, self.model.engine().unwrap()).unwrap()
     }
 
-    /// A day under correction.
+    /// A day under correction, with sensor faults as the command line takes them, one after the other.
     pub fn run(&self, schedule: Option<&Schedule>, seed: u64, fault: Option<&str>) -> Run {
         let mut simulation = self.started(1.0, seed, schedule, fault);
         let channels = self.machine.channels();

@@ -102,8 +102,10 @@ fn the_loop_of_the_linear_axis_is_bounded_and_recovers_too() {
 #[test]
 fn without_any_position_for_hours_the_correction_goes_on_as_well() {
     for (looped, moving) in [(die_tester(), [2, 5].as_slice()), (linear_axis(), &[1, 2])] {
-        let gone = "position=missing,from=6h,for=5h";
-        let (good, blind) = (looped.run(None, 7, None), looped.run(None, 7, Some(gone)));
+        let of_axis = |axis: &&str| format!("position.{axis}=missing,from=6h,for=5h");
+        let gone: Vec<String> = looped.axes.iter().map(of_axis).collect();
+        let good = looped.run(None, 7, None);
+        let blind = looped.run(None, 7, Some(&gone.join(" ")));
         assert_eq!(blind.invalid, 0);
         for &axis in moving {
             let (seen, unseen) = (good.left(axis, 11.2, 24.0), blind.left(axis, 11.2, 24.0));
@@ -144,7 +146,7 @@ fn a_correction_that_the_axis_clips_fools_nobody() {
     let text = format!(
         "schema = 1\nextends = {:?}\nname = \"boastful\"\n\
          [nodes.boast]\ntype = \"scale\"\ninputs.signal = \"rate\"\nfactor = 100.0\n\
-         [nodes.compensate]\ninputs.rate = {{ from = \"boast\", max_age = \"1min\" }}\n\
+         [nodes.compensate]\ninputs.rate = {{ from = \"boast\", max_age = \"1min\" }}\nmax_rate = \"10000 nm/min\"\nmax_slew = \"500 nm/s\"\n\
          [outputs]\nuncorrected = \"uncorrected\"\n",
         graph("die-tester-control")
     );

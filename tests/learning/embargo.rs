@@ -96,13 +96,13 @@ fn a_truth_meets_the_row_of_the_last_run_at_or_before_its_horizon() {
 #[test]
 fn an_estimator_that_cannot_learn_says_what_can() {
     let with = |line: &str| {
+        let text = graph("arrival", "5min", "0s");
+        let lines = text
+            .lines()
+            .filter(|line| !line.starts_with("about") && !line.starts_with("learn ="));
         let linear = "type = \"linear\"\n".to_owned() + line;
-        let text = graph("arrival", "5min", "0s").replace("type = \"test_told\"\n", &linear);
-        let lines = text.lines().filter(|line| !line.starts_with("about"));
-        lines
-            .filter(|line| !line.starts_with("learn = {"))
-            .collect::<Vec<_>>()
-            .join("\n")
+        let text = lines.collect::<Vec<_>>().join("\n");
+        text.replace("type = \"test_told\"", &linear)
     };
     let told = problems(&with("learn = true\n"));
     assert!(

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -28,7 +29,7 @@ const FAHRENHEIT_ZERO: f64 = 459.67;
 /// converted into ratios.
 #[derive(Debug, Clone)]
 pub struct Unit {
-    text: String,
+    text: Arc<str>,
     ratio: Ratio,
     dimension: [i8; 7],
     /// Units that UCUM calls special or arbitrary, with their exponents: each is a dimension of its own.
@@ -88,7 +89,7 @@ impl Unit {
             }
         }
         unit.opaque.retain(|_, exponent| *exponent != 0);
-        unit.text = canonical;
+        unit.text = canonical.into();
         Ok(unit)
     }
 
@@ -103,7 +104,7 @@ impl Unit {
         }
         let analysis = ucum::analyze(symbol).map_err(|error| unknown(text, &error))?;
         let mut unit = Unit {
-            text: symbol.to_owned(),
+            text: symbol.into(),
             ..Unit::one()
         };
         if analysis.is_special {
@@ -128,7 +129,7 @@ impl Unit {
     /// The second.
     pub fn second() -> Self {
         Unit {
-            text: "s".to_owned(),
+            text: "s".into(),
             dimension: [0, 1, 0, 0, 0, 0, 0],
             ..Unit::one()
         }
@@ -137,7 +138,7 @@ impl Unit {
     /// The unit of a bare ratio, `1`.
     pub fn one() -> Self {
         Unit {
-            text: "1".to_owned(),
+            text: "1".into(),
             ratio: Ratio::whole(1),
             dimension: [0; 7],
             opaque: BTreeMap::new(),
@@ -148,7 +149,7 @@ impl Unit {
     /// The kelvin.
     pub fn kelvin() -> Self {
         Unit {
-            text: "K".to_owned(),
+            text: "K".into(),
             dimension: [0, 0, 0, 0, 1, 0, 0],
             ..Unit::one()
         }
@@ -200,7 +201,7 @@ impl Unit {
             None => self.clone(),
             Some(Scale::Celsius) => Unit::kelvin(),
             Some(Scale::Fahrenheit) => Unit {
-                text: "[degR]".to_owned(),
+                text: "[degR]".into(),
                 ratio: self.ratio,
                 dimension: self.dimension,
                 opaque: BTreeMap::new(),
@@ -234,9 +235,9 @@ impl Unit {
             .collect();
         Unit {
             text: if text.is_empty() {
-                "1".to_owned()
+                "1".into()
             } else {
-                text.join(".")
+                text.join(".").into()
             },
             ratio: Ratio::whole(1),
             point: None,
@@ -265,11 +266,11 @@ impl Unit {
             *opaque.entry(name).or_default() -= exponent;
         }
         opaque.retain(|_, exponent| *exponent != 0);
-        let text = match below.text.as_str() {
+        let text = match &*below.text {
             "1" => above.text,
             // A product below the line needs its parentheses; UCUM reads from left to right.
-            code if code.contains(['.', '/']) => format!("{}/({code})", above.text),
-            code => format!("{}/{code}", above.text),
+            code if code.contains(['.', '/']) => format!("{}/({code})", above.text).into(),
+            code => format!("{}/{code}", above.text).into(),
         };
         Unit {
             text,
@@ -296,7 +297,7 @@ impl Scale {
             Scale::Fahrenheit => ("[degF]", Ratio::whole(5).times(Ratio::whole(9).power(-1))),
         };
         Unit {
-            text: text.to_owned(),
+            text: text.into(),
             ratio,
             point: Some(self),
             ..Unit::kelvin()

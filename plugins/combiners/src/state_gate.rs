@@ -82,7 +82,7 @@ struct Gate {
 /// The state that is followed: that of the gate.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct Seen {
-    state: Option<usize>,
+    followed: Option<usize>,
     /// Another state, and since when it lasts.
     other: Option<(usize, Instant)>,
 }
@@ -90,7 +90,7 @@ struct Seen {
 impl Gate {
     /// The vote that is passed on, and why.
     fn chosen(&self, votes: Votes<'_>) -> Option<(usize, f64, f64)> {
-        let Some(state) = self.seen.state else {
+        let Some(state) = self.seen.followed else {
             let first = votes.present().next();
             return first.map(|(voter, vote)| (voter, vote, reason::UNKNOWN));
         };
@@ -127,15 +127,15 @@ impl Combine for Gate {
             return;
         }
         let found = state.round() as usize;
-        match (self.seen.state, self.seen.other) {
+        match (self.seen.followed, self.seen.other) {
             (Some(state), _) if state == found => self.seen.other = None,
             (Some(_), Some((other, since))) if other == found => {
                 if now - since >= self.dwell {
-                    (self.seen.state, self.seen.other) = (Some(found), None);
+                    (self.seen.followed, self.seen.other) = (Some(found), None);
                 }
             }
             (Some(_), _) if self.dwell > Duration::ZERO => self.seen.other = Some((found, now)),
-            _ => (self.seen.state, self.seen.other) = (Some(found), None),
+            _ => (self.seen.followed, self.seen.other) = (Some(found), None),
         }
     }
 

@@ -36,6 +36,7 @@ mod ledger;
 mod lines;
 mod reader;
 mod recording;
+mod stream;
 mod writer;
 
 pub use dataset::{Dataset, layout};
@@ -46,4 +47,5 @@ pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};
 pub use reader::{Options, Reader, Row};
 pub use recording::{Event, Recording};
+pub use stream::WithRevision;
 pub use writer::{Flush, Writer};

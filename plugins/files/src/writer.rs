@@ -167,6 +167,10 @@ impl Writer {
     /// # Errors
     /// Writing failed.
     pub fn finish(mut self) -> Result<(), FileError> {
+        self.flush_all()
+    }
+
+    pub(crate) fn flush_all(&mut self) -> Result<(), FileError> {
         self.flush_when(true).map_err(|source| self.failed(source))
     }
 

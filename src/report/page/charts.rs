@@ -118,7 +118,8 @@ fn small<'a>(
         title,
         x_label,
         y_label,
-        height: 420.0,
+        width: 460.0,
+        height: 250.0,
         layers: vec![Layer {
             x,
             y,

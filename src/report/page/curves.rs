@@ -3,6 +3,7 @@
 use super::super::verdict::is_channel;
 use super::super::{Axis, Facts};
 use crate::chart::{Chart, Layer};
+use crate::diagnosis::response::Response;
 
 const COLOUR: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
 
@@ -13,6 +14,7 @@ pub(super) struct Curves {
     title: String,
     x_label: &'static str,
     y_label: String,
+    y_range: Option<(f64, f64)>,
     lines: Vec<Line>,
 }
 
@@ -29,13 +31,15 @@ impl Curves {
             title: self.title.clone(),
             x_label: self.x_label,
             y_label: self.y_label.clone(),
-            height: 420.0,
+            width: 460.0,
+            height: 250.0,
             layers: lines
                 .map(|(line, class)| {
                     Layer::line(&line.minutes, &line.value, class, line.name.as_str())
                 })
                 .collect(),
             limits: vec![0.0],
+            y_range: self.y_range,
             ..Chart::default()
         }
     }
@@ -47,7 +51,8 @@ fn minutes(seconds: &[f64]) -> Vec<f64> {
 
 /// The pictures of an axis: correlation against the lag, and impulse responses.
 pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
-    [lags(axis, facts), responses(axis, facts)]
+    let [steps, impulses] = [false, true].map(|impulse| responses(axis, facts, impulse));
+    [lags(axis, facts), steps, impulses]
         .into_iter()
         .flatten()
         .collect()
@@ -87,17 +92,16 @@ fn lags(axis: &Axis, facts: &Facts) -> Option<Curves> {
         title: format!("Correlation of {} with features against the lag", axis.name),
         x_label: "lag in minutes",
         y_label: format!("{} correlation", axis.name),
+        y_range: None,
         lines,
     })
 }
 
 /// How what is put out answers each sensor, or, where that is a vote, the first voter that answers any.
-fn responses(axis: &Axis, facts: &Facts) -> Option<Curves> {
+fn responses(axis: &Axis, facts: &Facts, impulse: bool) -> Option<Curves> {
     let of_axis = || {
-        facts
-            .responses
-            .iter()
-            .filter(|of| is_channel(&of.truth, &axis.name) && !of.sensors.is_empty())
+        let all = facts.responses.iter();
+        all.filter(|of| is_channel(&of.truth, &axis.name) && !of.sensors.is_empty())
     };
     let main = format!("{}.{}", axis.voters[axis.main].node, axis.name);
     let responses = of_axis()
@@ -105,20 +109,36 @@ fn responses(axis: &Axis, facts: &Facts) -> Option<Curves> {
         .or_else(|| of_axis().next())?;
     let mut sensors: Vec<_> = responses.sensors.iter().collect();
     sensors.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
-    let line = |of: &&crate::diagnosis::response::Response| Line {
+    let line = |of: &&Response| Line {
         name: of
             .sensor
             .split_once('.')
             .map_or(of.sensor.as_str(), |(_, name)| name)
             .to_owned(),
         minutes: minutes(&of.time_s),
-        value: of.impulse.clone(),
+        value: if impulse { &of.impulse } else { &of.step }.clone(),
+    };
+    let lines: Vec<Line> = sensors.iter().take(COLOUR.len()).map(line).collect();
+    let (kind, name, per) = if impulse {
+        ("impulses", "Impulse", "unit and minute")
+    } else {
+        ("steps", "Step", "unit")
     };
     Some(Curves {
-        kind: "responses",
-        title: format!("Impulse responses of {}", responses.node),
-        x_label: "minutes after the impulse",
-        y_label: format!("{} in {}", responses.node, responses.unit),
-        lines: sensors.iter().take(COLOUR.len()).map(line).collect(),
+        kind,
+        title: format!("{name} responses of {}", responses.node),
+        x_label: "minutes after the change",
+        y_label: format!("{}, {} per {per}", responses.node, responses.unit),
+        y_range: impulse.then(|| most_of(&lines)).flatten(),
+        lines,
     })
+}
+
+/// Where nearly all of the lines lies. An impulse makes a spike in every slope that it enters, and beside that nothing would be seen.
+fn most_of(lines: &[Line]) -> Option<(f64, f64)> {
+    let values = lines.iter().flat_map(|line| &line.value);
+    let mut sizes: Vec<f64> = values.map(|v| v.abs()).filter(|v| *v > 0.0).collect();
+    sizes.sort_by(f64::total_cmp);
+    let size = sizes.get(sizes.len() * 95 / 100)?;
+    Some((-1.1 * size, 1.1 * size))
 }

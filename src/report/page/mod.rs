@@ -8,7 +8,7 @@ mod tables;
 use std::fmt::Write as _;
 
 use super::{Facts, Worth, figure};
-use crate::chart::{COLOURS, Chart, STYLE, escaped};
+use crate::chart::{COLOURS, Chart, Plot, STYLE, escaped};
 
 /// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
 #[must_use]
@@ -46,6 +46,9 @@ fn verdicts(html: &mut String, facts: &Facts) {
         facts.course.ticks,
         (to - from) / 86400.0
     );
+    if let Some(headline) = facts.worth.as_ref().and_then(Worth::headline) {
+        let _ = write!(html, "<li><b>{}</b></li>", escaped(&headline));
+    }
     for verdict in &facts.verdicts {
         let class = if verdict.is_good() {
             ""
@@ -64,15 +67,11 @@ fn verdicts(html: &mut String, facts: &Facts) {
 
 fn worth_section(html: &mut String, worth: &Worth) {
     html.push_str("<h2>What the correction is worth</h2>");
-    if let (Some((without, with)), Some(chart)) = (worth.below_limit, charts::loss(worth)) {
+    if let Some(chart) = charts::loss(worth) {
         let worst = |losses: &[f64]| figure(Some(losses.iter().copied().fold(0.0, f64::max)));
         let _ = write!(
             html,
-            "<p>Five-minute losses below {} dB: <b>{:.1} %</b> without, <b class=\"good\">{:.1} %</b> with correction. \
-             Largest loss {} dB without, {} dB with (the picture ends at {} dB).</p><div class=\"wide\">{}</div>",
-            worth.loss_limit,
-            100.0 * without,
-            100.0 * with,
+            "<p>Largest loss over five minutes: {} dB without, {} dB with correction; the picture ends at {} dB.</p><div class=\"wide\">{}</div>",
             worst(&worth.loss_without.value),
             worst(&worth.loss_with.value),
             10.0 * worth.loss_limit,
@@ -132,7 +131,7 @@ fn wide(html: &mut String, chart: &Chart<'_>) {
 fn votes(html: &mut String, facts: &Facts) {
     html.push_str(
         "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
-         An impulse is one kelvin, or unit of the sensor, for one minute.</p>",
+         Responses are the estimator's to one sensor alone: a step of one unit, and one unit for one minute, whose spikes are cut off.</p>",
     );
     for (axis, errors) in facts.course.axes.iter().zip(&facts.errors) {
         let _ = write!(html, "<details><summary>{}</summary>", escaped(&axis.name));
@@ -167,7 +166,7 @@ fn chosen(html: &mut String, facts: &Facts) {
             .report
             .selection
             .iter()
-            .map(|step| format!("{} ({:.3})", escaped(&step.regressor), step.score));
+            .map(|step| format!("{} ({:.3})", escaped(&step.label()), step.score));
         let _ = write!(
             html,
             "<p><b>{}</b>: {}</p>",
@@ -213,32 +212,11 @@ fn card(html: &mut String, facts: &Facts) {
     html.push_str(&tables::estimators(&card.estimators));
 }
 
-/// A picture as files.
-#[derive(Debug, Clone)]
-pub struct Plot {
-    /// Its name, without ending.
-    pub name: String,
-    /// As SVG.
-    pub svg: String,
-    /// As PNG.
-    #[cfg(feature = "png")]
-    pub png: Vec<u8>,
-}
-
 /// Every picture of the page as files of its own; those with nothing to draw are left out.
 #[must_use]
 pub fn plots(facts: &Facts) -> Vec<Plot> {
     let mut plots = Vec::new();
-    let mut add = |name: String, chart: &Chart<'_>| {
-        #[cfg(feature = "png")]
-        let Some(png) = chart.png() else { return };
-        plots.push(Plot {
-            name,
-            svg: chart.file(),
-            #[cfg(feature = "png")]
-            png,
-        });
-    };
+    let mut add = |name: String, chart: &Chart<'_>| plots.extend(Plot::of(name, chart));
     for (axis, spread) in facts.course.axes.iter().zip(&facts.errors) {
         let (errors, name) = (axis.errors(), &axis.name);
         add(

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal_core::model::EstimatorCard;
 use athermal_core::score::Score;
 
-use super::super::{Published, SensorFacts, Worth, figure};
+use super::super::{Published, SensorFacts, Worth, figure, spelled};
 use crate::chart::escaped;
 
 fn table(header: &[&str], rows: &str) -> String {
@@ -87,7 +87,7 @@ pub(super) fn published(tables: &[Published]) -> String {
 }
 
 pub(super) fn settling(worth: &Worth) -> String {
-    let unit = escaped(worth.set_point_unit.as_deref().unwrap_or_default());
+    let unit = escaped(spelled(worth.set_point_unit.as_deref().unwrap_or_default()));
     let mut rows = String::new();
     for s in &worth.settling {
         let minutes =
@@ -117,7 +117,7 @@ pub(super) fn settling(worth: &Worth) -> String {
 }
 
 pub(super) fn steps(worth: &Worth) -> String {
-    let unit = escaped(worth.set_point_unit.as_deref().unwrap_or_default());
+    let unit = escaped(spelled(worth.set_point_unit.as_deref().unwrap_or_default()));
     let mut rows = String::new();
     for step in &worth.steps {
         let name = match step.changes {
@@ -162,7 +162,7 @@ pub(super) fn sensors(sensors: &[SensorFacts]) -> String {
             figure(sensor.noise),
             figure(Some(low)),
             figure(Some(high)),
-            escaped(&sensor.unit),
+            escaped(spelled(&sensor.unit)),
         );
     }
     let header = [

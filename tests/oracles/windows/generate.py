@@ -38,7 +38,9 @@ for name in ["y", "z"]:
     number = [int(row) for row in np.flatnonzero(table[name].notna())]
     for window in [20, 60, 150]:
         rolling = series.rolling(f"{window}s", closed="right", min_periods=1)
-        columns = [rolling.mean(), rolling.std(), rolling.min(), rolling.max(), rolling.median(), rolling.count()]
+        # Not rolling.std(), which carries rounding on from window to window.
+        spread = rolling.apply(lambda values: np.std(values, ddof=1) if len(values) > 1 else np.nan, raw=True)
+        columns = [rolling.mean(), spread, rolling.min(), rolling.max(), rolling.median(), rolling.count()]
         for i, row in enumerate(number):
             moving.append([name, window, row, *[float(c.iloc[i]) for c in columns]])
         for i, row in enumerate(number):
@@ -47,8 +49,11 @@ for name in ["y", "z"]:
             if len(within) < 3:
                 continue
             fit = linregress(x, within.to_numpy())
-            share = float(fit.rvalue**2) if np.ptp(within.to_numpy()) > 0 else float("nan")
-            lines.append([name, window, row, float(fit.slope), float(fit.stderr), float(fit.intercept), share])
+            # Of equal samples linregress leaves open what follows from r; the line misses none of them.
+            varies = np.ptp(within.to_numpy()) > 0
+            share = float(fit.rvalue**2) if varies else float("nan")
+            error = float(fit.stderr) if varies else 0.0
+            lines.append([name, window, row, float(fit.slope), error, float(fit.intercept), share])
     for window, threshold, floor in [(60, 3.0, 0.0), (60, 3.0, 0.02), (150, 4.5, 0.0)]:
         for i, row in enumerate(number):
             within = series[(series.index > series.index[i] - pd.Timedelta(seconds=window)) & (series.index <= series.index[i])]

@@ -45,7 +45,7 @@ impl Resolver<'_> {
     pub(super) fn look_up(&mut self, text: &str, place: Place) -> Option<Vec<usize>> {
         match self.scopes.look_up(text) {
             Ok(Found::Slots(slots)) => {
-                self.read.extend(&slots);
+                self.read.extend(slots.iter().copied());
                 Some(slots)
             }
             Ok(Found::Broken) => None,

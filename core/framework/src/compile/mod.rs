@@ -17,6 +17,7 @@ mod provenance;
 mod reference;
 mod resolver;
 mod scope;
+mod slot_set;
 mod steps;
 
 pub use diff::{

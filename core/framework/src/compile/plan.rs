@@ -260,6 +260,16 @@ pub struct PlannedLearning {
     pub freeze: Option<usize>,
 }
 
+impl Plan {
+    /// The slots that a node reads, with its truth.
+    pub(crate) fn reads<'a>(&'a self, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
+        let gathers = node.role.gathers();
+        let entries = gathers.flat_map(|gather| &self.gathers[gather].entries);
+        let truth = node.role.truth().map(|truth| truth.slot);
+        entries.map(|entry| entry.slot).chain(truth)
+    }
+}
+
 /// A truth and how predictions are paired with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TruthLink {

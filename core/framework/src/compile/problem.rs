@@ -282,6 +282,10 @@ impl Problem for CompileProblem {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
             Self::DuplicateName { name, what } => format!("there are two {what} named `{name}`"),
+            Self::UnusedNode { node } if node.contains('/') => {
+                "refer to it, name it under the module's `outputs`, or leave it out of the module"
+                    .to_owned()
+            }
             Self::UnusedNode { node } => {
                 format!("nothing that comes out depends on the node `{node}`")
             }

@@ -1,6 +1,6 @@
 //! Decides what each declaration of a graph stands for, in order: kinds read, inputs looked up, outputs given slots.
 
-use std::collections::BTreeSet;
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -15,6 +15,7 @@ use super::plan::{
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::scope::Scopes;
+use super::slot_set::SlotSet;
 use super::{Wanted, steps};
 use crate::channel::Channel;
 use crate::diagnostic::Diagnostics;
@@ -44,7 +45,7 @@ pub(crate) struct Resolver<'g> {
     /// Features whose leaks are looked for once all is known.
     pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
-    pub(super) read: BTreeSet<usize>,
+    pub(super) read: SlotSet,
 }
 
 impl<'g> Resolver<'g> {
@@ -59,7 +60,7 @@ impl<'g> Resolver<'g> {
             gathers: IndexSet::new(),
             nodes: Vec::new(),
             suspects: Vec::new(),
-            read: BTreeSet::new(),
+            read: SlotSet::default(),
         };
         resolver.take_signals();
         resolver
@@ -292,7 +293,7 @@ impl<'g> Resolver<'g> {
     fn outputs(&mut self) -> Vec<PlannedOutput> {
         let graph = self.graph;
         let mut outputs = Vec::new();
-        let mut names = BTreeSet::new();
+        let mut names = HashSet::new();
         for output in &graph.outputs {
             for (text, place) in &output.from {
                 for slot in self.look_up(text, *place).unwrap_or_default() {

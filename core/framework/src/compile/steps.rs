@@ -1,10 +1,11 @@
 //! Decides the steps of a tick, which ports are computed at all, and what nobody uses.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
 use super::Wanted;
 use super::plan::{Plan, PlannedNode, PlannedRole, Step};
 use super::problem::CompileProblem;
+use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 use crate::node::Role;
@@ -31,7 +32,8 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
         } else {
             steps.extend(
                 gathers
-                    .into_iter()
+                    .iter()
+                    .copied()
                     .filter(|&gather| gathered.insert(gather))
                     .map(Step::Gather),
             );
@@ -41,7 +43,8 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
     for (index, gathers) in late {
         steps.extend(
             gathers
-                .into_iter()
+                .iter()
+                .copied()
                 .filter(|&gather| gathered.insert(gather))
                 .map(Step::Gather),
         );
@@ -82,8 +85,8 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
 }
 
 /// Notes which ports of features somebody reads. The first is always computed.
-pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wanted) {
-    let truths: BTreeSet<usize> = plan
+pub(super) fn mark_wanted(plan: &mut Plan, read: &SlotSet, wanted: Wanted) {
+    let truths: SlotSet = plan
         .nodes
         .iter()
         .filter_map(|node| node.role.truth())
@@ -92,28 +95,27 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &BTreeSet<usize>, wanted: Wante
     let mut read = read.clone();
     // Whoever is read comes before its readers, and a combination of deviations reads those of its voters.
     for node in plan.nodes.iter_mut().rev() {
-        let is_truth = truths.range(node.slots.clone()).next().is_some();
+        let is_truth = truths.has_any(node.slots.clone());
         if let PlannedRole::Combiner { voters, beside, .. } = &mut node.role {
             let count = plan.gathers[*voters].entries.len();
             beside.weights = beside
                 .weights
-                .filter(|&first| read.range(first..first + count).next().is_some());
+                .filter(|&first| read.has_any(first..first + count));
             beside.deviation = beside
                 .deviation
-                .filter(|(slot, _)| wanted.intervals || read.contains(slot));
+                .filter(|(slot, _)| wanted.intervals || read.contains(*slot));
             if let Some((_, of_voters)) = beside.deviation {
                 let entries = &plan.gathers[of_voters].entries;
                 read.extend(entries.iter().map(|entry| entry.slot));
             }
         }
         if let PlannedRole::Estimator { deviation, .. } = &mut node.role {
-            *deviation = deviation.filter(|slot| wanted.intervals || read.contains(slot));
+            *deviation = deviation.filter(|slot| wanted.intervals || read.contains(*slot));
         }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {
                 let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
-                ports[index] =
-                    index == 0 || error_of_truth || read.range(slots.clone()).next().is_some();
+                ports[index] = index == 0 || error_of_truth || read.has_any(slots.clone());
             }
         }
     }
@@ -128,7 +130,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
     let fed = fed(plan);
     let owner = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
     let mut dry = HashMap::new();
-    for column in plan.outputs.iter().filter(|c| !fed.contains(&c.slot)) {
+    for column in plan.outputs.iter().filter(|c| !fed.contains(c.slot)) {
         dry.entry(owner(&column.name))
             .or_insert_with(|| column.name.clone());
     }
@@ -139,10 +141,10 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         }
     }
     let used = used(plan);
-    let used_nodes: BTreeSet<&str> = plan
+    let used_nodes: HashSet<&str> = plan
         .nodes
         .iter()
-        .filter(|node| used.range(node.slots.clone()).next().is_some())
+        .filter(|node| used.has_any(node.slots.clone()))
         .map(|node| node.name.as_str())
         .collect();
     for node in graph
@@ -160,7 +162,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         }
     }
     let used_signals: HashSet<String> = (0..plan.sources.len())
-        .filter(|slot| used.contains(slot))
+        .filter(|&slot| used.contains(slot))
         .map(|slot| owner(&plan.channels[slot].name))
         .collect();
     for signal in &graph.signals {
@@ -175,45 +177,36 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
     }
 }
 
-/// The slots that a node reads, with its truth.
-fn reads(plan: &Plan, node: usize) -> impl Iterator<Item = usize> + '_ {
-    let role = &plan.nodes[node].role;
-    let data = role
-        .gathers()
-        .flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
-    data.chain(role.truth().map(|truth| truth.slot))
-}
-
 /// Every slot that a measured channel reaches.
-fn fed(plan: &Plan) -> BTreeSet<usize> {
-    let mut fed: BTreeSet<usize> = (0..plan.sources.len()).collect();
+fn fed(plan: &Plan) -> SlotSet {
+    let mut fed: SlotSet = (0..plan.sources.len()).collect();
     loop {
-        let before = fed.len();
-        for (index, node) in plan.nodes.iter().enumerate() {
-            if reads(plan, index).any(|slot| fed.contains(&slot)) {
-                fed.extend(node.slots.clone());
+        let mut more = false;
+        for node in &plan.nodes {
+            if plan.reads(node).any(|slot| fed.contains(slot)) {
+                for slot in node.slots.clone() {
+                    more |= fed.insert(slot);
+                }
             }
         }
         // A second round is needed only where a loop is closed from behind.
-        if fed.len() == before {
+        if !more {
             return fed;
         }
     }
 }
 
 /// Every slot that some output depends on.
-fn used(plan: &Plan) -> BTreeSet<usize> {
-    let mut used = BTreeSet::new();
+fn used(plan: &Plan) -> SlotSet {
+    let mut used = SlotSet::default();
     let mut open: Vec<usize> = plan.outputs.iter().map(|output| output.slot).collect();
-    let mut seen = BTreeSet::new();
+    let mut seen = vec![false; plan.nodes.len()];
     while let Some(slot) = open.pop() {
-        if !used.insert(slot) {
-            continue;
-        }
-        if let Some(node) = plan.channels[slot].node
-            && seen.insert(node)
+        if used.insert(slot)
+            && let Some(node) = plan.channels[slot].node
+            && !std::mem::replace(&mut seen[node], true)
         {
-            open.extend(reads(plan, node));
+            open.extend(plan.reads(&plan.nodes[node]));
         }
     }
     used

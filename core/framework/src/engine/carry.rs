@@ -120,7 +120,7 @@ impl Heritage {
             if !touched.nodes[index] {
                 return Begin::AsItWas;
             }
-            let read = reads(plan, node).find(|&slot| touched.slots[slot]);
+            let read = plan.reads(node).find(|&slot| touched.slots[slot]);
             let reason = match (&own[index], read) {
                 (Some(own), _) => own.reason().to_owned(),
                 (None, Some(slot)) => {
@@ -206,7 +206,7 @@ impl Touched {
         slots[..signals.len()].copy_from_slice(signals);
         let mut readers = vec![Vec::new(); plan.channels.len()];
         for (index, node) in plan.nodes.iter().enumerate() {
-            for slot in reads(plan, node) {
+            for slot in plan.reads(node) {
                 readers[slot].push(index);
             }
         }
@@ -234,12 +234,4 @@ fn same_fit(old: &Fitted, new: &Fitted, instance: &str) -> bool {
             .map(|fit| serde_json::to_value(fit.as_ref()).ok())
     };
     as_value(old) == as_value(new)
-}
-
-/// The slots that a node reads, with its truth.
-pub(super) fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
-    let gathers = node.role.gathers();
-    let entries = gathers.flat_map(|gather| &plan.gathers[gather].entries);
-    let truth = node.role.truth().map(|truth| truth.slot);
-    entries.map(|entry| entry.slot).chain(truth)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched, reads};
+use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
 use super::estimate::Estimate;
 use super::state::{NodeState, SlotState};
 use super::{Engine, EngineState, RestoreError, Running};
@@ -186,7 +186,7 @@ impl Engine {
             // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.
             let touched = Touched::by(&plan, &[], |node| refusing[node]);
             for (node, carry) in plan.nodes.iter().zip(&mut carried) {
-                let read = reads(&plan, node).find(|&slot| touched.slots[slot]);
+                let read = plan.reads(node).find(|&slot| touched.slots[slot]);
                 if let (Carry::Carried, Some(slot)) = (&carry.outcome, read) {
                     let name = &plan.channels[slot].name;
                     carry.outcome = Carry::Adopted {

@@ -1,5 +1,5 @@
-//! Decides how a running graph is replaced: staged, watched in the shadow, handed over between two ticks, taken back; not
-//! where samples come from or go.
+//! Decides how a graph is run from a [`Source`] to a [`Sink`], and how a running one is replaced: staged, watched in the shadow,
+//! handed over between two ticks, taken back; not where samples come from or go.
 //!
 //! [`pair`] makes two ends. The **engine thread** owns a [`Stepper`] and steps it: no allocation, no lock, no wait, also at
 //! a hand-over. The **control thread** (or the same one, for recorded data) owns a [`Control`], to which every tick is
@@ -18,13 +18,19 @@ mod control;
 mod handover;
 mod refit;
 mod retained;
+mod run;
 mod shadow;
+mod sink;
+mod source;
 mod stepper;
 
 pub use control::{Control, Notice, StageError, Staged};
 pub use handover::Feed;
 pub use refit::Refit;
+pub use run::{RunError, run};
 pub use shadow::{Compared, Shadow, Verdict};
+pub use sink::{Frame, Sink, SinkError};
+pub use source::{Samples, Source, SourceError};
 pub use stepper::{Stepped, Stepper};
 
 use crate::engine::EngineError;

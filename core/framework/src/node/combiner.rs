@@ -44,6 +44,10 @@ use crate::time::{Duration, Instant};
 /// athermal_core::register!(Middle, Combiner, "middle");
 /// # fn main() {}
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no combiner",
+    label = "implement `athermal_core::node::Combiner` for it, or register it in the role that it has"
+)]
 pub trait Combiner: Debug + Send + Sync {
     /// The input ports: `voters`, `truth` where it learns, and `state` where it goes by one.
     fn inputs() -> &'static [InputPort]

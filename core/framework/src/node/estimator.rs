@@ -76,6 +76,10 @@ use crate::time::{Duration, Instant};
 /// athermal_core::register!(Mean, Estimator, "mean_of_fit");
 /// # fn main() {}
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no estimator",
+    label = "implement `athermal_core::node::Estimator` for it, or register it in the role that it has"
+)]
 pub trait Estimator: Debug + Send + Sync {
     /// The input ports: `truth`, and where features are taken, `features`.
     fn inputs() -> &'static [InputPort]
@@ -262,6 +266,15 @@ pub struct SelectionStep {
     /// What was tried at this step, the best first; this one is among them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub candidates: Vec<CandidateScore>,
+}
+
+impl SelectionStep {
+    /// The name, with a minus before one that was taken out.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let sign = if self.removed { "− " } else { "" };
+        format!("{sign}{}", self.regressor)
+    }
 }
 
 /// A candidate of a selection step.

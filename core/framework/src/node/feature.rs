@@ -69,6 +69,10 @@ use crate::time::{Duration, Instant};
 /// athermal_core::register!(Difference, Feature, "difference");
 /// # fn main() {}
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no feature",
+    label = "implement `athermal_core::node::Feature` for it, or register it in the role that it has"
+)]
 pub trait Feature: Debug + Send + Sync {
     /// The input ports.
     fn inputs() -> &'static [InputPort]

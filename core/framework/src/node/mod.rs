@@ -3,6 +3,10 @@
 //! A node *kind* is a serde struct of parameters plus one role: [`Feature`], [`Estimator`] or [`Combiner`]. The struct is
 //! the specification: building what runs from it does no I/O and spawns nothing. [`register!`](crate::register) makes the
 //! kind known under its name.
+//!
+//! A [`Feature`] with its [`Operator`] is the general form: any ports in, any ports out, a state of its own, at every tick if it
+//! asks for it. Monitors, filters, safe states and compensations are features. [`Estimator`] and [`Combiner`] are narrower on
+//! purpose: they never see a truth before its time, because it is not theirs to read.
 
 mod combiner;
 mod estimator;

@@ -38,7 +38,7 @@ impl Candidates {
             }
         }
         let mut sets: Vec<Vec<usize>> = (0..units).map(|unit| vec![unit]).collect();
-        for wanted in needs.iter().filter(|wanted| wanted.len() != 1) {
+        for wanted in needs.iter().filter(|wanted| wanted.len() > 1) {
             if !sets.contains(wanted) {
                 sets.push(wanted.clone());
             }
@@ -87,6 +87,11 @@ impl Candidates {
         };
         let columns = (0..self.width()).filter(|&column| new(&self.needs[column]));
         Cow::Owned(columns.collect())
+    }
+
+    /// The columns that need nothing, and so are always there.
+    pub(super) fn free(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.width()).filter(|&column| self.needs[column].is_empty())
     }
 
     /// The columns that cannot be there without a unit.

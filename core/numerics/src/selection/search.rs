@@ -104,6 +104,9 @@ impl Search {
                 path: Vec::new(),
             },
         };
+        if self.direction != Direction::Backward {
+            candidates.free().for_each(|column| state.include(column));
+        }
         match self.direction {
             Direction::Forward => while state.add() {},
             Direction::Floating => state.float(),
@@ -113,7 +116,7 @@ impl Search {
             }
         }
         let mut selection = state.selection;
-        selection.columns = selection.path.last().cloned().unwrap_or_default();
+        selection.columns = state.columns;
         Ok(selection)
     }
 
@@ -216,6 +219,13 @@ impl State<'_> {
         }
     }
 
+    fn include(&mut self, column: usize) {
+        self.columns.push(column);
+        for fold in &mut self.folds {
+            fold.turn(column, Change::Added);
+        }
+    }
+
     fn start_with_all(&mut self) {
         let mut left_out = Vec::new();
         for column in 0..self.candidates.width() {
@@ -223,10 +233,7 @@ impl State<'_> {
                 left_out.push(column);
                 continue;
             }
-            self.columns.push(column);
-            for fold in &mut self.folds {
-                fold.turn(column, Change::Added);
-            }
+            self.include(column);
         }
         for unit in 0..self.units.len() {
             let columns = self.candidates.of_unit(unit);

@@ -360,9 +360,10 @@ impl RollingSlope {
                 };
                 let origins = &self.blocks.origins()[quad];
                 let mut values = from_fn(|i| {
-                    let line = match moments.thin(i) {
+                    let line = window.parts.line(tables, (quad, i), &moments, end_ns);
+                    let line = match moments.thin(i) || line.is_flat() {
                         true => self.line(window, 4 * quad + i),
-                        false => window.parts.line(tables, (quad, i), &moments, end_ns),
+                        false => line,
                     };
                     of(&line, origins[i]).unwrap_or(self.no_value.absent)
                 });

@@ -15,10 +15,8 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
     }
     let silent = course(fixture, &mut subject.engine(), nothing.events());
     for number in 0..fixture.slots().len() {
-        let port = fixture.port(fixture.slots().start + number);
-        let speaks = subject.case.without_input.iter().any(|name| name == port);
         if let Some(value) = silent.values(number).find(|value| !value.is_nan())
-            && !speaks
+            && !subject.speaks(fixture.slots().start + number)
         {
             let name = subject.name(number);
             return Err(format!(
@@ -28,14 +26,16 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
     }
     for channel in 0..fixture.plan.sources.len() {
         for missing in [0..subject.events().len(), 200..400] {
+            let always = missing.len() == subject.events().len();
             let mut table = subject.table.clone();
             for (_, row) in &mut table.events_mut()[missing] {
                 row[channel] = ABSENT;
             }
-            finite(
-                subject,
-                &course(fixture, &mut subject.engine(), table.events()),
-            )?;
+            let course = course(fixture, &mut subject.engine(), table.events());
+            if always {
+                not_made_up(subject, channel, &course)?;
+            }
+            finite(subject, &course)?;
         }
     }
     let mut late = Table::default();
@@ -65,7 +65,8 @@ pub(super) fn infinity(subject: &Subject<'_>) -> Result<(), String> {
         for (tick, (_, row)) in table.events_mut()[100..140].iter_mut().enumerate() {
             for (channel, sample) in row.iter_mut().enumerate() {
                 if (tick + channel + nth) % 3 == 0 {
-                    *sample = if tick % 2 == 0 { size } else { -size };
+                    // Twice up and twice down, so that a sum of them overflows and its negative does too.
+                    *sample = if tick % 12 < 6 { size } else { -size };
                 }
             }
         }
@@ -85,6 +86,34 @@ pub(super) fn infinity(subject: &Subject<'_>) -> Result<(), String> {
                     ));
                 }
             }
+        }
+    }
+    Ok(())
+}
+
+/// What bears the name of a channel that is never there, at the first port of a feature, has no value either.
+fn not_made_up(subject: &Subject<'_>, channel: usize, course: &Course) -> Result<(), String> {
+    let plan = &subject.fixture.plan;
+    let source = &plan.sources[channel].name;
+    let first = subject.given.first().map(|given| given.port.as_str());
+    let Some((port, missing)) = source.split_once('.') else {
+        return Ok(());
+    };
+    if !subject.is_feature() || first != Some(port) {
+        return Ok(());
+    }
+    for number in 0..subject.fixture.slots().len() {
+        let slot = subject.fixture.slots().start + number;
+        let named = plan.channels[slot].channel.name.split('@').next();
+        let made_up = course.values(number).find(|value| !value.is_nan());
+        if let Some(value) = made_up
+            && named == Some(missing)
+            && !subject.speaks(slot)
+        {
+            let name = subject.name(number);
+            return Err(format!(
+                "`{name}` is {value} although `{source}` has never been measured"
+            ));
         }
     }
     Ok(())

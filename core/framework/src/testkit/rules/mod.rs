@@ -129,6 +129,12 @@ impl<'a> Subject<'a> {
         ) && !self.fitted.is_empty()
     }
 
+    /// Whether the port of a slot may have something to say of nothing.
+    fn speaks(&self, slot: usize) -> bool {
+        let port = self.fixture.port(slot);
+        self.case.without_input.iter().any(|name| name == port)
+    }
+
     /// A channel of the node, as the graph calls it.
     pub(super) fn name(&self, number: usize) -> &str {
         &self.fixture.plan.channels[self.fixture.slots().start + number].name

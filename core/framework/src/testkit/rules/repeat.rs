@@ -2,6 +2,7 @@
 
 use super::super::compared::{Course, course};
 use super::Subject;
+use crate::engine::Engine;
 use crate::fit::drive;
 use crate::recording::{Event, Table};
 use crate::time::{Duration, Instant};
@@ -22,30 +23,45 @@ pub(super) fn deterministic(subject: &Subject<'_>) -> Result<(), String> {
 
 /// One run over a recording, against one tick by tick beside another instance that is fed something else.
 pub(super) fn long_run(subject: &Subject<'_>) -> Result<(), String> {
-    let fixture = &subject.fixture;
-    let (mut engine, mut long) = (subject.engine(), Course::default());
-    drive(&mut engine, &subject.table, |engine, event| {
+    // Each on a thread of its own, where nothing of earlier runs is left.
+    let (long, by_ticks) = std::thread::scope(|scope| {
+        let long = scope.spawn(|| in_one_piece(subject)).join();
+        let by_ticks = scope.spawn(|| beside_another(subject)).join();
+        (long, by_ticks)
+    });
+    let panics = |_| "it panics on another thread".to_owned();
+    let (long, by_ticks) = (long.map_err(panics)??, by_ticks.map_err(panics)??);
+    match long.difference(&by_ticks, &subject.fixture) {
+        None => Ok(()),
+        Some(difference) => Err(format!(
+            "tick by tick beside another instance it gives other bits than in one long run: {difference}"
+        )),
+    }
+}
+
+fn in_one_piece(subject: &Subject<'_>) -> Result<Course, String> {
+    let mut course = Course::default();
+    let look = |engine: &Engine, event: Event| {
         if let Event::Row(now) = event {
-            long.note(fixture, engine, now);
+            course.note(&subject.fixture, engine, now);
         }
-    })
-    .map_err(|error| error.to_string())?;
+    };
+    drive(&mut subject.engine(), &subject.table, look).map_err(|error| error.to_string())?;
+    Ok(course)
+}
+
+fn beside_another(subject: &Subject<'_>) -> Result<Course, String> {
     let (mut engine, mut beside) = (subject.engine(), subject.engine());
-    let mut by_ticks = Course::default();
+    let mut course = Course::default();
     let others = subject.events().iter().rev();
     for ((now, values), (_, other)) in rows(subject.events()).zip(others) {
         beside.step(now, other).map_err(|error| error.to_string())?;
         engine
             .step(now, values)
             .map_err(|error| error.to_string())?;
-        by_ticks.note(fixture, &engine, now);
+        course.note(&subject.fixture, &engine, now);
     }
-    match long.difference(&by_ticks, fixture) {
-        None => Ok(()),
-        Some(difference) => Err(format!(
-            "tick by tick beside another instance it gives other bits than in one long run: {difference}"
-        )),
-    }
+    Ok(course)
 }
 
 /// What a feature gives after a break is what a new one gives, at other times too; others must live through it.

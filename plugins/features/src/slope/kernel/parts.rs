@@ -10,6 +10,9 @@ const NS_PER_S: f64 = 1e9;
 /// and too many digits are lost. Samples that span half of a window are above it up to thousands of samples.
 const THIN: f64 = 1e-4;
 
+/// Where Σ(y − ȳ)² is a smaller part of Σy² than this, it is computed from the samples.
+const FLAT: f64 = 1e-6;
+
 /// The end of a closed block, the whole blocks after it and the current block: where their sums lie, and how they are weighed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
@@ -242,9 +245,15 @@ impl Line {
         self.mean + self.sxy / self.sxx * self.since_mean
     }
 
+    /// Whether the samples differ so little from each other, for their distance to the origin, that Σ(y − ȳ)² has lost too many digits.
+    pub(super) fn is_flat(&self) -> bool {
+        self.syy < FLAT * self.n * self.mean * self.mean
+    }
+
     /// The share of Σ(y − ȳ)² that the line explains; nothing where all samples are the same.
     pub(super) fn r_squared(&self) -> Option<f64> {
         let r_squared = self.sxy / self.sxx * (self.sxy / self.syy);
-        (self.syy > 0.0).then(|| r_squared.min(1.0))
+        let rounding = 4.0 * f64::EPSILON * self.mean;
+        (self.syy > self.n * rounding * rounding).then(|| r_squared.min(1.0))
     }
 }

@@ -1,0 +1,64 @@
+//! Decides how an engine is run from a source to a sink on one thread; where both are is theirs.
+
+use std::fmt;
+
+use super::{Frame, Samples, Sink, SinkError, Source, SourceError};
+use crate::engine::{Engine, EngineError};
+use crate::recording::Event;
+
+/// Steps an engine through all that a source gives, and puts out what comes of it.
+///
+/// Each tick is put out before the next samples are asked for. Ticks that the engine refuses, because their time is not
+/// after the last one, are counted by it and passed over.
+///
+/// # Errors
+/// When the source, the sink or the engine fails.
+pub fn run(
+    engine: &mut Engine,
+    source: &mut dyn Source,
+    sink: &mut dyn Sink,
+) -> Result<(), RunError> {
+    let revision = engine.revision().to_owned();
+    let mut samples = Samples::default();
+    while let Some(event) = source.next(&mut samples).map_err(RunError::Source)? {
+        let Event::Row(time) = event else {
+            engine.segment();
+            continue;
+        };
+        let outputs = match engine.step(time, &samples.values) {
+            Ok(outputs) => outputs,
+            Err(EngineError::NotAfter { .. }) => continue,
+            Err(error) => return Err(RunError::Engine(error)),
+        };
+        let frame = Frame {
+            time,
+            time_text: &samples.time_text,
+            revision: &revision,
+            outputs,
+        };
+        sink.put(&frame).map_err(RunError::Sink)?;
+    }
+    sink.finish().map_err(RunError::Sink)
+}
+
+/// Why a run ended before its source did.
+#[derive(Debug)]
+pub enum RunError {
+    /// The source can give no more.
+    Source(SourceError),
+    /// The samples are not those of the graph.
+    Engine(EngineError),
+    /// The outputs cannot be put out.
+    Sink(SinkError),
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Source(error) | Self::Sink(error) => error.fmt(f),
+            Self::Engine(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for RunError {}

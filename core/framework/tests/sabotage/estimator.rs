@@ -1,0 +1,167 @@
+//! An estimator that is sound, and the same with one fault at a time.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use athermal_core::node::{
+    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
+};
+use athermal_core::testkit::{Case, Rule};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{breaks, breaks_only};
+
+/// Predicts the mean of the truths, or the quotient of it and the mean of the first feature times that feature.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Ratio {
+    /// What is wrong with it; nothing by default.
+    #[serde(default)]
+    fault: Fault,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Fault {
+    #[default]
+    None,
+    /// Divides by what may be zero.
+    Reckless,
+    /// No two fits are the same.
+    Unseeded,
+    /// Part of what was learned is not written.
+    Unwritten,
+    /// Counts on ten rows or more.
+    Panics,
+}
+
+impl Estimator for Ratio {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("features", "what the prediction is made of"),
+                InputPort::truth("what is predicted"),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            ..Regressors::default()
+        }
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        let regressors = setup
+            .regressors
+            .iter()
+            .map(|regressor| regressor.name.clone());
+        Box::new(Averaging {
+            fault: self.fault,
+            regressors: regressors.collect(),
+            sum: 0.0,
+            rows: 0,
+            first: None,
+            spread: 0.0,
+        })
+    }
+}
+
+struct Averaging {
+    fault: Fault,
+    regressors: Vec<String>,
+    sum: f64,
+    rows: usize,
+    first: Option<f64>,
+    spread: f64,
+}
+
+impl Trainer for Averaging {
+    fn row(&mut self, _regressors: &[f64], truth: f64) {
+        self.sum += truth;
+        self.rows += 1;
+        self.first.get_or_insert(truth);
+        self.spread = self
+            .first
+            .map_or(0.0, |first| self.spread.max((truth - first).abs()));
+    }
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        static FITS: AtomicU64 = AtomicU64::new(0);
+        assert!(self.fault != Fault::Panics || self.rows >= 10, "ten rows");
+        if self.rows == 0 {
+            return Err(TrainingError::TooFewRows { rows: 0, needed: 1 });
+        }
+        let mut mean = self.sum / self.rows as f64;
+        if self.fault == Fault::Reckless {
+            mean *= self.spread / self.spread;
+        }
+        if self.fault == Fault::Unseeded {
+            mean += FITS.fetch_add(1, Ordering::Relaxed) as f64;
+        }
+        let written = self.fault != Fault::Unwritten;
+        let fitted = Fitted {
+            regressors: self.regressors,
+            mean: if written { mean } else { 0.0 },
+            unwritten: if written { 0.0 } else { mean },
+        };
+        Ok(Trained {
+            predictor: Box::new(fitted),
+            report: TrainingReport::default(),
+        })
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Fitted {
+    regressors: Vec<String>,
+    mean: f64,
+    #[serde(skip)]
+    unwritten: f64,
+}
+
+#[typetag::serde(name = "sabotaged_estimator")]
+impl Predictor for Fitted {
+    fn uses(&self) -> &[String] {
+        &self.regressors
+    }
+
+    fn predict(&self, _regressors: &[f64]) -> f64 {
+        self.mean + self.unwritten
+    }
+}
+
+athermal_core::register!(Ratio, Estimator, "sabotaged_estimator");
+
+fn with(fault: &str) -> Case {
+    Case::new(format!("ahead = \"1min\"\nfault = \"{fault}\""))
+}
+
+#[test]
+fn a_sound_estimator_breaks_no_rule() {
+    breaks_only::<Ratio>(Case::new("ahead = \"1min\""), &[]);
+}
+
+#[test]
+fn a_fit_on_nothing_is_an_error_in_words() {
+    breaks::<Ratio>(with("panics"), Rule::Fits, "it panics: ten rows");
+    breaks::<Ratio>(
+        with("reckless"),
+        Rule::Fits,
+        "fitted on channels that never change",
+    );
+}
+
+#[test]
+fn a_fit_without_a_seed_is_another_every_time() {
+    breaks::<Ratio>(with("unseeded"), Rule::Fits, "it is another");
+}
+
+#[test]
+fn a_model_holds_all_that_predicts() {
+    breaks_only::<Ratio>(with("unwritten"), &[Rule::Models]);
+    breaks::<Ratio>(with("unwritten"), Rule::Models, "predicts otherwise");
+}

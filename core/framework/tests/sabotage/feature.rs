@@ -1,0 +1,326 @@
+//! A feature that is sound, and the same with one fault at a time.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use athermal_core::channel::ABSENT;
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+};
+use athermal_core::testkit::{Case, Rule};
+use athermal_core::time::Instant;
+use athermal_core::unit::Unit;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{breaks, breaks_only};
+
+/// The mean of each channel since the beginning of the segment.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Averages {
+    /// What is wrong with it; nothing by default.
+    #[serde(default)]
+    fault: Fault,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Fault {
+    #[default]
+    None,
+    /// Gives nothing at all.
+    Silent,
+    /// No two instances give the same.
+    CountsInstances,
+    /// Believes that what was computed at an instant is true of all instances.
+    Caches,
+    /// Leaves the counts out of its state.
+    ForgetsCounts,
+    /// Has no state to give.
+    ForgetsAll,
+    /// A snapshot changes it.
+    ClearedBySnapshot,
+    /// Takes any state for its own.
+    TakesAnyState,
+    /// Takes a state of another number of channels.
+    TakesAnyShape,
+    /// Its state has no version.
+    Unversioned,
+    /// Takes nothing for zero.
+    ZeroForAbsent,
+    /// Never gets rid of what is not finite.
+    Poisoned,
+    /// Writes infinity past the framework.
+    Infinite,
+    /// Goes on over a break.
+    IgnoresBreaks,
+    /// Has a threshold in nobody's unit.
+    BareThreshold,
+    /// States the wrong unit.
+    WrongUnit,
+    /// Keeps a list of all it has seen.
+    Hoards,
+    /// Panics at a gap.
+    Panics,
+}
+
+impl Feature for Averages {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what is averaged")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let mut channels = inputs.port("signal").to_vec();
+        if self.fault == Fault::WrongUnit {
+            for channel in &mut channels {
+                channel.unit = Unit::kelvin();
+            }
+        }
+        Ok(vec![OutputPort {
+            name: "mean",
+            channels,
+        }])
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        static INSTANCES: AtomicU64 = AtomicU64::new(0);
+        let channels = inputs.port("signal").len();
+        Box::new(Averaging {
+            fault: self.fault,
+            instance: INSTANCES.fetch_add(1, Ordering::Relaxed),
+            sums: vec![0.0; channels],
+            counts: vec![0.0; channels],
+            seen: Vec::new(),
+            cleared: false.into(),
+        })
+    }
+}
+
+struct Averaging {
+    fault: Fault,
+    instance: u64,
+    sums: Vec<f64>,
+    counts: Vec<f64>,
+    seen: Vec<f64>,
+    cleared: std::cell::Cell<bool>,
+}
+
+thread_local! {
+    static KNOWN: RefCell<BTreeMap<(Instant, usize), f64>> = const { RefCell::new(BTreeMap::new()) };
+}
+
+impl Averaging {
+    fn mean(&mut self, i: usize, value: f64) -> f64 {
+        self.sums[i] += value;
+        self.counts[i] += 1.0;
+        let mean = self.sums[i] / self.counts[i];
+        if !mean.is_finite() && self.fault != Fault::Poisoned {
+            (self.sums[i], self.counts[i]) = (0.0, 0.0);
+        }
+        mean
+    }
+}
+
+impl Operator for Averaging {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        if self.cleared.replace(false) {
+            self.segment();
+        }
+        let gap = tick.port(0).iter().any(|value| value.is_nan());
+        assert!(
+            !(gap && self.fault == Fault::Panics),
+            "there is nothing to average"
+        );
+        for (i, &value) in tick.port(0).iter().enumerate() {
+            let value = match self.fault {
+                Fault::ZeroForAbsent if value.is_nan() => 0.0,
+                Fault::BareThreshold if value.abs() < 10.0 => ABSENT,
+                _ => value,
+            };
+            if value.is_nan() && self.fault != Fault::ZeroForAbsent {
+                continue;
+            }
+            let mut mean = self.mean(i, value);
+            match self.fault {
+                Fault::Silent => mean = ABSENT,
+                Fault::CountsInstances => mean += self.instance as f64 * 1e-9,
+                Fault::Caches => {
+                    mean =
+                        KNOWN.with_borrow_mut(|known| *known.entry((tick.now, i)).or_insert(mean));
+                }
+                Fault::Hoards => self.seen.push(value),
+                _ => {}
+            }
+            if self.fault == Fault::Infinite && value > 1e200 {
+                outputs.fill_stamped(i..i + 1, tick.now)[0] = f64::INFINITY;
+            } else {
+                outputs.set(i, mean);
+            }
+        }
+    }
+
+    fn segment(&mut self) {
+        if self.fault != Fault::IgnoresBreaks {
+            self.sums.fill(0.0);
+            self.counts.fill(0.0);
+        }
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        if self.fault == Fault::Unversioned {
+            return Some(Box::new(Nameless {}));
+        }
+        self.cleared.set(self.fault == Fault::ClearedBySnapshot);
+        (self.fault != Fault::ForgetsAll).then(|| {
+            Box::new(Known {
+                sums: self.sums.clone(),
+                counts: self.counts.clone(),
+            }) as Box<dyn State>
+        })
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known::<Known>() {
+            Ok(known)
+                if known.sums.len() == self.sums.len() || self.fault == Fault::TakesAnyShape =>
+            {
+                self.sums = known.sums;
+                if self.fault != Fault::ForgetsCounts {
+                    self.counts = known.counts;
+                }
+                Restored::Accepted
+            }
+            Ok(_) => Restored::cold("the number of channels differs"),
+            Err(_) if self.fault == Fault::TakesAnyState => Restored::Accepted,
+            Err(cold) => cold,
+        }
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Known {
+    sums: Vec<f64>,
+    counts: Vec<f64>,
+}
+
+athermal_core::state!(Known, "sabotaged_feature/1");
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Nameless {}
+
+athermal_core::state!(Nameless, "sabotaged_feature");
+
+athermal_core::register!(Averages, Feature, "sabotaged_feature");
+
+fn with(fault: &str) -> Case {
+    Case::new(format!("fault = \"{fault}\""))
+}
+
+#[test]
+fn a_sound_feature_breaks_no_rule() {
+    breaks_only::<Averages>(Case::new(""), &[]);
+    breaks_only::<Averages>(Case::new("").input("signal", 5, "Cel"), &[]);
+}
+
+#[test]
+fn a_case_in_which_nothing_comes_out_proves_nothing() {
+    breaks::<Averages>(with("silent"), Rule::Answers, "nothing comes out");
+    breaks::<Averages>(
+        Case::new("").input("signals", 1, "K"),
+        Rule::Answers,
+        "`signal`",
+    );
+    breaks::<Averages>(Case::new("fault ="), Rule::Answers, "no TOML");
+}
+
+#[test]
+fn instances_that_differ_are_not_deterministic() {
+    breaks::<Averages>(with("counts_instances"), Rule::Deterministic, "run again");
+}
+
+#[test]
+fn what_instances_share_shows_when_another_runs_beside() {
+    breaks::<Averages>(with("caches"), Rule::LongRun, "beside another instance");
+}
+
+#[test]
+fn a_state_without_all_that_counts_does_not_go_on() {
+    for fault in ["forgets_counts", "forgets_all"] {
+        breaks_only::<Averages>(with(fault), &[Rule::Restores]);
+        breaks::<Averages>(with(fault), Rule::Restores, "restored after");
+    }
+    breaks::<Averages>(
+        with("cleared_by_snapshot"),
+        Rule::Restores,
+        "asked for a snapshot",
+    );
+}
+
+#[test]
+fn a_state_of_another_version_kind_or_shape_is_not_taken() {
+    breaks_only::<Averages>(with("takes_any_state"), &[Rule::Versions]);
+    breaks::<Averages>(with("takes_any_state"), Rule::Versions, "another kind");
+    breaks::<Averages>(with("unversioned"), Rule::Versions, "without a version");
+    let cases = [
+        with("takes_any_shape"),
+        with("takes_any_shape").input("signal", 1, "nm"),
+    ];
+    let broken = athermal_core::testkit::broken::<Averages>(&cases);
+    let told = broken.iter().find(|broken| broken.rule == Rule::Versions);
+    assert!(told.unwrap().found.contains("panics"), "{broken:#?}");
+}
+
+#[test]
+fn nothing_is_not_zero() {
+    breaks::<Averages>(
+        with("zero_for_absent"),
+        Rule::Absence,
+        "although `signal.a` has never been measured",
+    );
+    breaks::<Averages>(
+        with("panics"),
+        Rule::Answers,
+        "it panics: there is nothing to average",
+    );
+}
+
+#[test]
+fn what_is_not_finite_is_neither_kept_nor_given() {
+    breaks_only::<Averages>(with("poisoned"), &[Rule::Infinity]);
+    breaks::<Averages>(with("poisoned"), Rule::Infinity, "does not come back");
+    breaks_only::<Averages>(with("infinite"), &[Rule::Infinity]);
+    breaks::<Averages>(with("infinite"), Rule::Infinity, "is inf at");
+}
+
+#[test]
+fn a_break_in_the_data_is_a_new_beginning() {
+    breaks_only::<Averages>(with("ignores_breaks"), &[Rule::Segments]);
+    breaks::<Averages>(with("ignores_breaks"), Rule::Segments, "than a new node");
+}
+
+#[test]
+fn other_units_of_the_inputs_change_nothing() {
+    breaks_only::<Averages>(with("bare_threshold"), &[Rule::Units]);
+    breaks::<Averages>(with("bare_threshold"), Rule::Units, "signal in um");
+    breaks::<Averages>(with("wrong_unit"), Rule::Units, "rather than");
+}
+
+#[test]
+fn room_is_made_before_the_steady_state() {
+    breaks_only::<Averages>(with("hoards"), &[Rule::Allocation]);
+    breaks::<Averages>(with("hoards"), Rule::Allocation, "allocations");
+}
+
+#[test]
+fn a_rule_that_a_case_excepts_is_not_tried() {
+    let case = with("bare_threshold").except(Rule::Units, "the threshold is in nm by design");
+    breaks_only::<Averages>(case, &[]);
+}
+
+#[test]
+#[should_panic(expected = "`sabotaged_feature` breaks 1 of the rules that every node keeps")]
+fn an_assertion_fails_with_what_is_broken() {
+    athermal_core::testkit::assert_conforms::<Averages>(&[with("ignores_breaks")]);
+}

@@ -1,0 +1,81 @@
+//! Decides how cargo is called, and what is said when it is missing or fails.
+
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::terminal::Failure;
+
+/// The cargo of this machine.
+#[derive(Debug)]
+pub(super) struct Cargo {
+    program: OsString,
+    offline: bool,
+}
+
+impl Cargo {
+    pub(super) fn new(offline: bool) -> Self {
+        Self {
+            program: std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()),
+            offline,
+        }
+    }
+
+    /// What cargo knows of the crate in a folder; with its dependencies, all of them resolved.
+    ///
+    /// # Errors
+    /// When cargo is not there, or the crates cannot be put together.
+    pub(super) fn metadata(&self, folder: &Path, dependencies: bool) -> Result<Value, Failure> {
+        let mut command = self.command(folder, "metadata");
+        command.args(["--format-version", "1"]);
+        if !dependencies {
+            command.arg("--no-deps");
+        }
+        let output = command.output().map_err(|error| self.missing(&error))?;
+        if !output.status.success() {
+            let told = String::from_utf8_lossy(&output.stderr);
+            let told = told.trim().trim_start_matches("error: ");
+            return Err(Failure::Outside(format!(
+                "cargo cannot put the crates of {} together: {told}",
+                folder.display()
+            )));
+        }
+        serde_json::from_slice(&output.stdout)
+            .map_err(|error| Failure::Outside(format!("cargo metadata is no JSON: {error}")))
+    }
+
+    /// Builds the crate in a folder; cargo tells its progress itself.
+    ///
+    /// # Errors
+    /// When cargo is not there or fails.
+    pub(super) fn build(&self, folder: &Path) -> Result<(), Failure> {
+        let mut command = self.command(folder, "build");
+        command.arg("--release").stdout(Stdio::null());
+        let status = command.status().map_err(|error| self.missing(&error))?;
+        if status.success() {
+            return Ok(());
+        }
+        Err(Failure::Outside(format!(
+            "cargo could not build {}; what it said stands above",
+            folder.display()
+        )))
+    }
+
+    fn command(&self, folder: &Path, what: &str) -> Command {
+        let mut command = Command::new(&self.program);
+        command.arg(what).current_dir(folder);
+        if self.offline {
+            command.arg("--offline");
+        }
+        command
+    }
+
+    fn missing(&self, error: &std::io::Error) -> Failure {
+        Failure::Outside(format!(
+            "`{}` cannot be run ({error}): building needs a Rust toolchain, see https://rustup.rs",
+            self.program.display()
+        ))
+    }
+}

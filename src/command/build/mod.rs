@@ -1,0 +1,246 @@
+//! `athermal build`: this program with more plugins in it.
+
+mod cargo;
+mod project;
+mod wish;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::checkout::{Checkout, VERSION};
+use crate::terminal::{Answer, Failure, Format, Terminal};
+use cargo::Cargo;
+use project::Project;
+use wish::Wish;
+
+/// Build this program with plugin crates of your choice
+///
+/// Writes a small cargo project that names the crates, checks that they are made for this version of athermal, and
+/// builds it. The project and its lock file stay, so that the same binary can be built again.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  athermal build --with path:room-lag -o athermal-ours
+  athermal build --with drift-nodes@0.3.1 --with path:../ours -o athermal-ours
+  athermal build --with path:room-lag --vendored vendor -o athermal-ours    without a network")]
+pub struct Build {
+    /// A crate: NAME, NAME@VERSION, or path:DIR
+    #[arg(long, required = true, value_name = "CRATE")]
+    with: Vec<String>,
+    /// The binary
+    #[arg(long, short, value_name = "BINARY")]
+    output: PathBuf,
+    /// The folder of the cargo project; by default the binary's name and `-project`
+    #[arg(long, value_name = "DIR")]
+    project: Option<PathBuf>,
+    /// Take crates from this folder, as `cargo vendor` writes it, and never from a network
+    #[arg(long, value_name = "DIR")]
+    vendored: Option<PathBuf>,
+    /// Never use a network
+    #[arg(long)]
+    offline: bool,
+    /// Where the sources of athermal are, as path:DIR; by default where this program was built
+    #[arg(long, value_name = "path:DIR")]
+    athermal: Option<String>,
+}
+
+impl Build {
+    /// Writes the project, checks it and builds it.
+    ///
+    /// # Errors
+    /// When athermal or a crate is not found, they do not go together, or cargo fails.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let checkout = Checkout::find(self.athermal.as_deref())?;
+        let cargo = Cargo::new(self.offline || self.vendored.is_some());
+        let mut wishes = Vec::new();
+        for text in &self.with {
+            let wish = Wish::read(text)?;
+            wish.check(&cargo, &checkout)?;
+            wishes.push(wish);
+        }
+        let project = Project::write(&self.folder(), &wishes, &checkout, self.vendored.as_deref())?;
+        let resolved = cargo.metadata(project.folder(), true)?;
+        one_core(&resolved, &wishes)?;
+        cargo.build(project.folder())?;
+        let target = resolved["target_directory"].as_str().unwrap_or_default();
+        let built = Path::new(target)
+            .join("release")
+            .join(project::executable());
+        place(&built, &self.output)?;
+        self.tell(terminal, &wishes, &resolved)
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.project.clone().unwrap_or_else(|| {
+            let mut name = self.output.file_stem().unwrap_or_default().to_owned();
+            name.push("-project");
+            self.output.with_file_name(name)
+        })
+    }
+
+    /// Asks the new binary for its kinds.
+    fn tell(
+        &self,
+        terminal: &Terminal,
+        wishes: &[Wish],
+        resolved: &Value,
+    ) -> Result<Answer, Failure> {
+        let kinds = kinds(&self.output)?;
+        twice(&kinds)?;
+        if terminal.format == Format::Json {
+            println!(
+                "{:#}",
+                json!({ "binary": self.output, "project": self.folder(), "nodes": kinds })
+            );
+            return Ok(Answer::Fine);
+        }
+        println!("{} has {} node types", self.output.display(), kinds.len());
+        for wish in wishes {
+            let version = packages(resolved, wish.package()).next();
+            let version = version.and_then(|package| package["version"].as_str());
+            let brought: Vec<String> = kinds
+                .iter()
+                .filter(|kind| kind.package == wish.package())
+                .map(|kind| format!("{} ({})", kind.name, kind.role))
+                .collect();
+            let brought = if brought.is_empty() {
+                "no node type; a kind is made known by `athermal_core::register!`".to_owned()
+            } else {
+                brought.join(", ")
+            };
+            println!(
+                "  from {} {}: {brought}",
+                wish.package(),
+                version.unwrap_or_default()
+            );
+        }
+        terminal.note(format!(
+            "its cargo project is {}; keep it, with its Cargo.lock, to build the same again",
+            self.folder().display()
+        ));
+        Ok(Answer::Fine)
+    }
+}
+
+/// A kind of a binary.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Known {
+    name: String,
+    role: String,
+    package: String,
+    version: String,
+}
+
+fn kinds(binary: &Path) -> Result<Vec<Known>, Failure> {
+    let binary = std::fs::canonicalize(binary).unwrap_or_else(|_| binary.to_owned());
+    let failed = |reason: String| {
+        Failure::Outside(format!(
+            "{} was built and cannot list its nodes: {reason}",
+            binary.display()
+        ))
+    };
+    let output = Command::new(&binary)
+        .args(["nodes", "--format", "json"])
+        .output()
+        .map_err(|error| failed(error.to_string()))?;
+    let listed: Value =
+        serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))?;
+    serde_json::from_value(listed["nodes"].clone()).map_err(|error| failed(error.to_string()))
+}
+
+/// Refuses a name that two crates use.
+fn twice(kinds: &[Known]) -> Result<(), Failure> {
+    for (nth, kind) in kinds.iter().enumerate() {
+        if let Some(other) = kinds[..nth].iter().find(|other| other.name == kind.name) {
+            return Err(Failure::Request(format!(
+                "the node type `{}` is in {} {} and in {} {}: no graph could use it; leave one of them out, or rename its type",
+                kind.name, other.package, other.version, kind.package, kind.version
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn packages<'a>(resolved: &'a Value, name: &'a str) -> impl Iterator<Item = &'a Value> + 'a {
+    let all = resolved["packages"].as_array().into_iter().flatten();
+    all.filter(move |package| package["name"] == name)
+}
+
+/// Two copies of the core do not know each other's nodes.
+fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
+    let cores: Vec<String> = packages(resolved, "athermal-core")
+        .map(|package| {
+            let text = |key: &str| package[key].as_str().unwrap_or_default().to_owned();
+            format!("{} in {}", text("version"), text("manifest_path"))
+        })
+        .collect();
+    if cores.len() == 1 {
+        return Ok(());
+    }
+    let with: Vec<_> = wishes.iter().map(Wish::package).collect();
+    Err(Failure::Request(format!(
+        "{} would bring {} copies of athermal-core, which do not know each other's nodes: {}; this program is {VERSION}. \
+         Let every crate depend on the same one",
+        with.join(" and "),
+        cores.len(),
+        cores.join(", ")
+    )))
+}
+
+/// Puts the binary where it was asked for, all at once.
+fn place(built: &Path, output: &Path) -> Result<(), Failure> {
+    let mut aside = output.as_os_str().to_owned();
+    aside.push(".new");
+    let aside = PathBuf::from(aside);
+    let folder = output.parent().map_or(Ok(()), std::fs::create_dir_all);
+    folder
+        .and_then(|()| std::fs::copy(built, &aside))
+        .and_then(|_| std::fs::rename(&aside, output))
+        .map_err(|error| {
+            Failure::Outside(format!(
+                "cannot put {} at {}: {error}",
+                built.display(),
+                output.display()
+            ))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(name: &str, package: &str) -> Known {
+        Known {
+            name: name.to_owned(),
+            role: "feature".to_owned(),
+            package: package.to_owned(),
+            version: "0.1.0".to_owned(),
+        }
+    }
+
+    #[test]
+    fn two_crates_with_the_same_kind_are_both_named() {
+        assert!(twice(&[known("a", "one"), known("b", "two")]).is_ok());
+        let refused = twice(&[known("a", "one"), known("b", "one"), known("a", "two")]);
+        let Err(Failure::Request(told)) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!(
+            told.contains("`a` is in one 0.1.0 and in two 0.1.0"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn two_copies_of_the_core_are_told_with_their_places() {
+        let core = |path: &str| json!({ "name": "athermal-core", "version": "0.1.0", "manifest_path": path });
+        assert!(one_core(&json!({ "packages": [core("/a")] }), &[]).is_ok());
+        let refused = one_core(&json!({ "packages": [core("/a"), core("/b")] }), &[]);
+        let Err(Failure::Request(told)) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!(told.contains("0.1.0 in /a, 0.1.0 in /b"), "{told}");
+    }
+}

@@ -1,0 +1,127 @@
+//! Decides what the cargo project of a binary with chosen plugins consists of.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::wish::Wish;
+use crate::checkout::{Checkout, in_toml};
+use crate::terminal::Failure;
+
+/// What every manifest written here begins with, so that no other is written over.
+const MARK: &str = "# Written by `athermal build`, which writes it again.\n";
+
+/// The project, written.
+#[derive(Debug)]
+pub(super) struct Project {
+    folder: PathBuf,
+}
+
+/// The name of the binary in the target folder.
+pub(super) fn executable() -> String {
+    format!("athermal{}", std::env::consts::EXE_SUFFIX)
+}
+
+impl Project {
+    /// Writes it into a folder, which is new or has one already. A lock file that is there stays; a new one begins as that of
+    /// athermal, so that what is common is the same.
+    ///
+    /// # Errors
+    /// When the folder holds something else, or cannot be written.
+    pub(super) fn write(
+        folder: &Path,
+        wishes: &[Wish],
+        checkout: &Checkout,
+        vendored: Option<&Path>,
+    ) -> Result<Self, Failure> {
+        let failed = |error: std::io::Error| {
+            Failure::Outside(format!(
+                "cannot write the project into {}: {error}",
+                folder.display()
+            ))
+        };
+        let there = fs::read_to_string(folder.join("Cargo.toml"));
+        if there.is_ok_and(|manifest| !manifest.starts_with(MARK)) {
+            return Err(Failure::Request(format!(
+                "{} has a Cargo.toml that `athermal build` did not write; name another folder with --project",
+                folder.display()
+            )));
+        }
+        fs::create_dir_all(folder.join("src")).map_err(failed)?;
+        fs::create_dir_all(folder.join(".cargo")).map_err(failed)?;
+        let config = match vendored {
+            Some(vendored) => source(vendored)?,
+            None => String::new(),
+        };
+        let files = [
+            ("Cargo.toml", manifest(wishes, checkout)),
+            ("src/main.rs", program(wishes)),
+            (".cargo/config.toml", config),
+        ];
+        for (path, text) in files {
+            fs::write(folder.join(path), text).map_err(failed)?;
+        }
+        let lock = folder.join("Cargo.lock");
+        if !lock.exists() {
+            fs::copy(checkout.folder().join("Cargo.lock"), lock).map_err(failed)?;
+        }
+        Ok(Self {
+            folder: folder.to_owned(),
+        })
+    }
+
+    /// Where it is.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+fn manifest(wishes: &[Wish], checkout: &Checkout) -> String {
+    let athermal = in_toml(checkout.folder());
+    let core = in_toml(&checkout.folder().join("core/framework"));
+    let numerics = in_toml(&checkout.folder().join("core/numerics"));
+    let plugins: String = wishes.iter().map(|wish| wish.dependency() + "\n").collect();
+    format!(
+        "{MARK}\
+         [package]\n\
+         name = \"athermal-with-plugins\"\n\
+         version = \"0.0.0\"\n\
+         edition = \"2024\"\n\
+         publish = false\n\n\
+         [[bin]]\n\
+         name = \"athermal\"\n\
+         path = \"src/main.rs\"\n\n\
+         [dependencies]\n\
+         athermal = {{ path = {athermal} }}\n\
+         {plugins}\n\
+         # A plugin that asks for the athermal of a registry gets this one.\n\
+         [patch.crates-io]\n\
+         athermal-core = {{ path = {core} }}\n\
+         athermal-numerics = {{ path = {numerics} }}\n\n\
+         [workspace]\n"
+    )
+}
+
+fn program(wishes: &[Wish]) -> String {
+    let uses: String = wishes
+        .iter()
+        .map(|wish| format!("use {} as _;\n", wish.package().replace('-', "_")))
+        .collect();
+    format!(
+        "//! athermal with plugins. A plugin that no code names is left out by the linker.\n\n\
+         {uses}\n\
+         fn main() -> std::process::ExitCode {{\n    athermal::command_line()\n}}\n"
+    )
+}
+
+fn source(vendored: &Path) -> Result<String, Failure> {
+    let folder = fs::canonicalize(vendored).map_err(|error| {
+        Failure::Outside(format!(
+            "no vendored crates in {}: {error}",
+            vendored.display()
+        ))
+    })?;
+    Ok(format!(
+        "[source.crates-io]\nreplace-with = \"vendored\"\n\n[source.vendored]\ndirectory = {}\n",
+        in_toml(&folder)
+    ))
+}

@@ -1,0 +1,203 @@
+//! `athermal compare`: several graphs, fitted and scored on the same data, in one table.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use athermal::Model;
+use athermal::core::fit::{FitOptions, FitReport, Outcome};
+use athermal::core::quantity::Quantity;
+use athermal::core::score::trace;
+use athermal::diagnosis::comparison::{Comparison, Contender, compare};
+use clap::Args;
+use serde_json::json;
+
+use super::data::{self, Data};
+use super::evaluate::check_limit;
+use super::fit::fit_on;
+use crate::figures::{count, length, matrix, number, or_dash};
+use crate::terminal::{Answer, Failure, Format, Terminal};
+
+/// Fit several graphs on the same data and score them on others, in one table
+///
+/// Every prediction of every graph is a row, every axis a column. All that predict the same truth over the same horizon are scored
+/// on the instants at which all of them are valid, beside no model and persistence.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  athermal compare graphs/die-tester.toml mine.toml --data week.csv --on days.csv
+  athermal compare graphs/zoo.toml --data week.csv --on days.csv --abs-truth-below \"250 nm/min\"")]
+pub struct Compare {
+    /// The graphs, or models whose graphs are fitted anew
+    #[arg(required = true, value_name = "GRAPH")]
+    graphs: Vec<PathBuf>,
+    #[command(flatten)]
+    data: Data,
+    /// The recording to score on; several files are joined as with --data
+    #[arg(long, required = true, num_args = 1.., value_name = "FILE")]
+    on: Vec<PathBuf>,
+    /// Only truths whose absolute value is below count, such as "250 nm/min"
+    #[arg(long, value_name = "QUANTITY")]
+    abs_truth_below: Option<Quantity>,
+}
+
+/// A graph's fit.
+struct Fitted {
+    graph: String,
+    path: String,
+    seconds: f64,
+    report: FitReport,
+}
+
+impl Compare {
+    /// Fits, scores and prints.
+    ///
+    /// # Errors
+    /// When a graph has mistakes or the data cannot be used.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let mut models = Vec::new();
+        for path in &self.graphs {
+            let model = Model::load(path)?;
+            if let Some(limit) = &self.abs_truth_below {
+                check_limit(limit, &model)?;
+            }
+            models.push((path, model));
+        }
+        let on = self.data.others(self.on.clone());
+        let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
+        for (path, mut model) in models {
+            let began = Instant::now();
+            let report = fit_on(&mut model, &self.data, &FitOptions::default(), terminal)?;
+            let seconds = began.elapsed().as_secs_f64();
+            let path = path.display().to_string();
+            // Graphs that share a name are told apart by their files.
+            let mut name = model.plan.name.clone().unwrap_or_else(|| path.clone());
+            if fits.iter().any(|fit| fit.graph == name) {
+                name.clone_from(&path);
+            }
+            let dataset = on.dataset();
+            let mut progress = terminal.progress("scoring");
+            let mut ticks = 0;
+            let trace = trace(&model.plan, &model.fitted, &dataset, &mut |_, _| {
+                ticks += 1;
+                if ticks % 4096 == 0 {
+                    progress.tell(ticks);
+                }
+            })?;
+            drop(progress);
+            data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+            fits.push(Fitted {
+                graph: name.clone(),
+                path,
+                seconds,
+                report,
+            });
+            contenders.push(Contender {
+                name,
+                plan: model.plan,
+                trace,
+            });
+        }
+        let comparisons = compare(&contenders, self.abs_truth_below.as_ref());
+        if terminal.format == Format::Json {
+            let graphs: Vec<_> = fits
+                .iter()
+                .map(|fit| json!({ "graph": fit.graph, "file": fit.path, "fit_s": fit.seconds }))
+                .collect();
+            println!(
+                "{:#}",
+                json!({ "graphs": graphs, "comparisons": comparisons })
+            );
+        } else {
+            for comparison in &comparisons {
+                println!("{}", describe(comparison));
+            }
+            for fit in &fits {
+                println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
+            }
+        }
+        if comparisons.is_empty() {
+            terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
+        }
+        Ok(if failed(terminal, &fits) {
+            Answer::No
+        } else {
+            Answer::Fine
+        })
+    }
+}
+
+/// Whether an estimator could not be fitted; each is told.
+fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
+    let mut failed = false;
+    for fit in fits {
+        for estimator in &fit.report.estimators {
+            if let Outcome::Failed(error) = &estimator.outcome {
+                failed = true;
+                terminal.warning(format_args!(
+                    "{}: {} could not be fitted: {error}; it gave no prediction",
+                    fit.graph, estimator.node
+                ));
+            }
+        }
+    }
+    failed
+}
+
+fn describe(comparison: &Comparison) -> String {
+    let several = comparison
+        .rows
+        .iter()
+        .any(|row| row.graph != comparison.rows[0].graph);
+    let counts = comparison.truths.iter().map(|truth| truth.count as u64);
+    let (fewest, most) = (counts.clone().min(), counts.max());
+    let instants = match (fewest, most) {
+        (Some(fewest), Some(most)) if fewest != most => {
+            format!("{} to {}", count(fewest), count(most))
+        }
+        (_, most) => count(most.unwrap_or(0)),
+    };
+    let duration =
+        |seconds: f64| athermal::Duration::from_secs_f64(seconds).map_or_else(String::new, length);
+    let mut text = format!(
+        "RMSE in {}, {} ahead, {instants} instants; * best, ! worse than no model\n",
+        comparison.unit,
+        duration(comparison.ahead_s)
+    );
+    let columns = comparison.truths.iter().map(|truth| truth.name.clone());
+    let columns: Vec<String> = columns.collect();
+    let plain = |of: fn(&athermal::diagnosis::comparison::Column) -> Option<f64>| -> Vec<String> {
+        comparison
+            .truths
+            .iter()
+            .map(|truth| or_dash(of(truth)))
+            .collect()
+    };
+    let mut rows = vec![
+        ("no model".to_owned(), plain(|truth| truth.no_model)),
+        ("persistence".to_owned(), plain(|truth| truth.persistence)),
+    ];
+    let mut graph = None;
+    for (nth, row) in comparison.rows.iter().enumerate() {
+        if several && graph.replace(&row.graph) != Some(&row.graph) {
+            rows.push((row.graph.clone(), vec![String::new(); columns.len()]));
+        }
+        let cells = row
+            .rmse
+            .iter()
+            .zip(&comparison.truths)
+            .map(|(rmse, truth)| {
+                let worse =
+                    matches!((rmse, truth.no_model), (Some(rmse), Some(zero)) if *rmse > zero);
+                let mark = match (truth.best == Some(nth), worse) {
+                    (true, _) => "*",
+                    (_, true) => "!",
+                    _ => "",
+                };
+                format!("{mark}{}", or_dash(*rmse))
+            });
+        let indent = if several { "  " } else { "" };
+        let label = format!("{indent}{}", row.node);
+        rows.push((label, cells.collect()));
+    }
+    text.push_str(&matrix("", &columns, &rows));
+    text
+}

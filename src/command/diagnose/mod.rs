@@ -1,0 +1,144 @@
+//! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
+
+mod tables;
+
+use std::path::PathBuf;
+
+use athermal::Duration;
+use athermal::core::compile::Wanted;
+use athermal::diagnosis::{Diagnosis, Options, day, diagnose, plots};
+use clap::Args;
+use serde_json::json;
+
+use super::data::{self, Data};
+use super::evaluate::load_fitted;
+use super::report::write_plots;
+use crate::terminal::{Answer, Failure, Format, Terminal};
+use tables::Tables;
+
+/// Show why a model predicts as well as it does, and what would make it better
+///
+/// Tells whether what predictions leave is white; which features say something of the truth, at which lag, and of what
+/// predictions leave; how each estimator answers a change of each sensor; how well the data determine it; what each sensor
+/// contributes; and, by fits of its own on the data, how well each day is predicted from the others and how many days are
+/// needed.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  athermal diagnose model.json --data week.csv
+  athermal diagnose model.json --data week.csv --window --plots plots
+  athermal diagnose model.json --data week.csv --of Z1
+  athermal diagnose model.json --data hours.csv --day 30min
+  athermal diagnose model.json --data test.csv --no-fit --format json")]
+pub struct Diagnose {
+    /// The model, or a graph in which nothing needs fitting
+    model: PathBuf,
+    #[command(flatten)]
+    data: Data,
+    /// Show these predictions, by node, channel or axis, each with all its regressors; else what the graph puts out
+    #[arg(long, num_args = 1.., value_name = "NAME")]
+    of: Vec<String>,
+    /// Set the signal to noise of each drift against the window that it is taken over
+    #[arg(long)]
+    window: bool,
+    /// How long a day is, of which each is left out once
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        default_value = "1d",
+        conflicts_with = "no_fit"
+    )]
+    day: Duration,
+    /// Leave out what needs fits of its own: days left out, and how many are needed
+    #[arg(long)]
+    no_fit: bool,
+    /// A folder for every picture as SVG and PNG files
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
+}
+
+impl Diagnose {
+    /// Works out the facts and tells them.
+    ///
+    /// # Errors
+    /// When the model or the data cannot be used, or a picture cannot be written.
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        if self.day <= Duration::ZERO {
+            return Err(Failure::Request(format!(
+                "--day is {} and must be longer than nothing",
+                self.day
+            )));
+        }
+        let model = load_fitted(&self.model, Wanted::default())?;
+        let dataset = self.data.dataset();
+        let options = Options {
+            day: (!self.no_fit).then_some(self.day),
+            windows: self.window,
+        };
+        let mut bar = None;
+        let mut progress = |done: u64, total: u64| {
+            bar.get_or_insert_with(|| terminal.progress_to("fitting", "fits", Some(total)))
+                .tell(done);
+        };
+        let (diagnosis, observation) = diagnose(&model, &dataset, &options, &mut progress)?;
+        drop(bar);
+        self.check_names(&model.plan, &diagnosis)?;
+        if terminal.format == Format::Json {
+            let files = dataset.paths().iter();
+            let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
+            println!("{:#}", json!({ "data": files, "diagnosis": diagnosis }));
+        } else {
+            print!("{}", Tables::new(&diagnosis, &self.of).text());
+        }
+        let trace = &observation.trace;
+        data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+        self.tell(terminal, &diagnosis);
+        if let Some(folder) = &self.plots {
+            write_plots(terminal, folder, &plots(&diagnosis))?;
+        }
+        Ok(Answer::Fine)
+    }
+
+    fn tell(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
+        if diagnosis.main.is_empty() {
+            terminal.warning(
+                "the graph has no prediction of a measured truth, so there is nothing to diagnose",
+            );
+        } else if !self.no_fit && diagnosis.days.is_none() {
+            let (count, day) = (diagnosis.day_count, self.day);
+            let advice = if count < 2 {
+                "a shorter --day shows how fits on some parts do on others"
+            } else {
+                "a longer --day leaves fewer out"
+            };
+            let most = day::MOST_DAYS;
+            terminal.note(format_args!(
+                "no days left out: the data have {count} of {day}, and from 2 to {most} can be; {advice}"
+            ));
+        }
+    }
+
+    /// Whether every name of `--of` stands for something.
+    fn check_names(
+        &self,
+        plan: &athermal::core::compile::Plan,
+        diagnosis: &Diagnosis,
+    ) -> Result<(), Failure> {
+        let known: Vec<&str> = diagnosis
+            .residuals
+            .iter()
+            .map(|of| of.prediction.as_str())
+            .collect();
+        let unknown = self
+            .of
+            .iter()
+            .find(|name| !known.iter().any(|known| tables::is_called(known, name)));
+        let Some(unknown) = unknown else {
+            return Ok(());
+        };
+        let graph = plan.name.as_deref().unwrap_or("the graph");
+        Err(Failure::Request(format!(
+            "{graph} predicts nothing called `{unknown}`; there are {}",
+            known.join(", ")
+        )))
+    }
+}

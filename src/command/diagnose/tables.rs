@@ -1,0 +1,486 @@
+//! Decides how the facts of a diagnosis look as text, in 80 columns.
+
+use std::fmt::Write as _;
+
+use athermal::Duration;
+use athermal::diagnosis::day::{CurvePoint, DayScore};
+use athermal::diagnosis::lag::{Correlogram, FeatureLags};
+use athermal::diagnosis::regressor::Design;
+use athermal::diagnosis::response::Response;
+use athermal::diagnosis::{Diagnosis, Main};
+
+use crate::figures::{count, length, matrix, number, or_dash, table};
+
+/// Features that are named of each truth.
+const FEATURES: usize = 3;
+/// A correlation that lies so many standard errors from none says something.
+const SAYS_SOMETHING: f64 = 3.0;
+/// A variance inflation beyond which a coefficient means little by itself (Marquardt 1970).
+const INFLATED: f64 = 10.0;
+/// Fits on fewer days are enough when their error is at most so many times that of fits on all others.
+const ENOUGH: f64 = 1.05;
+
+/// Whether a prediction goes by a name: that of its channel, its node or its axis.
+pub fn is_called(prediction: &str, name: &str) -> bool {
+    let parts = prediction.split_once('.');
+    prediction == name || parts.is_some_and(|(node, axis)| node == name || axis == name)
+}
+
+/// The tables of a diagnosis, of the predictions asked for.
+pub struct Tables<'a> {
+    diagnosis: &'a Diagnosis,
+    asked: &'a [String],
+}
+
+impl<'a> Tables<'a> {
+    pub fn new(diagnosis: &'a Diagnosis, asked: &'a [String]) -> Self {
+        Self { diagnosis, asked }
+    }
+
+    /// Everything, section by section.
+    pub fn text(&self) -> String {
+        let sections = [
+            self.residuals(),
+            self.lags(),
+            self.responses(),
+            self.designs(),
+            self.contributions(),
+            self.days(),
+            self.windows(),
+        ];
+        let sections: Vec<String> = sections.into_iter().filter(|of| !of.is_empty()).collect();
+        sections.join("\n")
+    }
+
+    fn shows(&self, prediction: &str) -> bool {
+        if self.asked.is_empty() {
+            return self.main().any(|main| main.prediction == prediction);
+        }
+        self.asked.iter().any(|name| is_called(prediction, name))
+    }
+
+    /// The truths of which something is shown.
+    fn main(&self) -> impl Iterator<Item = &'a Main> {
+        let shown = |main: &&Main| {
+            let residuals = self.diagnosis.residuals.iter();
+            let mut of_truth = residuals.filter(|of| of.truth == main.truth);
+            self.asked.is_empty()
+                || of_truth.any(|of| {
+                    self.asked
+                        .iter()
+                        .any(|name| is_called(&of.prediction, name))
+                })
+        };
+        self.diagnosis.main.iter().filter(shown)
+    }
+
+    /// Estimators are shown with the truths that they predict, or where they are asked for.
+    fn shows_estimator(&self, node: &str) -> bool {
+        self.asked.is_empty() || self.asked.iter().any(|name| is_called(node, name))
+    }
+
+    fn residuals(&self) -> String {
+        let shown = self.diagnosis.residuals.iter();
+        let shown: Vec<_> = shown.filter(|of| self.shows(&of.prediction)).collect();
+        let Some(first) = shown.first() else {
+            return String::new();
+        };
+        let rows: Vec<Vec<String>> = shown
+            .iter()
+            .map(|of| {
+                let lags = of.autocorrelation.len();
+                let largest = (0..lags).max_by(|&a, &b| {
+                    let size = |lag: usize| of.autocorrelation[lag].abs();
+                    size(a).total_cmp(&size(b))
+                });
+                let largest = largest.map_or("-".to_owned(), |lag| {
+                    let after = seconds((lag + 1) as f64 * of.spacing_s);
+                    format!("{:.2} at {after}", of.autocorrelation[lag])
+                });
+                let verdict = match of.white() {
+                    Some(true) => "white",
+                    Some(false) => "not white",
+                    None => "too few",
+                };
+                vec![
+                    format!("  {}", of.prediction),
+                    number(of.rms),
+                    number(of.mean),
+                    count(of.spaced as u64),
+                    largest,
+                    of.bound.first().map_or("-".into(), |b| format!("±{b:.2}")),
+                    or_dash(of.ljung_box),
+                    of.p_value.map_or("-".to_owned(), |p| format!("{p:.3}")),
+                    verdict.to_owned(),
+                ]
+            })
+            .collect();
+        let header = [
+            "  prediction",
+            "RMS",
+            "mean",
+            "n",
+            "autocorrelation",
+            "95 %",
+            "Q",
+            "p",
+            "",
+        ];
+        format!(
+            "residuals: measured less predicted in {}, of which n are {} apart, so that\n\
+             neither windows nor horizons overlap; Q of Ljung and Box\n{}",
+            first.unit,
+            seconds(first.spacing_s),
+            table(&header, &rows)
+        )
+    }
+
+    fn lags(&self) -> String {
+        let mut rows = Vec::new();
+        for main in self.main() {
+            let Some(of) = self.diagnosis.lags.iter().find(|of| of.truth == main.truth) else {
+                continue;
+            };
+            let mut list = |title: String, side: fn(&FeatureLags) -> &Correlogram, least: f64| {
+                let features = of.features.iter();
+                let mut found: Vec<_> = features
+                    .filter(|of| side(of).significance() >= least)
+                    .collect();
+                found.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
+                let more = found.len().saturating_sub(FEATURES);
+                let told = match (found.is_empty(), least > 0.0 && more > 0) {
+                    (true, _) => format!("  {title}: nothing"),
+                    (_, true) => format!("  {title}, and {more} more"),
+                    _ => format!("  {title}"),
+                };
+                rows.push(vec![told]);
+                rows.extend(found.iter().take(FEATURES).map(|feature| {
+                    let correlogram = side(feature);
+                    vec![
+                        format!("    {}", feature.feature),
+                        format!("{:.2}", correlogram.best),
+                        seconds(correlogram.best_lag_s),
+                        format!("{:.2}", correlogram.error),
+                    ]
+                }));
+            };
+            list(of.truth.clone(), |of| &of.truth, 0.0);
+            let left = format!("left of it by {}", of.prediction);
+            list(left, |of| &of.residual, SAYS_SOMETHING);
+        }
+        if rows.is_empty() {
+            return String::new();
+        }
+        format!(
+            "largest correlation of features with the truth, with the lag by which it\n\
+             follows them; and beyond 3 σ with what is left of it, at lags at which they\n\
+             were known when it was predicted\n{}",
+            table(&["", "r", "lag", "σ"], &rows)
+        )
+    }
+
+    fn responses(&self) -> String {
+        let all = self.diagnosis.responses.iter();
+        let shown: Vec<_> = all.filter(|of| self.shows_estimator(&of.node)).collect();
+        let mut text = String::new();
+        let mut nodes: Vec<&str> = shown.iter().map(|of| name_of(&of.node)).collect();
+        nodes.dedup();
+        for node in nodes {
+            let of_node: Vec<_> = shown
+                .iter()
+                .filter(|of| name_of(&of.node) == node)
+                .collect();
+            let columns: Vec<String> = of_node.iter().map(|of| axis_of(&of.truth)).collect();
+            let mut sensors: Vec<&Response> = Vec::new();
+            for sensor in of_node.iter().flat_map(|of| &of.sensors) {
+                if !sensors.iter().any(|known| known.sensor == sensor.sensor) {
+                    sensors.push(sensor);
+                }
+            }
+            let Some(first) = sensors.first() else {
+                continue;
+            };
+            let cells = |cell: fn(&Response) -> String| -> Vec<(String, Vec<String>)> {
+                let row = |sensor: &&Response| {
+                    let find = |of: &&&athermal::diagnosis::response::Responses| {
+                        let mut of = of.sensors.iter();
+                        let found = of.find(|of| of.sensor == sensor.sensor);
+                        found.map_or("-".to_owned(), cell)
+                    };
+                    (sensor.sensor.clone(), of_node.iter().map(find).collect())
+                };
+                sensors.iter().map(row).collect()
+            };
+            let in_the_end = in_the_end(&of_node[0].unit);
+            let _ = writeln!(
+                text,
+                "{node}: how far a step of 1 {} moves what it predicts in the end, in {in_the_end}",
+                first.sensor_unit
+            );
+            text.push_str(&matrix(
+                "sensor",
+                &columns,
+                &cells(|of| of.total.map_or("no end".to_owned(), number)),
+            ));
+            let _ = writeln!(text, "{node}: time until nine tenths of that have come");
+            let settled = |of: &Response| of.settled_s.map_or("no end".to_owned(), seconds);
+            text.push_str(&matrix("sensor", &columns, &cells(settled)));
+            let bent = of_node.iter().flat_map(|of| &of.sensors);
+            if bent.clone().any(|of| of.asymmetry > 1e-6) {
+                let largest = bent.map(|of| of.asymmetry).fold(0.0, f64::max);
+                let _ = writeln!(
+                    text,
+                    "  it is not linear: steps up and down differ by up to {:.0} %",
+                    100.0 * largest
+                );
+            }
+        }
+        text
+    }
+
+    fn designs(&self) -> String {
+        let all = self.diagnosis.designs.iter();
+        let shown: Vec<_> = all.filter(|of| self.shows_estimator(&of.node)).collect();
+        if shown.is_empty() {
+            return String::new();
+        }
+        let mut text = String::from(
+            "how well the data determine each estimator: condition number of its regressors,\n\
+             and the largest variance inflation factor\n",
+        );
+        let rows: Vec<Vec<String>> = shown
+            .iter()
+            .map(|of| {
+                let known = of.regressors.iter().filter(|of| !of.inflation.is_nan());
+                let worst = known.max_by(|a, b| a.inflation.total_cmp(&b.inflation));
+                vec![
+                    format!("  {}", of.node),
+                    count(of.rows),
+                    of.regressors.len().to_string(),
+                    number(of.condition),
+                    worst.map_or("-".to_owned(), |of| number(of.inflation)),
+                    worst.map_or_else(String::new, |of| {
+                        let much = of.inflation > INFLATED;
+                        if much { of.name.clone() } else { String::new() }
+                    }),
+                ]
+            })
+            .collect();
+        let header = ["  estimator", "rows", "regressors", "condition", "VIF", ""];
+        text.push_str(&table(&header, &rows));
+        if !self.asked.is_empty() {
+            shown.iter().for_each(|of| text.push_str(&regressors(of)));
+        }
+        text
+    }
+
+    fn contributions(&self) -> String {
+        let shown: Vec<&str> = self
+            .diagnosis
+            .residuals
+            .iter()
+            .map(|of| of.prediction.as_str())
+            .filter(|name| self.shows(name))
+            .collect();
+        let all = &self.diagnosis.contributions;
+        let of = |sensor: &str, prediction: &str| {
+            let mut all = all.iter();
+            all.find(|of| of.sensor == sensor && of.prediction == prediction)
+        };
+        let mut sensors: Vec<&str> = Vec::new();
+        for of in all
+            .iter()
+            .filter(|of| shown.contains(&of.prediction.as_str()))
+        {
+            if !sensors.contains(&of.sensor.as_str()) {
+                sensors.push(&of.sensor);
+            }
+        }
+        let Some(unit) = all
+            .first()
+            .map(|of| &of.unit)
+            .filter(|_| !sensors.is_empty())
+        else {
+            return String::new();
+        };
+        let columns: Vec<String> = shown.iter().map(|name| (*name).to_owned()).collect();
+        let row =
+            |sensor: &&str, cell: &dyn Fn(&athermal::diagnosis::sensor::Contribution) -> String| {
+                let cells = shown
+                    .iter()
+                    .map(|name| of(sensor, name).map_or("-".to_owned(), cell));
+                ((*sensor).to_owned(), cells.collect::<Vec<String>>())
+            };
+        let moves: Vec<_> = sensors
+            .iter()
+            .map(|sensor| row(sensor, &|of| number(of.moves)))
+            .collect();
+        let mut errors: Vec<_> = sensors
+            .iter()
+            .map(|sensor| row(sensor, &|of| number(of.rmse_at_rest)))
+            .collect();
+        let as_it_is = shown.iter().map(|name| {
+            let mut residuals = self.diagnosis.residuals.iter();
+            let residuals = residuals.find(|of| of.prediction == *name);
+            residuals.map_or("-".to_owned(), |of| number(of.rms))
+        });
+        errors.insert(0, ("as it is".to_owned(), as_it_is.collect()));
+        format!(
+            "what each sensor moves the predictions by, in {unit} RMS\n{}\
+             RMSE in {unit} with a sensor at rest at its mean, nothing fitted anew\n{}",
+            matrix("sensor", &columns, &moves),
+            matrix("at rest", &columns, &errors)
+        )
+    }
+
+    fn days(&self) -> String {
+        let Some(days) = &self.diagnosis.days else {
+            return String::new();
+        };
+        let residuals = self.diagnosis.residuals.iter();
+        let shown = residuals.map(|of| of.prediction.clone());
+        let shown: Vec<String> = shown.filter(|name| self.shows(name)).collect();
+        let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<f64>| -> Vec<String> {
+            let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
+            let texts = shown.iter().map(|name| or_dash(of(name).and_then(cell)));
+            texts.collect()
+        };
+        let unit = self.main().next().map_or("", |main| main.unit.as_str());
+        let left_out = days.left_out.iter();
+        let left_out = left_out.map(|of| {
+            let label = format!("day {}", of.day);
+            (label, cells(&of.scores, |score| score.rmse))
+        });
+        let curve = days.curve.iter().map(|point| {
+            let plural = if point.days == 1 { "" } else { "s" };
+            let label = format!("{} day{plural} ({} fits)", point.days, point.fits);
+            (label, cells(&point.scores, DayScore::ratio))
+        });
+        let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
+        let near = |point: &CurvePoint| {
+            let scores = point.scores.iter();
+            let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
+            of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
+        };
+        let last_far = days.curve.iter().rposition(|point| !near(point));
+        let enough = days.curve.get(last_far.map_or(0, |last| last + 1));
+        let verdict = match enough.map_or(days.count, |point| point.days) {
+            1 => "1 day is enough to come within 5 %".to_owned(),
+            enough if enough + 1 < days.count => {
+                format!("{enough} days are enough to come within 5 %")
+            }
+            _ => "more days may still make it better".to_owned(),
+        };
+        let of_day = if days.day_s == 86_400.0 {
+            String::new()
+        } else {
+            format!(" of {}", seconds(days.day_s))
+        };
+        format!(
+            "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
+             how many times that the error is of a fit on so many days that follow each\n\
+             other, on the same days: {verdict}\n{}",
+            matrix("left out", &shown, &left_out),
+            matrix("fitted on", &shown, &curve)
+        )
+    }
+
+    fn windows(&self) -> String {
+        let shown: Vec<_> = self
+            .main()
+            .filter_map(|main| {
+                let mut windows = self.diagnosis.windows.iter();
+                windows.find(|of| of.truth == main.truth)
+            })
+            .collect();
+        let mut widths: Vec<f64> = shown
+            .iter()
+            .flat_map(|of| of.widths.iter().map(|width| width.window_s))
+            .collect();
+        widths.sort_by(f64::total_cmp);
+        widths.dedup();
+        if widths.is_empty() {
+            return String::new();
+        }
+        let columns: Vec<String> = shown.iter().map(|of| axis_of(&of.truth)).collect();
+        let rows = widths.iter().map(|&width| {
+            let cell = |of: &&athermal::diagnosis::window::Windows| {
+                let here = of.widths.iter().find(|of| of.window_s == width);
+                let own = if of.window_s == width { "*" } else { "" };
+                here.map_or("-".to_owned(), |of| format!("{own}{}", number(of.ratio)))
+            };
+            (seconds(width), shown.iter().map(cell).collect())
+        });
+        let rows: Vec<_> = rows.collect();
+        format!(
+            "signal to noise of the drift against its window, * as the graph has it\n{}",
+            matrix("window", &columns, &rows)
+        )
+    }
+}
+
+fn regressors(of: &Design) -> String {
+    let rows: Vec<Vec<String>> = of
+        .regressors
+        .iter()
+        .map(|of| {
+            vec![
+                format!("    {}", of.name),
+                number(of.effect),
+                number(of.inflation),
+            ]
+        })
+        .collect();
+    let effect = format!("{} per σ", of.unit);
+    let first = format!("  {}", of.node);
+    table(&[first.as_str(), effect.as_str(), "VIF"], &rows)
+}
+
+/// The node of an instance: `thermal` of `thermal.Z1`.
+fn name_of(instance: &str) -> &str {
+    instance.split_once('.').map_or(instance, |(node, _)| node)
+}
+
+fn axis_of(channel: &str) -> String {
+    let axis = channel.split_once('.').map_or(channel, |(_, axis)| axis);
+    axis.to_owned()
+}
+
+/// The unit of a sum over minutes: that of a position, where the truth is its drift per minute.
+fn in_the_end(unit: &str) -> String {
+    unit.strip_suffix("/min")
+        .map_or_else(|| format!("{unit}·min"), str::to_owned)
+}
+
+/// A length of time, to the second where it is longer than a minute.
+fn seconds(seconds: f64) -> String {
+    let sign = if seconds < 0.0 { "-" } else { "" };
+    let size = match seconds.abs() {
+        long if long > 60.0 => long.round(),
+        short => short,
+    };
+    let duration = Duration::from_secs_f64(size);
+    duration.map_or_else(|| "-".to_owned(), |of| format!("{sign}{}", length(of)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_prediction_goes_by_its_channel_its_node_and_its_axis() {
+        for name in ["vote.Z1", "vote", "Z1"] {
+            assert!(is_called("vote.Z1", name));
+        }
+        assert!(!is_called("vote.Z1", "Z"));
+        assert!(is_called("vote", "vote"));
+    }
+
+    #[test]
+    fn a_drift_per_minute_ends_as_a_length() {
+        assert_eq!(in_the_end("nm/min"), "nm");
+        assert_eq!(in_the_end("W/m2"), "W/m2·min");
+        assert_eq!(seconds(-150.05), "-150s");
+        assert_eq!(seconds(0.08), "80ms");
+    }
+}

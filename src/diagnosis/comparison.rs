@@ -1,0 +1,235 @@
+//! Decides how the predictions of several graphs are set against each other: the same truths, on the instants at which all of them
+//! are valid.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use athermal_core::compile::Plan;
+use athermal_core::quantity::Quantity;
+use athermal_core::score::{PredictionTrace, Trace, TruthTrace};
+use athermal_core::time::{Duration, Instant};
+use serde::Serialize;
+
+use crate::report::rms;
+
+/// The share of instants below which a prediction does not restrict those on which the others are scored, as in scoring.
+const RESTRICTS: f64 = 0.5;
+
+/// A graph that takes part.
+#[derive(Debug, Clone)]
+pub struct Contender {
+    /// What it is called in the comparison.
+    pub name: String,
+    /// Its plan.
+    pub plan: Arc<Plan>,
+    /// What it predicted of the test data.
+    pub trace: Trace,
+}
+
+/// Predictions over one horizon of truths over one span.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The horizon in s.
+    pub ahead_s: f64,
+    /// The span of the truths in s.
+    pub span_s: f64,
+    /// The unit of the truths and of all errors.
+    pub unit: String,
+    /// The truths: a column each.
+    pub truths: Vec<Column>,
+    /// A row for each node of each graph.
+    pub rows: Vec<Row>,
+}
+
+/// A truth that is predicted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Column {
+    /// The channel: `drift.Z1`.
+    pub truth: String,
+    /// Its name within its node: `Z1`.
+    pub name: String,
+    /// Instants scored: those at which every prediction of it that is mostly valid has a value.
+    pub count: usize,
+    /// Root mean square of the truth: the error of no model.
+    pub no_model: Option<f64>,
+    /// The error of the truth at the smallest lag that sees nothing of the answer.
+    pub persistence: Option<f64>,
+    /// The row with the smallest error.
+    pub best: Option<usize>,
+}
+
+/// A node of a graph.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The graph.
+    pub graph: String,
+    /// The node.
+    pub node: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// The root mean square error for each truth; none where the node does not predict it.
+    pub rmse: Vec<Option<f64>>,
+    /// The share of all instants with a truth at which there is a prediction.
+    pub valid: Vec<Option<f64>>,
+}
+
+/// A prediction of a truth by one of the contenders.
+struct Entry<'a> {
+    contender: &'a Contender,
+    truth: &'a TruthTrace,
+    of: &'a PredictionTrace,
+}
+
+/// What makes predictions comparable: horizon and span in ns, and unit.
+type Key = (i64, i64, String);
+
+impl Entry<'_> {
+    fn key(&self) -> Key {
+        let channel = &self.contender.plan.channels[self.truth.slot].channel;
+        let unit = channel.unit.to_string();
+        (self.of.ahead.as_ns(), channel.span.as_ns(), unit)
+    }
+
+    fn truth_name(&self) -> &str {
+        &self.contender.plan.channels[self.truth.slot].name
+    }
+
+    fn row(&self) -> (String, String, &'static str) {
+        let node = &self.contender.plan.nodes[self.of.node];
+        (
+            self.contender.name.clone(),
+            node.name.clone(),
+            node.kind.name,
+        )
+    }
+}
+
+/// Sets contenders against each other. Truths at or above `below` in size do not count.
+#[must_use]
+pub fn compare(contenders: &[Contender], below: Option<&Quantity>) -> Vec<Comparison> {
+    let mut tables: BTreeMap<Key, Vec<Entry<'_>>> = BTreeMap::new();
+    for contender in contenders {
+        for truth in &contender.trace.truths {
+            for of in &truth.predictions {
+                let entry = Entry {
+                    contender,
+                    truth,
+                    of,
+                };
+                tables.entry(entry.key()).or_default().push(entry);
+            }
+        }
+    }
+    let tables = tables.into_iter();
+    tables
+        .map(|(key, entries)| table(key, &entries, below))
+        .collect()
+}
+
+fn table(key: Key, entries: &[Entry<'_>], below: Option<&Quantity>) -> Comparison {
+    let mut truths: Vec<&str> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
+    for entry in entries {
+        if !truths.contains(&entry.truth_name()) {
+            truths.push(entry.truth_name());
+        }
+        let (graph, node, kind) = entry.row();
+        if !rows
+            .iter()
+            .any(|row| row.graph == graph && row.node == node)
+        {
+            rows.push(Row {
+                graph,
+                node,
+                kind,
+                rmse: Vec::new(),
+                valid: Vec::new(),
+            });
+        }
+    }
+    for row in &mut rows {
+        row.rmse.resize(truths.len(), None);
+        row.valid.resize(truths.len(), None);
+    }
+    let columns = truths.iter().enumerate().map(|(nth, truth)| {
+        let of_truth: Vec<&Entry<'_>> = entries
+            .iter()
+            .filter(|entry| entry.truth_name() == *truth)
+            .collect();
+        column(nth, &of_truth, &mut rows, below)
+    });
+    let truths = columns.collect();
+    let (ahead, span, unit) = key;
+    Comparison {
+        ahead_s: Duration::from_ns(ahead).secs(),
+        span_s: Duration::from_ns(span).secs(),
+        unit,
+        truths,
+        rows,
+    }
+}
+
+/// The instants of a truth that count, each with the place of every entry's prediction of it.
+fn instants(entries: &[&Entry<'_>], below: Option<f64>) -> Vec<Vec<usize>> {
+    let mut places: BTreeMap<(u32, Instant), Vec<usize>> = BTreeMap::new();
+    for entry in entries {
+        for (place, &at) in entry.truth.times.iter().enumerate() {
+            let fits = below.is_none_or(|below| entry.truth.values[place].abs() < below);
+            if fits {
+                places.entry(at).or_default().push(place);
+            }
+        }
+    }
+    // A graph that drops samples as out of range has fewer truths than another.
+    let all = places.into_values();
+    all.filter(|places| places.len() == entries.len()).collect()
+}
+
+fn column(
+    nth: usize,
+    entries: &[&Entry<'_>],
+    rows: &mut [Row],
+    below: Option<&Quantity>,
+) -> Column {
+    let first = entries[0];
+    let channel = &first.contender.plan.channels[first.truth.slot].channel;
+    let limit = below.and_then(|below| below.in_unit(&channel.unit));
+    let counted = instants(entries, limit);
+    let value = |entry: usize, places: &[usize]| entries[entry].of.values[places[entry]];
+    let valid: Vec<f64> = (0..entries.len())
+        .map(|entry| {
+            let there = counted.iter().filter(|at| !value(entry, at).is_nan());
+            there.count() as f64 / counted.len().max(1) as f64
+        })
+        .collect();
+    let common: Vec<&Vec<usize>> = counted
+        .iter()
+        .filter(|at| {
+            (0..entries.len()).all(|entry| valid[entry] < RESTRICTS || !value(entry, at).is_nan())
+        })
+        .collect();
+    let truth = |places: &[usize]| first.truth.values[places[0]];
+    for (entry, of) in entries.iter().enumerate() {
+        let (graph, node, _) = of.row();
+        let row = rows
+            .iter_mut()
+            .find(|row| row.graph == graph && row.node == node);
+        if let Some(row) = row {
+            row.rmse[nth] = rms(common.iter().map(|at| value(entry, at) - truth(at)));
+            row.valid[nth] = (!counted.is_empty()).then_some(valid[entry]);
+        }
+    }
+    let size = |row: &Row| row.rmse[nth].unwrap_or(f64::INFINITY);
+    let best = (0..rows.len()).min_by(|&a, &b| size(&rows[a]).total_cmp(&size(&rows[b])));
+    let persistence = first.truth.persistence.get(&first.of.ahead);
+    let lasting = |places: &Vec<usize>| persistence.map_or(f64::NAN, |values| values[places[0]]);
+    Column {
+        truth: first.truth_name().to_owned(),
+        name: channel.name.clone(),
+        count: common.len(),
+        no_model: rms(common.iter().map(|at| truth(at))),
+        persistence: rms(common.iter().map(|at| lasting(at) - truth(at))),
+        best: best.filter(|&best| rows[best].rmse[nth].is_some()),
+    }
+}

@@ -1,0 +1,358 @@
+//! Decides how fits on some days of a recording are scored on the others: each day left out once, and how many are needed.
+//!
+//! Days that are left out are cut out of the recording, so that no window of a row that is fitted on reaches into them; scores
+//! come from a pass over the whole of it. What a model learns at run time it learns there too.
+
+use std::sync::Arc;
+
+use athermal_core::compile::Plan;
+use athermal_core::engine::Fitted;
+use athermal_core::fit::{FitError, FitOptions, fit};
+use athermal_core::model::Model;
+use athermal_core::recording::{Event, Recording, RecordingError, Rows};
+use athermal_core::score::{PredictionTrace, Trace, trace};
+use athermal_core::time::{Duration, Instant};
+use serde::Serialize;
+
+use super::observation::Observation;
+
+/// Days of which each is left out once, at most: each costs a fit.
+pub const MOST_DAYS: usize = 60;
+/// How many fits on as many days, from different places of the recording, make a point of the learning curve.
+const PLACINGS: usize = 3;
+/// Numbers of days that are tried; all of the last few would tell the same.
+const NUMBERS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 11, 15, 21, 30, 42];
+
+/// What fits on some days are worth on others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Days {
+    /// The length of a day in s, as stated.
+    pub day_s: f64,
+    /// How many there are.
+    pub count: usize,
+    /// Each day, predicted by a fit on all others.
+    pub left_out: Vec<LeftOut>,
+    /// For each number of days, fits on so many that follow each other, scored on all other days.
+    pub curve: Vec<CurvePoint>,
+}
+
+/// A day that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// Its number, from 1.
+    pub day: usize,
+    /// How well it was predicted.
+    pub scores: Vec<DayScore>,
+}
+
+/// Fits on a number of days.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// How many days each fit saw.
+    pub days: usize,
+    /// How many fits there were.
+    pub fits: usize,
+    /// How well they predicted the others, over all fits.
+    pub scores: Vec<DayScore>,
+}
+
+/// How well a prediction did on days that its fit has not seen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DayScore {
+    /// The prediction: `vote.Z1`.
+    pub prediction: String,
+    /// Instants.
+    pub count: usize,
+    /// Root mean square error; none without an instant.
+    pub rmse: Option<f64>,
+    /// The same of fits on all days but the one predicted, on the same instants: what more days are worth.
+    pub all_others: Option<f64>,
+    /// Root mean square of the truth on the same instants: the error of no model.
+    pub zero: Option<f64>,
+}
+
+/// A recording cut into days.
+struct Calendar {
+    /// Segment and first instant of each day.
+    begins: Vec<(u32, Instant)>,
+}
+
+impl DayScore {
+    /// How many times the error of fits on all other days the error is.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        Some(self.rmse? / self.all_others?).filter(|ratio| !ratio.is_nan())
+    }
+}
+
+impl Calendar {
+    /// The last day of a segment takes a rest of less than half a day.
+    fn new(observation: &Observation, day: Duration) -> Self {
+        let mut begins = Vec::new();
+        for (segment, period) in observation.segments.iter().enumerate() {
+            let Some((from, to)) = *period else {
+                continue;
+            };
+            let days = ((to - from).secs() / day.secs()).round().max(1.0) as i64;
+            let segment = u32::try_from(segment).unwrap_or(u32::MAX);
+            let begin = |nth: i64| (segment, from + Duration::from_ns(nth * day.as_ns()));
+            begins.extend((0..days).map(begin));
+        }
+        Self { begins }
+    }
+
+    fn count(&self) -> usize {
+        self.begins.len()
+    }
+
+    fn day_of(&self, segment: u32, at: Instant) -> usize {
+        let after = self.begins.partition_point(|begin| *begin <= (segment, at));
+        after.saturating_sub(1)
+    }
+}
+
+/// Into how many days a recording falls.
+#[must_use]
+pub fn count(observation: &Observation, day: Duration) -> usize {
+    Calendar::new(observation, day).count()
+}
+
+/// Fits a model's graph anew on some days and scores it on the others. `progress` is told how many fits of how many are done.
+/// None where there are fewer than two days, or more than [`MOST_DAYS`].
+///
+/// # Errors
+/// When the recording cannot be read.
+pub fn days(
+    model: &Model,
+    recording: &dyn Recording,
+    observation: &Observation,
+    day: Duration,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Option<Days>, FitError> {
+    let calendar = Calendar::new(observation, day);
+    let count = calendar.count();
+    if !(2..=MOST_DAYS).contains(&count) {
+        return Ok(None);
+    }
+    let numbers: Vec<usize> = NUMBERS.into_iter().filter(|&n| n + 1 < count).collect();
+    let fits: usize = numbers.iter().map(|&n| placings(n, count).len()).sum();
+    let (total, mut done) = ((fits + count) as u64, 0);
+    let mut run = |kept: &dyn Fn(usize) -> bool| -> Result<Vec<Vec<Errors>>, FitError> {
+        let kept: Vec<bool> = (0..count).map(kept).collect();
+        progress(done, total);
+        done += 1;
+        let fitted = fit_on(model, recording, &calendar, &kept)?;
+        let trace = trace(&model.plan, &fitted, recording, &mut |_, _| {})?;
+        Ok(errors(&trace, &calendar))
+    };
+    let mut each = Vec::new();
+    for out in 0..count {
+        let errors = run(&|day| day != out)?;
+        each.extend(errors.into_iter().nth(out));
+    }
+    let (plan, of) = (&*model.plan, &observation.trace);
+    let left_out = each.iter().enumerate().map(|(out, errors)| LeftOut {
+        day: out + 1,
+        scores: scores(plan, of, errors, errors),
+    });
+    let left_out = left_out.collect();
+    let mut curve = Vec::new();
+    for days in numbers {
+        let (mut sums, mut all_others) = (Vec::new(), Vec::new());
+        let placings = placings(days, count);
+        for &from in &placings {
+            let seen = from..from + days;
+            let errors = run(&|day| seen.contains(&day))?;
+            for day in (0..count).filter(|day| !seen.contains(day)) {
+                add(&mut sums, &errors[day]);
+                add(&mut all_others, &each[day]);
+            }
+        }
+        curve.push(CurvePoint {
+            days,
+            fits: placings.len(),
+            scores: scores(plan, of, &sums, &all_others),
+        });
+    }
+    let mut all = Vec::new();
+    each.iter().for_each(|day| add(&mut all, day));
+    curve.push(CurvePoint {
+        days: count - 1,
+        fits: count,
+        scores: scores(plan, of, &all, &all),
+    });
+    Ok(Some(Days {
+        day_s: day.secs(),
+        count,
+        left_out,
+        curve,
+    }))
+}
+
+/// The first days of fits on so many of `count`, spread over the recording.
+fn placings(days: usize, count: usize) -> Vec<usize> {
+    let last = count - days;
+    let places = PLACINGS.min(last + 1);
+    let spread = |nth: usize| nth * last / (places - 1).max(1);
+    (0..places).map(spread).collect()
+}
+
+/// Squared errors and squared truths of one prediction, and how many.
+#[derive(Debug, Clone, Copy, Default)]
+struct Errors {
+    squares: f64,
+    zero: f64,
+    count: usize,
+}
+
+/// For each day and prediction.
+fn errors(trace: &Trace, calendar: &Calendar) -> Vec<Vec<Errors>> {
+    let mut errors = vec![Vec::new(); calendar.count()];
+    for truth in &trace.truths {
+        for prediction in &truth.predictions {
+            errors
+                .iter_mut()
+                .for_each(|day: &mut Vec<Errors>| day.push(Errors::default()));
+            let instants = truth.times.iter().zip(&truth.values);
+            for ((&(segment, at), &y), &p) in instants.zip(&prediction.values) {
+                let day = &mut errors[calendar.day_of(segment, at)];
+                if let Some(sums) = day.last_mut().filter(|_| !p.is_nan()) {
+                    sums.squares += (p - y) * (p - y);
+                    sums.zero += y * y;
+                    sums.count += 1;
+                }
+            }
+        }
+    }
+    errors
+}
+
+fn add(sums: &mut Vec<Errors>, more: &[Errors]) {
+    sums.resize(more.len(), Errors::default());
+    for (sum, more) in sums.iter_mut().zip(more) {
+        sum.squares += more.squares;
+        sum.zero += more.zero;
+        sum.count += more.count;
+    }
+}
+
+fn scores(plan: &Plan, trace: &Trace, errors: &[Errors], all_others: &[Errors]) -> Vec<DayScore> {
+    let predictions = trace.truths.iter().flat_map(|truth| &truth.predictions);
+    let rms =
+        |squares: f64, of: &Errors| (of.count > 0).then(|| (squares / of.count as f64).sqrt());
+    let figures = predictions.zip(errors.iter().zip(all_others));
+    let score = |(of, (errors, others)): (&PredictionTrace, (&Errors, &Errors))| DayScore {
+        prediction: plan.channels[of.slot].name.clone(),
+        count: errors.count,
+        rmse: rms(errors.squares, errors),
+        all_others: rms(others.squares, others),
+        zero: rms(errors.zero, errors),
+    };
+    figures.map(score).collect()
+}
+
+fn fit_on(
+    model: &Model,
+    recording: &dyn Recording,
+    calendar: &Calendar,
+    kept: &[bool],
+) -> Result<Fitted, FitError> {
+    let some = SomeDays {
+        recording,
+        calendar,
+        kept,
+    };
+    let (fitted, _) = fit(
+        &Arc::clone(&model.plan),
+        &some,
+        &FitOptions::default(),
+        &mut |_| {},
+    )?;
+    Ok(fitted)
+}
+
+/// The days of a recording that are kept; where one is missing, a segment ends.
+struct SomeDays<'a> {
+    recording: &'a dyn Recording,
+    calendar: &'a Calendar,
+    kept: &'a [bool],
+}
+
+struct SomeRows<'a> {
+    rows: Box<dyn Rows + 'a>,
+    of: &'a SomeDays<'a>,
+    segment: u32,
+    given: bool,
+    broken: bool,
+    /// A row that waits for the break before it to be told.
+    waiting: Option<(Instant, Vec<f64>)>,
+}
+
+impl Recording for SomeDays<'_> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+        Ok(Box::new(SomeRows {
+            rows: self.recording.open(plan)?,
+            of: self,
+            segment: 0,
+            given: false,
+            broken: false,
+            waiting: None,
+        }))
+    }
+}
+
+impl Rows for SomeRows<'_> {
+    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
+        if let Some((at, row)) = self.waiting.take() {
+            values.copy_from_slice(&row);
+            return Ok(Some(Event::Row(at)));
+        }
+        while let Some(event) = self.rows.next(values)? {
+            let Event::Row(at) = event else {
+                self.segment += 1;
+                self.broken = self.given;
+                continue;
+            };
+            if !self.of.kept[self.of.calendar.day_of(self.segment, at)] {
+                self.broken = self.given;
+                continue;
+            }
+            self.given = true;
+            if std::mem::take(&mut self.broken) {
+                self.waiting = Some((at, values.to_vec()));
+                return Ok(Some(Event::Segment));
+            }
+            return Ok(Some(event));
+        }
+        Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fits_on_a_few_days_come_from_the_whole_recording() {
+        assert_eq!(placings(1, 7), [0, 3, 6]);
+        assert_eq!(placings(5, 7), [0, 1, 2]);
+        assert_eq!(placings(6, 7), [0, 1]);
+        assert_eq!(placings(2, 3), [0, 1]);
+    }
+
+    #[test]
+    fn a_short_rest_belongs_to_the_day_before_and_a_segment_begins_a_day() {
+        let at = |hours: i64| Instant::from_ns(hours * 3_600_000_000_000);
+        let calendar = Calendar::new(
+            &Observation {
+                trace: Trace::default(),
+                sources: Vec::new(),
+                segments: vec![Some((at(0), at(58))), None, Some((at(0), at(5)))],
+            },
+            at(24) - at(0),
+        );
+        assert_eq!(calendar.count(), 3);
+        assert_eq!(calendar.day_of(0, at(57)), 1);
+        assert_eq!(calendar.day_of(2, at(1)), 2);
+    }
+}

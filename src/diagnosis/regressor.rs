@@ -1,0 +1,155 @@
+//! Decides how well the data determine what an estimator has learned: condition, variance inflation, and what each regressor
+//! moves.
+
+use athermal_core::compile::PlannedRole;
+use athermal_core::engine::Engine;
+use athermal_core::fit::FitError;
+use athermal_core::model::Model;
+use athermal_core::node::Predictor;
+use athermal_core::recording::{Event, Recording};
+use athermal_core::score::trace;
+use athermal_numerics::{Collinearity, GramBlocks};
+use serde::Serialize;
+
+/// The regressors that a fitted estimator uses, over the rows of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Design {
+    /// The estimator: `thermal.Z1`.
+    pub node: String,
+    /// The unit of its predictions.
+    pub unit: String,
+    /// Instants of its truth at which all its regressors had a value.
+    pub rows: u64,
+    /// The condition number of the standardised regressors; NaN (null in JSON) without rows.
+    pub condition: f64,
+    /// Each regressor.
+    pub regressors: Vec<RegressorFacts>,
+}
+
+/// A regressor of a fitted estimator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegressorFacts {
+    /// Its name: `gradients.chuck@150s`.
+    pub name: String,
+    /// How much the prediction moves when it moves by one standard deviation and the others stay at their means.
+    pub effect: f64,
+    /// Its variance inflation factor; NaN (null in JSON) where it is constant.
+    pub inflation: f64,
+}
+
+/// An estimator whose rows are collected.
+struct Collecting<'a> {
+    node: usize,
+    truth: usize,
+    predictor: &'a dyn Predictor,
+    /// Gather and place of each regressor that is used.
+    places: Vec<(usize, usize)>,
+    row: Vec<f64>,
+    blocks: GramBlocks,
+}
+
+/// The design of every fitted estimator that uses a regressor.
+///
+/// # Errors
+/// When the recording cannot be read, or the fit does not belong to the graph.
+pub fn designs(model: &Model, recording: &dyn Recording) -> Result<Vec<Design>, FitError> {
+    let mut collecting = collecting(model);
+    let mut look = |engine: &Engine, event: Event| {
+        if let Event::Row(_) = event {
+            collecting.iter_mut().for_each(|of| of.look(engine));
+        }
+    };
+    trace(&model.plan, &model.fitted, recording, &mut look)?;
+    Ok(collecting.iter().map(|of| of.design(model)).collect())
+}
+
+fn collecting(model: &Model) -> Vec<Collecting<'_>> {
+    let plan = &*model.plan;
+    let mut collecting = Vec::new();
+    for (index, node) in plan.nodes.iter().enumerate() {
+        let (
+            PlannedRole::Estimator {
+                regressors,
+                gathers,
+                truth,
+                ..
+            },
+            Some(predictor),
+        ) = (&node.role, model.fitted.get(&node.instance()))
+        else {
+            continue;
+        };
+        let places: Vec<(usize, usize)> = gathers
+            .iter()
+            .flat_map(|&gather| (0..plan.gathers[gather].entries.len()).map(move |n| (gather, n)))
+            .collect();
+        let place = |name: &String| regressors.iter().position(|of| of.name == *name);
+        let used: Option<Vec<usize>> = predictor.uses().iter().map(place).collect();
+        let Some(used) = used.filter(|used| !used.is_empty()) else {
+            continue;
+        };
+        collecting.push(Collecting {
+            node: index,
+            truth: truth.slot,
+            predictor: &**predictor,
+            row: vec![0.0; used.len()],
+            blocks: GramBlocks::with_row_memory(used.len(), 0),
+            places: used.into_iter().map(|nth| places[nth]).collect(),
+        });
+    }
+    collecting
+}
+
+impl Collecting<'_> {
+    /// Rows are taken where the truth is, as often as in a fit.
+    fn look(&mut self, engine: &Engine) {
+        if engine.value(self.truth).is_nan() {
+            return;
+        }
+        for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
+            *value = engine.gathered(gather).0[place];
+        }
+        if self.row.iter().all(|value| value.is_finite()) {
+            self.blocks.push(&self.row, 0.0);
+        }
+    }
+
+    fn design(&self, model: &Model) -> Design {
+        let gram = self.blocks.total();
+        let width = self.places.len();
+        let columns: Vec<usize> = (0..width).collect();
+        let found = Collinearity::of(&gram, &columns).ok();
+        let (means, variances) = (gram.means(), gram.variances());
+        let effect = |nth: usize| {
+            let at = |by: f64| {
+                let mut row = means[..width].to_vec();
+                row[nth] += by * variances[nth].sqrt();
+                self.predictor.predict(&row)
+            };
+            (at(1.0) - at(-1.0)) / 2.0
+        };
+        let node = &model.plan.nodes[self.node];
+        let truth = &model.plan.channels[self.truth].channel;
+        Design {
+            node: node.instance(),
+            unit: truth.unit.to_string(),
+            rows: gram.count(),
+            condition: found.as_ref().map_or(f64::NAN, |of| of.condition),
+            regressors: self
+                .predictor
+                .uses()
+                .iter()
+                .enumerate()
+                .map(|(nth, name)| RegressorFacts {
+                    name: name.clone(),
+                    effect: if found.is_some() {
+                        effect(nth)
+                    } else {
+                        f64::NAN
+                    },
+                    inflation: found.as_ref().map_or(f64::NAN, |of| of.inflation[nth]),
+                })
+                .collect(),
+        }
+    }
+}

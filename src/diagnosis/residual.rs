@@ -1,0 +1,137 @@
+//! Decides whether what predictions leave of a truth is white, so that nothing in its own past could still improve them.
+//!
+//! Truths over windows that overlap share noise, and forecasts made before the last error was known repeat it. So residuals are
+//! taken one per window or horizon, whichever is longer: those of a perfect model are white, and others are not.
+
+use athermal_core::compile::Plan;
+use athermal_core::score::{PredictionTrace, TruthTrace};
+use athermal_core::time::Duration;
+use athermal_numerics::{NORMAL_95, autocorrelation, autocorrelation_errors, ljung_box};
+use serde::Serialize;
+
+use super::observation::Observation;
+
+/// Lags of the autocorrelation, at most; and at most a fifth of the residuals (Box and Jenkins 1976).
+const MOST_LAGS: usize = 20;
+const SHARE: usize = 5;
+/// A series is called white unless it would be as unlikely as this.
+const UNLIKELY: f64 = 0.01;
+
+/// The residuals of a prediction: measured less predicted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Residuals {
+    /// The prediction: `vote.Z1`.
+    pub prediction: String,
+    /// What it predicts.
+    pub truth: String,
+    /// The unit of the truth.
+    pub unit: String,
+    /// Residuals over all truths.
+    pub count: usize,
+    /// Their root mean square.
+    pub rms: f64,
+    /// Their mean.
+    pub mean: f64,
+    /// The time in s between those of which the autocorrelation is taken.
+    pub spacing_s: f64,
+    /// How many these are.
+    pub spaced: usize,
+    /// Their autocorrelation from lag 1 on; empty where there are too few.
+    pub autocorrelation: Vec<f64>,
+    /// Half the width of the band about zero that holds 95 % of the autocorrelations of a white series, for each lag.
+    pub bound: Vec<f64>,
+    /// The statistic of Ljung and Box over all these lags, and how likely a white series has one as large.
+    pub ljung_box: Option<f64>,
+    /// See `ljung_box`.
+    pub p_value: Option<f64>,
+}
+
+impl Residuals {
+    /// Whether they may be white; none where there are too few to say.
+    #[must_use]
+    pub fn white(&self) -> Option<bool> {
+        self.p_value.map(|p| p >= UNLIKELY)
+    }
+}
+
+/// The residuals of every prediction of a model.
+#[must_use]
+pub fn residuals(plan: &Plan, observation: &Observation) -> Vec<Residuals> {
+    let truths = observation.trace.truths.iter();
+    let pairs = truths.flat_map(|truth| truth.predictions.iter().map(move |of| (truth, of)));
+    pairs
+        .map(|(truth, of)| of_prediction(plan, observation, truth, of))
+        .collect()
+}
+
+fn of_prediction(
+    plan: &Plan,
+    observation: &Observation,
+    truth: &TruthTrace,
+    of: &PredictionTrace,
+) -> Residuals {
+    let left: Vec<f64> = truth
+        .values
+        .iter()
+        .zip(&of.values)
+        .map(|(y, p)| y - p)
+        .collect();
+    let present: Vec<f64> = left.iter().copied().filter(|e| !e.is_nan()).collect();
+    let count = present.len();
+    let span = plan.channels[truth.slot].channel.span;
+    let interval = Observation::interval(truth).unwrap_or(Duration::ZERO);
+    // Intervals of a truth vary about their mean, and a place without one would be a gap.
+    let spacing = span.max(of.ahead).max(interval);
+    let spaced = spaced(observation, truth, &left, spacing);
+    let number = spaced.iter().filter(|e| !e.is_nan()).count();
+    let lags = MOST_LAGS.min(number / SHARE);
+    let correlation = autocorrelation(&spaced, lags);
+    let errors = autocorrelation_errors(&correlation, number);
+    let whiteness = ljung_box(&correlation, number);
+    let last = whiteness.last().filter(|of| of.statistic.is_finite());
+    let truth = &plan.channels[truth.slot];
+    Residuals {
+        prediction: plan.channels[of.slot].name.clone(),
+        truth: truth.name.clone(),
+        unit: truth.channel.unit.to_string(),
+        count,
+        rms: (present.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt(),
+        mean: present.iter().sum::<f64>() / count as f64,
+        spacing_s: spacing.secs(),
+        spaced: number,
+        autocorrelation: correlation.into_iter().skip(1).collect(),
+        bound: errors.iter().map(|error| NORMAL_95 * error).collect(),
+        ljung_box: last.map(|of| of.statistic),
+        p_value: last.map(|of| of.p_value),
+    }
+}
+
+/// The first value of every stretch of `spacing`; NaN where there is none. Segments stand far apart.
+fn spaced(
+    observation: &Observation,
+    truth: &TruthTrace,
+    values: &[f64],
+    spacing: Duration,
+) -> Vec<f64> {
+    let mut spaced: Vec<f64> = Vec::new();
+    let (mut begin, mut segment, mut last) = (0, None, None);
+    for (&(of, at), &value) in truth.times.iter().zip(values) {
+        let Some((first, _)) = observation.segments.get(of as usize).copied().flatten() else {
+            continue;
+        };
+        if segment != Some(of) {
+            begin = spaced.len() + usize::from(segment.is_some()) * MOST_LAGS;
+            (segment, last) = (Some(of), None);
+        }
+        // Two neighbours must not be nearer than the spacing, so a place is taken by its first value only if the one
+        // before is far enough away.
+        if value.is_nan() || last.is_some_and(|last| at - last < spacing) {
+            continue;
+        }
+        let place = ((at - first).as_ns() / spacing.as_ns().max(1)) as usize;
+        last = Some(at);
+        spaced.resize((begin + place).max(spaced.len()), f64::NAN);
+        spaced.push(value);
+    }
+    spaced
+}

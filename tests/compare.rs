@@ -1,0 +1,277 @@
+//! Graphs side by side: what `athermal compare` says, what the zoo holds, and that no shipped graph does harm. Decides nothing of
+//! how good a graph must be beyond that.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use athermal::Model;
+use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::node::{RoleName, kinds};
+use athermal::core::score::trace;
+use athermal::diagnosis::comparison::{Comparison, Contender, compare};
+use athermal::files::{Dataset, Options};
+use serde_json::Value;
+use workbench::{Scratch, athermal, data, graph, simulated};
+
+/// Kinds that predict the same whatever was measured: baselines, which others are measured by.
+const BASELINES: [&str; 2] = ["zero", "persistence"];
+
+fn figure(rows: &Value, graph: &str, node: &str, column: usize) -> f64 {
+    let mut rows = rows.as_array().unwrap().iter();
+    let row = rows.find(|row| row["graph"] == graph && row["node"] == node);
+    row.unwrap()["rmse"][column].as_f64().unwrap()
+}
+
+#[test]
+fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another() {
+    let scratch = Scratch::new("compare");
+    let train = simulated(&scratch, "train.csv", "die-tester", 2.0, 1);
+    let test = simulated(&scratch, "test.csv", "die-tester", 1.0, 2);
+    // Its longest window reaches back four times as far, so that it is valid later.
+    let slow = scratch.file(
+        "slow.toml",
+        format!(
+            "schema = 1\nextends = {:?}\nname = \"slow\"\nnodes.gradients = {{ windows = [\"5min\", \"90min\"] }}\n",
+            graph("die-tester")
+        ),
+    );
+    let both = athermal(&[
+        &"compare",
+        &graph("die-tester"),
+        &slow,
+        &"--data",
+        &train,
+        &"--on",
+        &test,
+        &"--format",
+        &"json",
+    ]);
+    let both = both.ended(0).json();
+    let table = &both["comparisons"][0];
+    assert_eq!(table["truths"].as_array().unwrap().len(), 6);
+    assert_eq!(table["rows"].as_array().unwrap().len(), 8);
+    let alone = |graph: &Path| {
+        let alone = athermal(&[
+            &"compare",
+            &graph,
+            &"--data",
+            &train,
+            &"--on",
+            &test,
+            &"--format",
+            &"json",
+        ]);
+        alone.ended(0).json()["comparisons"][0].clone()
+    };
+    let count = |table: &Value| table["truths"][2]["count"].as_u64().unwrap();
+    let first = alone(&graph("die-tester"));
+    assert_eq!(count(table), count(&alone(&slow)));
+    assert!(
+        count(table) + 40 < count(&first),
+        "{} {}",
+        count(table),
+        count(&first)
+    );
+    // Alone, a graph's figures are those of `evaluate`.
+    let model = scratch.path("model.json");
+    athermal(&[
+        &"fit",
+        &graph("die-tester"),
+        &"--data",
+        &train,
+        &"-o",
+        &model,
+    ])
+    .ended(0);
+    let scores = athermal(&[&"evaluate", &model, &"--data", &test, &"--format", &"json"]);
+    let scores = scores.ended(0).json();
+    for score in scores["scores"].as_array().unwrap() {
+        let axis = score["truth"].as_str().unwrap();
+        let mut truths = first["truths"].as_array().unwrap().iter();
+        let column = truths.position(|truth| truth["truth"] == axis).unwrap();
+        let rmse = figure(
+            &first["rows"],
+            "die-tester",
+            score["node"].as_str().unwrap(),
+            column,
+        );
+        assert!((rmse / score["rmse"].as_f64().unwrap() - 1.0).abs() < 1e-12);
+        let truth = &first["truths"][column];
+        for (here, there) in [
+            ("no_model", "baseline_zero"),
+            ("persistence", "baseline_persistence"),
+        ] {
+            let (here, there) = (
+                truth[here].as_f64().unwrap(),
+                score[there].as_f64().unwrap(),
+            );
+            assert!((here / there - 1.0).abs() < 1e-12);
+        }
+    }
+    // The best is marked, once in each column.
+    let text = athermal(&[
+        &"compare",
+        &graph("die-tester"),
+        &slow,
+        &"--data",
+        &train,
+        &"--on",
+        &test,
+    ]);
+    let text = text.ended(0).out;
+    assert_eq!(text.matches('*').count(), 1 + 6, "{text}");
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 80),
+        "{text}"
+    );
+    assert!(text.contains("slow was fitted in "), "{text}");
+}
+
+#[test]
+fn horizons_are_not_compared_with_each_other() {
+    let scratch = Scratch::new("compare-horizons");
+    let log = simulated(&scratch, "log.csv", "die-tester", 1.0, 1);
+    let told = athermal(&[
+        &"compare",
+        &graph("die-tester"),
+        &graph("die-tester-sensor"),
+        &"--data",
+        &log,
+        &"--on",
+        &log,
+        &"--abs-truth-below",
+        &"250 nm/min",
+        &"--format",
+        &"json",
+    ]);
+    let told = told.ended(0).json();
+    let ahead: Vec<f64> = told["comparisons"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|table| table["ahead_s"].as_f64().unwrap())
+        .collect();
+    assert_eq!(ahead, [0.0, 300.0]);
+    let limit = athermal(&[
+        &"compare",
+        &graph("die-tester"),
+        &"--data",
+        &log,
+        &"--on",
+        &log,
+        &"--abs-truth-below",
+        &"1 K",
+    ]);
+    limit.ended(2).tells(&["--abs-truth-below is in K"]);
+}
+
+#[test]
+fn the_zoo_holds_every_estimator_and_every_combiner() {
+    let zoo = Model::load(graph("zoo")).unwrap();
+    let there: BTreeSet<&str> = zoo.plan.nodes.iter().map(|node| node.kind.name).collect();
+    let all = kinds().values().flatten();
+    let of_role = all.filter(|kind| matches!(kind.role, RoleName::Estimator | RoleName::Combiner));
+    let missing: Vec<&str> = of_role
+        .map(|kind| kind.name)
+        .filter(|name| !there.contains(name))
+        .collect();
+    assert!(missing.is_empty(), "graphs/zoo.toml lacks {missing:?}");
+}
+
+/// Fits a shipped graph on one recording and compares it with no model on another.
+fn compared(name: &str, train: &Path, test: &Path, below: Option<&str>) -> Vec<Comparison> {
+    let mut model = Model::load(graph(name)).unwrap();
+    let recording = |path: &Path| Dataset::new(vec![path.to_owned()], Options::default());
+    let options = FitOptions::default();
+    let (fitted, report) = fit(&model.plan, &recording(train), &options, &mut |_| {}).unwrap();
+    for estimator in &report.estimators {
+        assert!(
+            matches!(estimator.outcome, Outcome::Fitted(_)),
+            "{estimator:?}"
+        );
+    }
+    model.fitted = fitted;
+    let trace = trace(&model.plan, &model.fitted, &recording(test), &mut |_, _| {}).unwrap();
+    let contender = Contender {
+        name: name.to_owned(),
+        plan: model.plan,
+        trace,
+    };
+    compare(
+        &[contender],
+        below.map(|below| below.parse().unwrap()).as_ref(),
+    )
+}
+
+#[test]
+fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
+    let Some(data) = data() else { return };
+    let die_tester = (
+        "die-tester/train.csv",
+        "die-tester/test.csv",
+        Some("250 nm/min"),
+    );
+    let linear_axis = (
+        "linear-axis/train.csv",
+        "linear-axis/test.csv",
+        Some("250 nm/min"),
+    );
+    let probe = |train, test| (train, test, None);
+    let mut runs = Vec::new();
+    let folder = graph("x").parent().unwrap().to_owned();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "toml") {
+            continue;
+        }
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        match &name {
+            name if name == "zoo" || name.starts_with("die-tester") => {
+                runs.push((name.clone(), die_tester))
+            }
+            name if name.starts_with("linear-axis") => runs.push((name.clone(), linear_axis)),
+            name if name == "z-probe" => {
+                for (train, test) in [
+                    ("z-probe/GX-H12A.csv", "z-probe/GX-H12A-covered.csv"),
+                    ("z-probe/GX-H12A-covered.csv", "z-probe/GX-H12A.csv"),
+                    ("z-probe/superpinda.csv", "z-probe/superpinda-covered.csv"),
+                    ("z-probe/superpinda-covered.csv", "z-probe/superpinda.csv"),
+                ] {
+                    runs.push((name.clone(), probe(train, test)));
+                }
+            }
+            name => panic!("no recording is named for graphs/{name}.toml"),
+        }
+    }
+    let mut worse = Vec::new();
+    let mut scored = 0;
+    for (name, (train, test, below)) in &runs {
+        for table in compared(name, &data.join(train), &data.join(test), *below) {
+            for row in table
+                .rows
+                .iter()
+                .filter(|row| !BASELINES.contains(&row.kind))
+            {
+                for (truth, rmse) in table.truths.iter().zip(&row.rmse) {
+                    let (Some(rmse), Some(zero)) = (*rmse, truth.no_model) else {
+                        worse.push(format!("{name} {} {}: not scored", row.node, truth.name));
+                        continue;
+                    };
+                    scored += 1;
+                    if rmse > zero {
+                        worse.push(format!(
+                            "{name} on {test}: {}.{} {rmse} of {zero}",
+                            row.node, truth.name
+                        ));
+                    }
+                }
+            }
+        }
+    }
+    assert!(scored > 150, "{scored}");
+    assert!(worse.is_empty(), "{}", worse.join("\n"));
+}

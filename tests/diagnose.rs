@@ -1,0 +1,507 @@
+//! What `athermal diagnose` says is true: facts against formulas and against recordings made so that the answer is known.
+//! Decides how near is near enough.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::sync::Arc;
+
+use athermal::core::fit::{FitOptions, fit};
+use athermal::core::node::Predictor;
+use athermal::core::prng::Prng;
+use athermal::core::recording::{Event, Table};
+use athermal::core::score::trace;
+use athermal::diagnosis::{
+    Options, day, diagnose, lag, observe, regressor, residual, response, sensor, window,
+};
+use athermal::files::Dataset;
+use athermal::{Duration, Instant, Model};
+use workbench::{Scratch, athermal, graph, linear, secs, simulated};
+
+/// Two temperatures and a position, every 10 s, and an estimator whose coefficients the test gives.
+const TWO_SENSORS: &str = r#"
+schema = 1
+name = "two-sensors"
+[time]
+column = "time_s"
+[signals.temperature]
+unit = "Cel"
+channels = ["a", "b"]
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = ["z"]
+max_age = "1min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+unit = "nm/min"
+[nodes.gradients]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["150s", "10min"]
+unit = "mK/min"
+[nodes.thermal]
+type = "linear"
+inputs.features = "gradients"
+inputs.truth = "drift.z"
+ahead = "0s"
+[outputs]
+predicted = "thermal"
+"#;
+
+fn model(test: &str, text: &str, fitted: &[(&str, Arc<dyn Predictor>)]) -> Model {
+    let scratch = Scratch::new(test);
+    let mut model = Model::load(scratch.file("graph.toml", text)).unwrap();
+    for (node, predictor) in fitted {
+        model
+            .fitted
+            .insert((*node).to_owned(), Arc::clone(predictor));
+    }
+    model
+}
+
+/// Temperatures that wander, and a position made of them, every 10 s.
+fn wandering(rows: usize, position: impl Fn(&[[f64; 2]], usize) -> f64) -> Table {
+    let mut random = Prng::stream(3, "wandering");
+    let (mut table, mut at) = (Table::default(), [20.0, 30.0]);
+    let mut rate = [0.0_f64; 2];
+    let mut course = Vec::new();
+    for row in 0..rows {
+        for (rate, at) in rate.iter_mut().zip(&mut at) {
+            *rate = 0.98 * *rate + 0.001 * random.normal();
+            *at += *rate;
+        }
+        course.push(at);
+        table.push(
+            secs(10.0 * row as f64),
+            &[at[0], at[1], position(&course, row)],
+        );
+    }
+    table
+}
+
+/// What a least-squares slope over `window_s` of samples `every_s` apart makes of an impulse so many samples ago, per s.
+fn frame(window_s: f64, every_s: f64, age: usize) -> f64 {
+    let n = window_s / every_s;
+    let age = age as f64;
+    if age >= n {
+        return 0.0;
+    }
+    12.0 * ((n - 1.0) / 2.0 - age) / (n * (n * n - 1.0) * every_s)
+}
+
+#[test]
+fn an_impulse_response_is_the_sum_of_the_frame_times_its_coefficients() {
+    let terms = [
+        ("gradients.a@150s", 0.4),
+        ("gradients.a@600s", -0.1),
+        ("gradients.b@600s", 0.7),
+    ];
+    let model = model("impulse", TWO_SENSORS, &[("thermal", linear(&terms, 5.0))]);
+    let table = wandering(600, |course, row| 1000.0 * course[row][0]);
+    let observation = observe(&model, &table).unwrap();
+    let found = response::responses(&model, &observation).unwrap();
+    assert_eq!(found.len(), 1);
+    let [a, b] = &found[0].sensors[..] else {
+        panic!("{found:?}")
+    };
+    let per_minute_and_millikelvin = 60.0 * 1000.0;
+    let impulse_lasts_min = 10.0 / 60.0;
+    for age in 0..a.impulse.len() {
+        let of =
+            |window_s| frame(window_s, 10.0, age) * per_minute_and_millikelvin / impulse_lasts_min;
+        let (expected_a, expected_b) = (0.4 * of(150.0) - 0.1 * of(600.0), 0.7 * of(600.0));
+        assert!(
+            (a.impulse[age] - expected_a).abs() < 1e-6,
+            "{age}: {} {expected_a}",
+            a.impulse[age]
+        );
+        assert!(
+            (b.impulse[age] - expected_b).abs() < 1e-6,
+            "{age}: {} {expected_b}",
+            b.impulse[age]
+        );
+        assert!((a.time_s[age] - 10.0 * age as f64).abs() < 1e-9);
+    }
+    // A step of 1 K in the end: the sum of the coefficients in nm per mK.
+    let [of_a, of_b] = [a, b].map(|of| of.total.unwrap());
+    assert!((of_a - 300.0).abs() < 1e-6 && (of_b - 700.0).abs() < 1e-6);
+    assert!(a.asymmetry < 1e-9, "{}", a.asymmetry);
+    // The step response of one window is a parabola with its top in the middle.
+    assert!((b.peak_s - 300.0).abs() <= 10.0, "{}", b.peak_s);
+    assert!(
+        b.settled_s
+            .is_some_and(|settled| (400.0..600.0).contains(&settled))
+    );
+}
+
+#[test]
+fn an_answer_that_lasts_has_no_end() {
+    let text = TWO_SENSORS.replace(
+        "inputs.features = \"gradients\"",
+        "inputs.features = \"temperature\"",
+    );
+    let terms = [("temperature.a", 3.0)];
+    let model = model("lasting", &text, &[("thermal", linear(&terms, 0.0))]);
+    let table = wandering(600, |course, row| 1000.0 * course[row][0]);
+    let observation = observe(&model, &table).unwrap();
+    let found = response::responses(&model, &observation).unwrap();
+    let [of] = &found[0].sensors[..] else {
+        panic!("{found:?}")
+    };
+    assert_eq!((of.total, of.settled_s), (None, None));
+    assert!(of.step.iter().all(|step| (step - 3.0).abs() < 1e-9));
+}
+
+#[test]
+fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_there() {
+    let terms = [("gradients.b@150s", 0.1)];
+    let model = model("lags", TWO_SENSORS, &[("thermal", linear(&terms, 0.0))]);
+    let table = wandering(6000, |course, row| {
+        1000.0 * course[row.saturating_sub(60)][0]
+    });
+    let observation = observe(&model, &table).unwrap();
+    let found = lag::lags(&model, &table, &observation).unwrap();
+    assert_eq!(found.len(), 1);
+    let of = |name: &str| {
+        found[0]
+            .features
+            .iter()
+            .find(|of| of.feature == name)
+            .unwrap()
+    };
+    let cause = of("gradients.a@150s");
+    // The drift is a slope over 300 s and the feature one over 150 s: their middles are 75 s apart.
+    assert!(
+        (cause.truth.best_lag_s - 675.0).abs() <= 30.0,
+        "{}",
+        cause.truth.best_lag_s
+    );
+    assert!(cause.truth.best > 0.95, "{}", cause.truth.best);
+    let bystander = of("gradients.b@150s");
+    assert!(
+        bystander.truth.significance() < 4.0,
+        "{}",
+        bystander.truth.significance()
+    );
+    // What the model leaves still follows the sensor that it does not use.
+    assert!(cause.residual.best > 0.9 && cause.residual.significance() > 5.0);
+}
+
+#[test]
+fn white_residuals_are_told_from_others() {
+    let text = r#"
+schema = 1
+name = "noise"
+[time]
+column = "time_s"
+[signals.y]
+unit = "1"
+channels = ["white", "smooth"]
+max_age = "1s"
+[nodes.nothing]
+type = "zero"
+each = ["channel"]
+inputs.truth = "y.{channel}"
+ahead = "0s"
+[sets]
+channel = ["white", "smooth"]
+[outputs]
+predicted = "nothing"
+"#;
+    let model = model("white", text, &[]);
+    let mut random = Prng::stream(1, "noise");
+    let (mut table, mut smooth) = (Table::default(), 0.0);
+    for row in 0..2000 {
+        smooth = 0.6 * smooth + random.normal();
+        table.push(secs(f64::from(row)), &[random.normal(), smooth]);
+    }
+    let observation = observe(&model, &table).unwrap();
+    let found = residual::residuals(&model.plan, &observation);
+    assert_eq!(found[0].white(), Some(true), "{:?}", found[0].p_value);
+    assert_eq!(found[1].white(), Some(false));
+    assert_eq!((found[1].spaced, found[1].spacing_s), (2000, 1.0));
+    assert!((found[1].autocorrelation[0] - 0.6).abs() < 0.05);
+}
+
+#[test]
+fn residuals_are_taken_one_per_window_and_never_across_segments() {
+    let model = model(
+        "spacing",
+        TWO_SENSORS,
+        &[("thermal", linear(&[("gradients.a@150s", 1.0)], 0.0))],
+    );
+    let whole = wandering(1200, |course, row| 1000.0 * course[row][0]);
+    let mut table = Table::default();
+    for (row, (event, values)) in whole.events().iter().enumerate() {
+        let Event::Row(at) = *event else { continue };
+        if row == 600 {
+            table.segment();
+        }
+        table.push(at, values);
+    }
+    let observation = observe(&model, &table).unwrap();
+    let found = residual::residuals(&model.plan, &observation);
+    assert_eq!(found[0].spacing_s, 300.0);
+    // Of 100 minutes each, the first drift comes after five and then one in every five.
+    assert_eq!(found[0].spaced, 19 + 19);
+}
+
+#[test]
+fn a_sensor_at_rest_takes_away_what_it_contributes() {
+    let terms = [("gradients.a@150s", 2.0), ("gradients.b@150s", 0.5)];
+    let model = model(
+        "contribution",
+        TWO_SENSORS,
+        &[("thermal", linear(&terms, 0.0))],
+    );
+    let table = wandering(3000, |course, row| {
+        2000.0 * course[row][0] + 500.0 * course[row][1]
+    });
+    let observation = observe(&model, &table).unwrap();
+    let found = sensor::contributions(&model, &table, &observation).unwrap();
+    let names: Vec<&str> = found.iter().map(|of| of.sensor.as_str()).collect();
+    // Positions are what is predicted, not what it is predicted from.
+    assert_eq!(names, ["temperature.a", "temperature.b"]);
+    // The model is right up to its shorter window, so what a sensor contributes is what is missing without it.
+    for of in &found {
+        let without = (of.rmse_at_rest.powi(2) - of.rmse.powi(2)).sqrt();
+        assert!((of.moves / without - 1.0).abs() < 0.25, "{of:?}");
+    }
+    assert!(found[0].moves > 2.0 * found[1].moves);
+    let designs = regressor::designs(&model, &table).unwrap();
+    for (regressor, of) in designs[0].regressors.iter().zip(&found) {
+        assert!(
+            (regressor.effect / of.moves - 1.0).abs() < 0.02,
+            "{regressor:?} {of:?}"
+        );
+        assert!((1.0..1.5).contains(&regressor.inflation), "{regressor:?}");
+    }
+    assert!(designs[0].condition >= 1.0 && designs[0].condition < 2.0);
+}
+
+#[test]
+fn a_day_left_out_is_scored_by_a_fit_that_has_not_seen_it() {
+    let scratch = Scratch::new("days");
+    let file = simulated(&scratch, "log.csv", "die-tester", 1.5, 5);
+    let model = Model::load(graph("die-tester-sensor")).unwrap();
+    let recording = Dataset::new(vec![file], athermal::files::Options::default());
+    let observation = observe(&model, &recording).unwrap();
+    let half: Duration = "12h".parse().unwrap();
+    let found = day::days(&model, &recording, &observation, half, &mut |_, _| {});
+    let found = found.unwrap().unwrap();
+    assert_eq!((found.count, found.left_out.len()), (3, 3));
+    assert_eq!(
+        found
+            .curve
+            .iter()
+            .map(|point| point.days)
+            .collect::<Vec<_>>(),
+        [1, 2]
+    );
+
+    // The second half day, by hand: the others are segments.
+    let whole = Table::read(&recording, &model.plan).unwrap();
+    let hours = |at: Instant| at.as_ns() as f64 / 3.6e12;
+    let (mut others, mut cut) = (Table::default(), false);
+    for (event, values) in whole.events() {
+        let Event::Row(at) = *event else { continue };
+        if (12.0..24.0).contains(&hours(at)) {
+            continue;
+        }
+        if hours(at) >= 24.0 && !std::mem::replace(&mut cut, true) {
+            others.segment();
+        }
+        others.push(at, values);
+    }
+    let rmse = |table: &Table| {
+        let (fitted, _) = fit(&model.plan, table, &FitOptions::default(), &mut |_| {}).unwrap();
+        let trace = trace(&model.plan, &fitted, &whole, &mut |_, _| {}).unwrap();
+        let truth = &trace.truths[2];
+        let inside = |nth: &usize| (12.0..24.0).contains(&hours(truth.times[*nth].1));
+        let errors: Vec<f64> = (0..truth.values.len())
+            .filter(inside)
+            .map(|nth| truth.predictions[0].values[nth] - truth.values[nth])
+            .filter(|error| !error.is_nan())
+            .collect();
+        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+    };
+    let mut scores = found.left_out[1].scores.iter();
+    let score = scores
+        .find(|score| score.prediction == "thermal.Z1")
+        .unwrap();
+    assert!((score.rmse.unwrap() / rmse(&others) - 1.0).abs() < 1e-12);
+    assert!(
+        (score.rmse.unwrap() / rmse(&whole) - 1.0).abs() > 1e-6,
+        "the day was seen"
+    );
+}
+
+#[test]
+fn a_wider_window_lifts_a_drift_above_its_noise() {
+    let model = model(
+        "window",
+        TWO_SENSORS,
+        &[("thermal", linear(&[("gradients.a@150s", 1.0)], 0.0))],
+    );
+    let mut random = Prng::stream(8, "noise");
+    let noise: Vec<f64> = (0..3000).map(|_| 12.0 * random.normal()).collect();
+    let table = wandering(3000, |_, row| {
+        noise[row] + 1000.0 * (row as f64 / 300.0).sin()
+    });
+    let found = window::windows(&model, &table).unwrap();
+    let [of] = &found[..] else {
+        panic!("{found:?}")
+    };
+    assert_eq!((of.truth.as_str(), of.window_s), ("drift.z", 300.0));
+    let ratios: Vec<f64> = of
+        .widths
+        .iter()
+        .filter(|of| of.window_s <= 600.0)
+        .map(|of| of.ratio)
+        .collect();
+    assert!(
+        ratios.len() > 4 && ratios.windows(2).all(|pair| pair[0] < pair[1]),
+        "{ratios:?}"
+    );
+    // Of n samples 10 s apart, the error of a slope is σ √(12 / (n (n² − 1))) per sample.
+    let own = of.widths.iter().find(|of| of.window_s == 300.0).unwrap();
+    let n: f64 = 30.0;
+    let expected = 12.0 * (12.0 / (n * (n * n - 1.0))).sqrt() / 10.0 * 60.0;
+    assert!(
+        (own.noise / expected - 1.0).abs() < 0.1,
+        "{} {expected}",
+        own.noise
+    );
+}
+
+#[test]
+fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
+    let scratch = Scratch::new("diagnose");
+    let week = simulated(&scratch, "log.csv", "die-tester", 2.5, 1);
+    let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
+    athermal(&[
+        &"fit",
+        &graph("die-tester"),
+        &"--data",
+        &week,
+        &"-o",
+        &model,
+    ])
+    .ended(0);
+    let told = athermal(&[
+        &"diagnose",
+        &model,
+        &"--data",
+        &week,
+        &"--window",
+        &"--plots",
+        &plots,
+    ])
+    .ended(0);
+    for line in told.out.lines() {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    for section in [
+        "residuals: ",
+        "correlation of features",
+        "thermal: how far a step of 1 K",
+        "how well the data determine",
+        "what each sensor moves",
+        "RMSE in nm/min of each day",
+        "how many times that the error is",
+        "signal to noise",
+    ] {
+        assert!(
+            told.out.contains(section),
+            "no `{section}` in:\n{}",
+            told.out
+        );
+    }
+    let pictures = [
+        "autocorrelation-vote.Z1",
+        "lags-drift.Z1",
+        "impulse-thermal.Z1",
+        "days",
+        "windows",
+    ];
+    for name in pictures {
+        let name = format!("{}.svg", name.replace('.', "_"));
+        let svg = std::fs::read_to_string(plots.join(&name)).unwrap();
+        assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{name}");
+    }
+    let facts = athermal(&[
+        &"diagnose",
+        &model,
+        &"--data",
+        &week,
+        &"--no-fit",
+        &"--format",
+        &"json",
+    ]);
+    let facts = facts.ended(0).json();
+    assert_eq!(facts["diagnosis"]["main"].as_array().unwrap().len(), 6);
+    assert!(facts["diagnosis"]["days"].is_null());
+    let of_one = athermal(&[
+        &"diagnose",
+        &model,
+        &"--data",
+        &week,
+        &"--no-fit",
+        &"--of",
+        &"thermal.Z1",
+    ]);
+    let of_one = of_one.ended(0);
+    assert!(
+        of_one.out.contains("per σ") && !of_one.out.contains("vote.X1"),
+        "{}",
+        of_one.out
+    );
+}
+
+#[test]
+fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
+    let scratch = Scratch::new("undiagnosed");
+    let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph("die-tester"), &"--data", &log, &"-o", &model]).ended(0);
+    let unknown = athermal(&[
+        &"diagnose",
+        &model,
+        &"--data",
+        &log,
+        &"--no-fit",
+        &"--of",
+        &"Z9",
+    ]);
+    unknown.ended(2).tells(&["nothing called `Z9`", "vote.Z1"]);
+    let never = athermal(&[&"diagnose", &model, &"--data", &log, &"--day", &"0s"]);
+    never.ended(2).tells(&["--day is 0s"]);
+    let short = athermal(&[&"diagnose", &model, &"--data", &log]);
+    short.ended(0).tells(&["a shorter --day"]);
+    let graph = athermal(&[&"diagnose", &graph("die-tester"), &"--data", &log]);
+    graph.ended(2).tells(&["fit"]);
+}
+
+#[test]
+fn a_recording_without_a_truth_is_no_reason_to_stop() {
+    let model = model(
+        "empty",
+        TWO_SENSORS,
+        &[("thermal", linear(&[("gradients.a@150s", 1.0)], 0.0))],
+    );
+    let options = Options {
+        day: "1d".parse().ok(),
+        windows: true,
+    };
+    let mut empty = Table::default();
+    diagnose(&model, &empty, &options, &mut |_, _| {}).unwrap();
+    for row in 0..50 {
+        empty.push(secs(10.0 * f64::from(row)), &[20.0, f64::NAN, f64::NAN]);
+    }
+    let (found, _) = diagnose(&model, &empty, &options, &mut |_, _| {}).unwrap();
+    assert!(found.residuals[0].count == 0 && found.days.is_none());
+}
