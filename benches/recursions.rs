@@ -1,6 +1,9 @@
-//! What it costs to learn from one row: recursive least squares and stochastic gradients, each a thousand rows at a time.
+//! What it costs to learn from one row: recursive least squares, stochastic gradients and the Kalman filter of a local linear
+//! trend, each a thousand rows at a time.
 
-use athermal_numerics::{Forgetting, LearningRate, Rls, RlsOptions, Sgd, SgdOptions};
+use athermal_numerics::{
+    Forgetting, Kalman, LearningRate, Passage, Rls, RlsOptions, Sgd, SgdOptions, Structural,
+};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
@@ -54,6 +57,24 @@ fn stochastic_gradients(bencher: Bencher, width: usize) {
     bencher.counter(ItemsCount::new(ROWS)).bench_local(|| {
         for (x, y) in &rows {
             divan::black_box(sgd.step(x, *y));
+        }
+    });
+}
+
+#[divan::bench(args = [0, 16, 46])]
+fn local_linear_trend(bencher: Bencher, regressors: usize) {
+    let rows = rows(regressors + 1);
+    let model = Structural {
+        observation: 1.0,
+        level: 0.01,
+        trend: Some(1e-4),
+        passage: Passage::Continuous,
+    };
+    let mut filter = Kalman::diffuse(model, regressors).expect("the variances are in range");
+    bencher.counter(ItemsCount::new(ROWS)).bench_local(|| {
+        for (x, y) in &rows {
+            filter.advance(1.0);
+            divan::black_box(filter.observe(&x[..regressors], *y));
         }
     });
 }

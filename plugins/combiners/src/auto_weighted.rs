@@ -22,6 +22,10 @@ use crate::share::{raise, shrink};
 /// 2004), `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there, and `floor` then lifts every weight to at least that
 /// much, at the cost of the larger ones.
 ///
+/// Where all voters tell their standard deviation, the port `deviation` is that of
+/// their mixture, `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999): rather too large than too
+/// small, since it takes one of the voters to be right.
+///
 /// After Mandelli, Dankwart and Napoli, section 3.4, whose printed formula `(RMSE_i / Σ RMSE_j)²` favours the worst voter;
 /// it is there for comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 pub struct Conformal {
     /// The share of truths that the intervals are to cover, above 0 and below 1.
     #[serde(default = "nine_tenths")]
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub coverage: f64,
     /// How long an error is remembered, counted from the arrival of its truth. A few hundred truths make a steady interval.
     pub memory: Duration,

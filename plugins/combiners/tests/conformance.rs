@@ -1,8 +1,8 @@
 //! Every kind of this crate through the rules that every node keeps.
 
 use athermal_combiners::{
-    Adwin, AutoWeighted, Best, Fallback, Guard, Hedge, Mean, Median, PageHinkley, StateGate,
-    Trimmed,
+    Adwin, AutoWeighted, Best, Conformal, Fallback, Guard, Hedge, Mean, Median, PageHinkley,
+    StateGate, Trimmed,
 };
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
@@ -99,6 +99,19 @@ conformance!(
         floor = 0.2
         "#
     ),
+);
+
+conformance!(
+    Conformal,
+    Case::new(r#"memory = "10min""#).input("prediction", 1, "nm"),
+    Case::new(
+        r#"
+        memory = "2min"
+        coverage = 0.6
+        gain = 0.1
+        "#
+    )
+    .input("prediction", 2, "nm"),
 );
 
 conformance!(

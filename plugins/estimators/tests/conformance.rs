@@ -3,7 +3,7 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use athermal_estimators::{
-    Ar, Arx, ElasticNet, Huber, Lasso, Linear, Persistence, Polynomial, Rls, Stack, Zero,
+    Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Persistence, Polynomial, Rls, Stack, Zero,
 };
 
 conformance!(
@@ -151,6 +151,28 @@ conformance!(
         selection = { method = "forward" }
         "#
     ),
+);
+
+conformance!(
+    Kalman,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        trend = true
+        every = "30s"
+        penalty = 0.5
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        learn = false
+        noises = { observation = "4 nm", level = "10 nm", per = "1h" }
+        "#
+    )
+    .input("features", 1, "K"),
 );
 
 conformance!(

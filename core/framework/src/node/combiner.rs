@@ -59,7 +59,8 @@ pub trait Combiner: Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Whether its answer is a sum of votes by weights, which the port `weights` then shows.
+    /// Whether its answer is a sum of votes by weights, which the port `weights` then shows. Where all voters tell their
+    /// standard deviation, the port `deviation` combines them by these weights: `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)`.
     fn weighs(&self) -> bool {
         false
     }

@@ -243,16 +243,19 @@ impl std::fmt::Display for Told<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self(model, unit) = self;
         let per: f64 = 3600.0;
-        let observation = model.observation.sqrt();
-        let level = (model.level * per).sqrt();
-        write!(
-            f,
-            "noises = {{ observation = \"{observation:.4} {unit}\", level = \"{level:.4} {unit}\", "
-        )?;
+        let observation = significant(model.observation.sqrt());
+        let level = significant((model.level * per).sqrt());
+        write!(f, "noises = {{ observation = \"{observation} {unit}\", ")?;
+        write!(f, "level = \"{level} {unit}\", ")?;
         if let Some(trend) = model.trend {
-            let trend = (trend * per).sqrt() * per;
-            write!(f, "trend = \"{trend:.4} {unit}\", ")?;
+            let trend = significant((trend * per).sqrt() * per);
+            write!(f, "trend = \"{trend} {unit}\", ")?;
         }
         write!(f, "per = \"1h\" }}")
     }
+}
+
+/// A number to four significant digits.
+fn significant(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }

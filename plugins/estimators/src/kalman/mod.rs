@@ -22,7 +22,8 @@ use fit::KalmanTrainer;
 /// Koopman 2012, chapters 2 to 4). The fit finds the coefficients, which stay, and unless `noises` gives them the variances
 /// that make its rows most likely. Running, the filter takes each truth that the embargo lets through and predicts
 /// `ahead` of now from the newest one; with `learn = false` it stays where the fit ended, which is regression on the
-/// features. Without features it is a forecast from the past of the truth alone.
+/// features. Without features it is a forecast from the past of the truth alone, which expects the level to stay: what
+/// returns to zero by itself, as drift does, is better forecast by `ar`.
 ///
 /// Truths whose windows overlap share their noise, which the model would take for a level that moves; so only one truth per
 /// `every` is taken. In a new segment level and trend start from what the fit knew of them at large. The port `deviation` is
