@@ -285,7 +285,7 @@ fn a_level_is_followed_by_the_textbook_recursion() {
     let train = recorded(200, |row| 5.0 * (row as f64 / 9.0).sin());
     let (fitted, _) = fit(&plan, &train, &FitOptions::default(), &mut |_| {}).unwrap();
     let mut engine = Engine::new(Arc::clone(&plan), &fitted).unwrap();
-    let written = serde_json::to_value(&fitted["level"]).unwrap();
+    let written = serde_json::to_value(&*fitted["level"]).unwrap();
     let start = &written["at_large"][0];
     let (mut level, mut variance) = (start[0].as_f64().unwrap(), start[1].as_f64().unwrap());
     let (observation, gained_per_s) = (4.0, 9.0 / 60.0);
