@@ -87,10 +87,6 @@ fn scored(text: &str, folder: &Path) -> Vec<Score> {
         .scores
 }
 
-fn covered(score: &Score) -> f64 {
-    score.interval.as_ref().unwrap().covered
-}
-
 #[test]
 fn conformal_intervals_cover_what_they_state_on_both_machines() {
     let Some(data) = data() else { return };
