@@ -57,8 +57,8 @@ fn list(terminal: &Terminal) {
     for role in roles {
         println!("{role}s");
         for kind in kinds().values().flatten().filter(|kind| kind.role == role) {
-            println!("  {:<14} {}", kind.name, kind.summary());
-            println!("  {:<14} from {} {}", "", kind.package, kind.version);
+            let (name, summary) = (kind.name, kind.summary());
+            println!("  {name:<14} {summary} ({} {})", kind.package, kind.version);
         }
     }
 }

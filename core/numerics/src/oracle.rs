@@ -9,6 +9,16 @@ pub(crate) struct Table {
 }
 
 impl Table {
+    pub(crate) fn parse(text: &str) -> Self {
+        let mut lines = text
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+        Self {
+            header: lines.next().unwrap(),
+            records: lines.collect(),
+        }
+    }
+
     /// All records as numbers, NaN where a field is empty or text.
     pub(crate) fn numbers(&self) -> Vec<Vec<f64>> {
         self.records
@@ -44,7 +54,7 @@ pub(crate) fn text(file: &str) -> Option<String> {
 
 /// A CSV file under `oracles/`; see [`text`].
 pub(crate) fn table(file: &str) -> Option<Table> {
-    text(file).map(|text| read(&text))
+    text(file).map(|text| Table::parse(&text))
 }
 
 /// The text of a file under this project's own `tests/oracles/`.
@@ -55,15 +65,5 @@ pub(crate) fn own_text(file: &str) -> String {
 
 /// A CSV file under this project's own `tests/oracles/`.
 pub(crate) fn own_table(file: &str) -> Table {
-    read(&own_text(file))
-}
-
-fn read(text: &str) -> Table {
-    let mut lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    Table {
-        header: lines.next().unwrap(),
-        records: lines.collect(),
-    }
+    Table::parse(&own_text(file))
 }

@@ -279,6 +279,7 @@ impl SparseTrainer {
                 .collect(),
             coefficients: kept.iter().map(|&j| fit.coefficients[j]).collect(),
             intercept: fit.intercept,
+            variance: None,
         })
     }
 }

@@ -114,6 +114,7 @@ impl Trainer for RobustTrainer {
             regressors: regressors.collect(),
             coefficients: fit.coefficients,
             intercept: fit.intercept,
+            variance: None,
         };
         Ok(Trained {
             predictor: Box::new(predictor),

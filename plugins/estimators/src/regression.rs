@@ -2,14 +2,16 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Predictor, Regressor, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
 };
 use athermal_numerics::{
-    GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError, Sgd, SgdOptions,
-    Standardization,
+    Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
+    PredictionVariance, Sgd, SgdOptions, Standardization,
 };
 use serde::{Deserialize, Serialize};
 
+use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
 use crate::solver::Solver;
 
@@ -20,6 +22,18 @@ pub(crate) struct LinearTrainer {
     solver: Solver,
     selection: Option<Selection>,
     blocks: GramBlocks,
+    /// The range of the regressors, for an estimator that goes on learning.
+    range: Option<TrainedRange>,
+}
+
+/// A fit of the chosen columns, and what it stands on.
+pub(crate) struct Found {
+    pub(crate) columns: Vec<usize>,
+    pub(crate) names: Vec<String>,
+    pub(crate) gram: Gram,
+    pub(crate) standard: Standardization,
+    pub(crate) squares: LeastSquares,
+    pub(crate) fit: LinearFit,
 }
 
 impl LinearTrainer {
@@ -30,6 +44,9 @@ impl LinearTrainer {
             solver,
             selection,
             blocks,
+            range: setup
+                .learns
+                .then(|| TrainedRange::new(setup.regressors.len())),
         }
     }
 
@@ -53,11 +70,8 @@ impl LinearTrainer {
         Ok((columns, settled.alpha))
     }
 
-    /// The fitted model; what there is to tell goes into the report.
-    pub(crate) fn solve(
-        &self,
-        report: &mut TrainingReport,
-    ) -> Result<LinearPredictor, TrainingError> {
+    /// Chooses the columns and solves for their coefficients; what there is to tell goes into the report.
+    pub(crate) fn find(&self, report: &mut TrainingReport) -> Result<Found, TrainingError> {
         let gram = self.blocks.total();
         let standard = Standardization::of(&gram);
         let (columns, alpha) = self.chosen(&standard.scales, report).map_err(told)?;
@@ -65,17 +79,55 @@ impl LinearTrainer {
         let solved = squares.solve(&gram, &columns, &standard.scales, self.blocks.rows());
         let fit = solved.map_err(told)?;
         report.condition = Some(fit.condition);
+        report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
         self.note(&fit, report);
         let names = columns
             .iter()
             .map(|&column| self.regressors[column].name.clone())
             .collect();
-        let predictor = match self.solver {
-            Solver::Ridge { .. } | Solver::Ols {} => LinearPredictor {
-                regressors: names,
-                coefficients: fit.coefficients.clone(),
-                intercept: fit.intercept,
-            },
+        Ok(Found {
+            columns,
+            names,
+            gram,
+            standard,
+            squares,
+            fit,
+        })
+    }
+
+    /// The range of some of the regressors, where it was kept.
+    pub(crate) fn range_of(&self, columns: &[usize]) -> Option<TrainedRange> {
+        Some(self.range.as_ref()?.of(columns))
+    }
+
+    /// The fitted model; what there is to tell goes into the report.
+    pub(crate) fn solve(
+        &self,
+        report: &mut TrainingReport,
+    ) -> Result<LinearPredictor, TrainingError> {
+        self.fitted(report).map(|(model, _)| model)
+    }
+
+    /// The fitted model, and the same as one that goes on learning, where it is to.
+    fn fitted(
+        &self,
+        report: &mut TrainingReport,
+    ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
+        let found = self.find(report)?;
+        match self.solver {
+            Solver::Ridge { .. } | Solver::Ols {} => {
+                let model = LinearPredictor {
+                    // Without more rows than coefficients there is a prediction, and nothing to say about its error.
+                    variance: found
+                        .squares
+                        .prediction_variance(&found.gram, &found.standard.scales, &found.fit)
+                        .ok(),
+                    regressors: found.names,
+                    coefficients: found.fit.coefficients.clone(),
+                    intercept: found.fit.intercept,
+                };
+                Ok((model, None))
+            }
             Solver::Sgd {
                 alpha,
                 eta0,
@@ -87,26 +139,9 @@ impl LinearTrainer {
                 } else {
                     LearningRate::InvScaling { eta0, power }
                 };
-                self.descend(
-                    SgdOptions { alpha, rate },
-                    epochs,
-                    &columns,
-                    names,
-                    &standard,
-                )?
+                self.descend(SgdOptions { alpha, rate }, epochs, found, report)
             }
-        };
-        report.in_sample_rmse = Some(match self.blocks.rows() {
-            Some(rows) if matches!(self.solver, Solver::Sgd { .. }) => {
-                let squared = rows.iter().map(|(x, y, _)| {
-                    let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
-                    (predictor.predict(&row) - y).powi(2)
-                });
-                (squared.sum::<f64>() / rows.count() as f64).sqrt()
-            }
-            _ => (fit.residual_sum_of_squares / gram.count() as f64).sqrt(),
-        });
-        Ok(predictor)
+        }
     }
 
     /// Stochastic gradients on standardised regressors and centred truths, told on the scale of the data.
@@ -114,10 +149,15 @@ impl LinearTrainer {
         &self,
         options: SgdOptions,
         epochs: usize,
-        columns: &[usize],
-        names: Vec<String>,
-        standard: &Standardization,
-    ) -> Result<LinearPredictor, TrainingError> {
+        found: Found,
+        report: &mut TrainingReport,
+    ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
+        let Found {
+            columns,
+            names,
+            standard,
+            ..
+        } = found;
         let rows = self.blocks.rows().ok_or_else(|| rows_gone(&self.blocks))?;
         let mean = rows.iter().map(|(_, y, _)| y).sum::<f64>() / rows.count() as f64;
         let scaled: Vec<(Vec<f64>, f64)> = rows
@@ -134,19 +174,30 @@ impl LinearTrainer {
         let coefficients: Vec<f64> = sgd
             .weights()
             .iter()
-            .zip(columns)
+            .zip(&columns)
             .map(|(w, &column)| w / standard.scales[column])
             .collect();
         let shift: f64 = coefficients
             .iter()
-            .zip(columns)
+            .zip(&columns)
             .map(|(b, &column)| b * standard.means[column])
             .sum();
-        Ok(LinearPredictor {
-            regressors: names,
+        let model = LinearPredictor {
+            regressors: names.clone(),
             coefficients,
             intercept: sgd.intercept() + mean - shift,
-        })
+            variance: None,
+        };
+        let squared = rows.iter().map(|(x, y, _)| {
+            let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
+            (model.predict(&row) - y).powi(2)
+        });
+        report.in_sample_rmse = Some((squared.sum::<f64>() / rows.count() as f64).sqrt());
+        let online = self.range_of(&columns).map(|range| {
+            let frame = Frame::new(names, &columns, &standard, mean);
+            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range)
+        });
+        Ok((model, online))
     }
 
     fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
@@ -186,16 +237,19 @@ impl LinearTrainer {
 
 impl Trainer for LinearTrainer {
     fn row(&mut self, regressors: &[f64], truth: f64) {
+        if let Some(range) = &mut self.range {
+            range.include(regressors);
+        }
         self.blocks.push(regressors, truth);
     }
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
-        let predictor = self.solve(&mut report)?;
-        Ok(Trained {
-            predictor: Box::new(predictor),
-            report,
-        })
+        let predictor: Box<dyn Predictor> = match self.fitted(&mut report)? {
+            (_, Some(online)) => Box::new(online),
+            (model, None) => Box::new(model),
+        };
+        Ok(Trained { predictor, report })
     }
 }
 
@@ -234,6 +288,9 @@ pub struct LinearPredictor {
     /// The intercept, in the unit of the truth.
     #[serde(with = "number")]
     pub(crate) intercept: f64,
+    /// How far a truth may be from its prediction, where theory says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) variance: Option<PredictionVariance>,
 }
 
 #[typetag::serde(name = "linear")]
@@ -245,5 +302,10 @@ impl Predictor for LinearPredictor {
     fn predict(&self, regressors: &[f64]) -> f64 {
         let terms = self.coefficients.iter().zip(regressors);
         terms.fold(self.intercept, |sum, (b, x)| sum + b * x)
+    }
+
+    fn deviation(&self, regressors: &[f64]) -> f64 {
+        let variance = self.variance.as_ref();
+        variance.map_or(f64::NAN, |variance| variance.at(regressors).sqrt())
     }
 }

@@ -1,6 +1,6 @@
 //! Decides which ways there are to find coefficients, and what their parameters may be.
 
-use athermal_core::node::Mistake;
+use athermal_core::node::{Learns, Mistake};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -100,6 +100,24 @@ impl Solver {
             }
         }
         mistakes
+    }
+
+    /// Whether estimators go on learning with it.
+    pub(crate) fn learns(&self) -> Learns {
+        match self {
+            Self::Sgd { .. } => Learns::WhenTold,
+            Self::Ridge { .. } | Self::Ols {} => Learns::Never {
+                help: Some("write `solver = { type = \"sgd\" }`, or use `type = \"rls\"`"),
+            },
+        }
+    }
+
+    /// Whether theory says how far predictions may be off.
+    pub(crate) fn deviates(&self) -> bool {
+        match self {
+            Self::Ridge { .. } | Self::Ols {} => true,
+            Self::Sgd { .. } => false,
+        }
     }
 
     /// The penalty of the least squares that this stands for.

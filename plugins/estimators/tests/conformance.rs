@@ -3,7 +3,7 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use athermal_estimators::{
-    Ar, Arx, ElasticNet, Huber, Lasso, Linear, Persistence, Polynomial, Zero,
+    Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Persistence, Polynomial, Rls, Stack, Zero,
 };
 
 conformance!(
@@ -34,6 +34,14 @@ conformance!(
         "#
     )
     .input("features", 1, "Cel"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        solver = { type = "sgd", power = 0.0 }
+        learn = { outliers = 8.0, margin = 0.5 }
+        "#
+    )
+    .input("freeze", 1, "1"),
     Case::new(
         r#"
         ahead = "30s"
@@ -143,6 +151,58 @@ conformance!(
         selection = { method = "forward" }
         "#
     ),
+);
+
+conformance!(
+    Kalman,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        trend = true
+        every = "30s"
+        penalty = 0.5
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        learn = false
+        noises = { observation = "4 nm", level = "10 nm", per = "1h" }
+        "#
+    )
+    .input("features", 1, "K"),
+);
+
+conformance!(
+    Rls,
+    Case::new(r#"ahead = "10s""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        lags = ["30s"]
+        forgetting = { type = "variable", memory = 100.0, lowest = 0.8 }
+        learn = { margin = 1.0 }
+        "#
+    )
+    .input("features", 2, "K")
+    .input("freeze", 1, "1"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        learn = false
+        alpha = 0.1
+        selection = { method = "forward", most = 2 }
+        "#
+    )
+    .input("features", 3, "Cel"),
+);
+
+conformance!(
+    Stack,
+    Case::new(r#"ahead = "0s""#),
+    Case::new(r#"ahead = "0s""#).input("voters", 1, "nm"),
 );
 
 #[test]
