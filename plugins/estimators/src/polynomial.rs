@@ -111,11 +111,12 @@ impl Polynomial {
         let mut terms: Vec<Term> = (0..features).map(|j| Term(j, None)).collect();
         for j in 0..features {
             for k in j..features {
-                if if j == k {
+                let wanted = if j == k {
                     self.squares
                 } else {
                     self.interactions
-                } {
+                };
+                if wanted {
                     terms.push(Term(j, Some(k)));
                 }
             }
