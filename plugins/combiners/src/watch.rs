@@ -32,11 +32,11 @@ pub struct PageHinkley {
     pub tolerance: f64,
     /// `λ`, how large the sum must grow, in multiples of the usual error; above 0.
     #[serde(default = "threshold")]
-    #[schemars(range(min = 0.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub threshold: f64,
     /// `φ`, what remains of the sum at each truth; above 0, at most 1.
     #[serde(default = "factor")]
-    #[schemars(range(max = 1.0))]
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub factor: f64,
     /// The time from one truth that is taken to the next; with none, all are.
     #[serde(default)]
@@ -68,7 +68,7 @@ pub struct Adwin {
     pub first: u64,
     /// `δ`, the probability of a false alarm at a look, above 0, below 1.
     #[serde(default = "confidence")]
-    #[schemars(range(max = 1.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
     /// At every how many truths the window is looked at; 1 or more.
     #[serde(default = "eight")]

@@ -34,7 +34,7 @@
 //!
 //! athermal_core::conformance!(Twice, Case::new(""), Case::new("").input("signal", 1, "K"));
 //! # fn main() {
-//! let mut bench = Bench::of(&Twice {});
+//! let mut bench = Bench::of(&Twice {}).input("signal", 1, "K");
 //! assert_eq!(bench.feed([(0.0, [1.0]), (10.0, [2.5])]).outputs(), [[2.0], [5.0]]);
 //! # }
 //! ```

@@ -197,8 +197,6 @@ fn units_in_words_are_not_taken_and_the_codes_are_suggested() {
         ("nanometer", "nm"),
         ("Nanometers/minute", "nm/min"),
         ("micrometres", "um"),
-        ("kelvin", "K"),
-        ("celsius", "Cel"),
         ("millikelvin/second", "mK/s"),
         ("percent", "%"),
     ] {
