@@ -57,6 +57,9 @@ impl Resolver<'_> {
         }
         let (truth_port, truth) = truth?;
         let link = self.link(instance, truth, ahead?)?;
+        let beside = estimator.mistakes_beside(&self.channels[truth].channel.unit);
+        let sound = sound && beside.is_empty();
+        self.mistakes(instance, beside);
         let (features_port, features) = features?;
         let wanted = estimator.regressors();
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{InputPort, Learner, Learns, Mistake, TrainedRange};
 use crate::time::{Duration, Instant};
+use crate::unit::Unit;
 
 /// A node that predicts the value which its `truth` will have, `ahead` of now.
 ///
@@ -91,6 +92,11 @@ pub trait Estimator: Debug + Send + Sync {
 
     /// Mistakes in the parameters that their types do not exclude.
     fn mistakes(&self) -> Vec<Mistake> {
+        Vec::new()
+    }
+
+    /// Mistakes that show only beside the truth: quantities in units that do not measure the same as this one.
+    fn mistakes_beside(&self, _truth: &Unit) -> Vec<Mistake> {
         Vec::new()
     }
 

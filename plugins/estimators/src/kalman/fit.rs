@@ -215,20 +215,17 @@ impl Noises {
         let of_truth: Unit = unit
             .parse()
             .map_err(|_| unsolvable("the unit of the truth is not known"))?;
-        let in_unit = |name: &str, given: &Quantity| {
-            given.in_unit(&of_truth.difference()).ok_or_else(|| {
-                let found = &given.unit;
-                unsolvable(&format!(
-                    "`noises.{name}` is in {found}, and the truth in {unit}"
-                ))
-            })
+        let in_unit = |given: &Quantity| {
+            given
+                .in_unit(&of_truth.difference())
+                .ok_or_else(|| unsolvable("a noise is in another unit than the truth"))
         };
         let per = self.per.secs();
-        let level = in_unit("level", &self.level)?;
+        let level = in_unit(&self.level)?;
         let trend = self.trend.as_ref();
-        let trend = trend.map(|trend| in_unit("trend", trend)).transpose()?;
+        let trend = trend.map(in_unit).transpose()?;
         Ok(Structural {
-            observation: in_unit("observation", &self.observation)?.powi(2),
+            observation: in_unit(&self.observation)?.powi(2),
             level: level * level / per,
             trend: trend.map(|trend| (trend / per).powi(2) / per),
             passage: Passage::Continuous,

@@ -7,6 +7,7 @@ use athermal_core::node::{
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
+use athermal_core::unit::Unit;
 use athermal_numerics::Kalman as Filter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -108,6 +109,13 @@ impl Estimator for Kalman {
         mistakes
     }
 
+    fn mistakes_beside(&self, truth: &Unit) -> Vec<Mistake> {
+        let noises = self.noises.iter();
+        noises
+            .flat_map(|noises| noises.of_another_unit(truth))
+            .collect()
+    }
+
     fn learns(&self) -> Learns {
         Learns::UnlessTold
     }
@@ -122,6 +130,28 @@ impl Estimator for Kalman {
 }
 
 impl Noises {
+    /// Each noise with its name.
+    fn each(&self) -> impl Iterator<Item = (&'static str, &Quantity)> {
+        let moving = [("observation", &self.observation), ("level", &self.level)];
+        let trend = self.trend.iter().map(|trend| ("trend", trend));
+        moving.into_iter().chain(trend)
+    }
+
+    fn of_another_unit(&self, truth: &Unit) -> Vec<Mistake> {
+        let unit = truth.difference();
+        let other = self
+            .each()
+            .filter(|(_, given)| given.in_unit(&unit).is_none());
+        let mistake = |(name, given): (&str, &Quantity)| {
+            let found = &given.unit;
+            let message = format!("`{name}` is in {found}, and the truth in {truth}");
+            Mistake::at(format!("noises.{name}"), message).help(format!(
+                "give it in {unit} or a unit that measures the same"
+            ))
+        };
+        other.map(mistake).collect()
+    }
+
     fn find_mistakes(&self, trend: bool, mistakes: &mut Vec<Mistake>) {
         let mut check = |name: &str, given: &Quantity, fits: bool, allowed: &str| {
             if !fits {
