@@ -30,8 +30,10 @@ inputs.truth = \"drift.Z\"
 memory = {{ truths = 4 }}
 min_truths = 2
 [outputs]
-gate = [\"gate\", \"gate:weights\", \"gate:reason\"]
-guard = [\"guard\", \"guard:weights\", \"guard:reason\"]
+gate = [\"gate\", \"gate:weights\"]
+why = \"gate:reason\"
+guard = [\"guard\", \"guard:weights\"]
+held = \"guard:reason\"
 "
     );
     Bench::new(&text, &[])
