@@ -31,9 +31,9 @@ memory = {{ truths = 4 }}
 min_truths = 2
 [outputs]
 gate = [\"gate\", \"gate:weights\"]
-gate_reason = \"gate:reason\"
+why = \"gate:reason\"
 guard = [\"guard\", \"guard:weights\"]
-guard_reason = \"guard:reason\"
+held = \"guard:reason\"
 "
     );
     Bench::new(&text, &[])

@@ -12,7 +12,7 @@ use super::workbench::{plan, problems, slot};
 
 /// A voter with two regressors, and one with so many that it fits its rows far too well.
 fn nodes(stacked: &str) -> String {
-    let lags: Vec<String> = (0..12).map(|lag| format!("\"{}s\"", 10 * lag)).collect();
+    let lags: Vec<String> = (0..5).map(|lag| format!("\"{}s\"", 10 * lag)).collect();
     format!(
         "{SAMPLES}
 [nodes.past]
@@ -82,10 +82,11 @@ fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight() {
         let after = weights.split(&format!("{name} ")).nth(1).unwrap();
         after.split(',').next().unwrap().parse().unwrap()
     };
-    assert!(
-        weight("plain.Z") > 2.0 * weight("rich.Z"),
-        "out of fold it is not: {weights}"
-    );
+    // numpy and scipy.optimize.nnls on the same rows and thirds; in-fold predictions would give the rich one nearly all.
+    for (name, expected) in [("plain.Z", 0.795), ("rich.Z", 0.199)] {
+        let found = weight(name);
+        assert!((found - expected).abs() < 0.002, "{weights}");
+    }
 
     // While the lags are cold the rich one is absent, and the plain one goes on alone.
     let mut engine = Engine::new(Arc::clone(&plan), &fitted).unwrap();
@@ -95,7 +96,7 @@ fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight() {
         };
         engine.step(now, values).unwrap();
         let [rich, stack] = ["rich.Z", "stack.Z"].map(|name| engine.value(slot(&plan, name)));
-        assert_eq!(rich.is_nan(), tick < 11, "{tick}");
+        assert_eq!(rich.is_nan(), tick < 4, "{tick}");
         assert!(stack.is_finite(), "{tick}");
     }
 }

@@ -122,7 +122,7 @@ impl Combine for Gate {
 
     fn state(&mut self, now: Instant, state: f64) {
         // What is no number of a state, below zero or absent, is not known.
-        if !(state >= 0.0) {
+        if state.is_nan() || state < 0.0 {
             self.seen = Seen::default();
             return;
         }

@@ -56,10 +56,15 @@ impl Sorted {
             let below = left.checked_sub(1).map(|at| centre - self.0[at]);
             let above = self.0.get(right).map(|value| value - centre);
             match (below, above) {
-                (Some(below), Some(above)) if below <= above => (left -= 1, below).1,
-                (_, Some(above)) => (right += 1, above).1,
-                (Some(below), None) => (left -= 1, below).1,
-                (None, None) => f64::NAN,
+                (Some(below), above) if above.is_none_or(|above| below <= above) => {
+                    left -= 1;
+                    below
+                }
+                (_, Some(above)) => {
+                    right += 1;
+                    above
+                }
+                _ => f64::NAN,
             }
         };
         let mut middle = (f64::NAN, f64::NAN);
