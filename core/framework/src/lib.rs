@@ -21,10 +21,20 @@
 //! | [`model`], [`fit`], [`score`] | a fitted graph, training it, scoring it |
 //! | [`schema`] | the JSON Schema of graph files, for editors |
 //! | [`trial`] | the tests in a graph file: what they mean, running one, judging it |
-//! | [`live`] | replacing a graph while it runs |
+//! | [`live`] | sources, sinks, running from one to the other; replacing a graph while it runs |
+//! | `testkit`, a feature | what every node must do, for the tests of those who write nodes |
 //!
 //! The core knows no concrete node and no linear algebra. Nodes come from plugin crates, which make a kind known with
-//! [`register!`]; start at [`node::Feature`], [`node::Estimator`] or [`node::Combiner`].
+//! [`register!`]. Whoever writes one implements one trait, of which each has a whole example:
+//!
+//! | to write | implement |
+//! |---|---|
+//! | channels from channels: a filter, a monitor, a correction | [`node::Feature`] |
+//! | a prediction, fitted on history | [`node::Estimator`] |
+//! | one prediction of several | [`node::Combiner`] |
+//! | where samples come from | [`live::Source`] |
+//! | where outputs go | [`live::Sink`] |
+//! | a simulated machine | [`machine::Machine`] |
 
 pub mod channel;
 pub mod compile;

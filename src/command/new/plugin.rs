@@ -60,6 +60,12 @@ impl Plugin {
             write(&path, &text)?;
             written.push(path);
         }
+        // What athermal is built with, so that it is built once.
+        let lock = folder.join("Cargo.lock");
+        fs::copy(checkout.folder().join("Cargo.lock"), &lock).map_err(|error| {
+            Failure::Outside(format!("cannot write {}: {error}", lock.display()))
+        })?;
+        written.push(lock);
         if terminal.format == Format::Json {
             println!(
                 "{:#}",

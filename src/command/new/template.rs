@@ -58,11 +58,7 @@ impl Names {
         taken(&self.spec)
             || taken(&format!("{}Fitted", self.spec))
             || KEYWORDS.contains(&self.kind.as_str())
-            || self.package.starts_with("athermal")
-            || [
-                "test", "core", "std", "alloc", "serde", "schemars", "typetag",
-            ]
-            .contains(&self.kind.as_str())
+            || CRATES.contains(&self.kind.as_str())
     }
 
     fn put_into(&self, text: &str) -> String {
@@ -81,6 +77,19 @@ const KEYWORDS: [&str; 51] = [
     "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
     "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
     "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
+];
+
+/// The crates that a new one cannot be called, because it uses them.
+const CRATES: [&str; 9] = [
+    "athermal",
+    "athermal_core",
+    "alloc",
+    "core",
+    "schemars",
+    "serde",
+    "std",
+    "test",
+    "typetag",
 ];
 
 /// The files of a crate: paths in it and what they say.

@@ -12,6 +12,10 @@ use crate::diagnostic::Diagnostics;
 use crate::document::{Value, decode};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not known as a kind of node",
+    label = "make it known: `athermal_core::register!({Self}, Feature, \"name\")`"
+)]
 pub trait NodeSpec: Debug + Send + Sync {
     /// The parameters seen as their role.
     fn role(&self) -> Role<'_>;
@@ -135,7 +139,10 @@ pub fn kind(name: &str) -> Option<&'static Kind> {
 /// documentation of the kind.
 #[macro_export]
 macro_rules! register {
-    ($spec:ty, $role:ident, $name:literal) => {
+    ($spec:ty, Feature, $name:literal) => { $crate::register!(@ $spec, Feature, $name); };
+    ($spec:ty, Estimator, $name:literal) => { $crate::register!(@ $spec, Estimator, $name); };
+    ($spec:ty, Combiner, $name:literal) => { $crate::register!(@ $spec, Combiner, $name); };
+    (@ $spec:ty, $role:ident, $name:literal) => {
         impl $crate::node::NodeSpec for $spec {
             fn role(&self) -> $crate::node::Role<'_> {
                 $crate::node::Role::$role(self)
@@ -161,5 +168,11 @@ macro_rules! register {
                 schema: || $crate::__private::schemars::schema_for!($spec),
             }
         }
+    };
+    ($($other:tt)*) => {
+        compile_error!(
+            "expected the type of the parameters, the role and the name of the kind: \
+             `register!(Difference, Feature, \"difference\")`; the roles are Feature, Estimator and Combiner"
+        );
     };
 }
