@@ -159,6 +159,8 @@ impl<'a> Probe<'a> {
     /// How slots change from the instant on at which a source steps by `size`, tick by tick; NaN where there is no value.
     fn run(&self, slots: &[usize], source: usize, size: f64) -> Result<Vec<Vec<f64>>, EngineError> {
         let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
+        // Nothing has been measured that could be learned from.
+        engine.freeze(true);
         let mut samples = self.rest.clone();
         let mut before = vec![f64::NAN; slots.len()];
         let mut found = vec![Vec::new(); slots.len()];
