@@ -32,11 +32,11 @@ pub struct PageHinkley {
     pub tolerance: f64,
     /// `λ`, how large the sum must grow, in multiples of the usual error; above 0.
     #[serde(default = "threshold")]
-    #[schemars(range(min = 0.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub threshold: f64,
     /// `φ`, what remains of the sum at each truth; above 0, at most 1.
     #[serde(default = "factor")]
-    #[schemars(range(max = 1.0))]
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub factor: f64,
     /// The time from one truth that is taken to the next; with none, all are.
     #[serde(default)]
@@ -49,8 +49,8 @@ pub struct PageHinkley {
 /// Passes a prediction on, and watches with adaptive windowing whether the model behind it has drifted.
 ///
 /// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the root mean square
-/// of the first `first` of them. It is cut, which is the alarm, where its two sides have means that are farther apart than
-/// chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
+/// of the first `first` of them. There is an alarm, and the window begins anew, where it has two sides with means that are
+/// farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///
@@ -68,7 +68,7 @@ pub struct Adwin {
     pub first: u64,
     /// `δ`, the probability of a false alarm at a look, above 0, below 1.
     #[serde(default = "confidence")]
-    #[schemars(range(max = 1.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
     /// At every how many truths the window is looked at; 1 or more.
     #[serde(default = "eight")]

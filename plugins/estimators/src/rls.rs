@@ -56,7 +56,7 @@ pub enum Forgetting {
     Constant {
         /// Above 0, at most 1, which forgets nothing; the memory is `1 / (1 − factor)` truths.
         #[serde(default = "slow")]
-        #[schemars(range(max = 1.0))]
+        #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
         factor: f64,
     },
     /// The more a truth surprises, the more is forgotten (Fortescue, Kershenbaum and Ydstie 1981):
@@ -64,11 +64,11 @@ pub enum Forgetting {
     Variable {
         /// Over how many truths of ordinary noise the past counts, above 1.
         #[serde(default = "thousand")]
-        #[schemars(range(min = 1.0))]
+        #[schemars(extend("exclusiveMinimum" = 1.0))]
         memory: f64,
         /// The smallest factor, above 0, at most 1.
         #[serde(default = "nine_tenths")]
-        #[schemars(range(max = 1.0))]
+        #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
         lowest: f64,
     },
 }

@@ -177,7 +177,7 @@ conformance!(
 
 conformance!(
     Rls,
-    Case::new(r#"ahead = "10s""#),
+    Case::new(r#"ahead = "10s""#).input("features", 3, "K"),
     Case::new(
         r#"
         ahead = "0s"
