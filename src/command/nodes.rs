@@ -1,7 +1,7 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
 use athermal::core::diagnostic::nearest;
-use athermal::core::node::{Kind, Read, kind, kinds};
+use athermal::core::node::{FREEZE, Kind, Read, kind, kinds};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -100,6 +100,12 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         println!(
             "  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on"
         );
+        if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
+            println!(
+                "  learn (true, false or table) – whether it goes on learning while it runs; `{{ outliers = 6.0, margin = 0.0 }}`: not from \
+                 truths that miss by more than so many times the recent error, nor so many widths outside the range of the fit"
+            );
+        }
     }
     let explained = parameters::explain(&schema);
     print!("{explained}");

@@ -49,8 +49,8 @@ pub struct PageHinkley {
 /// Passes a prediction on, and watches with adaptive windowing whether the model behind it has drifted.
 ///
 /// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the root mean square
-/// of the first `first` of them. It is cut, which is the alarm, where its two sides have means that are farther apart than
-/// chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
+/// of the first `first` of them. There is an alarm, and the window begins anew, where it has two sides with means that are
+/// farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///

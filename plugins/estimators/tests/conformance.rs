@@ -155,7 +155,7 @@ conformance!(
 
 conformance!(
     Kalman,
-    Case::new(r#"ahead = "1min""#).speaks_without_input(&["prediction", "deviation"]),
+    Case::new(r#"ahead = "1min""#),
     Case::new(
         r#"
         ahead = "0s"
@@ -177,7 +177,7 @@ conformance!(
 
 conformance!(
     Rls,
-    Case::new(r#"ahead = "10s""#).input("features", 1, "K"),
+    Case::new(r#"ahead = "10s""#).input("features", 3, "K"),
     Case::new(
         r#"
         ahead = "0s"

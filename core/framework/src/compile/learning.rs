@@ -31,7 +31,7 @@ pub(crate) enum Learn {
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct LearnLimits {
     /// Truths that miss their prediction by more than this multiple of the recent root mean square error, above 1.
-    #[schemars(range(min = 1.0))]
+    #[schemars(extend("exclusiveMinimum" = 1.0))]
     pub(crate) outliers: f64,
     /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width.
     #[schemars(range(min = 0.0))]
