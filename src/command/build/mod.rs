@@ -24,7 +24,9 @@ use wish::Wish;
 #[command(after_help = "Examples:
   athermal build --with path:room-lag -o athermal-ours
   athermal build --with drift-nodes@0.3.1 --with path:../ours -o athermal-ours
-  athermal build --with path:room-lag --vendored vendor -o athermal-ours    without a network")]
+  athermal build --with path:room-lag --vendored vendor -o athermal-ours
+
+The last one needs no network; `cargo vendor`, called in the project's folder where there is one, writes such a folder.")]
 pub struct Build {
     /// A crate: NAME, NAME@VERSION, or path:DIR
     #[arg(long, required = true, value_name = "CRATE")]
@@ -54,13 +56,20 @@ impl Build {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let checkout = Checkout::find(self.athermal.as_deref())?;
         let cargo = Cargo::new(self.offline || self.vendored.is_some());
-        let mut wishes = Vec::new();
+        let (mut wishes, mut registry) = (Vec::new(), false);
         for text in &self.with {
             let wish = Wish::read(text)?;
-            wish.check(&cargo, &checkout)?;
+            registry |= wish.check(&cargo, &checkout)?;
             wishes.push(wish);
         }
-        let project = Project::write(&self.folder(), &wishes, &checkout, self.vendored.as_deref())?;
+        let manifest = project::manifest(&wishes, &checkout, registry);
+        let project = Project::write(
+            &self.folder(),
+            &manifest,
+            &wishes,
+            &checkout,
+            self.vendored.as_deref(),
+        )?;
         let resolved = cargo.metadata(project.folder(), true)?;
         one_core(&resolved, &wishes)?;
         cargo.build(project.folder())?;

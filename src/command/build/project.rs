@@ -29,6 +29,7 @@ impl Project {
     /// When the folder holds something else, or cannot be written.
     pub(super) fn write(
         folder: &Path,
+        manifest: &str,
         wishes: &[Wish],
         checkout: &Checkout,
         vendored: Option<&Path>,
@@ -53,7 +54,7 @@ impl Project {
             None => String::new(),
         };
         let files = [
-            ("Cargo.toml", manifest(wishes, checkout)),
+            ("Cargo.toml", manifest.to_owned()),
             ("src/main.rs", program(wishes)),
             (".cargo/config.toml", config),
         ];
@@ -75,11 +76,19 @@ impl Project {
     }
 }
 
-fn manifest(wishes: &[Wish], checkout: &Checkout) -> String {
+/// The manifest. With `registry`, crates that ask a registry for the core get the one at hand.
+pub(super) fn manifest(wishes: &[Wish], checkout: &Checkout, registry: bool) -> String {
     let athermal = in_toml(checkout.folder());
     let core = in_toml(&checkout.folder().join("core/framework"));
     let numerics = in_toml(&checkout.folder().join("core/numerics"));
     let plugins: String = wishes.iter().map(|wish| wish.dependency() + "\n").collect();
+    let patch = format!(
+        "# A plugin that asks a registry for athermal gets this one.\n\
+         [patch.crates-io]\n\
+         athermal-core = {{ path = {core} }}\n\
+         athermal-numerics = {{ path = {numerics} }}\n\n"
+    );
+    let patch = if registry { patch.as_str() } else { "" };
     format!(
         "{MARK}\
          [package]\n\
@@ -93,10 +102,7 @@ fn manifest(wishes: &[Wish], checkout: &Checkout) -> String {
          [dependencies]\n\
          athermal = {{ path = {athermal} }}\n\
          {plugins}\n\
-         # A plugin that asks for the athermal of a registry gets this one.\n\
-         [patch.crates-io]\n\
-         athermal-core = {{ path = {core} }}\n\
-         athermal-numerics = {{ path = {numerics} }}\n\n\
+         {patch}\
          [workspace]\n"
     )
 }

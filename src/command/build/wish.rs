@@ -107,13 +107,14 @@ impl Wish {
         }
     }
 
-    /// Makes sure that a crate in a folder is made for this version of athermal; of others cargo knows.
+    /// Makes sure that a crate in a folder is made for this version of athermal; of others cargo knows. The answer is whether
+    /// it asks a registry for the core.
     ///
     /// # Errors
     /// When it is not, with both versions.
-    pub(super) fn check(&self, cargo: &Cargo, checkout: &Checkout) -> Result<(), Failure> {
+    pub(super) fn check(&self, cargo: &Cargo, checkout: &Checkout) -> Result<bool, Failure> {
         let Self::Folder { package, folder } = self else {
-            return Ok(());
+            return Ok(true);
         };
         let metadata = cargo.metadata(folder, false)?;
         let all = metadata["packages"].as_array().into_iter().flatten();
@@ -128,7 +129,8 @@ impl Wish {
                 "{package} does not depend on athermal-core, so it can bring no node type"
             )));
         };
-        made_for(package, core, checkout)
+        made_for(package, core, checkout)?;
+        Ok(core["path"].is_null())
     }
 }
 
