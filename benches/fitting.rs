@@ -10,9 +10,7 @@ use athermal::core::fit::{FitOptions, fit};
 use athermal::core::recording::Recording;
 use athermal::core::score::{ScoreOptions, score};
 use athermal::files::{Dataset, Options};
-use athermal_numerics::{
-    ForwardSelection, GramBlocks, LeastSquares, SelectionScore, Standardization,
-};
+use athermal_numerics::{Direction, Folds, GramBlocks, LeastSquares, Search, Standardization};
 use divan::Bencher;
 use divan::counter::BytesCount;
 
@@ -23,8 +21,7 @@ fn main() {
 const CANDIDATES: usize = 64;
 
 /// Rows of 64 candidates that hang together in pairs, and a truth of which 20 of them know something.
-fn blocks(rows: usize) -> GramBlocks {
-    let mut blocks = GramBlocks::new(CANDIDATES);
+fn each_row(rows: usize, mut take: impl FnMut(&[f64], f64)) {
     let mut state = 1_u64;
     let mut uniform = || {
         state = state
@@ -41,27 +38,68 @@ fn blocks(rows: usize) -> GramBlocks {
         }
         let known = row.iter().step_by(3).enumerate();
         let truth = known.fold(uniform(), |sum, (i, value)| sum + value / (i + 1) as f64);
-        blocks.push(&row, truth);
+        take(&row, truth);
     }
+}
+
+fn blocks(rows: usize) -> GramBlocks {
+    let mut blocks = GramBlocks::new(CANDIDATES);
+    each_row(rows, |row, truth| blocks.push(row, truth));
     blocks
 }
 
-#[divan::bench(args = [8_000, 80_000], sample_count = 10)]
-fn forward_selection(bencher: Bencher, rows: usize) {
+fn select(bencher: Bencher, rows: usize, direction: Direction) {
     let blocks = blocks(rows);
     let scales = Standardization::of(&blocks.total()).scales;
-    let selection = ForwardSelection {
+    let search = Search {
+        direction,
         alpha: 1.0,
         tolerance: Some(1e-3),
-        max_features: None,
-        score: SelectionScore::R2,
+        ..Search::forward()
     };
-    bencher.bench_local(|| selection.run(&blocks, 3, &scales));
+    let folds = Folds::contiguous(3);
+    bencher.bench_local(|| search.run(&blocks, &folds, &scales));
+}
+
+#[divan::bench(args = [8_000, 603_000], sample_count = 10)]
+fn forward_selection(bencher: Bencher, rows: usize) {
+    select(bencher, rows, Direction::Forward);
+}
+
+#[divan::bench(args = [8_000, 603_000], sample_count = 10)]
+fn backward_selection(bencher: Bencher, rows: usize) {
+    select(bencher, rows, Direction::Backward);
+}
+
+#[divan::bench(args = [8_000, 603_000], sample_count = 10)]
+fn floating_selection(bencher: Bencher, rows: usize) {
+    select(bencher, rows, Direction::Floating);
 }
 
 #[divan::bench(args = [8_000, 80_000], sample_count = 10)]
 fn rows_into_blocks(bencher: Bencher, rows: usize) {
     bencher.bench_local(|| blocks(rows));
+}
+
+/// All of a least squares: rows in memory become Gram blocks, and these coefficients.
+#[divan::bench(sample_count = 10)]
+fn least_squares_from_rows(bencher: Bencher) {
+    const ROWS: usize = 603_458;
+    let mut rows = Vec::with_capacity(ROWS * (CANDIDATES + 1));
+    each_row(ROWS, |row, truth| {
+        rows.extend_from_slice(row);
+        rows.push(truth);
+    });
+    let columns: Vec<_> = (0..CANDIDATES).collect();
+    bencher.bench_local(|| {
+        let mut blocks = GramBlocks::new(CANDIDATES);
+        for row in rows.chunks_exact(CANDIDATES + 1) {
+            blocks.push(&row[..CANDIDATES], row[CANDIDATES]);
+        }
+        let gram = blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        LeastSquares::ordinary().solve(&gram, &columns, &scales, blocks.rows())
+    });
 }
 
 #[divan::bench(args = [8_000, 80_000], sample_count = 10)]

@@ -412,7 +412,7 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
         "how well the data determine",
         "what each sensor moves",
         "RMSE in nm/min of each day",
-        "on all other days",
+        "how many times that the error is",
         "signal to noise",
     ] {
         assert!(

@@ -4,6 +4,11 @@
 
 mod workbench;
 
+use athermal::core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use workbench::Read;
 
 const HEAD: &str = "schema = 1\n\
@@ -140,5 +145,125 @@ fn a_lag_of_the_truth_leaks_until_its_window_is_past() {
     assert_eq!(
         told(&ar("179s"))[0].1,
         format!("{TRUTH} 2min ahead, so the smallest lag allowed is 3min (here it is 179s)")
+    );
+}
+
+/// Gives two channels, each made of the other one's input, and says nothing about it.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Crossed {}
+
+impl Feature for Crossed {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "two channels")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let channels = inputs.port("signal").to_vec();
+        let name = "crossed";
+        Ok(vec![OutputPort { name, channels }])
+    }
+
+    fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        Box::new(Crossing)
+    }
+}
+
+struct Crossing;
+
+impl Operator for Crossing {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        outputs.set(0, tick.port(0)[1]);
+        outputs.set(1, tick.port(0)[0]);
+    }
+
+    fn segment(&mut self) {}
+}
+
+athermal::core::register!(Crossed, Feature, "test_crossed");
+
+#[test]
+fn a_kind_that_mixes_as_many_channels_as_it_reads_hides_nothing() {
+    let crossed = "[nodes.crossed]\ntype = \"test_crossed\"\ninputs.signal = \"position\"\n";
+    for channel in ["crossed.X", "crossed.Y"] {
+        let leak = told(&format!("{crossed}{}", estimator(channel, "0s")));
+        assert!(leak[0].1.contains("from `position.X`"), "{}", leak[0].1);
+    }
+}
+
+#[test]
+fn a_kind_that_keeps_channels_apart_denies_none_for_another() {
+    let apart =
+        "[nodes.apart]\ntype = \"hampel\"\ninputs.signal = \"position\"\nwindow = \"1min\"\n";
+    assert_eq!(told(&format!("{apart}{}", estimator("apart.Y", "0s"))), []);
+    assert_eq!(
+        told(&format!("{apart}{}", estimator("apart.X", "0s"))).len(),
+        1
+    );
+}
+
+#[test]
+fn looking_back_over_a_window_delays_nothing() {
+    let nodes = [
+        "type = \"moving\"\nwindows = [\"1h\"]",
+        "type = \"difference\"\nover = \"1h\"",
+        "type = \"resample\"\nevery = \"1min\"",
+        "type = \"hampel\"\nwindow = \"1h\"\nreplace = \"median\"",
+    ];
+    for node in nodes {
+        let node = format!("[nodes.n]\n{node}\ninputs.signal = \"drift.X\"\n");
+        let leak = told(&format!("{node}{}", estimator("n.X", "0s")));
+        assert!(leak[0].1.ends_with("(here it is 0s)"), "{}", leak[0].1);
+    }
+}
+
+#[test]
+fn every_lag_counts_for_itself() {
+    let lags =
+        "[nodes.past]\ntype = \"lag\"\ninputs.signal = \"drift.X\"\nlags = [\"2min\", \"5min\"]\n";
+    assert_eq!(
+        told(&format!("{lags}{}", estimator("past.X@5min", "0s"))),
+        []
+    );
+    let leak = told(&format!("{lags}{}", estimator("past", "0s")));
+    assert!(leak[0].0.starts_with("`past.X@2min` "), "{}", leak[0].0);
+    assert!(leak[0].1.ends_with("(here it is 2min)"), "{}", leak[0].1);
+}
+
+#[test]
+fn a_truth_made_of_windows_over_windows_keeps_lags_out_of_both() {
+    let ar = |lag: &str| {
+        format!(
+            "[nodes.calm]\ntype = \"moving\"\ninputs.signal = \"drift.X\"\nwindows = [\"4min\"]\n\
+             [nodes.ar]\ntype = \"ar\"\ninputs.truth = \"calm.X\"\nahead = \"0s\"\nlags = [\"{lag}\"]\n[outputs]\npredicted = \"ar\"\n"
+        )
+    };
+    assert_eq!(told(&ar("9min")), []);
+    assert!(
+        told(&ar("8min"))[0]
+            .1
+            .contains("the smallest lag allowed is 9min")
+    );
+}
+
+#[test]
+fn a_gate_may_not_go_by_the_state_of_what_its_voters_predict() {
+    let gate = |ahead: &str, state: &str| {
+        format!(
+            "[nodes.state]\ntype = \"stability\"\ninputs.drift = \"drift.X\"\nstable_below = \"30 nm/min\"\ntransient_above = \"80 nm/min\"\n\
+             [nodes.before]\ntype = \"delay\"\ninputs.signal = \"state\"\ndelay = \"5min\"\n\
+             [nodes.zero]\ntype = \"zero\"\ninputs.truth = \"drift.X\"\nahead = \"{ahead}\"\n\
+             [nodes.same]\ntype = \"persistence\"\ninputs.truth = \"drift.X\"\nahead = \"{ahead}\"\n\
+             [nodes.gate]\ntype = \"state_gate\"\ninputs.voters = [\"zero\", \"same\"]\ninputs.state = \"{state}\"\n\
+             [outputs]\npredicted = \"gate\"\nwhy = \"gate:reason\"\n"
+        )
+    };
+    assert_eq!(told(&gate("5min", "state")), []);
+    assert_eq!(told(&gate("0s", "before")), []);
+    let leak = told(&gate("0s", "state"));
+    assert!(
+        leak[0].0.starts_with("`state.X` contains part"),
+        "{}",
+        leak[0].0
     );
 }

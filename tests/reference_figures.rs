@@ -23,6 +23,7 @@ const WORSE: f64 = 1.02;
 fn scored(name: &str, train: &Path, test: &Path, below: Option<&str>) -> Vec<Score> {
     let wanted = Wanted {
         standard_errors: true,
+        intervals: false,
     };
     let model = Model::load_for(graph(name), wanted).unwrap();
     let recording = |path: &Path| Dataset::new(vec![path.to_owned()], Options::default());

@@ -124,12 +124,15 @@ fn fit_model(
 }
 
 fn evaluate(model: &Path, test: &Path, terminal: &Terminal) -> Result<Scores, Failure> {
-    let standard_errors = true;
-    let model = Model::load_for(model, Wanted { standard_errors })?;
+    let wanted = Wanted {
+        standard_errors: true,
+        intervals: false,
+    };
+    let model = Model::load_for(model, wanted)?;
     let dataset = Data::of(vec![test.to_owned()]).dataset();
     let options = ScoreOptions {
         abs_truth_below: LIMIT.parse().ok(),
-        each_on_its_own: false,
+        ..ScoreOptions::default()
     };
     let mut progress = terminal.progress("evaluating");
     let scores = score(
@@ -291,6 +294,7 @@ mod tests {
             baseline_persistence: None,
             truth_noise: Some(3.85),
             own_instants: false,
+            interval: None,
         };
         let (x1, z1) = (score("vote.X1", 8.0, 10.0), score("vote.Z1", 25.0, 50.0));
         let axes = [

@@ -19,6 +19,10 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
 /// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
+///
+/// Where predictions have intervals (bounds, as of `conformal`, or a standard deviation, of which 1.645 to either side are
+/// to cover nine tenths), a second table tells which share of the truths they cover, how wide they are on average, and
+/// their interval score: the width plus 2/(1 − share to cover) times the mean distance of truths outside, small being good.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
@@ -35,6 +39,9 @@ pub struct Evaluate {
     /// Score each prediction on all instants of its own
     #[arg(long)]
     each_on_its_own: bool,
+    /// Let nothing learn on the way; otherwise, what learns does so after each truth has been predicted
+    #[arg(long)]
+    frozen: bool,
 }
 
 impl Evaluate {
@@ -47,6 +54,7 @@ impl Evaluate {
             &self.model,
             Wanted {
                 standard_errors: true,
+                intervals: true,
             },
         )?;
         if let Some(limit) = &self.abs_truth_below {
@@ -56,6 +64,7 @@ impl Evaluate {
         let options = ScoreOptions {
             abs_truth_below: self.abs_truth_below.clone(),
             each_on_its_own: self.each_on_its_own,
+            frozen: self.frozen,
         };
         let mut progress = terminal.progress("evaluating");
         let scores = score(
@@ -179,9 +188,27 @@ fn describe(scores: &Scores) -> String {
         ];
         let cells: Vec<Vec<String>> = rows.iter().map(|row| line(row)).collect();
         text.push_str(&table(&header, &cells));
+        let cells: Vec<Vec<String>> = rows.iter().filter_map(|row| interval(row)).collect();
+        if !cells.is_empty() {
+            let header = ["  interval", "from", "to cover", "covers", "width", "score"];
+            text.push_str(&table(&header, &cells));
+        }
         text.push('\n');
     }
     text
+}
+
+fn interval(score: &Score) -> Option<Vec<String>> {
+    let interval = score.interval.as_ref()?;
+    let percent = |share: f64| format!("{:.1}%", 100.0 * share);
+    Some(vec![
+        format!("  {}", score.output),
+        interval.from.to_owned(),
+        percent(interval.stated),
+        percent(interval.covered),
+        number(interval.width),
+        number(interval.score),
+    ])
 }
 
 fn line(score: &Score) -> Vec<String> {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
+use athermal::core::node::SelectionStep;
 use clap::Args;
 use serde_json::json;
 
@@ -14,8 +15,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit a graph's estimators on recorded data
 ///
-/// Prints for each estimator the rows used and left out, the regressors chosen with their cross-validation scores, the
-/// condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
+/// Prints for each estimator the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
+/// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run.
 #[derive(Debug, Args)]
 #[command(
@@ -36,6 +37,9 @@ pub struct Fit {
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
     #[arg(long, value_name = "MB", default_value_t = 64)]
     memory: usize,
+    /// Tell what else was tried at each step of a selection, and with what score
+    #[arg(long)]
+    candidates: bool,
 }
 
 impl Fit {
@@ -99,7 +103,7 @@ impl Fit {
                 ));
             }
             if !terminal.quiet && !to_stdout {
-                print!("{}", describe(fit));
+                print!("{}", describe(fit, self.candidates));
             }
         }
     }
@@ -131,7 +135,7 @@ pub fn fit_on(
             to_s: seconds(to),
         }),
         ticks: report.ticks,
-        estimators: report.estimators.iter().filter_map(card).collect(),
+        estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
     data::tell(
         terminal,
@@ -142,8 +146,26 @@ pub fn fit_on(
     Ok(report)
 }
 
+/// What is told of a step of a selection.
+fn tell_step(text: &mut String, nth: &str, step: &SelectionStep, candidates: bool) {
+    use std::fmt::Write as _;
+    let folds: Vec<String> = step.folds.iter().map(|r2| format!("{r2:.3}")).collect();
+    let folds = folds.join(" ");
+    let line = format!(
+        "  {nth:>3} {:<38} R² {:.4}  {folds}",
+        step.label(),
+        step.score
+    );
+    let _ = writeln!(text, "{}", line.trim_end());
+    if candidates {
+        for tried in &step.candidates {
+            let _ = writeln!(text, "        {:<37} {:.4}", tried.name, tried.score);
+        }
+    }
+}
+
 /// What is told of one estimator.
-fn describe(fit: &EstimatorFit) -> String {
+fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
     let _ = write!(
@@ -178,14 +200,11 @@ fn describe(fit: &EstimatorFit) -> String {
     let Outcome::Fitted(report) = &fit.outcome else {
         return text;
     };
-    for (step, chosen) in report.selection.iter().enumerate() {
-        let _ = writeln!(
-            text,
-            "  {:>2}  {:<44} R² {:.4}",
-            step + 1,
-            chosen.regressor,
-            chosen.score
-        );
+    for (nth, step) in report.selection.iter().enumerate() {
+        tell_step(&mut text, &format!("{:>2}", nth + 1), step, candidates);
+    }
+    if candidates && let Some(step) = &report.refused {
+        tell_step(&mut text, "not", step, candidates);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {
@@ -220,6 +239,19 @@ fn card(fit: &EstimatorFit) -> Option<EstimatorCard> {
         dropped_candidates: fit.dropped_candidates.clone(),
         report: report.clone(),
     })
+}
+
+/// How many candidates of each step a model keeps: the one taken, and the next best.
+const CANDIDATES_KEPT: usize = 2;
+
+/// A card as a model keeps it.
+fn short_card(fit: &EstimatorFit) -> Option<EstimatorCard> {
+    let mut card = card(fit)?;
+    let report = &mut card.report;
+    for step in report.selection.iter_mut().chain(&mut report.refused) {
+        step.candidates.truncate(CANDIDATES_KEPT);
+    }
+    Some(card)
 }
 
 fn seconds(instant: athermal::Instant) -> f64 {

@@ -14,6 +14,7 @@ mod fit;
 mod init;
 mod new;
 mod nodes;
+mod parameters;
 mod report;
 mod run;
 mod schema;

@@ -5,6 +5,7 @@ use athermal::core::node::{Kind, Read, kind, kinds};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::parameters;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// List the node types, or explain one
@@ -100,27 +101,9 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             "  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on"
         );
     }
-    let empty = serde_json::Map::new();
-    let properties = schema["properties"].as_object().unwrap_or(&empty);
-    let required: Vec<&str> = schema["required"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_str)
-        .collect();
-    for (name, property) in properties {
-        let description = property["description"]
-            .as_str()
-            .unwrap_or_default()
-            .replace('\n', " ");
-        let default = match &property["default"] {
-            Value::Null if required.contains(&name.as_str()) => "; required".to_owned(),
-            Value::Null => String::new(),
-            default => format!("; default {default}"),
-        };
-        println!("  {name} – {}{default}", description.trim_end_matches('.'));
-    }
-    if properties.is_empty() && kind.role != athermal::core::node::RoleName::Estimator {
+    let explained = parameters::explain(&schema);
+    print!("{explained}");
+    if explained.is_empty() && kind.role != athermal::core::node::RoleName::Estimator {
         println!("  none");
     }
 }

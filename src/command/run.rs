@@ -36,6 +36,9 @@ pub struct Run {
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
+    /// Let nothing learn while it runs
+    #[arg(long)]
+    frozen: bool,
     #[command(flatten)]
     swap: swap::Options,
 }
@@ -51,6 +54,7 @@ impl Run {
             return self.run_replaceable(terminal, model);
         }
         let mut engine = model.engine()?;
+        engine.freeze(self.frozen);
         let plan = std::sync::Arc::clone(engine.plan());
         let options = Options {
             lenient: self.lenient,
@@ -85,6 +89,9 @@ impl Run {
         };
         let (mut stepper, mut control) =
             pair(&model, live).map_err(|error| Failure::Request(error.to_string()))?;
+        if self.frozen {
+            stepper.freeze(true);
+        }
         let TimeBase::Column { column, .. } = &model.plan.time;
         let column = column.clone();
         let mut course = swap::Course::new(

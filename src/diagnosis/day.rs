@@ -10,7 +10,7 @@ use athermal_core::engine::Fitted;
 use athermal_core::fit::{FitError, FitOptions, fit};
 use athermal_core::model::Model;
 use athermal_core::recording::{Event, Recording, RecordingError, Rows};
-use athermal_core::score::{Trace, trace};
+use athermal_core::score::{PredictionTrace, Trace, trace};
 use athermal_core::time::{Duration, Instant};
 use serde::Serialize;
 
@@ -65,6 +65,8 @@ pub struct DayScore {
     pub count: usize,
     /// Root mean square error; none without an instant.
     pub rmse: Option<f64>,
+    /// The same of fits on all days but the one predicted, on the same instants: what more days are worth.
+    pub all_others: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of no model.
     pub zero: Option<f64>,
 }
@@ -73,6 +75,14 @@ pub struct DayScore {
 struct Calendar {
     /// Segment and first instant of each day.
     begins: Vec<(u32, Instant)>,
+}
+
+impl DayScore {
+    /// How many times the error of fits on all other days the error is.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        Some(self.rmse? / self.all_others?).filter(|ratio| !ratio.is_nan())
+    }
 }
 
 impl Calendar {
@@ -135,36 +145,41 @@ pub fn days(
         let trace = trace(&model.plan, &fitted, recording, &mut |_, _| {})?;
         Ok(errors(&trace, &calendar))
     };
+    let mut each = Vec::new();
+    for out in 0..count {
+        let errors = run(&|day| day != out)?;
+        each.extend(errors.into_iter().nth(out));
+    }
+    let (plan, of) = (&*model.plan, &observation.trace);
+    let left_out = each.iter().enumerate().map(|(out, errors)| LeftOut {
+        day: out + 1,
+        scores: scores(plan, of, errors, errors),
+    });
+    let left_out = left_out.collect();
     let mut curve = Vec::new();
     for days in numbers {
-        let mut sums = Vec::new();
+        let (mut sums, mut all_others) = (Vec::new(), Vec::new());
         let placings = placings(days, count);
         for &from in &placings {
             let seen = from..from + days;
             let errors = run(&|day| seen.contains(&day))?;
-            let others = errors.iter().enumerate();
-            let others = others.filter(|(day, _)| !seen.contains(day));
-            others.for_each(|(_, day)| add(&mut sums, day));
+            for day in (0..count).filter(|day| !seen.contains(day)) {
+                add(&mut sums, &errors[day]);
+                add(&mut all_others, &each[day]);
+            }
         }
         curve.push(CurvePoint {
             days,
             fits: placings.len(),
-            scores: scores(&model.plan, &observation.trace, &sums),
+            scores: scores(plan, of, &sums, &all_others),
         });
     }
-    let (mut left_out, mut all) = (Vec::new(), Vec::new());
-    for out in 0..count {
-        let errors = run(&|day| day != out)?;
-        add(&mut all, &errors[out]);
-        left_out.push(LeftOut {
-            day: out + 1,
-            scores: scores(&model.plan, &observation.trace, &errors[out]),
-        });
-    }
+    let mut all = Vec::new();
+    each.iter().for_each(|day| add(&mut all, day));
     curve.push(CurvePoint {
         days: count - 1,
         fits: count,
-        scores: scores(&model.plan, &observation.trace, &all),
+        scores: scores(plan, of, &all, &all),
     });
     Ok(Some(Days {
         day_s: day.secs(),
@@ -221,17 +236,19 @@ fn add(sums: &mut Vec<Errors>, more: &[Errors]) {
     }
 }
 
-fn scores(plan: &Plan, trace: &Trace, errors: &[Errors]) -> Vec<DayScore> {
+fn scores(plan: &Plan, trace: &Trace, errors: &[Errors], all_others: &[Errors]) -> Vec<DayScore> {
     let predictions = trace.truths.iter().flat_map(|truth| &truth.predictions);
     let rms =
         |squares: f64, of: &Errors| (of.count > 0).then(|| (squares / of.count as f64).sqrt());
-    let score = |(of, errors): (&athermal_core::score::PredictionTrace, &Errors)| DayScore {
+    let figures = predictions.zip(errors.iter().zip(all_others));
+    let score = |(of, (errors, others)): (&PredictionTrace, (&Errors, &Errors))| DayScore {
         prediction: plan.channels[of.slot].name.clone(),
         count: errors.count,
         rmse: rms(errors.squares, errors),
+        all_others: rms(others.squares, others),
         zero: rms(errors.zero, errors),
     };
-    predictions.zip(errors).map(score).collect()
+    figures.map(score).collect()
 }
 
 fn fit_on(

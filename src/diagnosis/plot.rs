@@ -1,7 +1,7 @@
 //! Decides which pictures a diagnosis has; how one is drawn is decided by [`crate::chart`].
 
 use super::Diagnosis;
-use super::day::{CurvePoint, Days};
+use super::day::{CurvePoint, DayScore, Days};
 use super::lag::{Correlogram, FeatureLags, Lags};
 use super::residual::Residuals;
 use super::response::{Response, Responses};
@@ -118,16 +118,15 @@ fn learning(diagnosis: &Diagnosis, days: &Days) -> Picture {
         let score = |point: &CurvePoint| {
             let mut scores = point.scores.iter();
             let score = scores.find(|score| score.prediction == main.prediction);
-            score.and_then(|score| score.rmse).unwrap_or(f64::NAN)
+            score.and_then(DayScore::ratio).unwrap_or(f64::NAN)
         };
         let y = days.curve.iter().map(score).collect();
         Points::line(nth, &main.prediction, x.clone(), y)
     });
-    let unit = diagnosis.main.first().map(|main| main.unit.clone());
     Picture {
-        title: "Error on other days against days of the fit".to_owned(),
+        title: "Error of fits on some days over that of fits on all others".to_owned(),
         x_label: "days",
-        y_label: unit.unwrap_or_default(),
+        y_label: "times the error of all others".to_owned(),
         points: curve.collect(),
     }
 }

@@ -221,33 +221,19 @@ impl Drawn<'_> {
     }
 
     fn arrows_to(&mut self, node: &PlannedNode, to: usize) {
-        let (gathers, truth, kind) = match &node.role {
+        let kind = match &node.role {
             PlannedRole::Feature {
-                gathers,
-                closes_loops,
-                ..
-            } => {
-                let kind = if *closes_loops {
-                    Flow::Delayed
-                } else {
-                    Flow::Data
-                };
-                (gathers.clone(), None, kind)
-            }
-            PlannedRole::Estimator { gathers, truth, .. } => {
-                (gathers.clone(), Some(truth.slot), Flow::Data)
-            }
-            PlannedRole::Combiner { voters, truth, .. } => {
-                (vec![*voters], truth.map(|truth| truth.slot), Flow::Data)
-            }
+                closes_loops: true, ..
+            } => Flow::Delayed,
+            _ => Flow::Data,
         };
-        for gather in gathers {
+        for gather in node.role.gathers() {
             for entry in &self.plan.gathers[gather].entries {
                 self.arrow(entry.slot, to, kind);
             }
         }
-        if let Some(slot) = truth {
-            self.arrow(slot, to, Flow::Truth);
+        if let Some(truth) = node.role.truth() {
+            self.arrow(truth.slot, to, Flow::Truth);
         }
     }
 

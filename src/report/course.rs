@@ -83,8 +83,9 @@ fn telling(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
     ask_for_reasons(&mut plan);
     for node in &mut plan.nodes {
-        if let PlannedRole::Combiner { weights, .. } = &mut node.role {
-            *weights = node.ports.len() > 1;
+        if let PlannedRole::Combiner { beside, .. } = &mut node.role {
+            let weights = node.ports.iter().find(|(name, _)| *name == "weights");
+            beside.weights = weights.map(|(_, slots)| slots.start);
         }
     }
     plan

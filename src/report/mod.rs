@@ -150,4 +150,5 @@ pub fn gather(
 /// What a model must be loaded with so that a report can tell the noise of the truth.
 pub const WANTED: Wanted = Wanted {
     standard_errors: true,
+    intervals: false,
 };

@@ -146,7 +146,7 @@ fn a_correction_that_the_axis_clips_fools_nobody() {
     let text = format!(
         "schema = 1\nextends = {:?}\nname = \"boastful\"\n\
          [nodes.boast]\ntype = \"scale\"\ninputs.signal = \"rate\"\nfactor = 100.0\n\
-         [nodes.compensate]\ninputs.rate = {{ from = \"boast\", max_age = \"1min\" }}\n\
+         [nodes.compensate]\ninputs.rate = {{ from = \"boast\", max_age = \"1min\" }}\nmax_rate = \"10000 nm/min\"\nmax_slew = \"500 nm/s\"\n\
          [outputs]\nuncorrected = \"uncorrected\"\n",
         graph("die-tester-control")
     );

@@ -19,7 +19,7 @@ fn noise(seed: u32) -> f64 {
 }
 
 /// 2,000 rows, ten seconds apart: two wandering temperatures, and a position that follows them.
-fn recording() -> Table {
+pub(super) fn recording() -> Table {
     let mut table = Table::default();
     let (mut room, mut chuck) = (21.0, 30.0);
     for tick in 0..2000_u32 {

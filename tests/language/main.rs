@@ -8,6 +8,7 @@
 mod workbench;
 
 mod ages;
+mod combiners;
 mod delays;
 mod embargo;
 mod fitting;
@@ -16,6 +17,7 @@ mod lags;
 mod leaks;
 mod samples;
 mod segments;
+mod stacking;
 mod windows;
 
 /// The beginning of a graph of one position and two temperatures, as samples; nodes and outputs follow.

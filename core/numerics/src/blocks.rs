@@ -1,7 +1,7 @@
 //! Training rows as Gram matrices of blocks, in their order. Decides how many rows make a block and when rows are no longer
 //! kept; does not decide what is fitted on them.
 
-use crate::{Gram, NumericsError, contiguous_folds};
+use crate::{FoldRows, Folds, Gram, NumericsError, Split};
 use std::ops::Range;
 
 /// How many rows the smallest block has.
@@ -197,30 +197,54 @@ impl GramBlocks {
         self.kept.is_some()
     }
 
-    /// The statistics of `folds` contiguous folds, in order: exactly those of [`contiguous_folds`] while rows are kept
-    /// (see [`GramBlocks::exact_folds`]), else with each edge moved to the nearest edge of a block.
+    /// The statistics of the rows that train and test each fold: to the row while rows are kept (see
+    /// [`GramBlocks::exact_folds`]), else with edges moved to blocks (see [`Folds::of_blocks`]).
     ///
     /// # Errors
     /// [`NumericsError::Folds`] for fewer than two folds or too few rows or blocks to fill them.
-    pub fn folds(&self, folds: usize) -> Result<Vec<Gram>, NumericsError> {
-        let ranges = contiguous_folds(self.count(), folds)?;
-        if let Some(kept) = &self.kept {
-            return Ok(ranges
-                .into_iter()
-                .map(|range| self.exact_span(kept, range))
-                .collect());
-        }
-        ranges
-            .into_iter()
-            .map(|range| {
-                let snapped = self.snap(range.start)..self.snap(range.end);
-                if snapped.is_empty() {
-                    return Err(NumericsError::Folds {
-                        folds,
-                        rows: self.count(),
-                    });
+    pub fn splits(&self, folds: &Folds) -> Result<Vec<Split>, NumericsError> {
+        let size = if self.exact_folds() {
+            1
+        } else {
+            self.block_rows as u64
+        };
+        let folds = folds.of_blocks(self.count(), size)?;
+        let pieces = self.pieces(&folds);
+        // Training rows are summed, not subtracted from a total, so that a fold of large values leaves no rounding in
+        // the others.
+        let sum = |ranges: &[Range<u64>]| {
+            let mut gram = self.open.emptied();
+            for (piece, part) in &pieces {
+                if ranges.iter().any(|range| range.contains(&piece.start)) {
+                    // Pieces before the first whole chunk may have a shift each.
+                    gram.merge(part).expect("pieces have one width");
                 }
-                Ok(self.block_span(snapped))
+            }
+            gram
+        };
+        let split = |fold: &FoldRows| Split {
+            train: sum(&fold.train),
+            test: sum(std::slice::from_ref(&fold.test)),
+        };
+        Ok(folds.iter().map(split).collect())
+    }
+
+    /// The rows between all neighbouring edges, each looked at once however many folds they are in.
+    fn pieces(&self, folds: &[FoldRows]) -> Vec<(Range<u64>, Gram)> {
+        let ranges = folds
+            .iter()
+            .flat_map(|fold| fold.train.iter().chain([&fold.test]));
+        let mut edges: Vec<u64> = ranges.flat_map(|range| [range.start, range.end]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let pieces = edges.windows(2).map(|edge| edge[0]..edge[1]);
+        pieces
+            .map(|piece| {
+                let gram = match &self.kept {
+                    Some(kept) => self.exact_span(kept, piece.clone()),
+                    None => self.block_span(piece.clone()),
+                };
+                (piece, gram)
             })
             .collect()
     }
@@ -247,17 +271,6 @@ impl GramBlocks {
             at = stop;
         }
         gram
-    }
-
-    /// The nearest edge of a block, the end of all rows among them; the later one when two are as near.
-    fn snap(&self, row: u64) -> u64 {
-        let size = self.block_rows as u64;
-        let nearest = (row + size / 2) / size * size;
-        if nearest <= self.closed_rows() && row < self.count() {
-            nearest
-        } else {
-            self.count()
-        }
     }
 
     fn block_span(&self, rows: Range<u64>) -> Gram {
@@ -369,10 +382,11 @@ mod tests {
     fn kept_rows_give_the_folds_to_the_row() {
         let blocks = filled(1000, DEFAULT_ROW_MEMORY);
         assert!(blocks.exact_folds());
-        let folds = blocks.folds(3).unwrap();
-        for (fold, rows) in folds.iter().zip([0..334, 334..667, 667..1000]) {
-            assert_near(fold, &direct(rows));
+        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
+        for (split, rows) in splits.iter().zip([0..334, 334..667, 667..1000]) {
+            assert_near(&split.test, &direct(rows));
         }
+        assert_near(&splits[2].train, &direct(0..667));
         assert_near(&blocks.total(), &direct(0..1000));
     }
 
@@ -381,10 +395,11 @@ mod tests {
         let blocks = filled(2000, 0);
         assert!(!blocks.exact_folds());
         assert!(blocks.rows().is_none());
-        let folds = blocks.folds(3).unwrap();
-        for (fold, rows) in folds.iter().zip([0..768, 768..1280, 1280..2000]) {
-            assert_near(fold, &direct(rows));
+        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
+        for (split, rows) in splits.iter().zip([0..768, 768..1280, 1280..2000]) {
+            assert_near(&split.test, &direct(rows));
         }
+        assert_near(&splits[0].train, &direct(768..2000));
     }
 
     #[test]
@@ -401,7 +416,8 @@ mod tests {
         assert!(blocks.blocks() <= 1025);
         assert_eq!(blocks.block_rows(), 512);
         assert_near(&blocks.total(), &direct(0..rows));
-        let counted: u64 = blocks.folds(7).unwrap().iter().map(Gram::count).sum();
+        let splits = blocks.splits(&Folds::contiguous(7)).unwrap();
+        let counted: u64 = splits.iter().map(|split| split.test.count()).sum();
         assert_eq!(counted, rows);
     }
 
@@ -416,8 +432,25 @@ mod tests {
 
     #[test]
     fn too_few_blocks_for_the_folds_are_refused_rather_than_empty() {
-        assert!(filled(300, 0).folds(3).is_err());
-        assert!(filled(300, DEFAULT_ROW_MEMORY).folds(3).is_ok());
+        let thirds = Folds::contiguous(3);
+        assert!(filled(300, 0).splits(&thirds).is_err());
+        assert!(filled(300, DEFAULT_ROW_MEMORY).splits(&thirds).is_ok());
+    }
+
+    #[test]
+    fn a_gap_is_in_neither_part_of_a_split() {
+        let folds = Folds::Blocked {
+            folds: 2,
+            gap: 10,
+            embargo: 20,
+        };
+        let exact = filled(1500, DEFAULT_ROW_MEMORY).splits(&folds).unwrap();
+        assert_near(&exact[0].train, &direct(780..1500));
+        assert_near(&exact[1].train, &direct(0..740));
+        let in_blocks = filled(1500, 0).splits(&folds).unwrap();
+        assert_near(&in_blocks[0].test, &direct(0..768));
+        assert_near(&in_blocks[0].train, &direct(1024..1500));
+        assert_near(&in_blocks[1].train, &direct(0..512));
     }
 
     #[test]

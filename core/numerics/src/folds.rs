@@ -1,6 +1,7 @@
 //! How rows are cut for cross-validation. Decides edges and which rows train and test; does not decide what is scored.
 
 use crate::{Gram, NumericsError};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The statistics of the rows that train and of the rows that test one fold.
@@ -12,55 +13,127 @@ pub struct Split {
     pub test: Gram,
 }
 
-/// The row ranges of `folds` contiguous folds, the first `rows % folds` of which have one row more (`KFold` of scikit-learn
-/// without shuffling).
-///
-/// # Errors
-/// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds.
-pub fn contiguous_folds(rows: u64, folds: usize) -> Result<Vec<Range<u64>>, NumericsError> {
-    let k = folds as u64;
-    if k < 2 || rows < k {
-        return Err(NumericsError::Folds { folds, rows });
-    }
-    let mut start = 0;
-    Ok((0..k)
-        .map(|fold| {
-            let end = start + rows / k + u64::from(fold < rows % k);
-            let range = start..end;
-            start = end;
-            range
-        })
-        .collect())
+/// How rows in the order of time are cut into pairs of training and test rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Folds {
+    /// Each of `folds` contiguous parts is the test once; the rows before and after it train, apart from `gap` rows on
+    /// either side and `embargo` more after it (López de Prado 2018, section 7.4). Without both this is `KFold` of
+    /// scikit-learn.
+    Blocked {
+        /// How many parts, 2 or more.
+        folds: usize,
+        /// Rows left out on either side of the test, since windows that reach across the edge share measurements.
+        gap: u64,
+        /// Rows left out after the test and its gap, since what follows remembers it.
+        embargo: u64,
+    },
+    /// The last `folds` of `folds + 1` equal parts are the tests, and the rows before each but for `gap` train
+    /// (`TimeSeriesSplit` of scikit-learn).
+    Expanding {
+        /// How many tests, 2 or more.
+        folds: usize,
+        /// Rows left out between training and test.
+        gap: u64,
+    },
 }
 
-/// Each fold once as the test, the others as training rows. Training rows are summed, not subtracted from a total, so
-/// that a fold of large values leaves no rounding in the others.
-///
-/// # Errors
-/// [`NumericsError::Folds`] for fewer than two folds or an empty one, [`NumericsError::Width`] when widths differ.
-pub fn leave_one_out(folds: &[Gram]) -> Result<Vec<Split>, NumericsError> {
-    if folds.len() < 2 || folds.iter().any(|fold| fold.count() == 0) {
-        return Err(NumericsError::Folds {
-            folds: folds.len(),
-            rows: folds.iter().map(Gram::count).sum(),
-        });
+/// The rows of one fold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoldRows {
+    /// Those that train: one range or two.
+    pub train: Vec<Range<u64>>,
+    /// Those that test.
+    pub test: Range<u64>,
+}
+
+impl Folds {
+    /// Contiguous parts without gap or embargo.
+    pub fn contiguous(folds: usize) -> Self {
+        Self::Blocked {
+            folds,
+            gap: 0,
+            embargo: 0,
+        }
     }
-    folds
-        .iter()
-        .enumerate()
-        .map(|(left_out, test)| {
-            let mut train = Gram::new(test.width());
-            for (index, fold) in folds.iter().enumerate() {
-                if index != left_out {
-                    train.merge(fold)?;
-                }
-            }
-            Ok(Split {
-                train,
-                test: test.clone(),
+
+    /// How many folds there are.
+    pub fn count(&self) -> usize {
+        match *self {
+            Self::Blocked { folds, .. } | Self::Expanding { folds, .. } => folds,
+        }
+    }
+
+    /// The folds of so many rows.
+    ///
+    /// # Errors
+    /// See [`Folds::of_blocks`].
+    pub fn of(&self, rows: u64) -> Result<Vec<FoldRows>, NumericsError> {
+        self.of_blocks(rows, 1)
+    }
+
+    /// The same where rows come in blocks of `size` that cannot be cut: edges of tests move to the nearest edge of a
+    /// block, and gaps become no smaller than stated.
+    ///
+    /// # Errors
+    /// [`NumericsError::Folds`] for fewer than two folds or a fold without a row to test or to train on.
+    pub fn of_blocks(&self, rows: u64, size: u64) -> Result<Vec<FoldRows>, NumericsError> {
+        let folds = self.count();
+        let refused = NumericsError::Folds { folds, rows };
+        let parts = folds as u64 + u64::from(matches!(self, Self::Expanding { .. }));
+        if folds < 2 || rows < parts {
+            return Err(refused);
+        }
+        let snap = |row: u64| match (row + size / 2) / size * size {
+            nearest if nearest <= rows / size * size && row < rows => nearest,
+            _ => rows,
+        };
+        let cut: Vec<FoldRows> = self
+            .tests(rows)
+            .into_iter()
+            .map(|test| snap(test.start)..snap(test.end))
+            .map(|test| FoldRows {
+                train: self.train(&test, rows, size),
+                test,
             })
-        })
-        .collect()
+            .collect();
+        if cut
+            .iter()
+            .any(|fold| fold.test.is_empty() || fold.train.is_empty())
+        {
+            return Err(refused);
+        }
+        Ok(cut)
+    }
+
+    fn tests(&self, rows: u64) -> Vec<Range<u64>> {
+        match *self {
+            Self::Blocked { folds, .. } => {
+                let k = folds as u64;
+                let start = |fold: u64| fold * (rows / k) + fold.min(rows % k);
+                (0..k).map(|fold| start(fold)..start(fold + 1)).collect()
+            }
+            Self::Expanding { folds, .. } => {
+                let size = rows / (folds as u64 + 1);
+                let start = |left: u64| rows - left * size;
+                let left = (1..=folds as u64).rev();
+                left.map(|left| start(left)..start(left - 1)).collect()
+            }
+        }
+    }
+
+    fn train(&self, test: &Range<u64>, rows: u64, size: u64) -> Vec<Range<u64>> {
+        let before = |gap: u64| 0..test.start.saturating_sub(gap) / size * size;
+        let both = match *self {
+            Self::Blocked { gap, embargo, .. } => {
+                let left_out = test.end.saturating_add(gap).saturating_add(embargo);
+                let start = left_out.min(rows).div_ceil(size).saturating_mul(size);
+                vec![before(gap), start.min(rows)..rows]
+            }
+            Self::Expanding { gap, .. } => vec![before(gap)],
+        };
+        both.into_iter().filter(|range| !range.is_empty()).collect()
+    }
 }
 
 #[cfg(test)]
@@ -69,27 +142,74 @@ mod tests {
     use crate::oracle;
 
     #[test]
-    fn contiguous_folds_have_the_edges_of_the_oracle() {
+    fn folds_have_the_edges_of_the_oracle() {
         let Some(table) = oracle::table("cv_splits/splits.csv") else {
             return;
         };
-        let mut compared = 0;
+        let mut compared = [0, 0];
         for row in &table.records {
-            if row[0] != "KFold" {
+            let number = |column: usize| row[column].parse::<i64>().unwrap();
+            let (rows, folds) = (number(1) as u64, number(2) as usize);
+            // Neither the size of a test nor the most rows to train on can be stated here.
+            if number(4) >= 0 || number(5) >= 0 {
                 continue;
             }
-            let number = |column: usize| row[column].parse::<u64>().unwrap();
-            let folds = contiguous_folds(number(1), number(2) as usize).unwrap();
-            assert_eq!(folds[number(6) as usize], number(9)..number(10));
-            compared += 1;
+            let how = if row[0] == "KFold" {
+                Folds::contiguous(folds)
+            } else {
+                let gap = number(3).max(0) as u64;
+                Folds::Expanding { folds, gap }
+            };
+            let found = &how.of(rows).unwrap()[number(6) as usize];
+            assert_eq!(found.test, number(9) as u64..number(10) as u64);
+            let expanding = matches!(how, Folds::Expanding { .. });
+            if expanding {
+                assert_eq!(found.train, [number(7) as u64..number(8) as u64]);
+            }
+            compared[usize::from(expanding)] += 1;
         }
-        assert!(compared >= 3);
+        assert!(compared[0] >= 3 && compared[1] >= 3, "{compared:?}");
     }
 
     #[test]
-    fn fewer_rows_than_folds_are_refused() {
-        assert!(contiguous_folds(2, 3).is_err());
-        assert!(contiguous_folds(10, 1).is_err());
-        assert!(contiguous_folds(3, 3).is_ok());
+    fn gap_and_embargo_leave_rows_out_on_the_right_sides() {
+        let how = Folds::Blocked {
+            folds: 4,
+            gap: 3,
+            embargo: 5,
+        };
+        let folds = how.of(100).unwrap();
+        assert_eq!(folds[0].train, [33..100]);
+        assert_eq!(folds[1].train, [0..22, 58..100]);
+        assert_eq!(folds[3].train, [0..72]);
+        assert_eq!(folds[3].test, 75..100);
+    }
+
+    #[test]
+    fn a_gap_never_shrinks_where_edges_move_to_blocks() {
+        let how = Folds::Blocked {
+            folds: 2,
+            gap: 1,
+            embargo: 0,
+        };
+        let folds = how.of_blocks(1000, 100).unwrap();
+        assert_eq!(folds[0].test, 0..500);
+        assert_eq!(folds[0].train, [600..1000]);
+        assert_eq!(folds[1].train, [0..400]);
+    }
+
+    #[test]
+    fn folds_without_a_row_are_refused() {
+        assert!(Folds::contiguous(3).of(2).is_err());
+        assert!(Folds::contiguous(1).of(10).is_err());
+        assert!(Folds::contiguous(3).of(3).is_ok());
+        let wide = Folds::Blocked {
+            folds: 2,
+            gap: u64::MAX,
+            embargo: u64::MAX,
+        };
+        assert!(wide.of(10).is_err());
+        let late = Folds::Expanding { folds: 3, gap: 25 };
+        assert!(late.of(100).is_err());
     }
 }

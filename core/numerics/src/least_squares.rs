@@ -1,13 +1,16 @@
 //! Ordinary and ridge least squares on chosen columns. Decides which method solves them, how well conditioned they are and
 //! what is done when they are not; does not decide which columns to use.
 
+use crate::checks::{check_columns, check_parameter, check_penalty, check_scale};
 use crate::normal_equations::{Problem, condition_of, nearly_dependent};
 use crate::{Gram, NumericsError, Rows};
 use serde::{Deserialize, Serialize};
 
-/// Above this condition number of the standardised design the Gram matrix (whose condition number is its square) is not
-/// trusted.
-pub const DEFAULT_CONDITION_BOUND: f64 = 1e6;
+/// Above this condition number of the standardised design the rows are solved instead of their Gram matrix, whose condition
+/// number is its square: at the bound, coefficients from the Gram matrix are exact to some 1e-9.
+pub const DEFAULT_CONDITION_BOUND: f64 = 1e3;
+/// Above this condition number columns are called collinear; without their rows they are solved with a tiny ridge.
+pub const SINGULAR_BOUND: f64 = 1e6;
 /// Directions whose singular value is below this share of the largest are left out of a minimum-norm solution.
 pub const DEFAULT_RCOND: f64 = 1e-10;
 
@@ -19,7 +22,8 @@ pub struct LeastSquares {
     pub alpha: f64,
     /// Whether there is an intercept, which is never penalised.
     pub intercept: bool,
-    /// The largest condition number of the (penalised) standardised design for which the Gram matrix is solved.
+    /// The largest condition number of the (penalised) standardised design for which the Gram matrix is solved while there
+    /// are rows; see [`DEFAULT_CONDITION_BOUND`].
     pub condition_bound: f64,
     /// For the minimum-norm solution, see [`DEFAULT_RCOND`].
     pub rcond: f64,
@@ -62,7 +66,7 @@ pub struct LinearFit {
     pub method: Method,
     /// Columns without variance (without an intercept: zero throughout). Their coefficient is 0.
     pub constant: Vec<usize>,
-    /// Where the condition number passes the bound: the columns that are nearly a combination of those before them.
+    /// Where the condition number passes [`SINGULAR_BOUND`]: the columns that are nearly a combination of those before them.
     /// Their coefficients are not determined by the rows, only by the method.
     pub collinear: Vec<usize>,
 }
@@ -128,8 +132,8 @@ impl LeastSquares {
             constant: problem.constant.iter().map(|&k| columns[k]).collect(),
             collinear: Vec::new(),
         };
-        if fit.condition > self.condition_bound {
-            fit.collinear = nearly_dependent(&problem.standard, self.condition_bound)
+        if fit.condition > SINGULAR_BOUND {
+            fit.collinear = nearly_dependent(&problem.standard, SINGULAR_BOUND)
                 .into_iter()
                 .map(|k| columns[problem.active[k]])
                 .collect();
@@ -140,7 +144,11 @@ impl LeastSquares {
         } else {
             fit.condition
         };
-        let direct = (solved <= self.condition_bound)
+        let bound = match rows {
+            Some(_) => self.condition_bound,
+            None => SINGULAR_BOUND,
+        };
+        let direct = (solved <= bound)
             .then(|| penalised.solve(&problem.target, 0.0))
             .flatten();
         let scaled = match (direct, rows) {
@@ -156,7 +164,7 @@ impl LeastSquares {
                 solution.coefficients
             }
             (None, None) => {
-                let alpha = penalised.order() as f64 / self.condition_bound.powi(2);
+                let alpha = penalised.order() as f64 / SINGULAR_BOUND.powi(2);
                 fit.method = Method::TinyRidge { alpha };
                 penalised
                     .solve(&problem.target, alpha)
@@ -184,25 +192,12 @@ impl LeastSquares {
         scales: &[f64],
         rows: Option<Rows<'_>>,
     ) -> Result<(), NumericsError> {
-        let parameter = |name, value, fine, allowed| {
-            if fine {
-                Ok(())
-            } else {
-                Err(NumericsError::Parameter {
-                    name,
-                    value,
-                    allowed,
-                })
-            }
-        };
-        let alpha = self.alpha;
-        let fine = alpha >= 0.0 && alpha.is_finite();
-        parameter("alpha", alpha, fine, "finite and not negative")?;
+        check_penalty(self.alpha)?;
         let bound = self.condition_bound;
-        let fine = (1.0..=1e7).contains(&bound);
-        parameter("condition_bound", bound, fine, "from 1 to 1e7")?;
+        let fine = (1.0..=SINGULAR_BOUND).contains(&bound);
+        check_parameter("condition_bound", bound, fine, "from 1 to 1e6")?;
         let fine = (0.0..1.0).contains(&self.rcond);
-        parameter("rcond", self.rcond, fine, "from 0 to below 1")?;
+        check_parameter("rcond", self.rcond, fine, "from 0 to below 1")?;
         let width = gram.width();
         if scales.len() != width {
             return Err(NumericsError::Width {
@@ -210,17 +205,9 @@ impl LeastSquares {
                 found: scales.len(),
             });
         }
-        let mut seen = vec![false; width];
+        check_columns(columns, width)?;
         for &column in columns {
-            match seen.get_mut(column) {
-                None => return Err(NumericsError::Column { column, width }),
-                Some(true) => return Err(NumericsError::RepeatedColumn { column }),
-                Some(mark) => *mark = true,
-            }
-            let scale = scales[column];
-            if !(scale > 0.0 && scale.is_finite()) {
-                return Err(NumericsError::Scale { column, scale });
-            }
+            check_scale(column, scales[column])?;
         }
         if !gram.is_finite() {
             return Err(NumericsError::NotFinite);
@@ -426,6 +413,93 @@ mod tests {
             .unwrap();
         assert_eq!(fit.intercept, gram.means()[4]);
         assert!(fit.residual_sum_of_squares > 0.0);
+    }
+
+    /// Seven days at 1 Hz would be 604,800 rows; an hour of them hangs together as much. A temperature that follows the room
+    /// through a first-order lag, and 45 lags of it and of its neighbour.
+    fn lagged(row_memory: usize) -> GramBlocks {
+        let (mut slow, mut slower) = (0.0, 0.0);
+        let mut past = [[0.0; 23]; 2];
+        let mut blocks = GramBlocks::with_row_memory(46, row_memory);
+        let mut noise = 1_u64;
+        let mut uniform = || {
+            noise = noise
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for t in 0..3600 {
+            let room = 21.0 + (f64::from(t) / 600.0).sin() + 0.3 * uniform();
+            slow += (room - slow) / 20.0;
+            slower += (slow - slower) / 60.0;
+            for (line, now) in past.iter_mut().zip([slow, slower]) {
+                line.rotate_right(1);
+                line[0] = now + 0.001 * uniform();
+            }
+            if t < 600 {
+                continue;
+            }
+            let row: Vec<f64> = past.iter().flatten().copied().collect();
+            let y = 3.0 * (row[0] - row[10]) - 2.0 * row[30] + 0.01 * uniform();
+            blocks.push(&row, y);
+        }
+        blocks
+    }
+
+    #[test]
+    fn lagged_regressors_at_one_hertz_have_the_coefficients_of_singular_values() {
+        let kept = lagged(1 << 24);
+        let gram = kept.total();
+        let scales = Standardization::of(&gram).scales;
+        let columns: Vec<usize> = (0..46).collect();
+        let fit = LeastSquares::ordinary().solve(&gram, &columns, &scales, kept.rows());
+        let fit = fit.unwrap();
+        assert!(
+            fit.condition > 1e3 && fit.condition < 1e6,
+            "{}",
+            fit.condition
+        );
+        assert_eq!(fit.collinear, Vec::<usize>::new());
+        let expected = by_singular_values(&kept, &gram.means(), &scales);
+        assert_relative(&fit.coefficients, &expected, 1e-8);
+        // Where the Gram matrix is trusted, it is as good.
+        let ridge = LeastSquares::ridge(1.0);
+        let direct = ridge.solve(&gram, &columns, &scales, kept.rows()).unwrap();
+        assert_eq!(direct.method, Method::Cholesky);
+        let strict = LeastSquares {
+            condition_bound: 1.0,
+            ..ridge
+        };
+        let from_rows = strict.solve(&gram, &columns, &scales, kept.rows()).unwrap();
+        assert!(matches!(from_rows.method, Method::Svd { rank: 46 }));
+        assert_relative(&direct.coefficients, &from_rows.coefficients, 1e-8);
+    }
+
+    /// The coefficients by the singular values of all rows at once.
+    fn by_singular_values(blocks: &GramBlocks, means: &[f64], scales: &[f64]) -> Vec<f64> {
+        use faer::Mat;
+        let rows: Vec<(&[f64], f64, f64)> = blocks.rows().unwrap().iter().collect();
+        let width = scales.len();
+        let x = Mat::from_fn(rows.len(), width, |i, j| {
+            (rows[i].0[j] - means[j]) / scales[j]
+        });
+        let y = Mat::from_fn(rows.len(), 1, |i, _| rows[i].1 - means[width]);
+        let svd = x.thin_svd().unwrap();
+        let along = svd.U().transpose() * y;
+        let values = svd.S().column_vector();
+        let scaled = Mat::from_fn(width, 1, |k, _| along[(k, 0)] / values[k]);
+        let weights = svd.V() * scaled;
+        (0..width).map(|j| weights[(j, 0)] / scales[j]).collect()
+    }
+
+    fn assert_relative(found: &[f64], wanted: &[f64], tolerance: f64) {
+        let size = wanted.iter().fold(0.0_f64, |size, b| size.max(b.abs()));
+        for (found, wanted) in found.iter().zip(wanted) {
+            assert!(
+                (found - wanted).abs() < tolerance * size,
+                "{found} {wanted}"
+            );
+        }
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, stochastic gradients, correlations.
+//! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, recursions, correlations; the Kalman
+//! filter of structural models; changes of a mean.
 //!
 //! Decides how rows of regressors become statistics and how statistics become coefficients. Does not decide where rows
 //! come from, what a regressor is called or what its unit is. Everything runs on the calling thread, and the same rows
@@ -23,33 +24,56 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod blocks;
+mod change;
+mod checks;
 mod collinearity;
 mod correlation;
+mod elastic_net;
 mod error;
-mod fold_state;
 mod folds;
 mod gram;
+mod huber;
+mod kalman;
 mod least_squares;
+mod non_negative;
 mod normal_equations;
 mod orthogonal;
+mod penalty;
+mod prediction_variance;
+mod rls;
 mod scaler;
 mod score;
 mod selection;
 mod sgd;
 
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
+pub use change::{Adwin, AdwinOptions, MeanChange, PageHinkley, PageHinkleyOptions};
 pub use collinearity::Collinearity;
 pub use correlation::{
     LjungBox, NORMAL_95, autocorrelation, autocorrelation_errors, chi_squared_tail,
     cross_correlation, cross_correlation_error, ljung_box,
 };
+pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;
-pub use folds::{Split, contiguous_folds, leave_one_out};
+pub use folds::{FoldRows, Folds, Split};
 pub use gram::Gram;
-pub use least_squares::{DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method};
+pub use huber::{Huber, HuberFit};
+pub use kalman::{
+    Followed, Forecast, Innovation, Kalman, Passage, Series, Structural, follow, most_likely,
+};
+pub use least_squares::{
+    DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
+};
+pub use non_negative::non_negative_least_squares;
+pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
+pub use prediction_variance::PredictionVariance;
+pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use scaler::{Standardization, Standardizer};
 pub use score::{Score, ScoreAccumulator};
-pub use selection::{CandidateScore, ForwardSelection, Selection, SelectionScore, SelectionStep};
+pub use selection::{
+    CandidateScore, Candidates, Change, Direction, Search, Selection, SelectionScore,
+    SelectionStep, Smallest, Start, Stepwise, StepwiseSelection, StepwiseStep,
+};
 pub use sgd::{LearningRate, Sgd, SgdOptions};
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! singular they are; does not decide what is done then.
 
 use crate::orthogonal::Triangle;
+use crate::prediction_variance::inverse_of_factor;
 use crate::{Gram, NumericsError, Rows};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -14,7 +15,7 @@ pub(crate) struct Problem {
     scales: Vec<f64>,
     intercept: bool,
     /// `Xᵀ X`, scaled.
-    gram: Mat<f64>,
+    pub(crate) gram: Mat<f64>,
     /// `Xᵀ y`, scaled.
     pub(crate) target: Vec<f64>,
     /// `yᵀ y`.
@@ -108,6 +109,20 @@ impl Equilibrated {
 
     pub(crate) fn order(&self) -> usize {
         self.roots.len()
+    }
+
+    /// `W` with `WᵀW` the inverse of the matrix as it was before it was brought to a unit diagonal, with `alpha` added to
+    /// that; nothing when that is not positive definite.
+    pub(crate) fn inverse_root(&self, alpha: f64) -> Option<Mat<f64>> {
+        let mut matrix = self.matrix.clone();
+        for i in 0..self.order() {
+            matrix[(i, i)] += alpha;
+        }
+        let inverse = inverse_of_factor(&matrix)?;
+        let order = self.order();
+        Some(Mat::from_fn(order, order, |i, j| {
+            inverse[(i, j)] / self.roots[j]
+        }))
     }
 
     /// Solves with `alpha` added to the unit diagonal; nothing when that is not positive definite.

@@ -9,6 +9,16 @@ pub(crate) struct Table {
 }
 
 impl Table {
+    pub(crate) fn parse(text: &str) -> Self {
+        let mut lines = text
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+        Self {
+            header: lines.next().unwrap(),
+            records: lines.collect(),
+        }
+    }
+
     /// All records as numbers, NaN where a field is empty or text.
     pub(crate) fn numbers(&self) -> Vec<Vec<f64>> {
         self.records
@@ -44,12 +54,16 @@ pub(crate) fn text(file: &str) -> Option<String> {
 
 /// A CSV file under `oracles/`; see [`text`].
 pub(crate) fn table(file: &str) -> Option<Table> {
-    let text = text(file)?;
-    let mut lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    Some(Table {
-        header: lines.next().unwrap(),
-        records: lines.collect(),
-    })
+    text(file).map(|text| Table::parse(&text))
+}
+
+/// The text of a file under this project's own `tests/oracles/`.
+pub(crate) fn own_text(file: &str) -> String {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles");
+    std::fs::read_to_string(root.join(file)).unwrap()
+}
+
+/// A CSV file under this project's own `tests/oracles/`.
+pub(crate) fn own_table(file: &str) -> Table {
+    Table::parse(&own_text(file))
 }

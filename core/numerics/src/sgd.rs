@@ -157,6 +157,19 @@ impl Sgd {
         }
     }
 
+    /// Goes on with other options.
+    #[must_use]
+    pub fn with(mut self, options: SgdOptions) -> Self {
+        self.options = options;
+        self
+    }
+
+    /// How the model learns.
+    #[must_use]
+    pub fn options(&self) -> SgdOptions {
+        self.options
+    }
+
     /// The weights, one per regressor.
     pub fn weights(&self) -> &[f64] {
         &self.weights
@@ -218,6 +231,38 @@ mod tests {
             assert!((model.intercept() - numbers[10]).abs() < 1e-9);
         }
         assert!(expected.records.len() >= 6);
+    }
+
+    #[test]
+    fn learning_row_by_row_follows_the_online_oracle() {
+        let Some(input) = oracle::table("online_river/input.csv") else {
+            return;
+        };
+        let expected = oracle::table("online_river/expected.csv").unwrap();
+        let mut scaler = crate::Standardizer::new(3);
+        // The library steps down the squared error where this steps down its half: 0.05 and 1e-3 are there what these are here.
+        let options = SgdOptions {
+            alpha: 0.5e-3,
+            rate: LearningRate::Constant { eta0: 0.1 },
+        };
+        let mut model = Sgd::new(3, options).unwrap();
+        let close = |found: f64, wanted: f64| {
+            assert!(
+                (found - wanted).abs() <= 1e-8 * wanted.abs().max(1.0),
+                "{found} {wanted}"
+            );
+        };
+        for (row, expected) in input.numbers().iter().zip(expected.numbers()) {
+            let mut z = row[..3].to_vec();
+            scaler.partial_fit(&z);
+            scaler.standardization().apply(&mut z);
+            model.step(&z, row[3]);
+            for (found, wanted) in model.weights().iter().zip(&expected[2..5]) {
+                close(*found, *wanted);
+            }
+            close(model.intercept(), expected[5]);
+        }
+        assert_eq!(expected.records.len(), 300);
     }
 
     #[test]

@@ -1,26 +1,39 @@
 //! The vote that weighs each estimator by its recent error.
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
-use athermal_core::time::{Duration, Instant};
+use std::cell::RefCell;
+
+use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::errors::Errors;
+use crate::errors::{ByErrors, Errors, Rule};
+use crate::memory::Memory;
+use crate::share::{raise, shrink};
 
 /// Auto-weighted voting: each voter counts by its recent root mean square error.
 ///
 /// `ŷ = Σ w_i ŷ_i` with `w_i ∝ RMSE_i^(−power)`, normalised, over the truths that arrived within `memory`. Only truths
 /// whose window does not overlap the predicted one count. A voter without errors in memory takes the mean weight of the
 /// others; if no voter has any, all weights are equal. A voter without a prediction drops out and the rest are
-/// renormalised, so that the vote goes on when a sensor dies.
+/// renormalised, so that the vote goes on when a sensor dies. The port `weights` shows them.
+///
+/// Recent errors are few and tell of the voters only roughly: `shrinkage` draws the weights towards equal ones (after Stock and Watson
+/// 2004), `(1 − shrinkage) · w_i + shrinkage / n` of `n` voters that are there, and `floor` then lifts every weight to at least that
+/// much, at the cost of the larger ones.
+///
+/// Where all voters tell their standard deviation, the port `deviation` is that of
+/// their mixture, `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)` (Hoeting, Madigan, Raftery and Volinsky 1999): rather too large than too
+/// small, since it takes one of the voters to be right.
 ///
 /// After Mandelli, Dankwart and Napoli, section 3.4, whose printed formula `(RMSE_i / Σ RMSE_j)²` favours the worst voter;
 /// it is there for comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AutoWeighted {
-    /// How long an error is remembered, counted from the arrival of its truth.
-    pub memory: Duration,
+    /// How long an error is remembered, counted from the arrival of its truth: `"15min"`, `{ truths = 12 }`, or ever less by
+    /// `{ half_life = "15min" }`.
+    pub memory: Memory,
     /// How strongly errors count: 0 not at all, 2 as inverse variances do; at most 16.
     #[serde(default = "two")]
     #[schemars(range(min = 0.0, max = 16.0))]
@@ -28,6 +41,14 @@ pub struct AutoWeighted {
     /// How errors become weights.
     #[serde(default)]
     pub weights: Weighting,
+    /// How far the weights are drawn towards equal ones: 0 not at all, 1 all the way.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub shrinkage: f64,
+    /// The least weight of a voter that is there, 0 to 1; where that is more than an equal share, all weights are equal.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub floor: f64,
 }
 
 fn two() -> f64 {
@@ -58,21 +79,22 @@ impl Combiner for AutoWeighted {
     }
 
     fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        if self.memory <= Duration::ZERO {
-            mistakes.push(Mistake::at(
-                "memory",
-                format!(
-                    "`memory` is {} and must be longer than nothing",
-                    self.memory
-                ),
-            ));
-        }
+        let mut mistakes = self.memory.mistakes();
         if !(0.0..=16.0).contains(&self.power) {
             mistakes.push(Mistake::at(
                 "power",
                 format!("`power` is {} and must be from 0 to 16", self.power),
             ));
+        }
+        for (name, value) in [("shrinkage", self.shrinkage), ("floor", self.floor)] {
+            if !(0.0..=1.0).contains(&value) {
+                let message = format!("`{name}` is {value} and must be from 0 to 1");
+                mistakes.push(Mistake::at(name, message));
+            } else if value > 0.0 && self.weights == Weighting::AsPrintedRaw {
+                let message = format!("`{name}` is for weights that add up to 1");
+                let help = "leave it out, or use `weights = \"as_printed\"`";
+                mistakes.push(Mistake::at(name, message).help(help));
+            }
         }
         mistakes
     }
@@ -82,44 +104,45 @@ impl Combiner for AutoWeighted {
     }
 
     fn memory(&self) -> Duration {
-        self.memory
+        self.memory.longest()
     }
 
     fn build(&self, voters: usize) -> Box<dyn Combine> {
-        Box::new(Weigher {
+        let weigher = Weigher {
             parameters: self.clone(),
-            errors: Errors::new(voters, self.memory),
-        })
+            room: RefCell::new(vec![0.0; voters]),
+        };
+        Box::new(ByErrors::new(weigher, voters, self.memory))
     }
 }
 
 /// Weighs votes by the errors in memory.
 struct Weigher {
     parameters: AutoWeighted,
-    errors: Errors,
+    /// Room for the weights.
+    room: RefCell<Vec<f64>>,
+}
+
+/// The mean squares of the voters that are there and known.
+fn known<'a>(errors: &'a Errors, votes: Votes<'a>) -> impl Iterator<Item = f64> + 'a {
+    votes
+        .present()
+        .filter_map(|(voter, _)| errors.means()[voter])
 }
 
 impl Weigher {
-    /// The mean squares of the voters that are there and known.
-    fn known<'a>(&'a self, votes: Votes<'a>) -> impl Iterator<Item = f64> + 'a {
-        votes
-            .present()
-            .filter_map(|(voter, _)| self.errors.means()[voter])
-    }
-
-    /// Gives each vote that is there its weight, not yet normalised; whether any of the voters is known.
-    fn weigh(&self, votes: Votes<'_>, mut give: impl FnMut(usize, f64, f64)) -> bool {
+    /// Gives each vote that is there its weight; what they are to be divided by.
+    fn weigh(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) -> f64 {
         let (power, form) = (self.parameters.power, self.parameters.weights);
         // Relative to the best voter, so that nothing over- or underflows; an error of exactly zero counts as the smallest
         // number there is.
-        let best = self
-            .known(votes)
+        let best = known(errors, votes)
             .fold(f64::INFINITY, f64::min)
             .max(f64::MIN_POSITIVE);
         let total: f64 = match form {
             Weighting::InversePower => 0.0,
             Weighting::AsPrinted | Weighting::AsPrintedRaw => {
-                self.known(votes).map(f64::sqrt).sum()
+                known(errors, votes).map(f64::sqrt).sum()
             }
         };
         let weight = |mean_square: f64| match form {
@@ -136,71 +159,47 @@ impl Weigher {
             }
             Weighting::AsPrinted | Weighting::AsPrintedRaw => 1.0,
         };
-        let (sum, count) = self.known(votes).fold((0.0, 0.0), |(sum, count), known| {
+        let (sum, count) = known(errors, votes).fold((0.0, 0.0), |(sum, count), known| {
             (sum + weight(known), count + 1.0)
         });
         let of_unknown = if count > 0.0 { sum / count } else { 1.0 };
-        for (voter, vote) in votes.present() {
-            give(
-                voter,
-                vote,
-                self.errors.means()[voter].map_or(of_unknown, weight),
-            );
+        let mut total = 0.0;
+        for (voter, _) in votes.present() {
+            weights[voter] = errors.means()[voter].map_or(of_unknown, weight);
+            total += weights[voter];
         }
-        count > 0.0
-    }
-
-    /// Whether weights stay as they are rather than add up to one.
-    fn is_raw(&self, any_known: bool) -> bool {
-        self.parameters.weights == Weighting::AsPrintedRaw && any_known
+        let AutoWeighted {
+            shrinkage, floor, ..
+        } = self.parameters;
+        if form == Weighting::AsPrintedRaw && count > 0.0 {
+            return 1.0;
+        }
+        if shrinkage > 0.0 || floor > 0.0 {
+            shrink(weights, votes, shrinkage);
+            raise(weights, votes, floor);
+            return 1.0;
+        }
+        total
     }
 }
 
-impl Combine for Weigher {
-    fn combine(&self, votes: Votes<'_>) -> f64 {
-        let (mut weighted, mut weights) = (0.0, 0.0);
-        let any_known = self.weigh(votes, |_, vote, weight| {
-            weighted += weight * vote;
-            weights += weight;
-        });
-        if weights == 0.0 {
+impl Rule for Weigher {
+    fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
+        let weights = &mut *self.room.borrow_mut();
+        let total = self.weigh(errors, votes, weights);
+        let terms = votes.present().map(|(voter, vote)| weights[voter] * vote);
+        if total == 0.0 {
             f64::NAN
-        } else if self.is_raw(any_known) {
-            weighted
         } else {
-            weighted / weights
+            terms.fold(0.0, |sum, term| sum + term) / total
         }
     }
 
-    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
-        let mut sum = 0.0;
-        let any_known = self.weigh(votes, |voter, _, weight| {
-            weights[voter] = weight;
-            sum += weight;
-        });
-        if !self.is_raw(any_known) {
-            weights.iter_mut().for_each(|weight| *weight /= sum);
+    fn weights(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) {
+        let total = self.weigh(errors, votes, weights);
+        for (voter, _) in votes.present() {
+            weights[voter] /= total;
         }
-    }
-
-    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
-        self.errors.observe(votes, truth, arrived);
-    }
-
-    fn advance(&mut self, newest: Instant) {
-        self.errors.advance(newest);
-    }
-
-    fn segment(&mut self, shift: Duration) {
-        self.errors.shift(shift);
-    }
-
-    fn snapshot(&self) -> Option<Box<dyn State>> {
-        Some(Box::new(self.errors.clone()))
-    }
-
-    fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        self.errors.restore(state)
     }
 }
 

@@ -1,27 +1,96 @@
-//! Decides which errors of voters are remembered; what follows from them is the combiner's.
+//! Decides which errors of voters are remembered, and how a combiner that goes by them is told of truths; what follows from them
+//! is the combiner's rule.
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{Restored, State, Votes};
+use athermal_core::node::{Combine, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
+
+use crate::memory::Memory;
+
+/// A combiner that goes by the recent errors of its voters.
+pub(crate) struct ByErrors<R> {
+    rule: R,
+    errors: Errors,
+}
+
+/// What a combiner makes of votes and the recent errors of their voters.
+pub(crate) trait Rule: Send {
+    fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64;
+
+    fn weights(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]);
+
+    fn reason(&self, _errors: &Errors, _votes: Votes<'_>) -> f64 {
+        f64::NAN
+    }
+
+    fn observe(&self, errors: &mut Errors, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        errors.observe(votes, truth, arrived);
+    }
+}
+
+impl<R: Rule> ByErrors<R> {
+    pub(crate) fn new(rule: R, voters: usize, memory: Memory) -> Self {
+        let errors = Errors::new(voters, memory);
+        Self { rule, errors }
+    }
+}
+
+impl<R: Rule> Combine for ByErrors<R> {
+    fn combine(&self, votes: Votes<'_>) -> f64 {
+        self.rule.combine(&self.errors, votes)
+    }
+
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        self.rule.weights(&self.errors, votes, weights);
+    }
+
+    fn reason(&self, votes: Votes<'_>) -> f64 {
+        self.rule.reason(&self.errors, votes)
+    }
+
+    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        self.rule.observe(&mut self.errors, votes, truth, arrived);
+    }
+
+    fn advance(&mut self, newest: Instant) {
+        self.errors.advance(newest);
+    }
+
+    fn segment(&mut self, shift: Duration) {
+        self.errors.shift(shift);
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(self.errors.clone()))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        self.errors.restore(state)
+    }
+}
 
 /// The recent squared errors of several voters, oldest first.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Errors {
-    memory: Duration,
-    /// For each voter the arrival and square of its errors.
+    memory: Memory,
+    /// For each voter the arrival and square of its errors; of a memory that fades, of the last one.
     squares: Vec<VecDeque<(Instant, f64)>>,
     /// For each voter the mean of what is in memory.
     means: Vec<Option<f64>>,
+    /// For each voter how many errors a memory that fades comes to.
+    #[serde(default)]
+    counts: Vec<f64>,
 }
 
 impl Errors {
-    pub(crate) fn new(voters: usize, memory: Duration) -> Self {
+    pub(crate) fn new(voters: usize, memory: Memory) -> Self {
         Self {
             memory,
             squares: vec![VecDeque::new(); voters],
             means: vec![None; voters],
+            counts: vec![0.0; voters],
         }
     }
 
@@ -31,8 +100,11 @@ impl Errors {
     }
 
     /// How many errors of a voter are in memory.
-    pub(crate) fn count(&self, voter: usize) -> usize {
-        self.squares[voter].len()
+    pub(crate) fn count(&self, voter: usize) -> f64 {
+        match self.memory {
+            Memory::HalfLife(_) => self.counts[voter],
+            Memory::Time(_) | Memory::Truths(_) => self.squares[voter].len() as f64,
+        }
     }
 
     /// Takes the errors of votes whose truth has arrived.
@@ -44,13 +116,39 @@ impl Errors {
 
     /// Takes the error of one vote whose truth has arrived.
     pub(crate) fn observe_one(&mut self, voter: usize, vote: f64, truth: f64, arrived: Instant) {
-        self.squares[voter].push_back((arrived, (vote - truth) * (vote - truth)));
+        self.remember(voter, arrived, (vote - truth) * (vote - truth));
+    }
+
+    fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
+        let squares = &mut self.squares[voter];
+        match self.memory {
+            Memory::Time(_) => squares.push_back((arrived, square)),
+            Memory::Truths(last) => {
+                if squares.len() >= last.truths {
+                    squares.pop_front();
+                }
+                squares.push_back((arrived, square));
+            }
+            Memory::HalfLife(fading) => {
+                let last = squares.pop_front();
+                squares.push_back((arrived, square));
+                let left = last.map_or(0.0, |(last, _)| fading.left(arrived - last));
+                let count = &mut self.counts[voter];
+                *count = *count * left + 1.0;
+                let mean = self.means[voter].unwrap_or(square);
+                self.means[voter] = Some(mean + (square - mean) / *count);
+                return;
+            }
+        }
         self.refresh(voter);
     }
 
     /// Forgets what arrived longer than the memory before `newest`.
     pub(crate) fn advance(&mut self, newest: Instant) {
-        let forgotten = newest - self.memory;
+        if matches!(self.memory, Memory::Truths(_)) {
+            return;
+        }
+        let forgotten = newest - self.memory.longest();
         for voter in 0..self.squares.len() {
             let squares = &mut self.squares[voter];
             let before = squares.len();
@@ -82,12 +180,34 @@ impl Errors {
         if known.squares.len() != self.squares.len() {
             return Restored::cold("the number of voters differs");
         }
-        self.squares = known.squares;
-        for squares in &mut self.squares {
-            // Whoever steps from here on must not have to make room.
-            squares.reserve(squares.len().max(32));
+        match (known.memory, self.memory) {
+            (Memory::HalfLife(_), Memory::HalfLife(_)) => {
+                (self.squares, self.means, self.counts) =
+                    (known.squares, known.means, known.counts);
+                self.counts.resize(self.squares.len(), 0.0);
+            }
+            (Memory::HalfLife(_), _) => {
+                return Restored::cold("of errors that fade only the sum is known, not each");
+            }
+            (_, Memory::HalfLife(_)) => {
+                for (voter, squares) in known.squares.into_iter().enumerate() {
+                    for (arrived, square) in squares {
+                        self.remember(voter, arrived, square);
+                    }
+                }
+            }
+            (_, memory) => {
+                self.squares = known.squares;
+                for squares in &mut self.squares {
+                    if let Memory::Truths(last) = memory {
+                        squares.drain(..squares.len().saturating_sub(last.truths));
+                    }
+                    // Whoever steps from here on must not have to make room.
+                    squares.reserve(squares.len().max(32));
+                }
+                (0..self.squares.len()).for_each(|voter| self.refresh(voter));
+            }
         }
-        (0..self.squares.len()).for_each(|voter| self.refresh(voter));
         Restored::Accepted
     }
 
@@ -96,6 +216,7 @@ impl Errors {
         let squares = &self.squares[voter];
         let sum: f64 = squares.iter().map(|(_, square)| square).sum();
         self.means[voter] = (!squares.is_empty()).then(|| sum / squares.len() as f64);
+        self.counts[voter] = 0.0;
     }
 }
 

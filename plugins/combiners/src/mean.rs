@@ -4,7 +4,7 @@ use athermal_core::node::{Combine, Combiner, InputPort, Votes};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The mean of the votes that are there.
+/// The mean of the votes that are there. The port `weights` shows an equal one for each of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {}
@@ -12,6 +12,10 @@ pub struct Mean {}
 impl Combiner for Mean {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::held("voters", "predictions of the same truth")] }
+    }
+
+    fn weighs(&self) -> bool {
+        true
     }
 
     fn build(&self, _voters: usize) -> Box<dyn Combine> {
@@ -28,6 +32,13 @@ impl Combine for Average {
         });
         if count > 0.0 { sum / count } else { f64::NAN }
     }
+
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        let count = votes.present().count() as f64;
+        for (voter, _) in votes.present() {
+            weights[voter] = 1.0 / count;
+        }
+    }
 }
 
 athermal_core::register!(Mean, Combiner, "mean");
@@ -40,5 +51,8 @@ mod tests {
     fn absent_voters_drop_out_of_the_mean() {
         assert_eq!(Average.combine(Votes(&[1.0, f64::NAN, 4.0])), 2.5);
         assert!(Average.combine(Votes(&[f64::NAN])).is_nan());
+        let mut weights = [f64::NAN; 3];
+        Average.weights(Votes(&[1.0, f64::NAN, 4.0]), &mut weights);
+        assert!(weights[0] == 0.5 && weights[1].is_nan() && weights[2] == 0.5);
     }
 }

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 
 /// The median of the votes that are there: half of the voters may be wrong without doing harm.
 ///
-/// Of an even number of votes it is the mean of the two in the middle.
+/// Of an even number of votes it is the mean of the two in the middle. The port `weights` shows which votes it is made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Median {}
 
 /// The mean of the votes that are left when the largest and smallest ones are taken away.
 ///
-/// Of `n` votes `⌊share · n⌋` are taken away at either end (Tukey and McLaughlin 1963).
+/// Of `n` votes `⌊share · n⌋` are taken away at either end (Tukey and McLaughlin 1963). The port `weights` shows which are left.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trimmed {
@@ -32,6 +32,10 @@ fn quarter() -> f64 {
 impl Combiner for Median {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::held("voters", "predictions of the same truth")] }
+    }
+
+    fn weighs(&self) -> bool {
+        true
     }
 
     fn build(&self, voters: usize) -> Box<dyn Combine> {
@@ -52,6 +56,10 @@ impl Combiner for Trimmed {
         vec![Mistake::at("share", message).help("0.25 takes a quarter away at either end")]
     }
 
+    fn weighs(&self) -> bool {
+        true
+    }
+
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         Box::new(Middle::new(voters, self.share))
     }
@@ -69,6 +77,12 @@ impl Middle {
         let room = RefCell::new(vec![0.0; voters]);
         Self { share, room }
     }
+
+    /// How many of so many votes are taken away at either end.
+    fn away(&self, count: usize) -> usize {
+        let away = (self.share * count as f64).floor() as usize;
+        away.min(count.saturating_sub(1) / 2)
+    }
 }
 
 impl Combine for Middle {
@@ -81,9 +95,24 @@ impl Combine for Middle {
         }
         let sorted = &mut room[..count];
         sorted.sort_unstable_by(f64::total_cmp);
-        let away = ((self.share * count as f64).floor() as usize).min(count.saturating_sub(1) / 2);
+        let away = self.away(count);
         let left = &sorted[away..count - away];
         left.iter().sum::<f64>() / left.len() as f64
+    }
+
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        let count = votes.present().count();
+        let left = self.away(count)..count - self.away(count);
+        for (voter, vote) in votes.present() {
+            let before =
+                |&(other, its): &(usize, f64)| its.total_cmp(&vote).then(other.cmp(&voter)).is_lt();
+            let rank = votes.present().filter(before).count();
+            weights[voter] = if left.contains(&rank) {
+                1.0 / left.len() as f64
+            } else {
+                0.0
+            };
+        }
     }
 }
 
@@ -111,6 +140,18 @@ mod tests {
         // numpy: scipy.stats.trim_mean([1, 2, 3, 1000], 0.25) is 2.5.
         assert_eq!(middle(0.25, &[1000.0, 1.0, 3.0, 2.0]), 2.5);
         assert_eq!(middle(0.0, &[1.0, 2.0, 6.0]), 3.0);
+    }
+
+    #[test]
+    fn the_weights_show_the_votes_that_are_left() {
+        let votes = Votes(&[5.0, f64::NAN, 1.0, 5.0, 9.0]);
+        let mut weights = [f64::NAN; 5];
+        Middle::new(5, 0.25).weights(votes, &mut weights);
+        assert!(weights[1].is_nan());
+        assert_eq!(
+            [weights[0], weights[2], weights[3], weights[4]],
+            [0.5, 0.0, 0.5, 0.0]
+        );
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use athermal_combiners::{AutoWeighted, Weighting};
+use athermal_combiners::{AutoWeighted, Memory, Weighting};
 use athermal_core::node::{Combine, Combiner, Votes};
 use athermal_core::time::{Duration, Instant};
 
@@ -14,9 +14,11 @@ fn s(seconds: i64) -> Instant {
 
 fn vote(memory_s: i64, power: f64, weights: Weighting) -> AutoWeighted {
     AutoWeighted {
-        memory: Duration::from_ns(memory_s * 1_000_000_000),
+        memory: Memory::Time(Duration::from_ns(memory_s * 1_000_000_000)),
         power,
         weights,
+        shrinkage: 0.0,
+        floor: 0.0,
     }
 }
 

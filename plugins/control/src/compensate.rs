@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -252,6 +253,10 @@ impl Feature for Compensate {
             Mistake::at("inputs.rate", message).help(help)
         };
         channel.map(doubt).into_iter().collect()
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

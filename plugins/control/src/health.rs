@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -198,6 +199,10 @@ impl Feature for Health {
         let help =
             "give `range`, `max_rate`, `stuck_after`, `noise_above`, `noise_below` or `max_gap`";
         vec![Mistake::at("", "no check is made, so every sample passes").help(help)]
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

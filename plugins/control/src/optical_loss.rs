@@ -2,7 +2,7 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
@@ -186,6 +186,13 @@ impl Feature for OpticalLoss {
                 channels: share,
             },
         ])
+    }
+
+    fn reach(&self, port: &str) -> Reach {
+        match port {
+            "share" => Reach::Own,
+            _ => Reach::All,
+        }
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -2,7 +2,8 @@
 
 use athermal_core::channel::Channel;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Instant;
@@ -137,6 +138,10 @@ impl Feature for SafeState {
                 channels: signal.iter().map(limit::numbered).collect(),
             },
         ])
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -115,6 +116,13 @@ impl Feature for Stability {
                 channels: worst.into_iter().collect(),
             },
         ])
+    }
+
+    fn reach(&self, port: &str) -> Reach {
+        match port {
+            "state" => Reach::Own,
+            _ => Reach::All,
+        }
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -70,6 +71,10 @@ impl Feature for Uncorrected {
         } else {
             Err(mistakes)
         }
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -1,19 +1,23 @@
 //! The endogenous estimator: drift from past drift.
 
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Solver, lag_mistakes};
+use crate::lags::lag_mistakes;
+use crate::regression::LinearTrainer;
+use crate::solver::Solver;
 
 /// Autoregression: linear regression of the truth on its own past.
 ///
 /// `ŷ(t + ahead) = b₀ + Σ b_l y(t − L_l)` (Ljung 1999, section 4.2). Lags count back from the instant of the run, and the
 /// value taken is the last one at or before the instant asked for. A lag whose window overlaps the predicted one is an
 /// error. The answer changes with time alone, so the node runs at every tick.
+///
+/// The port `deviation` is the standard deviation of the truth about the prediction, as `linear` gives it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ar {
@@ -26,7 +30,12 @@ pub struct Ar {
 
 impl Estimator for Ar {
     fn inputs() -> &'static [InputPort] {
-        const { &[InputPort::truth("what is predicted, from its own past")] }
+        const {
+            &[
+                InputPort::truth("what is predicted, from its own past"),
+                InputPort::freeze(),
+            ]
+        }
     }
 
     fn regressors(&self) -> Regressors {
@@ -41,6 +50,14 @@ impl Estimator for Ar {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        self.solver.learns()
+    }
+
+    fn deviates(&self) -> bool {
+        self.solver.deviates()
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -1,18 +1,23 @@
 //! The estimator with both: drift from past drift and temperatures.
 
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Selection, Solver, lag_mistakes};
+use crate::lags::lag_mistakes;
+use crate::regression::LinearTrainer;
+use crate::selection::Selection;
+use crate::solver::Solver;
 
 /// Autoregression with exogenous inputs: linear regression of the truth on features and on its own past.
 ///
 /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t − F) + Σ a_l y(t − L_l)` (Ljung 1999, section 4.2). With a selection, lags are
 /// candidates like the features. The answer changes with time alone, so the node runs at every tick.
+///
+/// The port `deviation` is the standard deviation of the truth about the prediction, as `linear` gives it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arx {
@@ -39,6 +44,7 @@ impl Estimator for Arx {
             &[
                 InputPort::held("features", "what the prediction is made of beside the past"),
                 InputPort::truth("what is predicted, from its own past and the features"),
+                InputPort::freeze(),
             ]
         }
     }
@@ -57,6 +63,14 @@ impl Estimator for Arx {
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
         mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        self.solver.learns()
+    }
+
+    fn deviates(&self) -> bool {
+        self.solver.deviates()
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -1,15 +1,41 @@
-//! Estimator nodes of athermal: linear, AR and ARX regression, and the baselines `zero` and `persistence`.
+//! Estimator nodes of athermal: linear, AR and ARX regression, sparse, robust and polynomial ones, recursive least squares,
+//! structural models followed by a Kalman filter, and the baselines `zero` and `persistence`.
 
 mod ar;
 mod arx;
+mod elastic_net;
+mod folds;
+mod huber;
+mod kalman;
+mod lags;
+mod lasso;
 mod linear;
+mod online;
+mod penalty;
 mod persistence;
+mod polynomial;
 mod regression;
+mod rls;
+mod selection;
+mod solver;
+mod stack;
 mod zero;
 
 pub use ar::Ar;
 pub use arx::Arx;
+pub use elastic_net::{ElasticNet, SparsePenalty};
+pub use folds::{Cut, Folds};
+pub use huber::Huber;
+pub use kalman::{Kalman, Noises};
+pub use lasso::Lasso;
 pub use linear::Linear;
+pub use online::OnlinePredictor;
+pub use penalty::{Choice, Penalty};
 pub use persistence::Persistence;
-pub use regression::{LinearPredictor, Selection, Solver};
+pub use polynomial::{Polynomial, PolynomialPredictor};
+pub use regression::LinearPredictor;
+pub use rls::{Forgetting, Rls};
+pub use selection::{By, CrossValidated, Selection};
+pub use solver::Solver;
+pub use stack::Stack;
 pub use zero::Zero;

@@ -1,17 +1,28 @@
 //! The exogenous estimator: drift from temperatures.
 
-use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, TrainingSetup};
+use athermal_core::node::{
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
+};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::regression::{LinearTrainer, Selection, Solver};
+use crate::regression::LinearTrainer;
+use crate::selection::Selection;
+use crate::solver::Solver;
 
 /// Linear regression of the truth on features.
 ///
 /// `ŷ(t + ahead) = b₀ + Σ b_j x_j(t)`. Features are standardised over all training rows (mean 0, population variance 1)
 /// before the solver sees them; the stated coefficients are for the features as they are. With a selection, features are
-/// added one by one by cross-validation, as in Mandelli, Dankwart and Napoli, section 3.3.
+/// chosen by cross-validation: `method = "forward"` adds them one by one, as in Mandelli, Dankwart and Napoli, section 3.3;
+/// `by = "sensor"` and `most = 2` tell which two sensors are worth their price. The penalty of ridge can be chosen too, for
+/// all candidates before a selection and for those chosen after it: `alpha = { by = "cross_validation", folds = 5 }`.
+///
+/// The port `deviation` is the standard deviation of the truth about the prediction, in the unit of the truth (not with the
+/// solver `sgd`): `s √(1 + 1/n + (x − x̄)ᵀ (XᵀX + αI)⁻¹ (x − x̄))` on standardised features, `s²` the residual variance
+/// (Draper and Smith 1998, section 3.1; for ridge, the posterior of Hastie, Tibshirani and Friedman 2009, section 3.4.1).
+/// It takes the data for more of the same: `conformal` measures how often an interval holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {
@@ -32,6 +43,7 @@ impl Estimator for Linear {
                     "what the prediction is made of, such as slopes of temperatures",
                 ),
                 InputPort::truth("what is predicted, such as the drift of an axis"),
+                InputPort::freeze(),
             ]
         }
     }
@@ -47,6 +59,14 @@ impl Estimator for Linear {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
         mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        self.solver.learns()
+    }
+
+    fn deviates(&self) -> bool {
+        self.solver.deviates()
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -2,7 +2,9 @@
 
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
-use athermal_estimators::{Ar, Arx, Linear, Persistence, Zero};
+use athermal_estimators::{
+    Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Persistence, Polynomial, Rls, Stack, Zero,
+};
 
 conformance!(
     Zero,
@@ -32,6 +34,87 @@ conformance!(
         "#
     )
     .input("features", 1, "Cel"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        solver = { type = "sgd", power = 0.0 }
+        learn = { outliers = 8.0, margin = 0.5 }
+        "#
+    )
+    .input("freeze", 1, "1"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        solver = { type = "ridge", alpha = { by = "cross_validation", folds = 3, smallest = 1e-2, largest = 1e2, per_decade = 2 } }
+        selection = { method = "backward", folds = { type = "blocked", count = 3, gap_rows = 1, embargo_rows = 1 }, by = "sensor" }
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        solver = { type = "ridge", alpha = { by = "generalised_cross_validation", smallest = 1e-2, largest = 1e2, per_decade = 2 } }
+        selection = { method = "floating", folds = { type = "expanding", count = 3, gap_rows = 1 }, one_standard_error = true }
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        selection = { method = "stepwise", f_enter = 4.0, f_remove = 3.9, most = 2 }
+        "#
+    ),
+);
+
+conformance!(
+    Lasso,
+    Case::new(
+        r#"
+        ahead = "1min"
+        alpha = 0.01
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "1min"
+        alpha = { folds = 3, smallest_share = 0.01, per_decade = 5 }
+        "#
+    ),
+);
+
+conformance!(
+    ElasticNet,
+    Case::new(
+        r#"
+        ahead = "1min"
+        alpha = 0.01
+        l1_ratio = 0.5
+        "#
+    ),
+    Case::new(r#"ahead = "1min""#),
+);
+
+conformance!(
+    Huber,
+    Case::new(
+        r#"
+        ahead = "1min"
+        epsilon = 1.35
+        alpha = 1e-4
+        "#
+    ),
+);
+
+conformance!(
+    Polynomial,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "1min"
+        squares = true
+        interactions = false
+        solver = { type = "ols" }
+        selection = { method = "forward", folds = 3 }
+        "#
+    ),
 );
 
 conformance!(
@@ -68,6 +151,58 @@ conformance!(
         selection = { method = "forward" }
         "#
     ),
+);
+
+conformance!(
+    Kalman,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        trend = true
+        every = "30s"
+        penalty = 0.5
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        learn = false
+        noises = { observation = "4 nm", level = "10 nm", per = "1h" }
+        "#
+    )
+    .input("features", 1, "K"),
+);
+
+conformance!(
+    Rls,
+    Case::new(r#"ahead = "10s""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        lags = ["30s"]
+        forgetting = { type = "variable", memory = 100.0, lowest = 0.8 }
+        learn = { margin = 1.0 }
+        "#
+    )
+    .input("features", 2, "K")
+    .input("freeze", 1, "1"),
+    Case::new(
+        r#"
+        ahead = "10s"
+        learn = false
+        alpha = 0.1
+        selection = { method = "forward", most = 2 }
+        "#
+    )
+    .input("features", 3, "Cel"),
+);
+
+conformance!(
+    Stack,
+    Case::new(r#"ahead = "0s""#),
+    Case::new(r#"ahead = "0s""#).input("voters", 1, "nm"),
 );
 
 #[test]

@@ -2,7 +2,7 @@
 
 use athermal_core::channel::Channel;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::unit::Unit;
@@ -221,6 +221,10 @@ impl Feature for Scale {
         } else {
             Err(mistakes)
         }
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

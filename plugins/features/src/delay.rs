@@ -5,7 +5,8 @@ use std::fmt;
 
 use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
@@ -150,15 +151,15 @@ impl Feature for Delay {
         true
     }
 
-    fn delay(&self) -> Duration {
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Delayed(vec![self.memory()])
+    }
+
+    fn memory(&self) -> Duration {
         match self.delay {
             Lateness::Ticks(_) => Duration::ZERO,
             Lateness::Time(time) => time,
         }
-    }
-
-    fn memory(&self) -> Duration {
-        self.delay()
     }
 
     fn closes_loops(&self) -> bool {

@@ -3,7 +3,8 @@
 use std::fmt;
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
@@ -160,6 +161,10 @@ impl Feature for FirstOrder {
             name: "lagged",
             channels,
         }])
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

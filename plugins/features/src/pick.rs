@@ -2,7 +2,7 @@
 
 use athermal_core::channel::is_unchanged;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,10 @@ impl Feature for Pick {
             name: "signal",
             channels,
         }])
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -2,7 +2,9 @@
 
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
-use athermal_features::{Delay, FirstOrder, Pick, Product, Scale, Slope, Sum};
+use athermal_features::{
+    Delay, Difference, FirstOrder, Hampel, Lag, Moving, Pick, Product, Resample, Scale, Slope, Sum,
+};
 
 conformance!(
     Slope,
@@ -77,6 +79,70 @@ conformance!(
         Rule::Units,
         "the factor is one between numbers in the stated units"
     ),
+);
+
+conformance!(
+    Moving,
+    Case::new(r#"windows = ["5min"]"#).input("signal", 2, "Cel"),
+    Case::new(
+        r#"
+        windows = ["1min", "3min"]
+        min_samples = 1
+        min_coverage = 0.0
+        cold = "partial"
+        "#
+    )
+    .input("signal", 3, "nm"),
+);
+
+conformance!(
+    Hampel,
+    Case::new(r#"window = "5min""#).input("signal", 2, "Cel"),
+    Case::new(
+        r#"
+        window = "2min"
+        threshold = 1.5
+        floor = "5 nm"
+        replace = "median"
+        "#
+    )
+    .input("signal", 2, "um"),
+);
+
+conformance!(
+    Lag,
+    Case::new(r#"lags = ["1min"]"#),
+    Case::new(
+        r#"
+        lags = ["0s", "30s", "5min"]
+        max_age = "20s"
+        "#
+    )
+    .input("signal", 2, "Cel"),
+);
+
+conformance!(
+    Difference,
+    Case::new(""),
+    Case::new(
+        r#"
+        over = "2min"
+        max_age = "20s"
+        "#
+    )
+    .input("signal", 2, "Cel"),
+);
+
+conformance!(
+    Resample,
+    Case::new(r#"every = "1min""#),
+    Case::new(
+        r#"
+        every = "25s"
+        method = "last"
+        "#
+    )
+    .input("signal", 2, "Cel"),
 );
 
 #[test]

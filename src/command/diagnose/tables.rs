@@ -3,10 +3,11 @@
 use std::fmt::Write as _;
 
 use athermal::Duration;
+use athermal::diagnosis::day::{CurvePoint, DayScore};
 use athermal::diagnosis::lag::{Correlogram, FeatureLags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::response::Response;
-use athermal::diagnosis::{Diagnosis, Main, day};
+use athermal::diagnosis::{Diagnosis, Main};
 
 use crate::figures::{count, length, matrix, number, or_dash, table};
 
@@ -16,8 +17,8 @@ const FEATURES: usize = 3;
 const SAYS_SOMETHING: f64 = 3.0;
 /// A variance inflation beyond which a coefficient means little by itself (Marquardt 1970).
 const INFLATED: f64 = 10.0;
-/// A fit on fewer days is enough when its error is this near to that of the most.
-const ENOUGH: f64 = 1.02;
+/// Fits on fewer days are enough when their error is at most so many times that of fits on all others.
+const ENOUGH: f64 = 1.05;
 
 /// Whether a prediction goes by a name: that of its channel, its node or its axis.
 pub fn is_called(prediction: &str, name: &str) -> bool {
@@ -339,55 +340,46 @@ impl<'a> Tables<'a> {
         let residuals = self.diagnosis.residuals.iter();
         let shown = residuals.map(|of| of.prediction.clone());
         let shown: Vec<String> = shown.filter(|name| self.shows(name)).collect();
-        let find = |scores: &[day::DayScore], name: &str| -> Option<day::DayScore> {
-            let mut scores = scores.iter();
-            scores.find(|score| score.prediction == name).cloned()
-        };
-        let cells = |scores: &[day::DayScore]| -> Vec<String> {
-            let rmse = |name: &String| or_dash(find(scores, name).and_then(|score| score.rmse));
-            shown.iter().map(rmse).collect()
+        let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<f64>| -> Vec<String> {
+            let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
+            let texts = shown.iter().map(|name| or_dash(of(name).and_then(cell)));
+            texts.collect()
         };
         let unit = self.main().next().map_or("", |main| main.unit.as_str());
-        let left_out = days
-            .left_out
-            .iter()
-            .map(|of| (format!("day {}", of.day), cells(&of.scores)));
-        let left_out: Vec<_> = left_out.collect();
+        let left_out = days.left_out.iter();
+        let left_out = left_out.map(|of| {
+            let label = format!("day {}", of.day);
+            (label, cells(&of.scores, |score| score.rmse))
+        });
         let curve = days.curve.iter().map(|point| {
             let plural = if point.days == 1 { "" } else { "s" };
             let label = format!("{} day{plural} ({} fits)", point.days, point.fits);
-            (label, cells(&point.scores))
+            (label, cells(&point.scores, DayScore::ratio))
         });
-        let curve: Vec<_> = curve.collect();
-        let near = |point: &day::CurvePoint| {
-            shown.iter().all(|name| {
-                let rmse = |scores: &[day::DayScore]| find(scores, name).and_then(|of| of.rmse);
-                let most = days.curve.last().and_then(|most| rmse(&most.scores));
-                match (rmse(&point.scores), most) {
-                    (Some(here), Some(most)) => here <= ENOUGH * most,
-                    (here, most) => here.is_some() || most.is_none(),
-                }
-            })
+        let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
+        let near = |point: &CurvePoint| {
+            let scores = point.scores.iter();
+            let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
+            of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
         };
         let last_far = days.curve.iter().rposition(|point| !near(point));
         let enough = days.curve.get(last_far.map_or(0, |last| last + 1));
-        let enough = enough.map_or(days.count, |point| point.days);
+        let verdict = match enough.map_or(days.count, |point| point.days) {
+            1 => "1 day is enough to come within 5 %".to_owned(),
+            enough if enough + 1 < days.count => {
+                format!("{enough} days are enough to come within 5 %")
+            }
+            _ => "more days may still make it better".to_owned(),
+        };
         let of_day = if days.day_s == 86_400.0 {
             String::new()
         } else {
             format!(" of {}", seconds(days.day_s))
         };
-        let verdict = if enough + 1 < days.count {
-            format!(
-                "{enough} are enough to come within 2 % of the error of a fit on {}",
-                days.count - 1
-            )
-        } else {
-            "more days may still make it better".to_owned()
-        };
         format!(
             "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
-             RMSE in {unit} on all other days of fits on so many days that follow each other\n{}  {verdict}\n",
+             how many times that the error is of a fit on so many days that follow each\n\
+             other, on the same days: {verdict}\n{}",
             matrix("left out", &shown, &left_out),
             matrix("fitted on", &shown, &curve)
         )

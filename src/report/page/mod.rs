@@ -166,7 +166,7 @@ fn chosen(html: &mut String, facts: &Facts) {
             .report
             .selection
             .iter()
-            .map(|step| format!("{} ({:.3})", escaped(&step.regressor), step.score));
+            .map(|step| format!("{} ({:.3})", escaped(&step.label()), step.score));
         let _ = write!(
             html,
             "<p><b>{}</b>: {}</p>",

@@ -1,8 +1,10 @@
 //! Decides which predictions a combiner may put together.
 
 use super::conversion::{factor, mismatch};
+use super::estimator::{self, DEVIATION};
 use super::instance::Instance;
-use super::plan::{PlannedRole, TruthLink};
+use super::leak::Suspect;
+use super::plan::{Beside, PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
@@ -22,23 +24,23 @@ impl Resolver<'_> {
         self.mistakes(instance, mistakes);
         let mut voters = None;
         let mut truth = Some(None);
+        let mut state = Some(None);
         for port in (instance.kind.inputs)() {
             match port.name {
                 "truth" if port.optional && instance.input("truth").is_none() => {}
                 "truth" => truth = self.single(instance, port).map(Some),
+                "state" => state = self.single(instance, port).map(|slot| Some((*port, slot))),
                 _ => voters = self.slots(instance, port).map(|slots| (*port, slots)),
             }
         }
         let (port, voters) = voters?;
         let truth = truth?;
+        let state = state?;
         let Some(&first) = voters.first() else {
             self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
-        let mut agree = sound;
-        for &other in &voters[1..] {
-            agree &= self.agree(instance, port.name, first, other, true);
-        }
+        let mut agree = sound & self.votes_agree(instance, port.name, &voters);
         let ahead = self.channels[first].channel.ahead;
         let link: Option<TruthLink> = match truth {
             Some(truth) => {
@@ -64,29 +66,98 @@ impl Resolver<'_> {
             unit,
             ..self.channels[first].channel.clone()
         };
-        let behind = Provenance::of(
-            voters
-                .iter()
-                .map(|&slot| (&self.provenance[slot], Duration::ZERO)),
-        );
+        if let (Some((port, slot)), Some(predicts)) = (state, predicts) {
+            let link = TruthLink {
+                slot: predicts,
+                ahead,
+                span: self.channels[predicts].channel.span,
+                limit: Duration::ZERO,
+            };
+            self.suspects.push(Suspect {
+                place: instance.input_place(port.name),
+                context: instance.context(),
+                features: vec![slot],
+                lag: Duration::ZERO,
+                link,
+            });
+        }
+        let slots = voters.iter().copied().chain(state.map(|(_, slot)| slot));
+        let behind = Provenance::of(slots.map(|slot| (&self.provenance[slot], Duration::ZERO)));
+        let state = match state {
+            Some((port, slot)) => {
+                let unit = Self::port_unit(&port);
+                let lags = [Duration::ZERO];
+                Some(self.gather(instance, &port, &[slot], &lags, unit.as_ref())?)
+            }
+            None => None,
+        };
+        let reason = self.beside(first, combined.name.clone());
         let mut outputs = vec![OutputPort {
             name: "prediction",
-            channels: vec![combined],
+            channels: vec![combined.clone()],
         }];
-        let mut behind = vec![behind];
+        let mut beside = Beside::default();
+        let mut next = self.channels.len() + 1;
         if combiner.weighs() {
             outputs.push(OutputPort {
                 name: "weights",
                 channels: self.weights(&voters),
             });
-            behind.extend(std::iter::repeat_n(behind[0].clone(), voters.len()));
+            beside.weights = Some(next);
+            next += voters.len();
         }
+        if combiner.reasons() {
+            outputs.push(OutputPort {
+                name: "reason",
+                channels: vec![reason],
+            });
+            beside.reason = Some(next);
+            next += 1;
+        }
+        if combiner.covers().is_some() {
+            for name in ["lower", "upper"] {
+                outputs.push(OutputPort {
+                    name,
+                    channels: vec![combined.clone()],
+                });
+            }
+            beside.bounds = Some((next, next + 1));
+            next += 2;
+        }
+        if combiner.weighs()
+            && let Some(of_voters) = self.deviations(&voters)
+        {
+            let deviation = estimator::deviation_of(&combined);
+            let unit = deviation
+                .channels
+                .first()
+                .map(|channel| channel.unit.clone());
+            let lags = [Duration::ZERO];
+            let gather = self.gather(instance, &port, &of_voters, &lags, unit.as_ref())?;
+            outputs.push(deviation);
+            beside.deviation = Some((next, gather));
+        }
+        let channels = outputs.iter().map(|port| port.channels.len()).sum();
+        let behind = vec![behind; channels];
         let role = PlannedRole::Combiner {
             voters: gather,
+            state,
             truth: link,
-            weights: false,
+            beside,
         };
         self.add(instance, outputs, role, behind, predicts)
+    }
+
+    /// The standard deviation that stands beside each of these predictions, where all have one.
+    fn deviations(&self, voters: &[usize]) -> Option<Vec<usize>> {
+        let beside = |&slot: &usize| {
+            let node = &self.nodes[self.channels[slot].node?];
+            let (_, predictions) = node.ports.first()?;
+            let (_, deviations) = node.ports.iter().find(|(name, _)| *name == DEVIATION)?;
+            let nth = slot.checked_sub(predictions.start)?;
+            (nth < deviations.len()).then(|| deviations.start + nth)
+        };
+        voters.iter().map(beside).collect()
     }
 
     /// A channel for the weight of each voter, named after the voter's node, or after the voter where that is not enough.
@@ -106,18 +177,37 @@ impl Resolver<'_> {
                 &self.channels[slot].name
             }
         };
-        let weight = |&slot: &usize| Channel {
-            name: format!("weight-{}", name(slot)),
+        let weight = |&slot: &usize| self.beside(slot, format!("weight-{}", name(slot)));
+        voters.iter().map(weight).collect()
+    }
+
+    /// A channel of plain numbers that tell of a vote, held as long as the vote is.
+    fn beside(&self, slot: usize, name: String) -> Channel {
+        Channel {
+            name,
             unit: Unit::one(),
             span: Duration::ZERO,
             ahead: Duration::ZERO,
             max_age: self.channels[slot].channel.default_max_age(),
-        };
-        voters.iter().map(weight).collect()
+        }
+    }
+
+    /// Whether predictions may be put together.
+    pub(super) fn votes_agree(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        voters: &[usize],
+    ) -> bool {
+        let mut agree = true;
+        for &other in voters.iter().skip(1) {
+            agree &= self.agree(instance, input, voters[0], other, true);
+        }
+        agree
     }
 
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.
-    fn agree(
+    pub(super) fn agree(
         &mut self,
         instance: &Instance<'_>,
         input: &str,

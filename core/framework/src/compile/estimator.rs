@@ -2,15 +2,31 @@
 
 use super::instance::{Instance, Limits};
 use super::leak::Suspect;
+use super::learning;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
 use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::diagnostic::Place;
-use crate::node::{Estimator, OutputPort, Regressor, TruthLags};
+use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
+
+/// The port of the standard deviation of the truth about its prediction.
+pub(super) const DEVIATION: &str = "deviation";
+
+/// The port of the standard deviation of the truth about a prediction.
+pub(super) fn deviation_of(prediction: &Channel) -> OutputPort {
+    let channel = Channel {
+        unit: prediction.unit.difference(),
+        ..prediction.clone()
+    };
+    OutputPort {
+        name: DEVIATION,
+        channels: vec![channel],
+    }
+}
 
 impl Resolver<'_> {
     pub(super) fn estimator(
@@ -35,6 +51,7 @@ impl Resolver<'_> {
         for port in (instance.kind.inputs)() {
             match port.name {
                 "truth" => truth = self.single(instance, port).map(|slot| (*port, slot)),
+                FREEZE => {}
                 _ => features = self.slots(instance, port).map(|slots| (Some(*port), slots)),
             }
         }
@@ -47,8 +64,15 @@ impl Resolver<'_> {
         let mut regressors = Vec::new();
         let mut behind = Vec::new();
         let mut whole = sound;
-        if let Some(port) = features_port {
-            let unit = Self::port_unit(&port);
+        if let Some(port) = features_port
+            && !features.is_empty()
+        {
+            let mut unit = Self::port_unit(&port);
+            if port.name == "voters" {
+                whole &= self.votes_agree(instance, port.name, &features);
+                whole &= self.votes_fit(instance, port.name, &features, &link);
+                unit = Some(self.channels[truth].channel.unit.clone());
+            }
             for &lag in &wanted.feature_lags {
                 for &slot in &features {
                     let mut regressor = self.regressor(slot, lag, false);
@@ -86,10 +110,23 @@ impl Resolver<'_> {
         if !lags.is_empty() {
             gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
         }
+        if regressors.is_empty() && !wanted.every_tick {
+            // An optional input that was left out, and nothing in its place.
+            let port = features_port.unwrap_or(truth_port);
+            let problem = CompileProblem::MissingInput {
+                kind: instance.kind.name,
+                input: port.name,
+                summary: port.summary,
+            };
+            self.diagnostics.report(instance.node.place, problem);
+            whole = false;
+        }
         let training = self.limits(instance, &link);
+        let learning = self.learning(instance, estimator);
         if !whole {
             return None;
         }
+        let (training, learning) = (training?, learning?);
         let behind = Provenance::of(
             behind
                 .iter()
@@ -100,18 +137,57 @@ impl Resolver<'_> {
             ahead: link.ahead,
             ..of.clone()
         };
+        let mut ports = vec![OutputPort {
+            name: "prediction",
+            channels: vec![prediction.clone()],
+        }];
+        let mut behind = vec![behind];
+        if learning.is_some() {
+            ports.push(learning::port(&prediction));
+            behind.push(behind[0].clone());
+        }
+        let mut deviation = None;
+        if estimator.deviates() {
+            deviation = Some(self.channels.len() + ports.len());
+            ports.push(deviation_of(&prediction));
+            behind.push(behind[0].clone());
+        }
         let role = PlannedRole::Estimator {
             regressors,
             gathers,
             every_tick: wanted.every_tick,
             truth: link,
-            training: training?,
+            training,
+            learning,
+            deviation,
         };
-        let port = OutputPort {
-            name: "prediction",
-            channels: vec![prediction],
+        self.add(instance, ports, role, behind, Some(truth))
+    }
+
+    /// Whether predictions are of the truth that is predicted from them, as far ahead.
+    fn votes_fit(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        voters: &[usize],
+        link: &TruthLink,
+    ) -> bool {
+        let Some(&first) = voters.first() else {
+            return true;
         };
-        self.add(instance, vec![port], role, vec![behind], Some(truth))
+        let voter = &self.channels[first];
+        if voter.channel.ahead != link.ahead {
+            let problem = CompileProblem::Horizons {
+                first: voter.name.clone(),
+                first_ahead: voter.channel.ahead,
+                second: instance.node.name.clone(),
+                second_ahead: link.ahead,
+            };
+            self.diagnostics
+                .report(instance.input_place(input), problem);
+            return false;
+        }
+        self.agree(instance, input, first, link.slot, false)
     }
 
     /// A truth as predictions `ahead` of it are paired with it.
@@ -156,6 +232,10 @@ impl Resolver<'_> {
         Regressor {
             name,
             unit: from.channel.unit.to_string(),
+            sensors: self.provenance[slot]
+                .sources()
+                .map(|(source, _)| self.channels[source].name.clone())
+                .collect(),
         }
     }
 

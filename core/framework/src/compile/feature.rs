@@ -39,10 +39,8 @@ impl Resolver<'_> {
         if !whole {
             return None;
         }
-        let slots: Vec<usize> = ports
-            .iter()
-            .flat_map(|(_, slots)| slots.iter().copied())
-            .collect();
+        let data = ports.iter().filter(|(port, _)| port.read != Read::Truth);
+        let slots: Vec<Vec<usize>> = data.map(|(_, slots)| slots.clone()).collect();
         let inputs = self.inputs(instance, ports);
         let outputs = match feature.outputs(&inputs) {
             Ok(outputs) => outputs,
@@ -52,8 +50,8 @@ impl Resolver<'_> {
             }
         };
         self.doubts(instance, feature.warnings(&inputs));
-        let channels = outputs.iter().map(|port| port.channels.len());
-        let behind = self.behind(&slots, channels, feature.delay());
+        let widths = outputs.iter().map(|port| (port.name, port.channels.len()));
+        let behind = self.behind(feature, &slots, widths);
         let role = PlannedRole::Feature {
             inputs,
             gathers,
@@ -64,25 +62,29 @@ impl Resolver<'_> {
         self.add(instance, outputs, role, behind, None)
     }
 
-    /// What is behind each output. A port with as many channels as there are inputs, or a multiple, is taken to compute
-    /// each from its own input, in order; any other mixes all inputs.
+    /// What is behind each channel of a feature's output ports, given the slots of each input port.
     pub(super) fn behind(
         &self,
-        slots: &[usize],
-        ports: impl Iterator<Item = usize>,
-        delay: Duration,
+        feature: &dyn Feature,
+        inputs: &[Vec<usize>],
+        ports: impl Iterator<Item = (&'static str, usize)>,
     ) -> Vec<Provenance> {
-        let mut behind = Vec::new();
-        for channels in ports {
-            if !slots.is_empty() && channels % slots.len() == 0 {
-                let each = channels / slots.len();
-                for &slot in slots {
-                    let own = Provenance::of([(&self.provenance[slot], delay)]);
-                    behind.extend(std::iter::repeat_n(own, each));
-                }
-            } else {
-                let all = Provenance::of(slots.iter().map(|&slot| (&self.provenance[slot], delay)));
-                behind.extend(std::iter::repeat_n(all, channels));
+        let mut behind: Vec<Provenance> = Vec::new();
+        for (port, width) in ports {
+            let reach = feature.reach(port);
+            let mut before: Option<(Vec<_>, Provenance)> = None;
+            for nth in 0..width {
+                let parts = reach.parts(inputs, nth, width);
+                // Neighbours are often made of the same, and then share it.
+                let own = match before {
+                    Some((same, own)) if same == parts => own,
+                    _ => {
+                        let of = |&(slot, delay): &(usize, _)| (&self.provenance[slot], delay);
+                        Provenance::of(parts.iter().map(of))
+                    }
+                };
+                behind.push(own.clone());
+                before = Some((parts, own));
             }
         }
         behind

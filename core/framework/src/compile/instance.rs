@@ -5,6 +5,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::learning::Learn;
 use super::problem::CompileProblem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
@@ -32,6 +33,8 @@ pub(crate) struct EstimatorKeys {
     pub(crate) ahead: Option<Duration>,
     /// Which truths it is fitted on.
     pub(crate) train: Train,
+    /// Whether it goes on learning while it runs: `true`, or a table of limits.
+    pub(crate) learn: Option<Learn>,
 }
 
 /// Which rows an estimator is trained on.
@@ -129,7 +132,7 @@ fn read_instance(
     if let (RoleName::Estimator, Data::Table(own), Data::Table(taken)) =
         (kind.role, &mut parameters.data, &mut framework.data)
     {
-        for key in ["ahead", "train"] {
+        for key in ["ahead", "train", "learn"] {
             if let Some(entry) = own.remove(key) {
                 taken.insert(key, entry);
             }

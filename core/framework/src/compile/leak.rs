@@ -2,7 +2,7 @@
 //!
 //! It looks at the graph once all of it is known, since feedback through a delay brings what comes later in the order.
 
-use super::plan::{PlannedRole, TruthLink};
+use super::plan::{PlannedNode, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{Provenance, leaks};
 use super::resolver::Resolver;
@@ -75,11 +75,9 @@ impl Resolver<'_> {
             let Some(delay) = self.provenance[at].delay_of(source) else {
                 break;
             };
-            let before = self.channels[at]
-                .node
-                .into_iter()
-                .flat_map(|node| self.parts(node));
-            let mut next = before.filter(|&(slot, own)| {
+            let node = self.channels[at].node;
+            let before = node.map_or_else(Vec::new, |node| self.parts(node, at));
+            let mut next = before.into_iter().filter(|&(slot, own)| {
                 let known = self.provenance[slot].delay_of(source);
                 known.is_some_and(|known| known + own == delay)
             });
@@ -90,19 +88,30 @@ impl Resolver<'_> {
         way
     }
 
-    /// What a node reads as data, with the delay at which that reaches its outputs.
-    fn parts(&self, node: usize) -> Vec<(usize, Duration)> {
+    /// What a slot of a node is made of: the slots that the node reads for it, with the delay at which each reaches it.
+    fn parts(&self, node: usize, slot: usize) -> Vec<(usize, Duration)> {
         let node = &self.nodes[node];
-        let own = match node.spec.role() {
-            Role::Feature(feature) => feature.delay(),
-            Role::Estimator(_) | Role::Combiner(_) => Duration::ZERO,
+        let entries = |gather: usize| &self.gathers[gather].entries;
+        if let Role::Feature(feature) = node.spec.role() {
+            let port = node.ports.iter().find(|(_, slots)| slots.contains(&slot));
+            return port.map_or_else(Vec::new, |(name, slots)| {
+                let inputs = self.inputs_of(node);
+                feature
+                    .reach(name)
+                    .parts(&inputs, slot - slots.start, slots.len())
+            });
+        }
+        let entries = node.role.inputs().flat_map(entries);
+        entries.map(|entry| (entry.slot, entry.lag)).collect()
+    }
+
+    /// The slots that a node reads as data, port by port.
+    fn inputs_of(&self, node: &PlannedNode) -> Vec<Vec<usize>> {
+        let slots = |gather: usize| {
+            let entries = self.gathers[gather].entries.iter();
+            entries.map(|entry| entry.slot).collect()
         };
-        let entries = node
-            .role
-            .gathers()
-            .iter()
-            .flat_map(|&gather| &self.gathers[gather].entries);
-        entries.map(|entry| (entry.slot, entry.lag + own)).collect()
+        node.role.inputs().map(slots).collect()
     }
 
     /// Takes into account what loops bring back, until that changes nothing.
@@ -113,22 +122,18 @@ impl Resolver<'_> {
         while changed {
             changed = false;
             for node in 0..self.nodes.len() {
-                let parts = self.parts(node);
-                let ports: Vec<_> = self.nodes[node]
-                    .ports
-                    .iter()
-                    .map(|(_, s)| s.len())
-                    .collect();
-                let behind = match &self.nodes[node].role {
-                    PlannedRole::Feature { .. } => {
-                        let delay = parts.first().map_or(Duration::ZERO, |(_, delay)| *delay);
-                        let slots: Vec<_> = parts.iter().map(|(slot, _)| *slot).collect();
-                        self.behind(&slots, ports.into_iter(), delay)
+                let planned = &self.nodes[node];
+                let behind = match planned.spec.role() {
+                    Role::Feature(feature) => {
+                        let ports = planned.ports.iter();
+                        let widths = ports.map(|(name, slots)| (*name, slots.len()));
+                        self.behind(feature, &self.inputs_of(planned), widths)
                     }
-                    PlannedRole::Estimator { .. } | PlannedRole::Combiner { .. } => {
+                    Role::Estimator(_) | Role::Combiner(_) => {
+                        let parts = self.parts(node, planned.slots.start);
                         let parts = parts.iter();
                         let all = parts.map(|&(slot, lag)| (&self.provenance[slot], lag));
-                        vec![Provenance::of(all)]
+                        vec![Provenance::of(all); planned.slots.len()]
                     }
                 };
                 for (slot, behind) in self.nodes[node].slots.clone().zip(behind) {

@@ -9,6 +9,7 @@ mod feature;
 mod inputs;
 mod instance;
 mod leak;
+mod learning;
 mod order;
 mod plan;
 mod problem;
@@ -24,8 +25,8 @@ pub use diff::{
 };
 pub(crate) use instance::EstimatorKeys;
 pub use plan::{
-    Conversion, Entry, Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole,
-    SourceChannel, Step, TrainingLimits, TruthLink,
+    Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode,
+    PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
@@ -41,6 +42,8 @@ use crate::document::GraphFile;
 pub struct Wanted {
     /// The standard errors of truths whose producers can give them (a port named `stderr`).
     pub standard_errors: bool,
+    /// The standard deviations of predictions whose makers can give them, and the bounds of intervals.
+    pub intervals: bool,
 }
 
 /// Compiles a graph. All mistakes are told; without one there is a plan.

@@ -166,43 +166,107 @@ pub enum PlannedRole {
         truth: TruthLink,
         /// Which rows it is fitted on.
         training: TrainingLimits,
+        /// How it goes on learning while it runs, where it does.
+        learning: Option<PlannedLearning>,
+        /// The slot of its standard deviation, where somebody reads it.
+        deviation: Option<usize>,
     },
     /// One prediction of several.
     Combiner {
         /// The gather of the votes.
         voters: usize,
+        /// The gather of the state that it goes by, where it goes by one.
+        state: Option<usize>,
         /// What is predicted, where it learns from errors.
         truth: Option<TruthLink>,
-        /// Whether somebody reads its weights.
-        weights: bool,
+        /// What it gives beside its prediction.
+        beside: Beside,
     },
 }
 
 impl PlannedRole {
-    /// The gathers that it reads.
-    pub(crate) fn gathers(&self) -> &[usize] {
+    /// What the input ports read as data: their gathers, in order.
+    pub fn inputs(&self) -> impl Iterator<Item = usize> + '_ {
+        let (many, voters, state) = match self {
+            Self::Feature { gathers, .. } | Self::Estimator { gathers, .. } => {
+                (&gathers[..], None, None)
+            }
+            Self::Combiner { voters, state, .. } => (&[][..], Some(*voters), *state),
+        };
+        many.iter().copied().chain(voters).chain(state)
+    }
+
+    /// All that is read at a tick: the gathers of the input ports, then what else there is.
+    pub fn gathers(&self) -> impl Iterator<Item = usize> + '_ {
+        let more = match self {
+            Self::Feature { .. } => None,
+            Self::Estimator { learning, .. } => learning.as_ref().and_then(|l| l.freeze),
+            Self::Combiner { beside, .. } => beside.deviation.map(|(_, of_voters)| of_voters),
+        };
+        self.inputs().chain(more)
+    }
+
+    /// What is predicted, or compared with predictions.
+    #[must_use]
+    pub fn truth(&self) -> Option<&TruthLink> {
         match self {
-            Self::Feature { gathers, .. } | Self::Estimator { gathers, .. } => gathers,
-            Self::Combiner { voters, .. } => std::slice::from_ref(voters),
+            Self::Feature { .. } => None,
+            Self::Estimator { truth, .. } => Some(truth),
+            Self::Combiner { truth, .. } => truth.as_ref(),
         }
     }
 
-    /// The slot of the truth that it predicts or learns from.
-    pub(crate) fn truth(&self) -> Option<usize> {
+    /// The slots of both ends of its intervals, where it gives them.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(usize, usize)> {
         match self {
-            Self::Feature { .. } => None,
-            Self::Estimator { truth, .. } => Some(truth.slot),
-            Self::Combiner { truth, .. } => truth.map(|truth| truth.slot),
+            Self::Feature { .. } | Self::Estimator { .. } => None,
+            Self::Combiner { beside, .. } => beside.bounds,
         }
     }
+
+    /// The slot of the standard deviation of its predictions, where somebody reads it.
+    #[must_use]
+    pub fn deviation(&self) -> Option<usize> {
+        match self {
+            Self::Feature { .. } => None,
+            Self::Estimator { deviation, .. } => *deviation,
+            Self::Combiner { beside, .. } => beside.deviation.map(|(slot, _)| slot),
+        }
+    }
+}
+
+/// What a combiner gives beside its prediction: the slots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Beside {
+    /// The first of the weights, where somebody reads them.
+    pub weights: Option<usize>,
+    /// Of the reason.
+    pub reason: Option<usize>,
+    /// Of both ends of its intervals.
+    pub bounds: Option<(usize, usize)>,
+    /// Of the standard deviation, where somebody reads it, and the gather of those of the voters.
+    pub deviation: Option<(usize, usize)>,
+}
+
+/// How an estimator goes on learning while it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedLearning {
+    /// A truth that misses its prediction by more than this multiple of the recent error is not learned from.
+    pub outliers: f64,
+    /// By which multiple of its width a regressor may lie outside its range in the fit.
+    pub margin: f64,
+    /// The gather of the channels that must all be 0 for learning to go on.
+    pub freeze: Option<usize>,
 }
 
 impl Plan {
     /// The slots that a node reads, with its truth.
     pub(crate) fn reads<'a>(&'a self, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
-        let gathers = node.role.gathers().iter();
-        let entries = gathers.flat_map(|&gather| &self.gathers[gather].entries);
-        entries.map(|entry| entry.slot).chain(node.role.truth())
+        let gathers = node.role.gathers();
+        let entries = gathers.flat_map(|gather| &self.gathers[gather].entries);
+        let truth = node.role.truth().map(|truth| truth.slot);
+        entries.map(|entry| entry.slot).chain(truth)
     }
 }
 

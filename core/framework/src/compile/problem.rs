@@ -105,6 +105,11 @@ pub enum CompileProblem {
         message: String,
         help: Option<String>,
     },
+    /// An estimator that is told to learn while it runs and cannot.
+    NeverLearns {
+        kind: &'static str,
+        help: Option<&'static str>,
+    },
     /// An estimator without a horizon.
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
@@ -187,6 +192,7 @@ impl Problem for CompileProblem {
             Self::PointOrDifference { .. } => "A063",
             Self::NoRows { .. } => "A064",
             Self::Doubt { .. } => "A065",
+            Self::NeverLearns { .. } => "A110",
         }
     }
 
@@ -263,6 +269,9 @@ impl Problem for CompileProblem {
                 format!("nothing says how long a value of `{channel}` counts")
             }
             Self::Parameter { message, .. } | Self::Doubt { message, .. } => message.clone(),
+            Self::NeverLearns { kind, .. } => {
+                format!("`{kind}`, as it is here, does not learn while it runs")
+            }
             Self::NoHorizon { kind } => {
                 format!("`{kind}` needs to know how far `ahead` it predicts")
             }
@@ -322,6 +331,7 @@ impl Problem for CompileProblem {
             Self::NoMaxAge { .. } => "held without a maximum age",
             Self::Parameter { .. } | Self::Doubt { .. } => "here",
             Self::NoHorizon { .. } => "`ahead` is missing",
+            Self::NeverLearns { .. } => "stays as it was fitted",
             Self::PredictedTruth { .. } => "not measured",
             Self::LimitUnit { .. } => "another unit",
             Self::DuplicateName { .. } => "the name is taken",
@@ -387,6 +397,9 @@ impl Problem for CompileProblem {
                 )
             }
             Self::Parameter { help, .. } | Self::Doubt { help, .. } => return help.clone(),
+            Self::NeverLearns { help, .. } => help
+                .unwrap_or("leave `learn` out, or choose a kind that learns")
+                .to_owned(),
             Self::NoHorizon { .. } => {
                 "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor".to_owned()
             }

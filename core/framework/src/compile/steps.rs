@@ -26,7 +26,7 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
                 ..
             }
         );
-        let gathers = node.role.gathers();
+        let gathers: Vec<usize> = node.role.gathers().collect();
         if closes_loops {
             late.push((index, gathers));
         } else {
@@ -66,22 +66,20 @@ pub(super) fn warm_up(plan: &Plan) -> Duration {
 /// The time after which a node, started cold, knows all that it would know had it always run.
 fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Duration {
     let entries = |gather: usize| &plan.gathers[gather].entries;
-    let before = |gathers: &[usize]| {
-        let all = gathers.iter().flat_map(|&gather| entries(gather));
+    let before = || {
+        let all = node.role.gathers().flat_map(entries);
         let ages = all.map(|entry| slot_warm_up[entry.slot] + entry.lag + entry.max_age);
         ages.max().unwrap_or(Duration::ZERO)
     };
     match (&node.role, node.spec.role()) {
-        (PlannedRole::Feature { gathers, .. }, Role::Feature(feature)) => {
-            feature.memory() + before(gathers)
-        }
-        (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(combiner)) => {
+        (PlannedRole::Feature { .. }, Role::Feature(feature)) => feature.memory() + before(),
+        (PlannedRole::Combiner { truth, .. }, Role::Combiner(combiner)) => {
             let learned = truth.map_or(Duration::ZERO, |truth| {
                 truth.embargo() + truth.ahead + truth.limit
             });
-            combiner.memory() + learned + before(&[*voters])
+            combiner.memory() + learned + before()
         }
-        (PlannedRole::Estimator { gathers, .. }, _) => before(gathers),
+        (PlannedRole::Estimator { .. }, _) => before(),
         _ => unreachable!("a plan gives each node the role of its specification"),
     }
 }
@@ -92,12 +90,27 @@ pub(super) fn mark_wanted(plan: &mut Plan, read: &SlotSet, wanted: Wanted) {
         .nodes
         .iter()
         .filter_map(|node| node.role.truth())
+        .map(|truth| truth.slot)
         .collect();
-    for node in &mut plan.nodes {
+    let mut read = read.clone();
+    // Whoever is read comes before its readers, and a combination of deviations reads those of its voters.
+    for node in plan.nodes.iter_mut().rev() {
         let is_truth = truths.has_any(node.slots.clone());
-        if let PlannedRole::Combiner { weights, .. } = &mut node.role {
-            let ports = node.ports.get(1);
-            *weights = ports.is_some_and(|(_, slots)| read.has_any(slots.clone()));
+        if let PlannedRole::Combiner { voters, beside, .. } = &mut node.role {
+            let count = plan.gathers[*voters].entries.len();
+            beside.weights = beside
+                .weights
+                .filter(|&first| read.has_any(first..first + count));
+            beside.deviation = beside
+                .deviation
+                .filter(|(slot, _)| wanted.intervals || read.contains(*slot));
+            if let Some((_, of_voters)) = beside.deviation {
+                let entries = &plan.gathers[of_voters].entries;
+                read.extend(entries.iter().map(|entry| entry.slot));
+            }
+        }
+        if let PlannedRole::Estimator { deviation, .. } = &mut node.role {
+            *deviation = deviation.filter(|slot| wanted.intervals || read.contains(*slot));
         }
         if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
             for (index, (name, slots)) in node.ports.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::{Engine, Fitted};
-use crate::compile::{Change, Plan, diff};
+use crate::compile::{Change, Plan, PlannedNode, diff};
 
 /// What of an old graph goes on in a new one, by the numbers of the new one.
 #[derive(Debug, Clone)]
@@ -93,14 +93,17 @@ impl Heritage {
             .iter()
             .map(|node| (node.instance.as_str(), &node.change))
             .collect();
-        let own: Vec<Option<Own>> = plan
-            .nodes
+        let instances: Vec<String> = plan.nodes.iter().map(PlannedNode::instance).collect();
+        let refitted: Vec<bool> = instances
             .iter()
-            .map(|node| {
-                let instance = node.instance();
-                Own::of(changes.get(instance.as_str()).copied()).or_else(|| {
-                    (!same_fit(old.fitted(), new.fitted(), &instance)).then_some(Own::Fit)
-                })
+            .map(|instance| !same_fit(old.fitted(), new.fitted(), instance))
+            .collect();
+        let own: Vec<Option<Own>> = instances
+            .iter()
+            .zip(&refitted)
+            .map(|(instance, refitted)| {
+                Own::of(changes.get(instance.as_str()).copied())
+                    .or_else(|| refitted.then_some(Own::Fit))
             })
             .collect();
         let signals = diff
@@ -126,7 +129,9 @@ impl Heritage {
                 (None, None) => unreachable!("a node is touched by itself or by what it reads"),
             };
             let retuned = own[index] == Some(Own::Parameters) && read.is_none();
-            if retuned || (learned && !but_for_fits.nodes[index]) {
+            // A new fit replaces what was learned, also where it was made for other parameters.
+            if (retuned && (learned || !refitted[index])) || (learned && !but_for_fits.nodes[index])
+            {
                 Begin::Offered { reason }
             } else {
                 Begin::Afresh { reason }

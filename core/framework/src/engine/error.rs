@@ -30,6 +30,11 @@ pub enum EngineError {
         /// The regressors that the node has.
         known: Vec<String>,
     },
+    /// A node that is to learn while it runs, with a fit that stays as it is.
+    DoesNotLearn {
+        /// The node.
+        node: String,
+    },
     /// Something fitted for a node that is no estimator of this graph.
     NotAnEstimator {
         /// The node.
@@ -60,6 +65,10 @@ impl fmt::Display for EngineError {
                 f,
                 "the fit of `{node}` uses `{regressor}`, which the node does not have (it has {}): fit the graph again",
                 known.join(", ")
+            ),
+            Self::DoesNotLearn { node } => write!(
+                f,
+                "`{node}` is to learn while it runs, and its fit was not made for that: fit the graph again"
             ),
             Self::NotAnEstimator { node } => {
                 write!(

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use super::EngineError;
 use super::gather::Gathered;
+use super::learning::Learning;
+use super::state::NodeState;
 use crate::compile::{PlannedNode, PlannedRole};
-use crate::node::Predictor;
+use crate::node::{Predictor, Restored};
 use crate::time::Instant;
 
 /// A fitted estimator in a running plan.
@@ -15,13 +17,16 @@ pub(crate) struct Estimate {
     /// Where the regressors that it uses are: gather and place within it.
     places: Vec<(usize, usize)>,
     row: Vec<f64>,
+    takes_absent: bool,
+    /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
+    pub(super) learning: Option<Learning>,
 }
 
 impl Estimate {
     /// Finds the regressors that a predictor uses.
     ///
     /// # Errors
-    /// When the node has no regressor of a name that the predictor uses.
+    /// When the node has no regressor of a name that the predictor uses, or is to learn and the predictor does not.
     pub(crate) fn new(
         node: &PlannedNode,
         predictor: Arc<dyn Predictor>,
@@ -30,6 +35,9 @@ impl Estimate {
         let PlannedRole::Estimator {
             regressors,
             gathers,
+            truth,
+            training,
+            learning,
             ..
         } = &node.role
         else {
@@ -60,30 +68,100 @@ impl Estimate {
             .iter()
             .map(place)
             .collect::<Result<Vec<_>, _>>()?;
+        let learning = match learning {
+            None => None,
+            Some(planned) => {
+                let learning = Learning::new(&predictor, *planned, *truth, *training);
+                Some(learning.ok_or_else(|| EngineError::DoesNotLearn {
+                    node: node.instance(),
+                })?)
+            }
+        };
         Ok(Self {
             row: vec![0.0; places.len()],
+            takes_absent: predictor.takes_absent(),
             predictor,
             places,
+            learning,
         })
     }
 
-    /// The prediction and its stamp, the oldest among the values used; none where one of them is missing.
-    pub(crate) fn run(&mut self, gathered: &[Gathered], now: Instant) -> Option<(f64, Instant)> {
+    /// The prediction and its stamp, the oldest among the values used; none where one of them is missing that is needed.
+    ///
+    /// `on` says whether learning goes on.
+    pub(crate) fn run(
+        &mut self,
+        gathered: &[Gathered],
+        now: Instant,
+        on: bool,
+    ) -> Option<(f64, Instant)> {
         let mut oldest = if self.places.is_empty() {
             now
         } else {
             Instant::MAX
         };
+        let mut whole = true;
         for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
             let from = &gathered[gather];
             *value = from.values[place];
-            if value.is_nan() {
-                return None;
+            if !value.is_nan() {
+                oldest = oldest.min(from.stamps[place]);
+            } else if !self.takes_absent {
+                whole = false;
+                break;
             }
-            oldest = oldest.min(from.stamps[place]);
         }
-        let prediction = self.predictor.predict(&self.row);
+        // Where none of several regressors is there, none had a stamp.
+        whole &= oldest < Instant::MAX;
+        if let Some(learning) = &mut self.learning {
+            if !whole {
+                // Nothing of earlier runs may stand in it.
+                self.row.fill(f64::NAN);
+            }
+            learning.run(&self.row, now, gathered, on);
+        }
+        if !whole {
+            return None;
+        }
+        let prediction = match &self.learning {
+            Some(learning) => learning.predict(&self.row, now),
+            None => self.predictor.predict(&self.row),
+        };
         prediction.is_finite().then_some((prediction, oldest))
+    }
+
+    /// The standard deviation of the truth about the prediction that was made at this tick.
+    pub(crate) fn deviation(&self, now: Instant) -> f64 {
+        let deviation = match &self.learning {
+            Some(learning) => learning.deviation(&self.row, now),
+            None => self.predictor.deviation(&self.row),
+        };
+        if deviation.is_finite() {
+            deviation
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// What goes on learning.
+    pub(crate) fn learning(&mut self) -> Option<&mut Learning> {
+        self.learning.as_mut()
+    }
+
+    /// What was learned since the fit.
+    pub(crate) fn snapshot(&self) -> NodeState {
+        self.learning
+            .as_ref()
+            .map(Learning::snapshot)
+            .unwrap_or_default()
+    }
+
+    /// Goes on from what was learned.
+    pub(crate) fn restore(&mut self, state: &NodeState) -> Restored {
+        match &mut self.learning {
+            Some(learning) => learning.restore(state),
+            None => Restored::Accepted,
+        }
     }
 
     /// Asks for the prediction from any values.
@@ -91,5 +169,8 @@ impl Estimate {
     pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
         let row: Vec<f64> = self.row.iter().map(|_| value()).collect();
         self.predictor.predict(&row);
+        if let Some(learning) = &self.learning {
+            learning.predict(&row, Instant::from_ns(0));
+        }
     }
 }

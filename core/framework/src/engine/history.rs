@@ -1,4 +1,4 @@
-//! Decides what a slot held at an earlier instant; not who asks.
+//! Decides what a channel held at an earlier instant; not who asks.
 
 use std::collections::VecDeque;
 
@@ -6,11 +6,11 @@ use crate::channel::{ABSENT, COLD};
 use crate::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
-/// The past of one slot, as far back as anybody reads it.
+/// The past of one channel, as far back as anybody reads it.
 ///
 /// Readers ask for instants that never go back, each through a cursor of its own, so that an answer costs a step or two.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct History {
+pub struct History {
     depth: Duration,
     entries: VecDeque<Past>,
     /// How many entries have been dropped at the front since the segment began.
@@ -25,11 +25,12 @@ struct Past {
 }
 
 /// A reader's place: the number, since the segment began, of entries at or before the instant asked last.
-pub(crate) type Cursor = u64;
+pub type Cursor = u64;
 
 impl History {
     /// A history that can be asked for instants up to `depth` back.
-    pub(crate) fn new(depth: Duration) -> Self {
+    #[must_use]
+    pub fn new(depth: Duration) -> Self {
         Self {
             depth,
             entries: VecDeque::new(),
@@ -37,8 +38,8 @@ impl History {
         }
     }
 
-    /// Writes down what the slot holds from `at` on; NaN where a run gave nothing.
-    pub(crate) fn push(&mut self, at: Instant, value: f64, stamp: Instant) {
+    /// Writes down what the channel holds from `at` on; NaN where a run gave nothing.
+    pub fn push(&mut self, at: Instant, value: f64, stamp: Instant) {
         while self
             .entries
             .get(1)
@@ -51,7 +52,7 @@ impl History {
     }
 
     /// The value that was held at `at`, and its stamp; NaN where there was none or it was older than `max_age`.
-    pub(crate) fn at(&self, at: Instant, max_age: Duration, cursor: &mut Cursor) -> (f64, Instant) {
+    pub fn at(&self, at: Instant, max_age: Duration, cursor: &mut Cursor) -> (f64, Instant) {
         *cursor = (*cursor).max(self.dropped);
         while self.entry(*cursor).is_some_and(|next| next.at <= at) {
             *cursor += 1;
@@ -66,8 +67,8 @@ impl History {
         }
     }
 
-    /// Goes on from another history of the same slot, keeping what it reached back further.
-    pub(crate) fn adopt(&mut self, other: &Self) {
+    /// Goes on from another history of the same channel, keeping what it reached back further.
+    pub fn adopt(&mut self, other: &Self) {
         let begin = other.entries.front().map_or(Instant::MAX, |past| past.at);
         self.entries.retain(|past| past.at < begin);
         if self.depth <= other.depth {
@@ -81,7 +82,7 @@ impl History {
     }
 
     /// Forgets everything.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.entries.clear();
         self.dropped = 0;
     }

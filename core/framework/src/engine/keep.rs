@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
+use super::estimate::Estimate;
 use super::state::{NodeState, SlotState};
 use super::{Engine, EngineState, RestoreError, Running};
 use crate::node::Restored;
@@ -87,6 +88,7 @@ impl Engine {
             tick: self.slots.tick,
             last: self.last,
             before_break: self.before_break,
+            frozen: self.frozen,
             rejected: sources
                 .map(|(source, &count)| (source.name.clone(), count))
                 .collect(),
@@ -124,7 +126,10 @@ impl Engine {
             .map(|(node, running)| {
                 let state = match running {
                     Running::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
-                    Running::Estimate { .. } => NodeState::default(),
+                    Running::Estimate { estimate, .. } => estimate
+                        .as_ref()
+                        .map(Estimate::snapshot)
+                        .unwrap_or_default(),
                     Running::Vote(vote) => vote.snapshot(),
                 };
                 (node.instance(), state)
@@ -227,6 +232,7 @@ impl Engine {
         self.last = state.last;
         self.before_break = state.before_break;
         self.refused = state.refused;
+        self.frozen = state.frozen;
     }
 }
 
@@ -241,7 +247,10 @@ fn restored(running: &mut Running, state: Option<&NodeState>) -> Restored {
             Ok(None) => Restored::Accepted,
             Err(cold) => cold,
         },
-        Running::Estimate { .. } => Restored::Accepted,
+        Running::Estimate { estimate, .. } => match estimate {
+            Some(estimate) => estimate.restore(state),
+            None => Restored::Accepted,
+        },
         Running::Vote(vote) => vote.restore(state),
     }
 }

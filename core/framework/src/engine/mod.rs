@@ -10,11 +10,13 @@ mod history;
 #[cfg(feature = "testkit")]
 mod idle;
 mod keep;
+mod learning;
 mod pairing;
 mod revision;
 mod slots;
 mod state;
 mod vote;
+mod withheld;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -27,7 +29,7 @@ pub use state::{EngineState, RestoreError};
 
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
-pub(crate) use history::{Cursor, History};
+pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
 use crate::compile::{Plan, PlannedRole, Step};
@@ -54,14 +56,16 @@ pub struct Engine {
     histories: Vec<Option<History>>,
     /// The slots that have a history.
     recorded: Vec<usize>,
-    /// The nodes that are told truths.
-    voting: Vec<usize>,
+    /// The nodes that are told truths, and the slots of these.
+    told: Vec<(usize, usize)>,
     nodes: Vec<Running>,
     last: Instant,
     /// Set between a segment break and the first tick after it: the last instant before the break.
     before_break: Option<Instant>,
     rejected: Vec<u64>,
     refused: u64,
+    /// Whether learning has been frozen on command.
+    frozen: bool,
     outputs: Vec<f64>,
     /// For each output its rate of passing over, in its unit per second, and how far it has.
     blending: Vec<(Option<f64>, Blending)>,
@@ -79,6 +83,17 @@ enum Running {
         trigger: Option<usize>,
     },
     Vote(Vote),
+}
+
+impl Running {
+    /// The slot of the truth that it is told.
+    fn truth(&self) -> Option<usize> {
+        match self {
+            Self::Operator { .. } => None,
+            Self::Estimate { estimate, .. } => Some(estimate.as_ref()?.learning.as_ref()?.truth()),
+            Self::Vote(vote) => vote.truth(),
+        }
+    }
 }
 
 impl Engine {
@@ -139,11 +154,7 @@ impl Engine {
                     }
                 }
                 (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
-                    Running::Vote(Vote::new(
-                        spec.build(widths[*voters]),
-                        widths[*voters],
-                        *truth,
-                    ))
+                    Running::Vote(Vote::new(spec, widths[*voters], *truth))
                 }
                 _ => unreachable!("a plan gives each node the role of its specification"),
             });
@@ -158,12 +169,14 @@ impl Engine {
             let node = fitted.keys().find(known).cloned().unwrap_or_default();
             return Err(EngineError::NotAnEstimator { node });
         }
-        let votes =
-            |&node: &usize| matches!(&nodes[node], Running::Vote(vote) if vote.truth().is_some());
         let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
-            voting: (0..nodes.len()).filter(votes).collect(),
+            told: nodes
+                .iter()
+                .enumerate()
+                .filter_map(|(node, running)| Some((node, running.truth()?)))
+                .collect(),
             slots: Slots::new(plan.channels.len()),
             gathered: plan.gathers.iter().map(Gathered::new).collect(),
             histories: plan
@@ -176,6 +189,7 @@ impl Engine {
             before_break: None,
             rejected: vec![0; plan.sources.len()],
             refused: 0,
+            frozen: false,
             outputs: vec![f64::NAN; plan.outputs.len()],
             blending: plan
                 .outputs
@@ -227,7 +241,7 @@ impl Engine {
             });
         }
         if let Some(before) = self.before_break.take() {
-            self.shift_votes(time - before);
+            self.shift(time - before);
         }
         self.last = time;
         self.slots.tick += 1;
@@ -257,6 +271,19 @@ impl Engine {
         time > self.last
     }
 
+    /// Freezes what estimators learn while they run, or lets it go on; votes, which weigh by recent errors, go on.
+    ///
+    /// Nothing is learned at a tick at which learning is frozen, and nothing later from a row or a truth of such a tick.
+    pub fn freeze(&mut self, frozen: bool) {
+        self.frozen = frozen;
+    }
+
+    /// Whether learning has been frozen on command.
+    #[must_use]
+    pub fn frozen(&self) -> bool {
+        self.frozen
+    }
+
     /// What was fitted.
     #[must_use]
     pub fn fitted(&self) -> &Fitted {
@@ -278,7 +305,11 @@ impl Engine {
         for node in &mut self.nodes {
             match node {
                 Running::Operator { operator, .. } => operator.segment(),
-                Running::Estimate { .. } => {}
+                Running::Estimate { estimate, .. } => {
+                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                        learning.segment(self.last, &self.gathered, !self.frozen);
+                    }
+                }
                 Running::Vote(vote) => vote.segment(self.last),
             }
         }
@@ -402,36 +433,70 @@ impl Engine {
                 );
             }
             Running::Estimate { estimate, trigger } => {
+                let on = !self.frozen;
+                if let Some(learning) = estimate.as_mut().and_then(Estimate::learning)
+                    && let Some((became, arrived)) = learning.release(now, &self.gathered, on)
+                {
+                    let slot = node.slots.start + 1;
+                    self.slots.set(slot, f64::from(became as u8), arrived);
+                }
                 if trigger.is_some_and(|gather| !self.gathered[gather].fresh) {
                     return;
                 }
                 let prediction = estimate
                     .as_mut()
-                    .and_then(|estimate| estimate.run(&self.gathered, now));
+                    .and_then(|estimate| estimate.run(&self.gathered, now, on));
                 let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
                 self.slots.set(node.slots.start, value, stamp);
+                if let (Some(estimate), Some(slot)) = (estimate, node.role.deviation()) {
+                    let known = if value.is_nan() {
+                        f64::NAN
+                    } else {
+                        estimate.deviation(now)
+                    };
+                    self.slots.set(slot, known, stamp);
+                }
             }
             Running::Vote(vote) => {
                 vote.release(now);
                 let PlannedRole::Combiner {
-                    voters, weights, ..
+                    voters,
+                    state,
+                    beside,
+                    ..
                 } = node.role
                 else {
                     unreachable!("a vote is planned as a combiner")
                 };
-                if !self.gathered[voters].fresh {
+                let votes = &self.gathered[voters];
+                let mut fresh = votes.fresh;
+                if let Some(state) = state {
+                    vote.go_by(self.gathered[state].values[0], now);
+                    fresh |= self.gathered[state].fresh;
+                }
+                if !fresh {
                     return;
                 }
-                let (value, stamp) = vote.run(&self.gathered[voters], now);
+                let (value, stamp) = vote.run(votes, now);
                 self.slots.set(node.slots.start, value, stamp);
-                if weights {
-                    let slots = node.slots.start + 1..node.slots.end;
-                    vote.weights(
-                        &self.gathered[voters],
-                        &mut self.slots.values[slots.clone()],
-                    );
+                if let Some(first) = beside.weights {
+                    let slots = first..first + votes.values.len();
+                    vote.weights(votes, &mut self.slots.values[slots.clone()]);
                     self.slots.stamps[slots.clone()].fill(stamp);
                     self.slots.written[slots].fill(self.slots.tick);
+                }
+                if let Some(slot) = beside.reason {
+                    self.slots.set(slot, vote.reason(votes), stamp);
+                }
+                if let Some((lower, upper)) = beside.bounds {
+                    let ends = vote.interval();
+                    self.slots.set(lower, ends[0], stamp);
+                    self.slots.set(upper, ends[1], stamp);
+                }
+                if let Some((slot, of_voters)) = beside.deviation {
+                    let of_voters = &self.gathered[of_voters].values;
+                    let deviation = vote.deviation(votes, of_voters, value);
+                    self.slots.set(slot, deviation, stamp);
                 }
             }
         }
@@ -459,20 +524,33 @@ impl Engine {
                 history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
             }
         }
-        for &node in &self.voting {
-            if let Running::Vote(vote) = &mut self.nodes[node]
-                && let Some(slot) = vote.truth()
-                && self.slots.fresh(slot)
-            {
-                vote.observe(self.slots.values[slot], now);
+        for &(node, slot) in &self.told {
+            if !self.slots.fresh(slot) {
+                continue;
+            }
+            let truth = self.slots.values[slot];
+            match &mut self.nodes[node] {
+                Running::Vote(vote) => vote.observe(truth, now),
+                Running::Estimate { estimate, .. } => {
+                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                        learning.observe(truth, now, &self.gathered, !self.frozen);
+                    }
+                }
+                Running::Operator { .. } => {}
             }
         }
     }
 
-    fn shift_votes(&mut self, shift: Duration) {
+    fn shift(&mut self, shift: Duration) {
         for node in &mut self.nodes {
-            if let Running::Vote(vote) = node {
-                vote.shift(shift);
+            match node {
+                Running::Vote(vote) => vote.shift(shift),
+                Running::Estimate { estimate, .. } => {
+                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                        learning.shift(shift);
+                    }
+                }
+                Running::Operator { .. } => {}
             }
         }
     }

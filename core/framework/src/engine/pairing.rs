@@ -103,6 +103,11 @@ impl Pairing {
         self.number
     }
 
+    /// Whether truths are paired as in another, and as much is written down.
+    pub(crate) fn pairs_like(&self, other: &Self) -> bool {
+        (self.ahead, self.limit, self.width) == (other.ahead, other.limit, other.width)
+    }
+
     /// Forgets all runs: the next one belongs to another segment.
     pub fn clear(&mut self) {
         self.number += self.len as u64;

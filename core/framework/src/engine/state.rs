@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::blend::Blending;
 use super::history::History;
+use super::learning::RecentError;
 use super::revision::fnv_1a;
-use super::vote::LearningState;
+use super::withheld::LearningState;
 use crate::node::{Restored, State};
 use crate::time::Instant;
 
@@ -31,6 +32,9 @@ pub struct EngineState {
     pub(crate) histories: BTreeMap<String, History>,
     pub(crate) nodes: BTreeMap<String, NodeState>,
     pub(crate) blending: BTreeMap<String, Blending>,
+    /// Whether learning has been frozen on command.
+    #[serde(default)]
+    pub(crate) frozen: bool,
 }
 
 /// What a slot holds.
@@ -46,6 +50,9 @@ pub(crate) struct SlotState {
 pub(crate) struct NodeState {
     pub(crate) own: Option<Vec<u8>>,
     pub(crate) learning: Option<LearningState>,
+    /// The recent error of an estimator that learns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) recent: Option<RecentError>,
 }
 
 impl NodeState {
@@ -55,7 +62,7 @@ impl NodeState {
         });
         Self {
             own,
-            learning: None,
+            ..Self::default()
         }
     }
 

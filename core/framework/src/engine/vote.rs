@@ -1,49 +1,60 @@
 //! Decides when a combiner is told of a truth; not what it makes of it.
 
-use std::collections::VecDeque;
-
 use super::gather::Gathered;
-use super::pairing::Pairing;
 use super::state::NodeState;
+use super::withheld::{Released, Withheld};
 use crate::channel::ABSENT;
 use crate::compile::TruthLink;
-use crate::node::{Combine, Restored, Votes};
+use crate::node::{Combine, Combiner, Restored, Votes};
 use crate::time::{Duration, Instant};
-use serde::{Deserialize, Serialize};
 
 /// A combiner in a running plan, with the truths that the embargo still withholds from it.
 pub(crate) struct Vote {
     combine: Box<dyn Combine>,
-    learning: Option<Learning>,
-}
-
-struct Learning {
-    link: TruthLink,
-    pairing: Pairing,
-    /// Arrival and value of truths not yet handed over, and the votes cast for each.
-    withheld: VecDeque<(Instant, f64)>,
-    votes: VecDeque<f64>,
-    row: Vec<f64>,
+    withheld: Option<Withheld>,
+    /// Both ends of the interval of this tick, for a combiner that gives intervals.
+    interval: Option<[f64; 2]>,
+    /// Room for the weights that deviations are combined by.
+    weights: Vec<f64>,
 }
 
 impl Vote {
-    pub(crate) fn new(combine: Box<dyn Combine>, voters: usize, link: Option<TruthLink>) -> Self {
-        let learning = link.map(|link| Learning {
-            link,
-            pairing: Pairing::new(&link, voters),
-            withheld: VecDeque::new(),
-            votes: VecDeque::new(),
-            row: vec![0.0; voters],
-        });
-        Self { combine, learning }
+    pub(crate) fn new(spec: &dyn Combiner, voters: usize, link: Option<TruthLink>) -> Self {
+        let interval = spec.covers().map(|_| [f64::NAN; 2]);
+        // The interval that was given for a truth is written down with the votes for it.
+        let width = voters + interval.map_or(0, |ends| ends.len());
+        Self {
+            combine: spec.build(voters),
+            withheld: link.map(|link| Withheld::new(link, width)),
+            interval,
+            weights: vec![f64::NAN; voters],
+        }
+    }
+
+    /// Tells the combiner the state that it goes by.
+    pub(crate) fn go_by(&mut self, state: f64, now: Instant) {
+        self.combine.state(now, state);
+    }
+
+    /// Why the votes of this tick are combined as they are.
+    pub(crate) fn reason(&self, votes: &Gathered) -> f64 {
+        self.combine.reason(Votes(&votes.values))
     }
 
     /// Hands over what the embargo lets through at `now`.
     pub(crate) fn release(&mut self, now: Instant) {
-        if let Some(learning) = &mut self.learning {
-            let newest = now - learning.link.embargo();
-            learning.release(newest, &mut *self.combine);
-            self.combine.advance(newest);
+        let Self {
+            combine,
+            withheld,
+            weights,
+            ..
+        } = self;
+        if let Some(withheld) = withheld {
+            let newest = withheld.newest(now);
+            withheld.release(newest, |released| {
+                tell(&mut **combine, weights.len(), released)
+            });
+            combine.advance(newest);
         }
     }
 
@@ -55,8 +66,12 @@ impl Vote {
         } else {
             combined
         };
-        if let Some(learning) = &mut self.learning {
-            learning.pairing.run(now, [&votes.values[..]]);
+        if let Some(ends) = &mut self.interval {
+            *ends = self.combine.interval(Votes(&votes.values));
+        }
+        if let Some(withheld) = &mut self.withheld {
+            let ends = self.interval.as_ref().map_or(&[][..], |ends| &ends[..]);
+            withheld.run(now, [&votes.values[..], ends]);
         }
         (combined, votes.oldest().unwrap_or(now))
     }
@@ -67,10 +82,40 @@ impl Vote {
         self.combine.weights(Votes(&votes.values), weights);
     }
 
+    /// Both ends of the interval of this tick.
+    pub(crate) fn interval(&self) -> [f64; 2] {
+        self.interval.unwrap_or([f64::NAN; 2])
+    }
+
+    /// The standard deviation of the truth about the combination of this tick, from those about the votes.
+    ///
+    /// The truth is taken to follow one of the voters, each with the probability of its weight, so that the variance is
+    /// `Σ w_i (σ_i² + (ŷ_i − ŷ)²)`: what voters disagree about is uncertain too (Hoeting, Madigan, Raftery and Volinsky 1999,
+    /// section 2). NaN where a vote that counts has none, or the weights do not add up to 1.
+    pub(crate) fn deviation(&mut self, votes: &Gathered, of_votes: &[f64], combined: f64) -> f64 {
+        let mut weights = std::mem::take(&mut self.weights);
+        self.weights(votes, &mut weights);
+        let (mut sum, mut variance) = (0.0, 0.0);
+        for ((&weight, &vote), deviation) in weights.iter().zip(&votes.values).zip(of_votes) {
+            if weight != 0.0 && !vote.is_nan() {
+                sum += weight;
+                variance += weight * (deviation * deviation + (vote - combined).powi(2));
+            }
+        }
+        self.weights = weights;
+        // Written so that NaN fails.
+        if (sum - 1.0).abs() < 1e-9 && variance >= 0.0 && variance.is_finite() {
+            variance.sqrt()
+        } else {
+            f64::NAN
+        }
+    }
+
     /// Asks for the answer to any votes, all of them and all but the first.
     #[cfg(feature = "testkit")]
     pub(crate) fn ask_idly(&self, mut votes: Vec<f64>) {
         self.combine.combine(Votes(&votes));
+        self.combine.interval(Votes(&votes));
         self.combine
             .weights(Votes(&votes), &mut vec![f64::NAN; votes.len()]);
         if let Some(first) = votes.first_mut() {
@@ -81,37 +126,35 @@ impl Vote {
 
     /// The truth to look at after all outputs, if any.
     pub(crate) fn truth(&self) -> Option<usize> {
-        self.learning.as_ref().map(|learning| learning.link.slot)
+        Some(self.withheld.as_ref()?.link().slot)
     }
 
     /// Takes a truth that has just been measured.
     pub(crate) fn observe(&mut self, truth: f64, now: Instant) {
-        let Some(learning) = &mut self.learning else {
-            return;
-        };
-        if let Some(paired) = learning.pairing.truth(now) {
-            learning.withheld.push_back((now, truth));
-            learning.votes.extend(paired.row);
+        if let Some(withheld) = &mut self.withheld {
+            withheld.observe(truth, now);
         }
     }
 
-    /// Goes over into another segment, which starts `shift` later than a seamless continuation would.
+    /// The segment has ended with this tick.
     pub(crate) fn segment(&mut self, last: Instant) {
-        if let Some(learning) = &mut self.learning {
-            // The embargo guards predictions of the segment that has ended; none of them is still to come.
-            learning.release(last, &mut *self.combine);
-            learning.pairing.clear();
+        let Self {
+            combine,
+            withheld,
+            weights,
+            ..
+        } = self;
+        if let Some(withheld) = withheld {
+            withheld.end_segment(last, |released| {
+                tell(&mut **combine, weights.len(), released)
+            });
         }
     }
 
     /// What the combiner knows, and what is still withheld from it.
     pub(crate) fn snapshot(&self) -> NodeState {
         let mut state = NodeState::pack(self.combine.snapshot());
-        state.learning = self.learning.as_ref().map(|learning| LearningState {
-            pairing: learning.pairing.clone(),
-            withheld: learning.withheld.clone(),
-            votes: learning.votes.clone(),
-        });
+        state.learning = self.withheld.as_ref().map(Withheld::state);
         state
     }
 
@@ -122,15 +165,10 @@ impl Vote {
             Ok(None) => Restored::Accepted,
             Err(cold) => cold,
         };
-        if let (Some(learning), Some(from)) = (&mut self.learning, &state.learning)
+        if let (Some(withheld), Some(from)) = (&mut self.withheld, &state.learning)
             && !matches!(answer, Restored::Cold { .. })
         {
-            learning.pairing.clone_from(&from.pairing);
-            learning.withheld.clone_from(&from.withheld);
-            learning.votes.clone_from(&from.votes);
-            // The engine thread must not have to make room.
-            learning.withheld.reserve(learning.withheld.len().max(16));
-            learning.votes.reserve(learning.votes.len().max(64));
+            withheld.restore(from);
         }
         answer
     }
@@ -141,28 +179,10 @@ impl Vote {
     }
 }
 
-/// The truths that are withheld from a combiner, and the runs that later ones may be paired with.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct LearningState {
-    pairing: Pairing,
-    withheld: VecDeque<(Instant, f64)>,
-    votes: VecDeque<f64>,
-}
-
-impl Learning {
-    fn release(&mut self, newest: Instant, combine: &mut dyn Combine) {
-        while let Some(&(arrived, truth)) = self.withheld.front() {
-            if arrived > newest {
-                break;
-            }
-            self.withheld.pop_front();
-            for vote in &mut self.row {
-                *vote = self
-                    .votes
-                    .pop_front()
-                    .expect("as many votes are withheld as truths times voters");
-            }
-            combine.observe(Votes(&self.row), truth, arrived);
-        }
+fn tell(combine: &mut dyn Combine, voters: usize, released: Released<'_>) {
+    let (votes, interval) = released.row.split_at(voters);
+    if let &[lower, upper] = interval {
+        combine.judge([lower, upper], released.truth);
     }
+    combine.observe(Votes(votes), released.truth, released.arrived);
 }

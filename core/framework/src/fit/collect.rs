@@ -8,6 +8,7 @@ use super::report::Dropped;
 use crate::compile::{Plan, PlannedRole, TrainingLimits, TruthLink};
 use crate::engine::{Engine, Pairing};
 use crate::recording::Event;
+use crate::time::Instant;
 
 /// A part of the ticks of a recording, by their number.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,7 +50,8 @@ pub(super) struct Trainee {
     taps: Vec<usize>,
     pub(super) validity: Validity,
     pub(super) dropped: Dropped,
-    truths: Vec<f64>,
+    /// When each truth was measured, and what it was.
+    truths: Vec<(Instant, f64)>,
     /// For each example and tap, the number of the kept row.
     rows: Vec<u32>,
     /// The first example of each segment after the first.
@@ -70,7 +72,7 @@ pub(super) struct Collector {
 
 /// Takes the examples of one estimator, in order.
 pub(super) trait Sink {
-    fn row<'a>(&mut self, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64);
+    fn row<'a>(&mut self, at: Instant, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64);
     fn segment(&mut self);
 }
 
@@ -87,6 +89,7 @@ impl Collector {
                 every_tick,
                 truth,
                 training,
+                ..
             } = &plan.nodes[node].role
             else {
                 unreachable!("only estimators are trained")
@@ -181,9 +184,9 @@ impl Collector {
                     live[index].segment();
                 }
                 let parts = trainee.taps.iter().map(|&tap| taps[tap].pairing.last());
-                live[index].row(parts, truth);
+                live[index].row(now, parts, truth);
             } else {
-                self.keep(index, truth);
+                self.keep(index, now, truth);
             }
         }
     }
@@ -193,7 +196,7 @@ impl Collector {
         let trainee = &self.trainees[index];
         let mut breaks = trainee.breaks.iter().peekable();
         let width = trainee.taps.len();
-        for (example, &truth) in trainee.truths.iter().enumerate() {
+        for (example, &(at, truth)) in trainee.truths.iter().enumerate() {
             while breaks.next_if(|&&at| at <= example).is_some() {
                 sink.segment();
             }
@@ -202,11 +205,11 @@ impl Collector {
                 let tap = &self.taps[tap];
                 &tap.kept[row as usize * tap.width..(row as usize + 1) * tap.width]
             });
-            sink.row(parts, truth);
+            sink.row(at, parts, truth);
         }
     }
 
-    fn keep(&mut self, index: usize, truth: f64) {
+    fn keep(&mut self, index: usize, at: Instant, truth: f64) {
         let Self { taps, trainees, .. } = self;
         let trainee = &mut trainees[index];
         trainee
@@ -218,8 +221,8 @@ impl Collector {
         if std::mem::take(&mut trainee.segment_pending) {
             trainee.breaks.push(trainee.truths.len());
         }
-        trainee.truths.push(truth);
-        self.bytes += size_of::<f64>();
+        trainee.truths.push((at, truth));
+        self.bytes += size_of::<(Instant, f64)>();
         for &tap in &trainee.taps {
             let tap = &mut taps[tap];
             let number = tap.pairing.last_number();

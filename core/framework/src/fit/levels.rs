@@ -186,15 +186,8 @@ fn levels(plan: &Plan) -> Vec<Vec<usize>> {
     let mut of_slot = vec![0_usize; plan.channels.len()];
     let mut levels: Vec<Vec<usize>> = Vec::new();
     for (index, node) in plan.nodes.iter().enumerate() {
-        let gathers: &[usize] = match &node.role {
-            PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => {
-                gathers
-            }
-            PlannedRole::Combiner { voters, .. } => std::slice::from_ref(voters),
-        };
-        let slots = gathers
-            .iter()
-            .flat_map(|&gather| &plan.gathers[gather].entries);
+        let gathers = node.role.inputs();
+        let slots = gathers.flat_map(|gather| &plan.gathers[gather].entries);
         let mut level = slots.map(|entry| of_slot[entry.slot]).max().unwrap_or(0);
         if let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
             (&node.role, node.spec.role())

@@ -7,6 +7,7 @@ use super::collect::{Collector, Sink, Trainee};
 use super::report::{EstimatorFit, Outcome};
 use crate::compile::{Plan, PlannedRole};
 use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
+use crate::time::Instant;
 
 /// A fit in the making: the complete rows of the candidates that were kept go to the trainer.
 pub(super) struct Making {
@@ -19,7 +20,7 @@ pub(super) struct Making {
 }
 
 impl Sink for Making {
-    fn row<'a>(&mut self, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64) {
+    fn row<'a>(&mut self, at: Instant, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64) {
         self.all.clear();
         for part in parts {
             self.all.extend_from_slice(part);
@@ -31,7 +32,7 @@ impl Sink for Making {
             self.incomplete += 1;
         } else {
             self.rows += 1;
-            self.trainer.row(&self.row, truth);
+            self.trainer.row_at(at, &self.row, truth);
         }
     }
 
@@ -46,8 +47,14 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 /// Starts the fit of one estimator, now that it is known which candidates have values.
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
     let node = &plan.nodes[trainee.node];
-    let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
-        (&node.role, node.spec.role())
+    let (
+        PlannedRole::Estimator {
+            regressors,
+            learning,
+            ..
+        },
+        Role::Estimator(estimator),
+    ) = (&node.role, node.spec.role())
     else {
         unreachable!("only estimators are trained")
     };
@@ -59,6 +66,9 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
             .collect::<Vec<Regressor>>(),
         truth_unit: plan.channels[trainee.link.slot].channel.unit.to_string(),
         memory,
+        ahead: trainee.link.ahead,
+        span: trainee.link.span,
+        learns: learning.is_some(),
     };
     let trainer = estimator.trainer(&setup);
     Making {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::handover::{Feed, Mark, Seated};
+use super::handover::{Feed, Happening, Mark, Seated};
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::{LiveOptions, Stepper};
@@ -38,6 +38,8 @@ pub struct Control {
     previous: Option<Previous>,
     event: u64,
     last: Option<Instant>,
+    /// Whether learning is frozen on command.
+    frozen: bool,
     generation: u64,
     row: Vec<f64>,
 }
@@ -188,6 +190,7 @@ pub(super) fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Cont
         previous: None,
         event: 0,
         last: None,
+        frozen: false,
         generation: 0,
     };
     Ok((stepper, control))
@@ -230,6 +233,7 @@ impl Control {
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;
         let mut seated = Seated::new(engine, &self.feed, 0)
             .map_err(|channels| StageError::MissingChannels { channels })?;
+        seated.engine.freeze(self.frozen);
         let mut warmed = false;
         self.retained.for_each(|time, samples| match time {
             Some(time) => warmed |= seated.step(time, samples).is_ok(),
@@ -378,9 +382,10 @@ impl Control {
             self.lose(missed, notices);
         }
         self.event = mark.event;
-        match mark.time {
-            None => self.segment(),
-            Some(time) => self.tick(mark, time, samples, notices),
+        match mark.what {
+            Happening::Break => self.segment(),
+            Happening::Freeze(frozen) => self.freeze(frozen),
+            Happening::Tick(time) => self.tick(mark, time, samples, notices),
         }
     }
 
@@ -395,6 +400,11 @@ impl Control {
         {
             shadow.segment();
         }
+    }
+
+    fn freeze(&mut self, frozen: bool) {
+        self.frozen = frozen;
+        self.for_all(|seated| seated.freeze(frozen));
     }
 
     fn tick(&mut self, mark: Mark, time: Instant, samples: &[f64], notices: &mut Vec<Notice>) {

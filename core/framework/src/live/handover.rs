@@ -36,7 +36,7 @@ pub(super) struct Seated {
     pub(super) samples: Vec<f64>,
     /// For each output, that of the engine before which it passes over from.
     pub(super) outputs: Vec<Option<usize>>,
-    /// The number of the event, tick or segment break, up to which the engine has been taken.
+    /// The number of the event up to which the engine has been taken.
     pub(super) event: u64,
     /// Whether it was sent back without having taken over.
     pub(super) refused: bool,
@@ -87,6 +87,12 @@ impl Seated {
         self.event += 1;
     }
 
+    /// Freezes learning, or lets it go on.
+    pub(super) fn freeze(&mut self, frozen: bool) {
+        self.engine.freeze(frozen);
+        self.event += 1;
+    }
+
     /// Notes which outputs of another plan those of this one pass over from.
     pub(super) fn follow(&mut self, before: &Plan) {
         let old = &before.outputs;
@@ -106,26 +112,50 @@ impl Seated {
     }
 }
 
-/// What stands for a segment break, in the place of a time.
-const BREAK: f64 = f64::INFINITY;
-
-/// An instant, or none for a segment break, as a number of the same bits.
-pub(super) fn write_time(time: Option<Instant>) -> f64 {
-    time.map_or(BREAK, |time| f64::from_bits(time.as_ns().cast_unsigned()))
+/// What happens to an engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Happening {
+    /// A tick.
+    Tick(Instant),
+    /// What follows belongs to another segment.
+    Break,
+    /// Learning is frozen, or goes on.
+    Freeze(bool),
 }
 
-/// The instant that was written as a number; none for a segment break.
-pub(super) fn read_time(number: f64) -> Option<Instant> {
-    let bits = number.to_bits();
-    (bits != BREAK.to_bits()).then(|| Instant::from_ns(bits.cast_signed()))
+impl Happening {
+    /// What stands for a happening without an instant: the bits of instants in the year 2262.
+    const BREAK: u64 = f64::INFINITY.to_bits();
+    const FROZEN: u64 = Self::BREAK - 1;
+    const THAWED: u64 = Self::BREAK - 2;
+
+    /// As a number: an instant has the bits that it has as an integer.
+    pub(super) fn write(self) -> f64 {
+        f64::from_bits(match self {
+            Self::Tick(time) => time.as_ns().cast_unsigned(),
+            Self::Break => Self::BREAK,
+            Self::Freeze(true) => Self::FROZEN,
+            Self::Freeze(false) => Self::THAWED,
+        })
+    }
+
+    /// What was written as a number.
+    pub(super) fn read(number: f64) -> Self {
+        match number.to_bits() {
+            Self::BREAK => Self::Break,
+            Self::FROZEN => Self::Freeze(true),
+            Self::THAWED => Self::Freeze(false),
+            bits => Self::Tick(Instant::from_ns(bits.cast_signed())),
+        }
+    }
 }
 
-/// What is mirrored of a tick or segment break beside the samples.
+/// What is mirrored of a happening beside the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Mark {
-    /// The instant; none for a segment break.
-    pub(super) time: Option<Instant>,
-    /// The number of the event, ticks and segment breaks counted alike.
+    /// What happened.
+    pub(super) what: Happening,
+    /// The number of the event, whatever happened.
     pub(super) event: u64,
     /// The number of ticks so far.
     pub(super) tick: u64,
@@ -141,12 +171,12 @@ impl Mark {
     pub(super) fn write(self) -> [f64; Self::WIDTH] {
         let [event, tick, generation] =
             [self.event, self.tick, self.generation].map(f64::from_bits);
-        [write_time(self.time), event, tick, generation]
+        [self.what.write(), event, tick, generation]
     }
 
-    pub(super) fn read([time, event, tick, generation]: [f64; Self::WIDTH]) -> Self {
+    pub(super) fn read([what, event, tick, generation]: [f64; Self::WIDTH]) -> Self {
         Self {
-            time: read_time(time),
+            what: Happening::read(what),
             event: event.to_bits(),
             tick: tick.to_bits(),
             generation: generation.to_bits(),
@@ -160,15 +190,18 @@ mod tests {
 
     #[test]
     fn marks_go_through_the_ring_to_the_last_bit() {
-        for time in [
-            None,
-            Some(i64::MIN + 1),
-            Some(-1),
-            Some(0),
-            Some(1_760_000_000_000_000_001),
+        let tick = |ns| Happening::Tick(Instant::from_ns(ns));
+        for what in [
+            Happening::Break,
+            Happening::Freeze(true),
+            Happening::Freeze(false),
+            tick(i64::MIN + 1),
+            tick(-1),
+            tick(0),
+            tick(1_760_000_000_000_000_001),
         ] {
             let mark = Mark {
-                time: time.map(Instant::from_ns),
+                what,
                 event: u64::MAX,
                 tick: u64::MAX - 1,
                 generation: 7,

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, Producer};
 
-use super::handover::{Feed, Mark, Seated, read_time, write_time};
+use super::handover::{Feed, Happening, Mark, Seated};
 use crate::compile::Plan;
 use crate::engine::EngineError;
 use crate::time::Instant;
 
-/// Ticks and segment breaks that are kept for an engine that comes a little late.
+/// Ticks and what else happens that are kept for an engine that comes a little late.
 const RECENT: u64 = 256;
 /// Ticks by which a new engine catches up at each tick, so that no tick becomes long.
 const CATCH_UP: u64 = 4;
@@ -101,7 +101,7 @@ impl Stepper {
         }
         self.seated.step(time, samples)?;
         self.tick += 1;
-        self.record(Some(time), samples);
+        self.record(Happening::Tick(time), samples);
         let Seated {
             engine, revision, ..
         } = &*self.seated;
@@ -115,7 +115,13 @@ impl Stepper {
     /// The next tick belongs to another segment.
     pub fn segment(&mut self) {
         self.seated.segment();
-        self.record(None, &[]);
+        self.record(Happening::Break, &[]);
+    }
+
+    /// Freezes what estimators learn while they run, or lets it go on; see [`Engine::freeze`](crate::engine::Engine::freeze).
+    pub fn freeze(&mut self, frozen: bool) {
+        self.seated.freeze(frozen);
+        self.record(Happening::Freeze(frozen), &[]);
     }
 
     /// Lets a committed engine catch up, and take over once it has.
@@ -132,10 +138,11 @@ impl Stepper {
         let width = self.feed.len() + 1;
         for _ in 0..behind.min(CATCH_UP) {
             let row = (next.event % RECENT) as usize * width;
-            let (time, samples) = (self.recent[row], &self.recent[row + 1..row + width]);
-            match read_time(time) {
-                None => next.segment(),
-                Some(time) => {
+            let (what, samples) = (self.recent[row], &self.recent[row + 1..row + width]);
+            match Happening::read(what) {
+                Happening::Break => next.segment(),
+                Happening::Freeze(frozen) => next.freeze(frozen),
+                Happening::Tick(time) => {
                     if next.step(time, samples).is_err() {
                         self.send_back();
                         return;
@@ -170,19 +177,19 @@ impl Stepper {
     }
 
     /// Writes an event down for an engine that comes late, and for the control thread.
-    fn record(&mut self, time: Option<Instant>, samples: &[f64]) {
+    fn record(&mut self, what: Happening, samples: &[f64]) {
         let width = self.feed.len() + 1;
         let row = (self.event % RECENT) as usize * width;
-        self.recent[row] = write_time(time);
+        self.recent[row] = what.write();
         self.recent[row + 1..row + 1 + samples.len()].copy_from_slice(samples);
         self.event += 1;
-        self.mirror(time, samples);
+        self.mirror(what, samples);
     }
 
-    fn mirror(&mut self, time: Option<Instant>, samples: &[f64]) {
+    fn mirror(&mut self, what: Happening, samples: &[f64]) {
         let width = self.feed.len() + Mark::WIDTH;
         let mark = Mark {
-            time,
+            what,
             event: self.event,
             tick: self.tick,
             generation: self.generation,

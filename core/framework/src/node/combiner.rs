@@ -8,7 +8,7 @@ use crate::time::{Duration, Instant};
 /// A node that makes one prediction of several for the same instant.
 ///
 /// The framework holds votes and their ages, and hands over truths only when the embargo lets them through. The ports are
-/// `voters`, and `truth` where the combiner learns from errors. A whole combiner, the median of the votes at hand:
+/// `voters`, `truth` where the combiner learns from errors, and `state` where it goes by one. A whole combiner, the median of the votes at hand:
 ///
 /// ```
 /// use athermal_core::node::{Combine, Combiner, InputPort, Votes};
@@ -49,7 +49,7 @@ use crate::time::{Duration, Instant};
     label = "implement `athermal_core::node::Combiner` for it, or register it in the role that it has"
 )]
 pub trait Combiner: Debug + Send + Sync {
-    /// The input ports: `voters`, and `truth` where it learns.
+    /// The input ports: `voters`, `truth` where it learns, and `state` where it goes by one.
     fn inputs() -> &'static [InputPort]
     where
         Self: Sized;
@@ -59,9 +59,20 @@ pub trait Combiner: Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Whether its answer is a sum of votes by weights, which the port `weights` then shows.
+    /// Whether its answer is a sum of votes by weights, which the port `weights` then shows. Where all voters tell their
+    /// standard deviation, the port `deviation` combines them by these weights: `√Σ w_i (σ_i² + (ŷ_i − ŷ)²)`.
     fn weighs(&self) -> bool {
         false
+    }
+
+    /// Whether it gives a reason for what it does: a number, which the port `reason` shows.
+    fn reasons(&self) -> bool {
+        false
+    }
+
+    /// The share of truths that its intervals are to cover, for kinds that give intervals: the ports `lower` and `upper`.
+    fn covers(&self) -> Option<f64> {
+        None
     }
 
     /// How long what was learned counts; the engine keeps so much of the past for warming up.
@@ -80,6 +91,24 @@ pub trait Combine: Send {
 
     /// The weights by which these votes would be combined, for kinds that weigh; NaN for a vote that is not there.
     fn weights(&self, _votes: Votes<'_>, _weights: &mut [f64]) {}
+
+    /// Both ends of the interval about the combination of these votes, for kinds that give intervals; NaN where there is none.
+    fn interval(&self, _votes: Votes<'_>) -> [f64; 2] {
+        [f64::NAN; 2]
+    }
+
+    /// A truth, and both ends of the interval that was given for it, for kinds that give intervals: called before
+    /// [`observe`](Combine::observe).
+    fn judge(&mut self, _interval: [f64; 2], _truth: f64) {}
+
+    /// Why these votes are combined as they are, for kinds that give reasons; the kind's documentation says what each
+    /// number means.
+    fn reason(&self, _votes: Votes<'_>) -> f64 {
+        f64::NAN
+    }
+
+    /// Called before [`combine`](Combine::combine), for kinds with an input `state`: its value, NaN where there is none.
+    fn state(&mut self, _now: Instant, _state: f64) {}
 
     /// A truth and the votes that were cast for it. `arrived` is when the truth was measured.
     fn observe(&mut self, _votes: Votes<'_>, _truth: f64, _arrived: Instant) {}

@@ -4,8 +4,8 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use super::{InputPort, Mistake};
-use crate::time::Duration;
+use super::{InputPort, Learner, Learns, Mistake, TrainedRange};
+use crate::time::{Duration, Instant};
 
 /// A node that predicts the value which its `truth` will have, `ahead` of now.
 ///
@@ -99,6 +99,16 @@ pub trait Estimator: Debug + Send + Sync {
         None
     }
 
+    /// Whether it goes on learning while it runs. What it starts from is its fit: see [`Predictor::learner`].
+    fn learns(&self) -> Learns {
+        Learns::Never { help: None }
+    }
+
+    /// Whether its predictions come with their standard deviation, in the port `deviation`.
+    fn deviates(&self) -> bool {
+        false
+    }
+
     /// What learns from the rows.
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer>;
 }
@@ -133,6 +143,9 @@ pub struct Regressor {
     pub name: String,
     /// The unit of its values.
     pub unit: String,
+    /// The measured channels that it is made from, in the order of the plan: `temperature.room`.
+    #[serde(default)]
+    pub sensors: Vec<String>,
 }
 
 /// What a trainer knows before the first row.
@@ -144,12 +157,23 @@ pub struct TrainingSetup {
     pub truth_unit: String,
     /// How many bytes of rows the trainer may keep.
     pub memory: usize,
+    /// How far ahead the truth is predicted.
+    pub ahead: Duration,
+    /// The span of the truth: the length of past time that one value summarises.
+    pub span: Duration,
+    /// Whether the estimator will go on learning while it runs, so that its predictor needs what that takes.
+    pub learns: bool,
 }
 
 /// Takes the rows of one fit, in order.
 pub trait Trainer: Send {
     /// One row: the regressors, all of them present, and the truth that they belong to.
     fn row(&mut self, regressors: &[f64], truth: f64);
+
+    /// The same with the instant at which the truth was measured, for trainers to which time matters.
+    fn row_at(&mut self, _at: Instant, regressors: &[f64], truth: f64) {
+        self.row(regressors, truth);
+    }
 
     /// The next row belongs to another segment of the data.
     fn segment(&mut self) {}
@@ -203,6 +227,9 @@ pub struct Trained {
 pub struct TrainingReport {
     /// The regressors chosen, in the order in which they were, with the score after each.
     pub selection: Vec<SelectionStep>,
+    /// The step at which selection stopped, since it was not worth it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<SelectionStep>,
     /// Condition number of the standardised design.
     #[serde(
         default,
@@ -222,17 +249,42 @@ pub struct TrainingReport {
     pub notes: Vec<String>,
 }
 
-/// A regressor chosen by selection.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A regressor, or a sensor with all its regressors, chosen or taken out again by selection.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SelectionStep {
     /// Its name.
     pub regressor: String,
-    /// The cross-validation score with it and all before it: the mean over the folds.
+    /// Whether it was taken out.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub removed: bool,
+    /// The cross-validation score after the step: the mean over the folds.
     #[serde(with = "crate::model::number")]
     pub score: f64,
     /// The score of each fold.
     #[serde(default, with = "crate::model::numbers")]
     pub folds: Vec<f64>,
+    /// What was tried at this step, the best first; this one is among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub candidates: Vec<CandidateScore>,
+}
+
+impl SelectionStep {
+    /// The name, with a minus before one that was taken out.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let sign = if self.removed { "− " } else { "" };
+        format!("{sign}{}", self.regressor)
+    }
+}
+
+/// A candidate of a selection step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CandidateScore {
+    /// Its name.
+    pub name: String,
+    /// The score that the step would have had with it.
+    #[serde(with = "crate::model::number")]
+    pub score: f64,
 }
 
 /// A fitted estimator. Predicting never changes what was learned.
@@ -243,4 +295,25 @@ pub trait Predictor: Debug + Send + Sync {
 
     /// The prediction, from present values of the used regressors.
     fn predict(&self, regressors: &[f64]) -> f64;
+
+    /// Whether it predicts from the regressors that are there, NaN standing for the others, while there is any.
+    fn takes_absent(&self) -> bool {
+        false
+    }
+
+    /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
+    /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
+    fn deviation(&self, _regressors: &[f64]) -> f64 {
+        f64::NAN
+    }
+
+    /// What goes on learning from here; none for one that stays as it was fitted.
+    fn learner(&self) -> Option<Box<dyn Learner>> {
+        None
+    }
+
+    /// The range of the used regressors in the fit, where it is known: outside, nothing is learned.
+    fn trained_range(&self) -> Option<&TrainedRange> {
+        None
+    }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use super::{InputPort, Inputs, Mistake, OutputPort, Restored, State};
+use super::{InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
 use crate::channel::ABSENT;
 use crate::engine::Gathered;
 use crate::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use crate::time::{Duration, Instant};
 /// A whole node, which gives the difference of each channel to its previous value:
 ///
 /// ```
-/// use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
+/// use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick};
 /// use schemars::JsonSchema;
 /// use serde::{Deserialize, Serialize};
 ///
@@ -36,6 +36,10 @@ use crate::time::{Duration, Instant};
 ///             channel.unit = channel.unit.difference();
 ///         }
 ///         Ok(vec![OutputPort { name: "difference", channels }])
+///     }
+///
+///     fn reach(&self, _port: &str) -> Reach {
+///         Reach::Own
 ///     }
 ///
 ///     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
@@ -94,9 +98,10 @@ pub trait Feature: Debug + Send + Sync {
         false
     }
 
-    /// The time by which the outputs lag the inputs, where the node moves values in time.
-    fn delay(&self) -> Duration {
-        Duration::ZERO
+    /// What the channels of an output port are made of. A kind that computes each from its own input, or moves values in
+    /// time, says so here; otherwise an estimator may be denied a harmless channel because of another beside it.
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::All
     }
 
     /// How far back the inputs reach that the outputs depend on; the engine keeps so much of the past for warming up.

@@ -11,17 +11,21 @@
 mod combiner;
 mod estimator;
 mod feature;
+mod learner;
 mod port;
+mod reach;
 mod registry;
 mod state;
 
 pub use combiner::{Combine, Combiner, Votes};
 pub use estimator::{
-    Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup, TruthLags,
+    CandidateScore, Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer,
+    TrainingError, TrainingReport, TrainingSetup, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
-pub use port::{InputPort, Inputs, Mistake, OutputPort, Read};
+pub use learner::{Learner, Learns, TrainedRange};
+pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
+pub use reach::Reach;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{Kind, NodeSpec, Role, RoleName, kind, kinds};

@@ -13,6 +13,9 @@ pub enum Read {
     Truth,
 }
 
+/// The name of the port by which channels freeze the learning of an estimator; the framework reads it, not the node.
+pub const FREEZE: &str = "freeze";
+
 /// An input port as the kind declares it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InputPort {
@@ -62,6 +65,18 @@ impl InputPort {
             optional: false,
             unit: None,
             summary,
+        }
+    }
+
+    /// The port that freezes the learning of an estimator: see [`FREEZE`].
+    #[must_use]
+    pub const fn freeze() -> Self {
+        Self {
+            name: FREEZE,
+            read: Read::Held,
+            optional: true,
+            unit: None,
+            summary: "learning goes on only while all of these are 0, such as the reason of a `health` node",
         }
     }
 

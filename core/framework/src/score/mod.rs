@@ -1,11 +1,13 @@
 //! Decides how predictions are scored against the truths measured later; not how they are made.
 
+mod interval;
 mod table;
 mod trace;
 mod watch;
 
 use std::sync::Arc;
 
+pub use interval::IntervalScore;
 pub use table::{Score, Scores};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
 pub(crate) use watch::{Prediction, Watch};
@@ -23,11 +25,14 @@ pub struct ScoreOptions {
     pub abs_truth_below: Option<Quantity>,
     /// Every row on all of its own instants, rather than on those valid for all rows of a truth.
     pub each_on_its_own: bool,
+    /// Nothing is learned on the way.
+    pub frozen: bool,
 }
 
 /// Steps a plan over a recording, cold, and scores every prediction in it.
 ///
-/// A truth at `τ` is compared with the output of the predicting node's last run at or before `τ − ahead`. `progress` is
+/// A truth at `τ` is compared with the output of the predicting node's last run at or before `τ − ahead`. Estimators that
+/// learn do so on the way, each truth after its prediction has been made: test, then train. `progress` is
 /// told the number of ticks stepped so far.
 ///
 /// # Errors
@@ -40,6 +45,7 @@ pub fn score(
     progress: &mut dyn FnMut(u64),
 ) -> Result<Scores, FitError> {
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
+    engine.freeze(options.frozen);
     let mut watch = Watch::new(plan);
     let mut stepped = 0;
     let passed = drive(&mut engine, recording, |engine, event| {

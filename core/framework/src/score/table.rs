@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::ScoreOptions;
 use super::watch::{Truth, Watch};
+use super::{IntervalScore, ScoreOptions};
 use crate::compile::Plan;
 use crate::engine::Engine;
 use crate::time::Instant;
@@ -66,6 +66,8 @@ pub struct Score {
     pub truth_noise: Option<f64>,
     /// Whether it is scored on instants of its own.
     pub own_instants: bool,
+    /// How well its intervals hold, where it gives any.
+    pub interval: Option<IntervalScore>,
 }
 
 impl Score {
@@ -191,6 +193,12 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                         .filter(|e| !e.is_nan()),
                 ),
                 own_instants,
+                interval: prediction.intervals.and_then(|intervals| {
+                    let ends = instants
+                        .iter()
+                        .map(|&i| (prediction.ends[i], truth.values[i]));
+                    IntervalScore::of(intervals, ends)
+                }),
             }
         })
         .collect()

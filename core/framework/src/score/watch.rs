@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::interval::Intervals;
 use crate::compile::{Plan, TruthLink, persistence_lag};
 use crate::engine::{Cursor, Engine, History, Pairing};
 use crate::recording::Event;
@@ -33,6 +34,10 @@ pub(crate) struct Prediction {
     pub(crate) ahead: Duration,
     pairing: Pairing,
     pub(crate) values: Vec<f64>,
+    /// Where its intervals come from, if it has any.
+    pub(crate) intervals: Option<Intervals>,
+    /// Both ends of each.
+    pub(crate) ends: Vec<[f64; 2]>,
 }
 
 /// The truth at the smallest lag that sees nothing of the answer, for one horizon.
@@ -64,13 +69,16 @@ impl Watch {
                 limit,
             };
             let truth = truths.entry(of).or_insert_with(|| Truth::new(plan, of));
-            let pairing = Pairing::new(&link, 1);
+            let intervals = Intervals::of(&plan.nodes[node]);
+            let pairing = Pairing::new(&link, if intervals.is_some() { 3 } else { 1 });
             truth.predictions.push(Prediction {
                 slot,
                 node,
                 ahead,
                 pairing,
                 values: Vec::new(),
+                intervals,
+                ends: Vec::new(),
             });
             truth
                 .persistences
@@ -114,9 +122,11 @@ impl Truth {
     fn look(&mut self, engine: &Engine, now: Instant) {
         for prediction in &mut self.predictions {
             if engine.ran(prediction.slot) {
-                prediction
-                    .pairing
-                    .run(now, [&[engine.value(prediction.slot)][..]]);
+                let value = engine.value(prediction.slot);
+                let intervals = prediction.intervals.as_ref();
+                let ends = intervals.map(|intervals| intervals.read(engine, value));
+                let ends = ends.as_ref().map_or(&[][..], |ends| &ends[..]);
+                prediction.pairing.run(now, [&[value][..], ends]);
             }
         }
         let measured = engine.ran(self.slot);
@@ -141,11 +151,14 @@ impl Truth {
         self.errors
             .push(self.error_slot.map_or(f64::NAN, |slot| engine.value(slot)));
         for prediction in &mut self.predictions {
-            let paired = prediction
-                .pairing
-                .truth(now)
-                .map_or(f64::NAN, |paired| paired.row[0]);
-            prediction.values.push(paired);
+            let paired = prediction.pairing.truth(now).map(|paired| paired.row);
+            prediction
+                .values
+                .push(paired.map_or(f64::NAN, |row| row[0]));
+            if prediction.intervals.is_some() {
+                let ends = paired.map_or([f64::NAN; 2], |row| [row[1], row[2]]);
+                prediction.ends.push(ends);
+            }
         }
         for persistence in self.persistences.values_mut() {
             let paired = persistence

@@ -320,7 +320,8 @@ impl RollingSlope {
             let t = self.rows.time(row).saturating_sub(head_ns) as f64;
             (t, self.rows.samples(row).as_flattened()[channel] - origin)
         });
-        Line::through(samples.filter(|(_, y)| !y.is_nan()))
+        let end = self.rows.time(self.rows.next() - 1).saturating_sub(head_ns) as f64;
+        Line::through(samples.filter(|(_, y)| !y.is_nan()), end)
     }
 
     /// Standard errors of the slopes at the last row, per second, laid out as in [`slopes`](Self::slopes): `sqrt(SSR / (n − 2) / Σ(x − x̄)²)`,
@@ -328,34 +329,52 @@ impl RollingSlope {
     ///
     /// `SSR = Σ(y − ȳ)² − slope·Σ(x − x̄)(y − ȳ)` loses digits as `r²` approaches 1: its relative error is about 1e-15 / (1 − r²).
     pub fn stderr(&self, out: &mut [f64]) {
+        self.tell(out, |line, _| line.stderr());
+    }
+
+    /// The values of the lines at the last row's time, laid out as in [`slopes`](Self::slopes). Absent unless the kernel keeps squares.
+    pub fn ends(&self, out: &mut [f64]) {
+        self.tell(out, |line, origin| Some(origin + line.end()));
+    }
+
+    /// The coefficients of determination `1 − SSR / Σ(y − ȳ)²` of the lines, laid out as in [`slopes`](Self::slopes). Absent where
+    /// all samples are the same and unless the kernel keeps squares.
+    pub fn r_squared(&self, out: &mut [f64]) {
+        self.tell(out, |line, _| line.r_squared());
+    }
+
+    /// Something about the line of each channel and window, given with the origin of the channel's values.
+    fn tell(&self, out: &mut [f64], of: impl Fn(&Line, f64) -> Option<f64>) {
         let wide = self.windows.len();
         let fits = self.squares && out.len() == self.channels * wide;
-        if !fits || self.last_time().is_none() {
+        let Some(end_ns) = self.last_time().filter(|_| fits) else {
             out.fill(self.no_value.absent);
             return;
-        }
+        };
+        let tables = self.blocks.tables();
         for (index, window) in self.windows.iter().enumerate() {
             for quad in 0..quads(self.channels) {
-                let tables = self.blocks.tables();
                 let moments = match window.kind {
                     Kind::Gaps => window.parts.moments(tables, quad),
                     _ => window.parts.moments_of_complete(tables, quad),
                 };
-                let mut errors = from_fn(|i| {
-                    let line = match moments.thin(i) {
+                let origins = &self.blocks.origins()[quad];
+                let mut values = from_fn(|i| {
+                    let line = window.parts.line(tables, (quad, i), &moments, end_ns);
+                    let line = match moments.thin(i) || line.is_flat() {
                         true => self.line(window, 4 * quad + i),
-                        false => window.parts.line(tables, quad, &moments, i),
+                        false => line,
                     };
-                    line.stderr().unwrap_or(self.no_value.absent)
+                    of(&line, origins[i]).unwrap_or(self.no_value.absent)
                 });
-                self.mark_absent(window, quad, &moments.n, &mut errors);
-                self.mark_cold(window, quad, &mut errors);
-                for (out, error) in channels(&mut out[4 * quad * wide..], wide)
+                self.mark_absent(window, quad, &moments.n, &mut values);
+                self.mark_cold(window, quad, &mut values);
+                for (out, value) in channels(&mut out[4 * quad * wide..], wide)
                     .into_iter()
-                    .zip(errors)
+                    .zip(values)
                 {
                     if let Some(out) = out.get_mut(index) {
-                        *out = error;
+                        *out = value;
                     }
                 }
             }

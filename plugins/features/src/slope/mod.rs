@@ -1,11 +1,11 @@
 //! Least-squares slopes over trailing windows: the thermal features, and the drift itself.
 
 pub mod kernel;
-mod windows;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -13,13 +13,16 @@ use kernel::{Coverage, NoValue, RollingSlope};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use windows::Windows;
+pub use crate::windows::{Cold, Windows};
+use crate::windows::{half, over, three, window_mistakes};
 
 /// The slope of the least-squares line through the samples of each channel in trailing windows.
 ///
 /// `Σ(x − x̄)(y − ȳ) / Σ(x − x̄)²` over the samples with time in `(t − T, t]`; times need not be regular. With several
 /// windows per temperature these are the dynamic-range features of Mandelli, Dankwart and Napoli, section 3.2; of a
-/// position it is the drift. The port `stderr` gives the standard error of each slope from the residuals of its own line.
+/// position it is the drift. Ports tell more of each line: `stderr` the standard error of its slope, from its own residuals
+/// (Draper and Smith 1998, section 1.4); `value` its value at the end of the window, a smoothed sample that lags nothing behind a
+/// steady ramp; `r2` its coefficient of determination, the share of the variance that it explains.
 ///
 /// A value exists once the window reaches back no further than the channel's first value, holds `min_samples` samples and
 /// these span `min_coverage` of it.
@@ -42,25 +45,6 @@ pub struct Slope {
     /// Whether a window that reaches back before the channel's first value has a value.
     #[serde(default)]
     pub cold: Cold,
-}
-
-/// What a window does that reaches back before the first value of its channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Cold {
-    /// It has no value.
-    #[default]
-    Absent,
-    /// It makes do with what there is.
-    Partial,
-}
-
-fn three() -> usize {
-    3
-}
-
-fn half() -> f64 {
-    0.5
 }
 
 impl Slope {
@@ -98,38 +82,12 @@ impl Slope {
                 break;
             }
         }
-        if self.min_samples < 2 {
-            let message = format!(
-                "`min_samples` is {} and must be 2 or more",
-                self.min_samples
-            );
-            mistakes.push(Mistake::at("min_samples", message).help("a slope needs two samples"));
-        }
-        if !(0.0..=1.0).contains(&self.min_coverage) {
-            let message = format!(
-                "`min_coverage` is {} and must be from 0 to 1",
-                self.min_coverage
-            );
-            mistakes.push(Mistake::at("min_coverage", message));
-        }
-        if windows.is_empty() {
-            mistakes.push(
-                Mistake::at("windows", "there is no window")
-                    .help("give one or more, such as [\"5min\"]"),
-            );
-        }
-        for (i, window) in windows.iter().enumerate() {
-            let at = format!("windows.{i}");
-            if *window <= Duration::ZERO {
-                mistakes.push(Mistake::at(
-                    at.as_str(),
-                    format!("a window of {window} is no window"),
-                ));
-            }
-            if windows[..i].contains(window) {
-                mistakes.push(Mistake::at(at, format!("the window {window} stands twice")));
-            }
-        }
+        mistakes.extend(window_mistakes(
+            windows,
+            self.min_samples,
+            2,
+            self.min_coverage,
+        ));
         mistakes
     }
 }
@@ -146,35 +104,33 @@ impl Feature for Slope {
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
-        let of = |channel: &Channel, window: Duration| Channel {
-            name: if windows.len() == 1 {
-                channel.name.clone()
-            } else {
-                format!("{}@{}", channel.name, seconds(window))
-            },
+        let values = over(from, &windows);
+        let slope = |channel: &Channel| Channel {
             unit: self.unit(channel).unwrap_or_else(|| channel.unit.clone()),
-            span: window,
             ..channel.clone()
         };
-        let channels: Vec<Channel> = from
-            .iter()
-            .flat_map(|channel| windows.iter().map(move |&window| of(channel, window)))
-            .collect();
+        let share = |channel: &Channel| Channel {
+            unit: Unit::one(),
+            ..channel.clone()
+        };
+        let slopes: Vec<Channel> = values.iter().map(slope).collect();
+        let shares = values.iter().map(share).collect();
+        let port = |name, channels| OutputPort { name, channels };
         Ok(vec![
-            OutputPort {
-                name: "slope",
-                channels: channels.clone(),
-            },
-            OutputPort {
-                name: "stderr",
-                channels,
-            },
+            port("slope", slopes.clone()),
+            port("stderr", slopes),
+            port("value", values),
+            port("r2", shares),
         ])
     }
 
     fn memory(&self) -> Duration {
         let lengths = self.windows.lengths().unwrap_or_default();
         lengths.into_iter().max().unwrap_or(Duration::ZERO)
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
     }
 
     fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator> {
@@ -186,7 +142,8 @@ impl Feature for Slope {
             min_coverage: self.min_coverage,
             cold_partial: self.cold == Cold::Partial,
         };
-        let errors = wanted.get(1).copied().unwrap_or(false);
+        let tells = [1, 2, 3].map(|port| wanted.get(port).copied().unwrap_or(false));
+        let squares = tells.contains(&true);
         let width = from.len() * windows.len();
         Box::new(Sloping {
             lengths: lengths.clone(),
@@ -199,23 +156,17 @@ impl Feature for Slope {
                     absent: ABSENT,
                     cold: COLD,
                 },
-                errors,
+                squares,
             ),
             factors: from
                 .iter()
                 .map(|channel| self.factor(channel).unwrap_or(f64::NAN))
                 .collect(),
             windows: windows.len(),
-            errors,
+            tells,
             results: vec![ABSENT; width],
         })
     }
-}
-
-/// A window's length in seconds, rounded to the millisecond, in its shortest form.
-fn seconds(window: Duration) -> String {
-    let milliseconds = (window.as_ns() + 500_000) / 1_000_000;
-    format!("{}s", milliseconds as f64 / 1000.0)
 }
 
 /// Running slopes.
@@ -227,27 +178,31 @@ struct Sloping {
     /// What a slope per second of each channel is multiplied by.
     factors: Vec<f64>,
     windows: usize,
-    errors: bool,
+    /// Whether somebody reads the standard errors, the values at the end, the coefficients of determination.
+    tells: [bool; 3],
     results: Vec<f64>,
 }
 
 impl Sloping {
-    /// Gives the results of the channels that have a new sample; the others keep what they had.
-    fn give(&self, tick: &Tick<'_>, outputs: &mut Outputs<'_>, offset: usize) {
+    /// Gives the results of the channels that have a new sample; the others keep what they had. `scaled` says whether they are per
+    /// second of the channel and still have to be brought to the unit of the slopes.
+    fn give(&self, tick: &Tick<'_>, outputs: &mut Outputs<'_>, port: usize, scaled: bool) {
+        let offset = port * self.results.len();
         for (channel, (&sample, &factor)) in tick.port(0).iter().zip(&self.factors).enumerate() {
             if sample.is_nan() {
                 continue;
             }
+            let factor = if scaled { factor } else { 1.0 };
             let windows = channel * self.windows..(channel + 1) * self.windows;
-            let slopes = &self.results[windows.clone()];
+            let results = &self.results[windows.clone()];
             let given =
                 outputs.fill_stamped(offset + windows.start..offset + windows.end, tick.now);
-            for (given, &slope) in given.iter_mut().zip(slopes) {
+            for (given, &result) in given.iter_mut().zip(results) {
                 // A NaN says why there is no value, and must stay as it is.
-                *given = if slope.is_nan() {
-                    slope
+                *given = if result.is_nan() {
+                    result
                 } else {
-                    slope * factor
+                    result * factor
                 };
             }
         }
@@ -258,10 +213,19 @@ impl Operator for Sloping {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         self.kernel.push(tick.now.as_ns(), tick.port(0));
         self.kernel.slopes(&mut self.results);
-        self.give(tick, outputs, 0);
-        if self.errors {
+        self.give(tick, outputs, 0, true);
+        let [errors, values, shares] = self.tells;
+        if errors {
             self.kernel.stderr(&mut self.results);
-            self.give(tick, outputs, self.results.len());
+            self.give(tick, outputs, 1, true);
+        }
+        if values {
+            self.kernel.ends(&mut self.results);
+            self.give(tick, outputs, 2, false);
+        }
+        if shares {
+            self.kernel.r_squared(&mut self.results);
+            self.give(tick, outputs, 3, false);
         }
     }
 
@@ -273,7 +237,7 @@ impl Operator for Sloping {
         Some(Box::new(Windowed {
             lengths: self.lengths.clone(),
             coverage: self.coverage,
-            errors: self.errors,
+            errors: self.tells.contains(&true),
             kernel: self.kernel.clone(),
         }))
     }
@@ -287,7 +251,7 @@ impl Operator for Sloping {
             return Restored::cold("the number of channels differs");
         }
         if (&state.lengths, state.coverage, state.errors)
-            != (&self.lengths, self.coverage, self.errors)
+            != (&self.lengths, self.coverage, self.tells.contains(&true))
         {
             return Restored::cold("the windows or what they must hold differ");
         }
@@ -301,6 +265,7 @@ impl Operator for Sloping {
 struct Windowed {
     lengths: Vec<i64>,
     coverage: Coverage,
+    /// Whether the kernel keeps squares.
     errors: bool,
     kernel: RollingSlope,
 }

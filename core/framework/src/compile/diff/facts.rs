@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::ParameterChange;
 use crate::compile::plan::{Plan, PlannedNode, PlannedRole, TruthLink};
 use crate::document::{TimeBase, TimeForm};
-use crate::node::{Kind, Read, Role, TruthLags, kinds};
+use crate::node::{FREEZE, Kind, Read, Role, TruthLags, kinds};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -245,7 +245,10 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     let mut facts = Facts::default();
     facts.plain("type", node.kind.name);
     if let PlannedRole::Estimator {
-        truth, training, ..
+        truth,
+        training,
+        learning,
+        ..
     } = &node.role
     {
         facts.plain("ahead", truth.ahead.to_string());
@@ -257,6 +260,10 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
             if limit != none {
                 facts.measured(path, format!("{limit} {unit}"));
             }
+        }
+        if let Some(learning) = learning {
+            facts.plain("learn.outliers", learning.outliers.to_string());
+            facts.plain("learn.margin", learning.margin.to_string());
         }
     }
     if let Value::Object(parameters) = node.spec.parameters() {
@@ -287,16 +294,17 @@ fn is_measured(schema: &Value) -> bool {
 
 fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
     let (gathers, link) = match &node.role {
-        PlannedRole::Feature { gathers, .. } => (gathers.clone(), None),
         PlannedRole::Estimator { gathers, truth, .. } => {
             // The gathers after the first read the same channels at other lags, which are parameters.
             let first = gathers.first().filter(|_| reads_features(node));
             (first.copied().into_iter().collect(), Some(*truth))
         }
-        PlannedRole::Combiner { voters, truth, .. } => (vec![*voters], *truth),
+        role => (role.inputs().collect::<Vec<_>>(), role.truth().copied()),
     };
     let ports = (node.kind.inputs)();
-    let data = ports.iter().filter(|port| port.read != Read::Truth);
+    let data = ports
+        .iter()
+        .filter(|port| port.read != Read::Truth && port.name != FREEZE);
     for (port, gather) in data.zip(gathers) {
         let gather = &plan.gathers[gather];
         let slots: Vec<usize> = gather.entries.iter().map(|entry| entry.slot).collect();
@@ -304,9 +312,23 @@ fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
             .then(|| gather.entries.iter().map(|entry| entry.max_age).collect());
         input(plan, port.name, &slots, ages, facts);
     }
+    if let Some(gather) = freeze(&node.role) {
+        let entries = &plan.gathers[gather].entries;
+        let slots: Vec<usize> = entries.iter().map(|entry| entry.slot).collect();
+        let ages = entries.iter().map(|entry| entry.max_age).collect();
+        input(plan, FREEZE, &slots, Some(ages), facts);
+    }
     if let Some(TruthLink { slot, limit, .. }) = link {
         let age = held_truth(plan, node).unwrap_or(limit);
         input(plan, "truth", &[slot], Some(vec![age]), facts);
+    }
+}
+
+/// The gather of the channels that freeze the learning of an estimator.
+fn freeze(role: &PlannedRole) -> Option<usize> {
+    match role {
+        PlannedRole::Estimator { learning, .. } => learning.as_ref()?.freeze,
+        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
     }
 }
 

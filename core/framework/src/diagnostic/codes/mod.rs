@@ -29,7 +29,8 @@ macro_rules! code {
     };
 }
 
-/// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for their tests.
+/// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for their tests,
+/// A110 for learning while they run.
 pub const CODES: &[Code] = &[
     code!(
         "A001",
@@ -365,6 +366,11 @@ pub const CODES: &[Code] = &[
         "A082",
         "sample without a unit",
         "Samples are quantities; only `nan`, for no value, stands without a unit."
+    ),
+    code!(
+        "A110",
+        "estimator that does not learn",
+        "`learn` lets an estimator go on learning while it runs. Not every kind can, and some only with certain parameters."
     ),
     code!(
         "A170",

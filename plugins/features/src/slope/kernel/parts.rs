@@ -10,11 +10,16 @@ const NS_PER_S: f64 = 1e9;
 /// and too many digits are lost. Samples that span half of a window are above it up to thousands of samples.
 const THIN: f64 = 1e-4;
 
+/// Where Σ(y − ȳ)² is a smaller part of Σy² than this, it is computed from the samples.
+const FLAT: f64 = 1e-6;
+
 /// The end of a closed block, the whole blocks after it and the current block: where their sums lie, and how they are weighed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
     /// The first groups of the three runs in their tables.
     places: [usize; 3],
+    /// What times are measured from.
+    origin: i64,
     /// Origin of the first run's time less that of the other two, in nanoseconds.
     by: f64,
     /// Sums of the rows' times.
@@ -27,6 +32,7 @@ pub(super) struct Parts {
 impl Parts {
     pub(super) const NONE: Parts = Parts {
         places: [0; 3],
+        origin: 0,
         by: 0.0,
         times: Times::NONE,
         of_ty: 0.0,
@@ -46,6 +52,7 @@ impl Parts {
         let (of_ty, of_y) = (n * scale, t * scale);
         Parts {
             places,
+            origin: now.origin,
             by,
             times,
             of_ty,
@@ -135,22 +142,25 @@ impl Parts {
             n_tt: from_fn(|i| n[i] * tt[i]),
             n_sxx: from_fn(|i| n[i] * tt[i] - t[i] * t[i]),
             n_sxy: from_fn(|i| n[i] * ty[i] - t[i] * y[i]),
+            t,
             y,
         }
     }
 
-    /// Centred sums of one of four channels, from tables that keep squares.
+    /// Centred sums of one of four channels, from tables that keep squares; the window ends at `end_ns`.
     pub(super) fn line(
         &self,
         tables: [&Table; 3],
-        quad: usize,
+        (quad, i): (usize, usize),
         moments: &Moments,
-        i: usize,
+        end_ns: i64,
     ) -> Line {
         let place = |part: usize| tables[part].squares[self.places[part] + quad][i];
-        let (n, y) = (moments.n[i], moments.y[i]);
+        let (n, t, y) = (moments.n[i], moments.t[i], moments.y[i]);
         Line {
             n,
+            mean: y / n,
+            since_mean: end_ns.wrapping_sub(self.origin) as f64 - t / n,
             sxx: moments.n_sxx[i] / n,
             sxy: moments.n_sxy[i] / n,
             syy: place(0) + (place(1) + place(2)) - y * y / n,
@@ -165,7 +175,8 @@ pub(super) struct Moments {
     n_tt: Quad,
     n_sxx: Quad,
     n_sxy: Quad,
-    /// Σy.
+    /// Σt and Σy.
+    t: Quad,
     y: Quad,
 }
 
@@ -186,19 +197,25 @@ impl Moments {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
     n: f64,
+    /// ȳ, about the channel's origin.
+    mean: f64,
+    /// From t̄ to the end of the window.
+    since_mean: f64,
     sxx: f64,
     sxy: f64,
     syy: f64,
 }
 
 impl Line {
-    /// From the samples themselves, times in nanoseconds.
-    pub(super) fn through(samples: impl Iterator<Item = (f64, f64)> + Clone) -> Line {
+    /// From the samples themselves, times in nanoseconds, those of a window that ends at `end`.
+    pub(super) fn through(samples: impl Iterator<Item = (f64, f64)> + Clone, end: f64) -> Line {
         let n = samples.clone().count() as f64;
         let mean_t = samples.clone().map(|(t, _)| t).sum::<f64>() / n;
         let mean_y = samples.clone().map(|(_, y)| y).sum::<f64>() / n;
         let mut line = Line {
             n,
+            mean: mean_y,
+            since_mean: end - mean_t,
             sxx: 0.0,
             sxy: 0.0,
             syy: 0.0,
@@ -221,5 +238,22 @@ impl Line {
     pub(super) fn stderr(&self) -> Option<f64> {
         let residual = (self.syy - self.sxy / self.sxx * self.sxy).max(0.0);
         (self.n > 2.0).then(|| (residual / (self.n - 2.0) / self.sxx).sqrt() * NS_PER_S)
+    }
+
+    /// The value of the line at the end of the window, about the channel's origin.
+    pub(super) fn end(&self) -> f64 {
+        self.mean + self.sxy / self.sxx * self.since_mean
+    }
+
+    /// Whether the samples differ so little from each other, for their distance to the origin, that Σ(y − ȳ)² has lost too many digits.
+    pub(super) fn is_flat(&self) -> bool {
+        self.syy < FLAT * self.n * self.mean * self.mean
+    }
+
+    /// The share of Σ(y − ȳ)² that the line explains; nothing where all samples are the same.
+    pub(super) fn r_squared(&self) -> Option<f64> {
+        let r_squared = self.sxy / self.sxx * (self.sxy / self.syy);
+        let rounding = 4.0 * f64::EPSILON * self.mean;
+        (self.syy > self.n * rounding * rounding).then(|| r_squared.min(1.0))
     }
 }

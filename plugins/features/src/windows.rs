@@ -1,7 +1,8 @@
-//! Decides which windows a slope is taken over.
+//! Decides which trailing windows a node looks back over, and what a window must hold before it has a value.
 
 use std::fmt;
 
+use athermal_core::channel::Channel;
 use athermal_core::node::Mistake;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -9,7 +10,7 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// The windows of a slope.
+/// Trailing windows.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Windows {
@@ -17,6 +18,87 @@ pub enum Windows {
     Lengths(Vec<Duration>),
     /// A dynamic range of lengths around a drift window.
     Range(DynamicRange),
+}
+
+/// What a window does that reaches back before the first value of its channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Cold {
+    /// It has no value.
+    #[default]
+    Absent,
+    /// It makes do with what there is.
+    Partial,
+}
+
+/// The default of `min_samples`.
+pub(crate) fn three() -> usize {
+    3
+}
+
+/// The default of `min_coverage`.
+pub(crate) fn half() -> f64 {
+    0.5
+}
+
+/// Mistakes in the lengths of windows and in what they must hold: at least `fewest` samples.
+pub(crate) fn window_mistakes(
+    windows: &[Duration],
+    min_samples: usize,
+    fewest: usize,
+    min_coverage: f64,
+) -> Vec<Mistake> {
+    let mut mistakes = Vec::new();
+    if min_samples < fewest {
+        let message = format!("`min_samples` is {min_samples} and must be {fewest} or more");
+        mistakes.push(Mistake::at("min_samples", message));
+    }
+    if !(0.0..=1.0).contains(&min_coverage) {
+        let message = format!("`min_coverage` is {min_coverage} and must be from 0 to 1");
+        mistakes.push(Mistake::at("min_coverage", message));
+    }
+    if windows.is_empty() {
+        mistakes.push(
+            Mistake::at("windows", "there is no window")
+                .help("give one or more, such as [\"5min\"]"),
+        );
+    }
+    for (i, window) in windows.iter().enumerate() {
+        let at = format!("windows.{i}");
+        if *window <= Duration::ZERO {
+            mistakes.push(Mistake::at(
+                at.as_str(),
+                format!("a window of {window} is no window"),
+            ));
+        }
+        if windows[..i].contains(window) {
+            mistakes.push(Mistake::at(at, format!("the window {window} stands twice")));
+        }
+    }
+    mistakes
+}
+
+/// What windows of these lengths make of channels: one for each channel and window, named by both where there are several windows.
+pub(crate) fn over(from: &[Channel], windows: &[Duration]) -> Vec<Channel> {
+    let of = |channel: &Channel, window: Duration| Channel {
+        name: if windows.len() == 1 {
+            channel.name.clone()
+        } else {
+            format!("{}@{}", channel.name, seconds(window))
+        },
+        // What a value of the channel summarises reaches back before the window that holds it.
+        span: channel.span + window,
+        ..channel.clone()
+    };
+    from.iter()
+        .flat_map(|channel| windows.iter().map(move |&window| of(channel, window)))
+        .collect()
+}
+
+/// A window's length in seconds, rounded to the millisecond, in its shortest form.
+fn seconds(window: Duration) -> String {
+    let milliseconds = (window.as_ns() + 500_000) / 1_000_000;
+    format!("{}s", milliseconds as f64 / 1000.0)
 }
 
 /// Windows that fit a drift window `t_s`, from the shortest to the harmonics of its spectrum.

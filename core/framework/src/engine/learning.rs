@@ -1,0 +1,267 @@
+//! Decides what an estimator learns from while it runs, and what it is kept from; how it learns is the learner's.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::gather::Gathered;
+use super::state::NodeState;
+use super::withheld::{Released, Withheld};
+use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
+use crate::node::{Learner, Predictor, Restored};
+use crate::time::{Duration, Instant};
+
+/// A learner in a running plan, with the truths that the embargo still withholds from it.
+#[derive(Debug)]
+pub(crate) struct Learning {
+    learner: Box<dyn Learner>,
+    withheld: Withheld,
+    gate: Gate,
+    freeze: Option<usize>,
+}
+
+/// What became of a truth that the embargo let through, as the port `learning` tells it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Became {
+    /// It was learned from.
+    Learned = 0,
+    /// Learning was frozen on command.
+    FrozenOnCommand = 1,
+    /// Learning was frozen by a channel.
+    FrozenByChannel = 2,
+    /// It missed its prediction by too much.
+    Outlier = 3,
+    /// A regressor lay outside the range of the fit.
+    OutsideRange = 4,
+    /// It lay outside the limits of `train.abs_truth`.
+    OutsideLimits = 5,
+    /// The run that it belongs to lacked a regressor.
+    Incomplete = 6,
+}
+
+impl Learning {
+    /// Goes on from a fit; none for a predictor that stays as it was fitted.
+    pub(crate) fn new(
+        predictor: &Arc<dyn Predictor>,
+        planned: PlannedLearning,
+        truth: TruthLink,
+        training: TrainingLimits,
+    ) -> Option<Self> {
+        let width = predictor.uses().len();
+        Some(Self {
+            learner: predictor.learner()?,
+            // With each row stands whether learning was frozen at the run, or at the arrival of the truth.
+            withheld: Withheld::new(truth, width + 1),
+            freeze: planned.freeze,
+            gate: Gate {
+                predictor: Arc::clone(predictor),
+                planned,
+                training,
+                recent: RecentError::default(),
+            },
+        })
+    }
+
+    pub(crate) fn predict(&self, row: &[f64], now: Instant) -> f64 {
+        self.learner.predict(row, now + self.withheld.link().ahead)
+    }
+
+    pub(crate) fn deviation(&self, row: &[f64], now: Instant) -> f64 {
+        let of = now + self.withheld.link().ahead;
+        self.learner.deviation(row, of)
+    }
+
+    /// The truth to look at after all outputs.
+    pub(crate) fn truth(&self) -> usize {
+        self.withheld.link().slot
+    }
+
+    /// Writes the regressors of a run down.
+    pub(crate) fn run(&mut self, row: &[f64], now: Instant, gathered: &[Gathered], on: bool) {
+        let frozen = [self.frozen(gathered, on)];
+        self.withheld.run(now, [row, &frozen]);
+    }
+
+    /// Takes a truth that has just been measured.
+    pub(crate) fn observe(&mut self, truth: f64, now: Instant, gathered: &[Gathered], on: bool) {
+        let frozen = self.frozen(gathered, on);
+        if let Some(of_row) = self.withheld.observe(truth, now)
+            && frozen > *of_row
+        {
+            *of_row = frozen;
+        }
+    }
+
+    /// Learns from what the embargo lets through at `now`; tells what became of the newest, and when it had arrived.
+    pub(crate) fn release(
+        &mut self,
+        now: Instant,
+        gathered: &[Gathered],
+        on: bool,
+    ) -> Option<(Became, Instant)> {
+        let frozen = self.frozen(gathered, on);
+        let newest = self.withheld.newest(now);
+        let (learner, gate) = (&mut *self.learner, &mut self.gate);
+        let mut news = None;
+        self.withheld.release(newest, |released| {
+            news = Some((gate.offer(learner, released, frozen), released.arrived));
+        });
+        news
+    }
+
+    /// The segment has ended with this tick.
+    pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
+        let frozen = self.frozen(gathered, on);
+        let (learner, gate) = (&mut *self.learner, &mut self.gate);
+        self.withheld.end_segment(last, |released| {
+            gate.offer(learner, released, frozen);
+        });
+    }
+
+    /// Moves what is remembered to the clock of the segment that begins.
+    pub(crate) fn shift(&mut self, shift: Duration) {
+        self.learner.segment(shift);
+    }
+
+    pub(crate) fn snapshot(&self) -> NodeState {
+        let mut state = NodeState::pack(Some(self.learner.snapshot()));
+        state.learning = Some(self.withheld.state());
+        state.recent = Some(self.gate.recent);
+        state
+    }
+
+    pub(crate) fn restore(&mut self, state: &NodeState) -> Restored {
+        let answer = match state.unpack() {
+            Ok(Some(own)) => self.learner.restore(own),
+            Ok(None) => Restored::cold("it did not learn before"),
+            Err(cold) => cold,
+        };
+        if !matches!(answer, Restored::Cold { .. }) {
+            if let Some(from) = &state.learning {
+                self.withheld.restore(from);
+            }
+            self.gate.recent = state.recent.unwrap_or_default();
+        }
+        answer
+    }
+
+    /// Why nothing of this tick is learned from, as a number; 0 where it is.
+    fn frozen(&self, gathered: &[Gathered], on: bool) -> f64 {
+        let mut channels = self
+            .freeze
+            .iter()
+            .flat_map(|&freeze| &gathered[freeze].values);
+        let became = if !on {
+            Became::FrozenOnCommand
+        } else if channels.any(|&value| value != 0.0) {
+            // NaN too: where nobody says that learning may go on, it does not.
+            Became::FrozenByChannel
+        } else {
+            Became::Learned
+        };
+        f64::from(became as u8)
+    }
+}
+
+/// What keeps a learner from rows that would spoil it.
+#[derive(Debug)]
+struct Gate {
+    predictor: Arc<dyn Predictor>,
+    planned: PlannedLearning,
+    training: TrainingLimits,
+    recent: RecentError,
+}
+
+impl Gate {
+    /// Lets a learner learn from a pair, unless something speaks against it.
+    fn offer(&mut self, learner: &mut dyn Learner, released: Released<'_>, frozen: f64) -> Became {
+        let Released {
+            row,
+            truth,
+            arrived,
+        } = released;
+        let (row, frozen_then) = row.split_at(row.len() - 1);
+        let frozen = frozen.max(frozen_then[0]);
+        if frozen == f64::from(Became::FrozenOnCommand as u8) {
+            return Became::FrozenOnCommand;
+        }
+        if frozen > 0.0 {
+            return Became::FrozenByChannel;
+        }
+        if row.iter().any(|value| value.is_nan()) {
+            return Became::Incomplete;
+        }
+        if !self.training.admits(truth) {
+            return Became::OutsideLimits;
+        }
+        let range = self.predictor.trained_range();
+        if range.is_some_and(|range| !range.contains(row, self.planned.margin)) {
+            return Became::OutsideRange;
+        }
+        let error = truth - learner.predict(row, arrived);
+        if !self.recent.admits(error, self.planned.outliers) {
+            return Became::Outlier;
+        }
+        learner.learn(row, truth, arrived);
+        Became::Learned
+    }
+}
+
+/// The mean square of the recent errors: the arithmetic mean of the first, an exponentially weighted one later.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(crate) struct RecentError {
+    seen: u32,
+    mean_square: f64,
+}
+
+impl RecentError {
+    /// How many errors weigh in.
+    const MEMORY: u32 = 50;
+    /// How many there must have been before one can be called too large.
+    const FIRST: u32 = 10;
+
+    /// Whether an error is below so many times the recent root mean square.
+    ///
+    /// One that is not counts as if it were as large as that, so that what has changed for good is learned after a few.
+    fn admits(&mut self, error: f64, multiple: f64) -> bool {
+        let square = error * error;
+        if !square.is_finite() {
+            return false;
+        }
+        let most = if self.seen < Self::FIRST || multiple == f64::INFINITY {
+            f64::INFINITY
+        } else {
+            multiple * multiple * self.mean_square
+        };
+        self.seen = (self.seen + 1).min(Self::MEMORY);
+        self.mean_square += (square.min(most) - self.mean_square) / f64::from(self.seen);
+        square <= most
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spike_is_held_off_and_a_lasting_change_is_let_in_after_a_few() {
+        let mut recent = RecentError::default();
+        for i in 0..200 {
+            assert!(recent.admits(if i % 2 == 0 { 1.0 } else { -1.0 }, 6.0));
+        }
+        assert!(!recent.admits(20.0, 6.0), "a spike");
+        assert!(recent.admits(1.0, 6.0));
+        assert!(!recent.admits(f64::NAN, 6.0) && !recent.admits(f64::INFINITY, 6.0));
+        let refused = (0..100).take_while(|_| !recent.admits(20.0, 6.0)).count();
+        assert!((1..10).contains(&refused), "{refused}");
+    }
+
+    #[test]
+    fn the_first_errors_are_let_in_whatever_they_are() {
+        let mut recent = RecentError::default();
+        for error in [1e-3, 1e3, 0.0, 5.0] {
+            assert!(recent.admits(error, 6.0));
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Decides what the author of a learning estimator implements: going on from a fit; when there is something to learn from is
+//! decided by the engine.
+
+use std::fmt::Debug;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Restored, State};
+use crate::model::numbers;
+use crate::time::{Duration, Instant};
+
+/// Whether an estimator goes on learning while it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Learns {
+    /// It stays as it was fitted.
+    Never {
+        /// What to write instead, where something else of the kind learns.
+        help: Option<&'static str>,
+    },
+    /// With `learn = true`.
+    WhenTold,
+    /// Unless the graph says `learn = false`.
+    UnlessTold,
+}
+
+/// A fitted estimator that goes on learning; a [`Predictor`](super::Predictor) makes it.
+///
+/// The predictor stays as it was fitted and may be shared; what is learned since is the learner's own. The engine hands over
+/// each run's regressors with the truth that belongs to them, once the embargo lets it through, and asks for a prediction
+/// first: learning is test-then-train. It hands over nothing while learning is frozen. A whole learner, which predicts the
+/// last truth that it was told:
+///
+/// ```
+/// use athermal_core::node::{Learner, Predictor, Restored, State};
+/// use athermal_core::time::Instant;
+/// use serde::{Deserialize, Serialize};
+///
+/// #[derive(Debug, Clone, Serialize, Deserialize)]
+/// struct Start {
+///     value: f64,
+/// }
+///
+/// #[typetag::serde(name = "start")]
+/// impl Predictor for Start {
+///     fn uses(&self) -> &[String] {
+///         &[]
+///     }
+///
+///     fn predict(&self, _regressors: &[f64]) -> f64 {
+///         self.value
+///     }
+///
+///     fn learner(&self) -> Option<Box<dyn Learner>> {
+///         Some(Box::new(Last { value: self.value }))
+///     }
+/// }
+///
+/// #[derive(Debug, Clone, Serialize, Deserialize)]
+/// struct Last {
+///     value: f64,
+/// }
+///
+/// impl Learner for Last {
+///     fn predict(&self, _regressors: &[f64], _of: Instant) -> f64 {
+///         self.value
+///     }
+///
+///     fn learn(&mut self, _regressors: &[f64], truth: f64, _at: Instant) {
+///         self.value = truth;
+///     }
+///
+///     fn snapshot(&self) -> Box<dyn State> {
+///         Box::new(self.clone())
+///     }
+///
+///     fn restore(&mut self, state: Box<dyn State>) -> Restored {
+///         match state.known() {
+///             Ok(known) => {
+///                 *self = known;
+///                 Restored::Accepted
+///             }
+///             Err(cold) => cold,
+///         }
+///     }
+/// }
+///
+/// athermal_core::state!(Last, "last/1");
+/// # fn main() {}
+/// ```
+pub trait Learner: Debug + Send {
+    /// The prediction of the truth that will be measured at `of`, from present values of the used regressors.
+    fn predict(&self, regressors: &[f64], of: Instant) -> f64;
+
+    /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known.
+    fn deviation(&self, _regressors: &[f64], _of: Instant) -> f64 {
+        f64::NAN
+    }
+
+    /// A truth, measured at `at`, and the regressors of the run that it belongs to. Instants never go back.
+    ///
+    /// Nothing is allocated here.
+    fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant);
+
+    /// The next tick belongs to another segment of the data, whose clock is `shift` ahead of a seamless continuation.
+    ///
+    /// What was learned stays; instants that are kept move by `shift`.
+    fn segment(&mut self, _shift: Duration) {}
+
+    /// All that the next predictions depend on, beside the regressors.
+    fn snapshot(&self) -> Box<dyn State>;
+
+    /// Goes on from what a learner of this kind knew, maybe with other parameters, of another fit or in an older form.
+    fn restore(&mut self, state: Box<dyn State>) -> Restored;
+}
+
+/// The smallest and largest value of each regressor among the rows of a fit.
+///
+/// Far outside of it a row says more about the shape of the model than about its coefficients, so that nothing is learned
+/// there unless the graph allows it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainedRange {
+    #[serde(with = "numbers")]
+    lowest: Vec<f64>,
+    #[serde(with = "numbers")]
+    highest: Vec<f64>,
+}
+
+impl TrainedRange {
+    /// Of no rows yet.
+    #[must_use]
+    pub fn new(width: usize) -> Self {
+        Self {
+            lowest: vec![f64::INFINITY; width],
+            highest: vec![f64::NEG_INFINITY; width],
+        }
+    }
+
+    /// Widens it to a row.
+    pub fn include(&mut self, row: &[f64]) {
+        let ends = self.lowest.iter_mut().zip(&mut self.highest);
+        for ((lowest, highest), &value) in ends.zip(row) {
+            *lowest = lowest.min(value);
+            *highest = highest.max(value);
+        }
+    }
+
+    /// The range of some of the regressors, in this order.
+    #[must_use]
+    pub fn of(&self, columns: &[usize]) -> Self {
+        let some = |ends: &[f64]| columns.iter().map(|&column| ends[column]).collect();
+        Self {
+            lowest: some(&self.lowest),
+            highest: some(&self.highest),
+        }
+    }
+
+    /// Whether each value lies within its range, widened on either side by `margin` times its width.
+    #[must_use]
+    pub fn contains(&self, row: &[f64], margin: f64) -> bool {
+        let ends = self.lowest.iter().zip(&self.highest);
+        ends.zip(row).all(|((&lowest, &highest), &value)| {
+            let beyond = margin * (highest - lowest);
+            value >= lowest - beyond && value <= highest + beyond
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_is_widened_by_its_margin_and_nan_lies_in_none() {
+        let mut range = TrainedRange::new(2);
+        for row in [[1.0, 5.0], [3.0, 5.0], [2.0, 5.0]] {
+            range.include(&row);
+        }
+        assert!(range.contains(&[1.0, 5.0], 0.0) && range.contains(&[3.0, 5.0], 0.0));
+        assert!(!range.contains(&[3.1, 5.0], 0.0) && range.contains(&[3.9, 5.0], 0.5));
+        assert!(!range.contains(&[4.1, 5.0], 0.5) && !range.contains(&[-0.1, 5.0], 0.5));
+        assert!(!range.contains(&[2.0, 5.1], 0.5), "a constant has no width");
+        assert!(!range.contains(&[f64::NAN, 5.0], 0.0));
+        assert!(range.of(&[1]).contains(&[5.0], 0.0));
+        assert!(!range.of(&[1]).contains(&[2.0], 0.0));
+    }
+}

@@ -1,0 +1,269 @@
+//! Least squares with a penalty on absolute coefficients. Decides how such coefficients are found; does not decide how large
+//! the penalty is.
+
+use crate::checks::{check_columns, check_parameter, check_penalty, check_scale, check_splits};
+use crate::normal_equations::Problem;
+use crate::penalty::TestMoments;
+use crate::{Gram, NumericsError, Split};
+
+/// A sweep that moves no coefficient by more than this share of the target's deviation ends the descent.
+const TOLERANCE: f64 = 1e-13;
+const MOST_SWEEPS: usize = 50_000;
+
+/// Minimises `1/(2n) Σ(y − b₀ − xᵀb)² + α (ρ Σ|s_j b_j| + (1 − ρ)/2 Σ(s_j b_j)²)` with column scales `s` by cyclic coordinate
+/// descent on the Gram matrix (Friedman, Hastie and Tibshirani 2010, section 2.2). `ρ = 1` is the lasso.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElasticNet {
+    /// The penalty `α`, on the *mean* of squares, unlike that of ridge.
+    pub alpha: f64,
+    /// The share `ρ` of the absolute values, above 0 up to 1.
+    pub l1_ratio: f64,
+}
+
+/// A sparse linear model on the original scale of its columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparseFit {
+    /// One coefficient per column that was asked for, many of them 0.
+    pub coefficients: Vec<f64>,
+    /// The intercept in target units.
+    pub intercept: f64,
+    /// The sum of the squared residuals, without the penalty.
+    pub residual_sum_of_squares: f64,
+    /// Whether the descent came to its end.
+    pub converged: bool,
+}
+
+impl ElasticNet {
+    /// Fits `columns` of the rows in `gram`. `scales` has one positive value per regressor of the rows, used or not.
+    ///
+    /// # Errors
+    /// [`NumericsError::Parameter`], [`NumericsError::Column`], [`NumericsError::RepeatedColumn`], [`NumericsError::Scale`],
+    /// [`NumericsError::TooFewRows`] without rows, [`NumericsError::NotFinite`].
+    pub fn solve(
+        &self,
+        gram: &Gram,
+        columns: &[usize],
+        scales: &[f64],
+    ) -> Result<SparseFit, NumericsError> {
+        self.check(gram, columns, scales)?;
+        let problem = Problem::new(true, gram, columns, scales);
+        let mut descent = Descent::new(&problem, gram.weight());
+        let converged = descent.run(self.alpha, self.l1_ratio);
+        let mut coefficients = vec![0.0; columns.len()];
+        for (&k, weight) in problem.active.iter().zip(&descent.weights) {
+            coefficients[k] = weight / scales[columns[k]];
+        }
+        let means = gram.means();
+        let terms = columns.iter().zip(&coefficients);
+        Ok(SparseFit {
+            intercept: terms.fold(means[gram.width()], |rest, (&j, b)| rest - b * means[j]),
+            residual_sum_of_squares: problem.residual_sum_of_squares(&descent.weights),
+            coefficients,
+            converged,
+        })
+    }
+
+    /// The smallest penalty for which all coefficients are 0.
+    ///
+    /// # Errors
+    /// As [`ElasticNet::solve`].
+    pub fn largest_alpha(
+        &self,
+        gram: &Gram,
+        columns: &[usize],
+        scales: &[f64],
+    ) -> Result<f64, NumericsError> {
+        self.check(gram, columns, scales)?;
+        let problem = Problem::new(true, gram, columns, scales);
+        let largest = problem.target.iter().fold(0.0_f64, |l, t| l.max(t.abs()));
+        Ok(largest / gram.weight() / self.l1_ratio)
+    }
+
+    /// The score of each penalty in each fold: `R²` on its test rows of the model of its training rows.
+    ///
+    /// # Errors
+    /// As [`ElasticNet::solve`], and [`NumericsError::Folds`], [`NumericsError::Width`].
+    pub fn cross_validated(
+        &self,
+        splits: &[Split],
+        columns: &[usize],
+        scales: &[f64],
+        alphas: &[f64],
+    ) -> Result<Vec<Vec<f64>>, NumericsError> {
+        check_splits(splits, scales)?;
+        let mut order: Vec<usize> = (0..alphas.len()).collect();
+        // From the largest on, each solution is a good start for the next.
+        order.sort_by(|&a, &b| alphas[b].total_cmp(&alphas[a]));
+        let mut scores = vec![Vec::with_capacity(splits.len()); alphas.len()];
+        for split in splits {
+            self.check(&split.train, columns, scales)?;
+            let problem = Problem::new(true, &split.train, columns, scales);
+            let used: Vec<usize> = problem.active.iter().map(|&k| columns[k]).collect();
+            let test = TestMoments::of(split, &used, scales);
+            let mut descent = Descent::new(&problem, split.train.weight());
+            for &at in &order {
+                check_penalty(alphas[at])?;
+                descent.run(alphas[at], self.l1_ratio);
+                let errors = test.errors(&test.cross, &test.target, &descent.weights);
+                scores[at].push(test.r2(errors));
+            }
+        }
+        Ok(scores)
+    }
+
+    fn check(&self, gram: &Gram, columns: &[usize], scales: &[f64]) -> Result<(), NumericsError> {
+        check_penalty(self.alpha)?;
+        let fine = self.l1_ratio > 0.0 && self.l1_ratio <= 1.0;
+        check_parameter("l1_ratio", self.l1_ratio, fine, "above 0 up to 1")?;
+        if scales.len() != gram.width() {
+            return Err(NumericsError::Width {
+                expected: gram.width(),
+                found: scales.len(),
+            });
+        }
+        check_columns(columns, gram.width())?;
+        for &column in columns {
+            check_scale(column, scales[column])?;
+        }
+        if !gram.is_finite() {
+            return Err(NumericsError::NotFinite);
+        }
+        if gram.count() == 0 || gram.weight() <= 0.0 {
+            return Err(NumericsError::TooFewRows {
+                needed: 1,
+                found: gram.count(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Coordinate descent from where it stands.
+struct Descent<'a> {
+    problem: &'a Problem,
+    rows: f64,
+    weights: Vec<f64>,
+    /// The covariance of each column with the residuals.
+    slopes: Vec<f64>,
+    least_move: f64,
+}
+
+impl<'a> Descent<'a> {
+    fn new(problem: &'a Problem, rows: f64) -> Self {
+        Self {
+            weights: vec![0.0; problem.target.len()],
+            slopes: problem.target.iter().map(|t| t / rows).collect(),
+            least_move: TOLERANCE * (problem.spread / rows).sqrt(),
+            problem,
+            rows,
+        }
+    }
+
+    fn run(&mut self, alpha: f64, l1_ratio: f64) -> bool {
+        let (threshold, damping) = (alpha * l1_ratio, alpha * (1.0 - l1_ratio));
+        for _ in 0..MOST_SWEEPS {
+            let mut largest = 0.0_f64;
+            for j in 0..self.weights.len() {
+                let own = self.problem.gram[(j, j)] / self.rows;
+                let old = self.weights[j];
+                let slope = self.slopes[j] + own * old;
+                let shrunk = (slope.abs() - threshold).max(0.0) * slope.signum();
+                let new = shrunk / (own + damping);
+                if new == old {
+                    continue;
+                }
+                let change = (new - old) / self.rows;
+                for (k, slope) in self.slopes.iter_mut().enumerate() {
+                    *slope -= change * self.problem.gram[(k, j)];
+                }
+                self.weights[j] = new;
+                largest = largest.max((new - old).abs() * own.sqrt());
+            }
+            if largest <= self.least_move {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Folds, GramBlocks, Standardization, oracle};
+
+    fn own() -> (GramBlocks, Vec<f64>, serde_json::Value) {
+        let mut blocks = GramBlocks::new(12);
+        for row in oracle::own_table("selection/input.csv").numbers() {
+            blocks.push(&row[..12], row[12]);
+        }
+        let scales = Standardization::of(&blocks.total()).scales;
+        let text = oracle::own_text("penalties/expected.json");
+        (blocks, scales, serde_json::from_str(&text).unwrap())
+    }
+
+    const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
+    #[test]
+    fn the_coefficients_are_those_of_the_own_oracle() {
+        let (blocks, scales, expected) = own();
+        let gram = blocks.total();
+        let models = expected["elastic_net"].as_array().unwrap();
+        for model in models {
+            let number = |key: &str| model[key].as_f64().unwrap();
+            let how = ElasticNet {
+                alpha: number("alpha"),
+                l1_ratio: number("l1_ratio"),
+            };
+            let fit = how.solve(&gram, &ALL, &scales).unwrap();
+            assert!(fit.converged);
+            assert!((fit.intercept - number("intercept")).abs() < 1e-8);
+            for (found, wanted) in fit
+                .coefficients
+                .iter()
+                .zip(model["coef"].as_array().unwrap())
+            {
+                assert!((found - wanted.as_f64().unwrap()).abs() < 1e-8, "{how:?}");
+            }
+            let zeros = fit.coefficients.iter().filter(|b| **b == 0.0).count();
+            assert_eq!(zeros as u64, model["zeros"]);
+        }
+        assert!(models.len() >= 4);
+    }
+
+    #[test]
+    fn the_scores_of_all_folds_are_those_of_the_own_oracle() {
+        let (blocks, scales, expected) = own();
+        let splits = blocks.splits(&Folds::contiguous(5)).unwrap();
+        let lasso = ElasticNet {
+            alpha: 0.0,
+            l1_ratio: 1.0,
+        };
+        let rows = expected["lasso_folds"].as_array().unwrap();
+        let alphas: Vec<f64> = rows
+            .iter()
+            .map(|row| row["alpha"].as_f64().unwrap())
+            .collect();
+        let found = lasso
+            .cross_validated(&splits, &ALL, &scales, &alphas)
+            .unwrap();
+        for (scores, row) in found.iter().zip(rows) {
+            for (score, wanted) in scores.iter().zip(row["folds"].as_array().unwrap()) {
+                assert!((score - wanted.as_f64().unwrap()).abs() < 1e-8);
+            }
+        }
+        let largest = lasso.largest_alpha(&blocks.total(), &ALL, &scales).unwrap();
+        assert!((largest / expected["largest_alpha"].as_f64().unwrap() - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn wrong_requests_are_refused() {
+        let (blocks, scales, _) = own();
+        let gram = blocks.total();
+        let solve = |alpha, l1_ratio| ElasticNet { alpha, l1_ratio }.solve(&gram, &ALL, &scales);
+        assert!(solve(f64::NAN, 1.0).is_err());
+        assert!(solve(1.0, 0.0).is_err());
+        assert!(solve(1.0, f64::NAN).is_err());
+        assert!(solve(1.0, 0.5).is_ok());
+    }
+}

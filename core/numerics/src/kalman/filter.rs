@@ -1,0 +1,386 @@
+//! The Kalman filter of a structural model, one scalar observation at a time. Decides what is known after each; does not
+//! decide which variances the model has.
+
+use super::Structural;
+use crate::NumericsError;
+use serde::{Deserialize, Serialize};
+
+/// Below this share of what a row could at most say about states of which nothing is known, it says nothing about them.
+const NOTHING_NEW: f64 = 1e-9;
+
+/// What is known of level, trend and coefficients, in this order.
+///
+/// States whose variance is given as infinite are diffuse: nothing is known of them, exactly (Koopman 1997; Durbin and
+/// Koopman 2012, chapter 5), rather than something with a large variance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kalman {
+    model: Structural,
+    state: Vec<f64>,
+    /// Row by row; where something is diffuse, the finite part.
+    covariance: Vec<f64>,
+    /// Row by row, the part of the covariance that is multiplied by infinity; empty once nothing is diffuse.
+    diffuse: Vec<f64>,
+    /// How many more observations it takes at least until nothing is diffuse.
+    unknown: usize,
+    room: Vec<f64>,
+}
+
+/// What an observation brought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Observation minus prediction.
+    pub error: f64,
+    /// The variance of the error before the observation; where the prediction was diffuse, the factor of infinity in it.
+    pub variance: f64,
+    /// Whether nothing was known that could predict the observation.
+    pub diffuse: bool,
+}
+
+/// A prediction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Forecast {
+    /// The expected observation.
+    pub mean: f64,
+    /// The variance of what is expected, without that of the observation itself.
+    pub variance: f64,
+}
+
+impl Innovation {
+    /// The logarithm of the density of the observation, given those before.
+    #[must_use]
+    pub fn log_likelihood(&self) -> f64 {
+        let square = if self.diffuse {
+            0.0
+        } else {
+            self.error * self.error / self.variance
+        };
+        -0.5 * ((2.0 * std::f64::consts::PI).ln() + self.variance.ln() + square)
+    }
+}
+
+impl Kalman {
+    /// Starts with nothing known of level, trend and the coefficients of `regressors`.
+    ///
+    /// # Errors
+    /// [`NumericsError::Parameter`] for variances out of range.
+    pub fn diffuse(model: Structural, regressors: usize) -> Result<Self, NumericsError> {
+        let order = model.moving() + regressors;
+        let variances = vec![f64::INFINITY; order];
+        Self::starting_at(model, vec![0.0; order], &diagonal(&variances))
+    }
+
+    /// Starts from what is known of level, trend and coefficients before the first observation, their covariance row by
+    /// row. An infinite variance says that nothing is known of a state.
+    ///
+    /// # Errors
+    /// [`NumericsError::Parameter`] for variances out of range, [`NumericsError::Width`] where the numbers of states do not
+    /// fit, [`NumericsError::NotFinite`] for other numbers that are not finite.
+    pub fn starting_at(
+        model: Structural,
+        state: Vec<f64>,
+        covariance: &[f64],
+    ) -> Result<Self, NumericsError> {
+        model.check()?;
+        let order = state.len();
+        if order < model.moving() || covariance.len() != order * order {
+            return Err(NumericsError::Width {
+                expected: order.max(model.moving()).pow(2),
+                found: covariance.len(),
+            });
+        }
+        let mut filter = Self {
+            model,
+            state,
+            covariance: covariance.to_vec(),
+            diffuse: Vec::new(),
+            unknown: 0,
+            room: vec![0.0; 2 * order],
+        };
+        for i in 0..order {
+            if filter.covariance[i * order + i] == f64::INFINITY {
+                filter.forget(i);
+            }
+        }
+        let all = filter.covariance.iter().chain(&filter.state);
+        if all.into_iter().any(|value| !value.is_finite()) {
+            return Err(NumericsError::NotFinite);
+        }
+        Ok(filter)
+    }
+
+    /// The model that is followed.
+    #[must_use]
+    pub fn model(&self) -> Structural {
+        self.model
+    }
+
+    /// Level, trend where there is one, and coefficients.
+    #[must_use]
+    pub fn state(&self) -> &[f64] {
+        &self.state
+    }
+
+    /// The covariance of the states, row by row; of no meaning while something is diffuse.
+    #[must_use]
+    pub fn covariance(&self) -> &[f64] {
+        &self.covariance
+    }
+
+    /// Whether there is a state of which nothing is known.
+    #[must_use]
+    pub fn is_diffuse(&self) -> bool {
+        self.unknown > 0
+    }
+
+    /// Lets time pass.
+    #[inline]
+    pub fn advance(&mut self, time: f64) {
+        let order = self.state.len();
+        let gained = self.model.gained(time);
+        if self.model.trend.is_some() {
+            self.state[0] += time * self.state[1];
+            carry(&mut self.covariance, order, time);
+            if self.unknown > 0 {
+                carry(&mut self.diffuse, order, time);
+            }
+            self.covariance[1] += gained.both;
+            self.covariance[order] += gained.both;
+            self.covariance[order + 1] += gained.trend;
+        }
+        self.covariance[0] += gained.level;
+    }
+
+    /// Takes an observation with its regressors, without allocating; NaN is none. The answer is empty where the observation
+    /// was not used: it is missing, a number is not finite, or nothing is uncertain that it could tell of.
+    ///
+    /// # Panics
+    /// When `x` has not one value per coefficient.
+    #[inline]
+    pub fn observe(&mut self, x: &[f64], y: f64) -> Option<Innovation> {
+        let order = self.state.len();
+        assert_eq!(
+            self.model.moving() + x.len(),
+            order,
+            "a row has a value per coefficient"
+        );
+        let error = y - self.expected(0.0, |regressor| x[regressor]);
+        if !error.is_finite() {
+            return None;
+        }
+        if self.unknown > 0
+            && let Some(innovation) = self.learn_of_the_unknown(x, error)
+        {
+            return Some(innovation);
+        }
+        let (shared, _) = self.room.split_at_mut(order);
+        let explained = product(&self.covariance, &self.model, x, shared);
+        let variance = explained + self.model.observation;
+        if !(variance > 0.0 && variance.is_finite()) {
+            return None;
+        }
+        let root = variance.sqrt();
+        let step = error / root;
+        for share in shared.iter_mut() {
+            *share /= root;
+        }
+        for (state, share) in self.state.iter_mut().zip(&*shared) {
+            *state += share * step;
+        }
+        for (row, a) in self.covariance.chunks_exact_mut(order).zip(&*shared) {
+            for (value, b) in row.iter_mut().zip(&*shared) {
+                *value -= a * b;
+            }
+        }
+        Some(Innovation {
+            error,
+            variance,
+            diffuse: false,
+        })
+    }
+
+    /// What is expected `time` from now of the observation that has these regressors; none while that is diffuse.
+    ///
+    /// # Panics
+    /// When `x` has not one value per coefficient.
+    #[must_use]
+    pub fn forecast(&self, time: f64, x: &[f64]) -> Option<Forecast> {
+        assert_eq!(
+            self.model.moving() + x.len(),
+            self.state.len(),
+            "a row has a value per coefficient"
+        );
+        self.forecast_of(time, |regressor| x[regressor])
+    }
+
+    /// The same, the regressors given by their number.
+    #[must_use]
+    pub fn forecast_of(&self, time: f64, x: impl Fn(usize) -> f64) -> Option<Forecast> {
+        let order = self.state.len();
+        let weight = |i: usize| match i.checked_sub(self.model.moving()) {
+            Some(regressor) => x(regressor),
+            None if i == 0 => 1.0,
+            None => time,
+        };
+        let spread = |matrix: &[f64]| -> f64 {
+            let rows = matrix.chunks_exact(order).enumerate();
+            rows.map(|(i, row)| {
+                let along = row.iter().enumerate().map(|(j, value)| weight(j) * value);
+                weight(i) * along.sum::<f64>()
+            })
+            .sum()
+        };
+        if self.unknown > 0 {
+            let most: f64 = (0..order).map(|i| weight(i).powi(2)).sum();
+            if spread(&self.diffuse) > NOTHING_NEW * most {
+                return None;
+            }
+        }
+        Some(Forecast {
+            mean: self.expected(time, &x),
+            variance: (spread(&self.covariance) + self.model.gained(time).level).max(0.0),
+        })
+    }
+
+    /// Forgets level and trend, of which nothing is known from now on; the coefficients stay.
+    pub fn forget_level(&mut self) {
+        for state in 0..self.model.moving() {
+            self.forget(state);
+        }
+    }
+
+    /// Starts level and trend afresh from what is known of them, each a mean and a variance; the coefficients stay.
+    ///
+    /// # Panics
+    /// When there is not one pair for the level and, where there is one, the trend; or one is not finite.
+    pub fn restart_level(&mut self, known: &[(f64, f64)]) {
+        assert_eq!(
+            known.len(),
+            self.model.moving(),
+            "level and trend are told together"
+        );
+        let order = self.state.len();
+        self.forget_level();
+        for (state, &(mean, variance)) in known.iter().enumerate() {
+            assert!(
+                mean.is_finite() && variance >= 0.0 && variance.is_finite(),
+                "what is known is finite"
+            );
+            self.state[state] = mean;
+            self.covariance[state * order + state] = variance;
+            self.diffuse[state * order + state] = 0.0;
+            self.unknown -= 1;
+        }
+    }
+
+    /// Goes on from what another filter knew of the same states, under this one's variances; whether the two have the same
+    /// states.
+    #[must_use]
+    pub fn resume(&mut self, from: &Self) -> bool {
+        let same = self.model.moving() == from.model.moving()
+            && self.state.len() == from.state.len()
+            && from.covariance.len() == from.state.len().pow(2);
+        if same {
+            self.state.clone_from(&from.state);
+            self.covariance.clone_from(&from.covariance);
+            self.diffuse.clone_from(&from.diffuse);
+            self.unknown = from.unknown;
+        }
+        same
+    }
+
+    /// Makes a state diffuse.
+    fn forget(&mut self, state: usize) {
+        let order = self.state.len();
+        if self.unknown == 0 {
+            self.diffuse.clear();
+            self.diffuse.resize(order * order, 0.0);
+        }
+        let known = self.diffuse[state * order + state] == 0.0;
+        for other in 0..order {
+            for matrix in [&mut self.covariance, &mut self.diffuse] {
+                matrix[state * order + other] = 0.0;
+                matrix[other * order + state] = 0.0;
+            }
+        }
+        self.diffuse[state * order + state] = 1.0;
+        self.state[state] = 0.0;
+        self.unknown += usize::from(known);
+    }
+
+    /// What is expected `time` from now of the observation that has these regressors, given by their number; of no
+    /// meaning while that is diffuse.
+    #[must_use]
+    #[inline]
+    pub fn expected(&self, time: f64, x: impl Fn(usize) -> f64) -> f64 {
+        let moving = self.model.moving();
+        let mut mean = self.state[0];
+        if moving > 1 {
+            mean += time * self.state[1];
+        }
+        let terms = self.state[moving..].iter().enumerate();
+        terms.fold(mean, |sum, (nth, coefficient)| sum + coefficient * x(nth))
+    }
+
+    /// Takes an observation of something that nothing is known of; none where all that it tells of is known.
+    fn learn_of_the_unknown(&mut self, x: &[f64], error: f64) -> Option<Innovation> {
+        let order = self.state.len();
+        let (of_diffuse, shared) = self.room.split_at_mut(order);
+        let variance = product(&self.diffuse, &self.model, x, of_diffuse);
+        let most = 1.0 + x.iter().map(|x| x * x).sum::<f64>();
+        if variance.is_nan() || variance <= NOTHING_NEW * most {
+            return None;
+        }
+        let finite = product(&self.covariance, &self.model, x, shared) + self.model.observation;
+        for (state, gain) in self.state.iter_mut().zip(&*of_diffuse) {
+            *state += gain / variance * error;
+        }
+        for i in 0..order {
+            for j in 0..order {
+                let (a, b) = (of_diffuse[i] / variance, of_diffuse[j] / variance);
+                self.covariance[i * order + j] += a * b * finite - (a * shared[j] + b * shared[i]);
+                self.diffuse[i * order + j] -= of_diffuse[i] * of_diffuse[j] / variance;
+            }
+        }
+        self.unknown -= 1;
+        Some(Innovation {
+            error,
+            variance,
+            diffuse: true,
+        })
+    }
+}
+
+/// A matrix with these on its diagonal, row by row.
+#[must_use]
+pub(super) fn diagonal(values: &[f64]) -> Vec<f64> {
+    let order = values.len();
+    let mut matrix = vec![0.0; order * order];
+    for (i, value) in values.iter().enumerate() {
+        matrix[i * order + i] = *value;
+    }
+    matrix
+}
+
+/// Adds `time` times the trend's row and column to those of the level.
+#[inline]
+fn carry(matrix: &mut [f64], order: usize, time: f64) {
+    for j in 0..order {
+        matrix[j] += time * matrix[order + j];
+    }
+    for i in 0..order {
+        matrix[i * order] += time * matrix[i * order + 1];
+    }
+}
+
+/// Multiplies a symmetric matrix by the row `(1, 0, x)` of an observation; the answer is the row times the product.
+#[inline]
+fn product(matrix: &[f64], model: &Structural, x: &[f64], to: &mut [f64]) -> f64 {
+    let (order, moving) = (to.len(), model.moving());
+    for (to, row) in to.iter_mut().zip(matrix.chunks_exact(order)) {
+        let terms = row[moving..].iter().zip(x);
+        *to = terms.fold(row[0], |sum, (value, x)| sum + value * x);
+    }
+    let terms = to[moving..].iter().zip(x);
+    terms.fold(to[0], |sum, (value, x)| sum + value * x)
+}

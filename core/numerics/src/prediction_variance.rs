@@ -1,0 +1,209 @@
+//! How far a linear model's prediction may be from the value that is observed. Decides the variance of that error; does not
+//! decide the coefficients.
+
+use crate::normal_equations::Problem;
+use crate::{Gram, LeastSquares, LinearFit, NumericsError};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Mat, Par, Side};
+use serde::{Deserialize, Serialize};
+
+/// The variance of an observation about its prediction, `s²(1 + 1/n + |W(x − x̄)|²)`, with `WᵀW` the inverse of the
+/// penalised normal equations and `s² = RSS / (n − 1 − tr H)`.
+///
+/// Without a penalty this is the textbook's prediction variance (Draper and Smith 1998, section 3.1). With one it is that of
+/// the Bayesian model of which ridge is the posterior mean: coefficients with a prior variance of `s²/α` (Hastie,
+/// Tibshirani and Friedman 2009, section 3.4.1); `tr H` is then the effective number of coefficients. Rows whose errors hang
+/// together tell less than their number says: the first term stands, the others are too small.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PredictionVariance {
+    /// The variance of the residuals, `s²`.
+    pub noise: f64,
+    /// The number of rows, `n`.
+    pub rows: u64,
+    /// The mean of each column; empty without an intercept.
+    pub centre: Vec<f64>,
+    /// `W`, a lower triangle row by row.
+    pub root: Vec<f64>,
+}
+
+impl PredictionVariance {
+    /// The variance at the values of the fit's columns, in their order.
+    pub fn at(&self, x: &[f64]) -> f64 {
+        let mut leverage = if self.centre.is_empty() {
+            0.0
+        } else {
+            1.0 / self.rows as f64
+        };
+        let mut rest = self.root.as_slice();
+        for i in 0..x.len() {
+            let (row, below) = rest.split_at((i + 1).min(rest.len()));
+            rest = below;
+            let along: f64 = row
+                .iter()
+                .enumerate()
+                .map(|(j, w)| w * (x[j] - self.centre.get(j).copied().unwrap_or(0.0)))
+                .sum();
+            leverage += along * along;
+        }
+        self.noise * (1.0 + leverage)
+    }
+}
+
+impl LeastSquares {
+    /// The variance about the predictions of a fit of the same columns, scales and rows.
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFewRows`] when there are no more rows than coefficients, [`NumericsError::NoConvergence`] when the
+    /// normal equations cannot be factorised.
+    pub fn prediction_variance(
+        &self,
+        gram: &Gram,
+        scales: &[f64],
+        fit: &LinearFit,
+    ) -> Result<PredictionVariance, NumericsError> {
+        let columns = &fit.columns;
+        let problem = Problem::new(self.intercept, gram, columns, scales);
+        let penalised = problem.penalised(self.alpha);
+        let order = penalised.order();
+        // What the rows do not determine at all must not make the whole unsolvable.
+        let least = order as f64 / self.condition_bound.powi(2);
+        let inverse = penalised
+            .inverse_root(0.0)
+            .or_else(|| penalised.inverse_root(least))
+            .ok_or(NumericsError::NoConvergence)?;
+        let squares: f64 = (0..order).map(|j| inverse.col(j).squared_norm_l2()).sum();
+        let effective = order as f64 - self.alpha * squares + f64::from(u8::from(self.intercept));
+        let rows = gram.count();
+        let free = rows as f64 - effective;
+        if free <= 0.0 {
+            return Err(NumericsError::TooFewRows {
+                needed: effective.ceil() as u64 + 1,
+                found: rows,
+            });
+        }
+        let width = columns.len();
+        let mut root = vec![0.0; width * (width + 1) / 2];
+        for (i, &row) in problem.active.iter().enumerate() {
+            for (j, &column) in problem.active[..=i].iter().enumerate() {
+                let scale = scales[columns[column]];
+                root[row * (row + 1) / 2 + column] = inverse[(i, j)] / scale;
+            }
+        }
+        let means = gram.means();
+        let centre = columns.iter().map(|&column| means[column]);
+        Ok(PredictionVariance {
+            noise: fit.residual_sum_of_squares / free,
+            rows,
+            centre: if self.intercept {
+                centre.collect()
+            } else {
+                Vec::new()
+            },
+            root,
+        })
+    }
+}
+
+/// The inverse of the lower Cholesky factor; nothing when there is none.
+pub(crate) fn inverse_of_factor(matrix: &Mat<f64>) -> Option<Mat<f64>> {
+    let factor = matrix.llt(Side::Lower).ok()?;
+    let mut inverse = Mat::<f64>::identity(matrix.nrows(), matrix.nrows());
+    solve_lower_triangular_in_place(factor.L(), inverse.as_mut(), Par::Seq);
+    let finite = (0..inverse.ncols()).all(|j| inverse.col(j).iter().all(|value| value.is_finite()));
+    finite.then_some(inverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oracle::Table;
+    use crate::{GramBlocks, Standardization};
+
+    fn oracle(file: &str) -> Vec<Vec<f64>> {
+        let folder = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/oracles/prediction_variance"
+        );
+        let text = std::fs::read_to_string(format!("{folder}/{file}")).unwrap();
+        Table::parse(&text).numbers()
+    }
+
+    fn fitted(alpha: f64, columns: &[usize]) -> (LinearFit, PredictionVariance) {
+        let rows = oracle("rows.csv");
+        let mut blocks = GramBlocks::new(4);
+        for row in &rows {
+            blocks.push(&row[..4], row[4]);
+        }
+        let gram = blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        let squares = LeastSquares::ridge(alpha);
+        let fit = squares
+            .solve(&gram, columns, &scales, blocks.rows())
+            .unwrap();
+        let variance = squares.prediction_variance(&gram, &scales, &fit).unwrap();
+        (fit, variance)
+    }
+
+    #[test]
+    fn the_deviation_of_a_prediction_equals_the_oracle() {
+        // The third column of the rows is constant and stands in the middle, so that its place must be kept.
+        for (alpha, column) in [(0.0, 4), (5.0, 5)] {
+            let (_, variance) = fitted(alpha, &[0, 1, 2, 3]);
+            for row in oracle("expected.csv") {
+                let found = variance.at(&row[..4]).sqrt();
+                let expected = row[column];
+                assert!(
+                    (found - expected).abs() < 1e-9 * expected,
+                    "{found} instead of {expected} with a penalty of {alpha}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_order_of_columns_changes_nothing() {
+        let (_, one) = fitted(5.0, &[0, 1, 2, 3]);
+        let (_, other) = fitted(5.0, &[3, 1, 0]);
+        let (a, b) = (one.at(&[1.0, 2.0, 7.0, -1.0]), other.at(&[-1.0, 2.0, 1.0]));
+        assert!((a - b).abs() < 1e-12 * a, "{a} and {b}");
+    }
+
+    #[test]
+    fn columns_that_say_the_same_leave_the_variance_where_the_rows_are() {
+        let mut blocks = GramBlocks::new(2);
+        for i in 0..200 {
+            let x = f64::from(i % 17);
+            blocks.push(&[x, 2.0 * x], 3.0 * x + f64::from(i % 5));
+        }
+        let gram = blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        let squares = LeastSquares::ordinary();
+        let fit = squares
+            .solve(&gram, &[0, 1], &scales, blocks.rows())
+            .unwrap();
+        let variance = squares.prediction_variance(&gram, &scales, &fit).unwrap();
+        let (seen, unseen) = (variance.at(&[8.0, 16.0]), variance.at(&[8.0, 40.0]));
+        assert!((seen / 2.0 - 1.0).abs() < 0.1, "{seen}");
+        assert!(unseen > 1e3 * seen, "{unseen}");
+    }
+
+    #[test]
+    fn rows_that_are_no_more_than_coefficients_tell_no_variance() {
+        let mut blocks = GramBlocks::new(2);
+        for row in [[1.0, 0.0], [0.0, 1.0], [2.0, 5.0]] {
+            blocks.push(&row, row[0]);
+        }
+        let gram = blocks.total();
+        let squares = LeastSquares::ordinary();
+        let fit = squares.solve(&gram, &[0, 1], &[1.0, 1.0], None).unwrap();
+        let found = squares.prediction_variance(&gram, &[1.0, 1.0], &fit);
+        assert_eq!(
+            found,
+            Err(NumericsError::TooFewRows {
+                needed: 4,
+                found: 3
+            })
+        );
+    }
+}

@@ -1,0 +1,308 @@
+//! Intervals about a prediction that hold as often as they say.
+
+use std::collections::VecDeque;
+
+use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::time::{Duration, Instant};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Adaptive conformal inference: intervals about any prediction, calibrated by its recent errors.
+///
+/// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
+/// and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by `gain · (1 − coverage − miss)`, `miss` being
+/// 1 where the truth lay outside of the interval that was given for it and 0 where not (Gibbs and Candès 2021, equation 2).
+/// So the share of truths within comes to `coverage` whatever the errors are like, and when a machine changes; it is a share
+/// over time, not at each instant. Only truths that the embargo lets through count.
+///
+/// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends. They
+/// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths, and where more is asked for than any
+/// error in memory, it is the largest that counts. `athermal evaluate` tells how often intervals held.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Conformal {
+    /// The share of truths that the intervals are to cover, above 0 and below 1.
+    #[serde(default = "nine_tenths")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub coverage: f64,
+    /// How long an error is remembered, counted from the arrival of its truth. A few hundred truths make a steady interval.
+    pub memory: Duration,
+    /// How much a miss widens the next intervals, 0 (not at all) to 1; small is steady, large adapts fast.
+    #[serde(default = "one_in_two_hundred")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub gain: f64,
+}
+
+fn nine_tenths() -> f64 {
+    0.9
+}
+
+fn one_in_two_hundred() -> f64 {
+    0.005
+}
+
+impl Combiner for Conformal {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("prediction", "what the intervals are about"),
+                InputPort::truth("what is predicted, for the errors"),
+            ]
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if !(self.coverage > 0.0 && self.coverage < 1.0) {
+            let message = format!(
+                "`coverage` is {} and must be above 0 and below 1",
+                self.coverage
+            );
+            mistakes.push(Mistake::at("coverage", message).help("0.9 is nine of ten truths"));
+        }
+        if self.memory <= Duration::ZERO {
+            let message = format!(
+                "`memory` is {} and must be longer than nothing",
+                self.memory
+            );
+            mistakes.push(Mistake::at("memory", message));
+        }
+        if !(0.0..=1.0).contains(&self.gain) {
+            let message = format!("`gain` is {} and must be from 0 to 1", self.gain);
+            mistakes.push(Mistake::at("gain", message));
+        }
+        mistakes
+    }
+
+    fn covers(&self) -> Option<f64> {
+        Some(self.coverage)
+    }
+
+    fn memory(&self) -> Duration {
+        self.memory
+    }
+
+    fn build(&self, _voters: usize) -> Box<dyn Combine> {
+        Box::new(Calibrating {
+            parameters: self.clone(),
+            known: Known {
+                miscoverage: 1.0 - self.coverage,
+                errors: VecDeque::new(),
+            },
+            sorted: Vec::new(),
+        })
+    }
+}
+
+/// Keeps errors in the order of arrival and of size.
+struct Calibrating {
+    parameters: Conformal,
+    known: Known,
+    sorted: Vec<f64>,
+}
+
+/// What was learned of the errors of a prediction.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Known {
+    /// The share of misses that the next interval allows for, `α`.
+    miscoverage: f64,
+    /// When truths arrived, and the absolute errors, oldest first.
+    errors: VecDeque<(Instant, f64)>,
+}
+
+athermal_core::state!(Known, "conformal/1");
+
+impl Calibrating {
+    /// How far the interval reaches to either side; none while there are too few errors.
+    fn reach(&self) -> Option<f64> {
+        let count = self.sorted.len();
+        let rank = |miscoverage: f64| {
+            // A share such as 1 − 0.9 is not what it looks like in binary; a rank must not hang on its last bit.
+            ((count + 1) as f64 * (1.0 - miscoverage) - 1e-9).ceil()
+        };
+        if rank(1.0 - self.parameters.coverage) > count as f64 {
+            return None;
+        }
+        let rank = rank(self.known.miscoverage).clamp(0.0, count as f64) as usize;
+        Some(rank.checked_sub(1).map_or(0.0, |nth| self.sorted[nth]))
+    }
+
+    fn forget_first(&mut self) {
+        if let Some((_, error)) = self.known.errors.pop_front() {
+            let place = self.sorted.partition_point(|&other| other < error);
+            self.sorted.remove(place);
+        }
+    }
+}
+
+impl Combine for Calibrating {
+    fn combine(&self, votes: Votes<'_>) -> f64 {
+        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
+            (sum + vote, count + 1.0)
+        });
+        if count > 0.0 { sum / count } else { f64::NAN }
+    }
+
+    fn interval(&self, votes: Votes<'_>) -> [f64; 2] {
+        let prediction = self.combine(votes);
+        self.reach().map_or([f64::NAN; 2], |reach| {
+            [prediction - reach, prediction + reach]
+        })
+    }
+
+    fn judge(&mut self, [lower, upper]: [f64; 2], truth: f64) {
+        if lower.is_nan() || upper.is_nan() {
+            return;
+        }
+        let miss = if lower <= truth && truth <= upper {
+            0.0
+        } else {
+            1.0
+        };
+        let Conformal { coverage, gain, .. } = self.parameters;
+        let moved = self.known.miscoverage + gain * (1.0 - coverage - miss);
+        self.known.miscoverage = moved.clamp(0.0, 1.0);
+    }
+
+    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        let error = (truth - self.combine(votes)).abs();
+        if error.is_finite() {
+            self.known.errors.push_back((arrived, error));
+            let place = self.sorted.partition_point(|&other| other < error);
+            self.sorted.insert(place, error);
+        }
+    }
+
+    fn advance(&mut self, newest: Instant) {
+        let forgotten = newest - self.parameters.memory;
+        while matches!(self.known.errors.front(), Some(&(arrived, _)) if arrived <= forgotten) {
+            self.forget_first();
+        }
+    }
+
+    fn segment(&mut self, shift: Duration) {
+        for (arrived, _) in &mut self.known.errors {
+            *arrived = *arrived + shift;
+        }
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(self.known.clone()))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known() {
+            Ok(known) => {
+                self.known = known;
+                let errors = self.known.errors.iter().map(|&(_, error)| error);
+                self.sorted = errors.collect();
+                self.sorted.sort_unstable_by(f64::total_cmp);
+                // Whoever steps from here on must not have to make room.
+                let room = self.sorted.len().max(32);
+                self.known.errors.reserve(room);
+                self.sorted.reserve(room);
+                Restored::Accepted
+            }
+            Err(cold) => cold,
+        }
+    }
+}
+
+athermal_core::register!(Conformal, Combiner, "conformal");
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn s(seconds: i64) -> Instant {
+        Instant::from_ns(seconds * 1_000_000_000)
+    }
+
+    fn conformal(coverage: f64, gain: f64) -> Box<dyn Combine> {
+        let memory = Duration::from_ns(60_000_000_000);
+        Conformal {
+            coverage,
+            memory,
+            gain,
+        }
+        .build(1)
+    }
+
+    #[test]
+    fn intervals_equal_the_oracle() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/oracles/conformal");
+        let text = std::fs::read_to_string(format!("{folder}/expected.csv")).unwrap();
+        let mut node = conformal(0.8, 0.05);
+        let mut compared = 0;
+        for (second, line) in text.lines().skip(1).enumerate() {
+            let cells: Vec<f64> = line
+                .split(',')
+                .map(|cell| cell.parse().unwrap_or(f64::NAN))
+                .collect();
+            let [prediction, truth, lower, upper] = cells[..] else {
+                panic!("four cells")
+            };
+            let now = s(second as i64);
+            node.advance(now);
+            let found = node.interval(Votes(&[prediction]));
+            assert_eq!(found[0].is_nan(), lower.is_nan(), "row {second}");
+            if !lower.is_nan() {
+                assert!((found[0] - lower).abs() < 1e-12 && (found[1] - upper).abs() < 1e-12);
+                compared += 1;
+            }
+            node.judge(found, truth);
+            node.observe(Votes(&[prediction]), truth, now);
+        }
+        assert!(compared > 900);
+    }
+
+    #[test]
+    fn nothing_is_said_before_there_are_enough_errors() {
+        let mut node = conformal(0.9, 0.0);
+        for second in 0..9 {
+            assert!(node.interval(Votes(&[1.0]))[0].is_nan());
+            node.observe(Votes(&[0.0]), second as f64, s(second));
+        }
+        assert_eq!(node.interval(Votes(&[1.0])), [-7.0, 9.0]);
+        assert!(node.interval(Votes(&[f64::NAN]))[0].is_nan());
+    }
+
+    #[test]
+    fn errors_are_forgotten_in_the_order_of_arrival() {
+        let mut node = conformal(0.5, 0.0);
+        for (second, error) in [5.0, 1.0, 3.0, 2.0].into_iter().enumerate() {
+            node.observe(Votes(&[0.0]), error, s(second as i64));
+        }
+        assert_eq!(node.interval(Votes(&[0.0])), [-3.0, 3.0]);
+        node.advance(s(61));
+        assert_eq!(
+            node.interval(Votes(&[0.0])),
+            [-3.0, 3.0],
+            "3 and 2 are left"
+        );
+        node.advance(s(62));
+        assert_eq!(node.interval(Votes(&[0.0])), [-2.0, 2.0]);
+    }
+
+    #[test]
+    fn misses_widen_and_hits_narrow() {
+        let mut node = conformal(0.5, 0.2);
+        for second in 0..19 {
+            node.observe(Votes(&[0.0]), second as f64, s(second));
+        }
+        let reach = |node: &dyn Combine| node.interval(Votes(&[0.0]))[1];
+        assert_eq!(reach(&*node), 9.0);
+        node.judge([-1.0, 1.0], 5.0);
+        assert_eq!(reach(&*node), 11.0, "α is 0.4");
+        node.judge([-1.0, 1.0], 0.0);
+        node.judge([-1.0, 1.0], 0.0);
+        assert_eq!(reach(&*node), 7.0, "α is 0.6");
+        node.judge([f64::NAN; 2], 5.0);
+        assert_eq!(reach(&*node), 7.0, "nothing was said");
+        for _ in 0..100 {
+            node.judge([-1.0, 1.0], 5.0);
+        }
+        assert_eq!(reach(&*node), 18.0, "the largest there is");
+    }
+}

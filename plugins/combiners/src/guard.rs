@@ -1,0 +1,194 @@
+//! A combiner that does no harm.
+
+use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
+use athermal_core::time::{Duration, Instant};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::errors::{ByErrors, Errors, Rule};
+use crate::memory::Memory;
+
+/// Passes a prediction on only while it does no harm: while its recent error is below that of predicting zero.
+///
+/// Otherwise it predicts zero, which is what a machine without a model does. Before `min_truths` truths have been compared,
+/// nothing is known to do harm and the prediction passes. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back, 2 it
+/// passes since too little is known. The port `weights` says 0 while it is held back. Of several predictions the mean is guarded, and
+/// held back when the worst of them does harm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Guard {
+    /// How long an error is remembered, counted from the arrival of its truth: `"15min"`, `{ truths = 12 }`, or ever less by
+    /// `{ half_life = "15min" }`.
+    pub memory: Memory,
+    /// How many truths must be in memory before a prediction is held back; 1 or more.
+    #[serde(default = "five")]
+    #[schemars(range(min = 1))]
+    pub min_truths: usize,
+}
+
+fn five() -> usize {
+    5
+}
+
+/// The numbers of the port `reason`.
+mod reason {
+    pub(super) const HARMLESS: f64 = 0.0;
+    pub(super) const HARMS: f64 = 1.0;
+    pub(super) const UNKNOWN: f64 = 2.0;
+}
+
+impl Combiner for Guard {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("voters", "the prediction that is guarded"),
+                InputPort::truth("what it predicts, for its errors"),
+            ]
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = self.memory.mistakes();
+        if self.min_truths == 0 {
+            mistakes.push(Mistake::at(
+                "min_truths",
+                "`min_truths` is 0 and must be 1 or more",
+            ));
+        }
+        if let Memory::Truths(last) = self.memory
+            && last.truths < self.min_truths
+        {
+            let message = format!(
+                "`min_truths` is {} and the memory holds {} at most",
+                self.min_truths, last.truths
+            );
+            mistakes.push(Mistake::at("min_truths", message));
+        }
+        mistakes
+    }
+
+    fn weighs(&self) -> bool {
+        true
+    }
+
+    fn reasons(&self) -> bool {
+        true
+    }
+
+    fn memory(&self) -> Duration {
+        self.memory.longest()
+    }
+
+    fn build(&self, voters: usize) -> Box<dyn Combine> {
+        let rule = Guarding {
+            min_truths: self.min_truths as f64,
+            voters,
+        };
+        // Behind the voters stands one that always predicts zero.
+        Box::new(ByErrors::new(rule, voters + 1, self.memory))
+    }
+}
+
+/// Compares the votes with predicting zero.
+struct Guarding {
+    min_truths: f64,
+    voters: usize,
+}
+
+impl Guarding {
+    fn judge(&self, errors: &Errors) -> f64 {
+        let means = errors.means();
+        let worst = means[..self.voters]
+            .iter()
+            .flatten()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        match means[self.voters] {
+            Some(zero) if errors.count(self.voters) >= self.min_truths => {
+                if worst >= zero {
+                    reason::HARMS
+                } else {
+                    reason::HARMLESS
+                }
+            }
+            _ => reason::UNKNOWN,
+        }
+    }
+
+    fn passes(&self, errors: &Errors) -> bool {
+        self.judge(errors) != reason::HARMS
+    }
+}
+
+impl Rule for Guarding {
+    fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
+        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
+            (sum + vote, count + 1.0)
+        });
+        if count == 0.0 {
+            f64::NAN
+        } else if self.passes(errors) {
+            sum / count
+        } else {
+            0.0
+        }
+    }
+
+    fn weights(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) {
+        let passes = if self.passes(errors) { 1.0 } else { 0.0 };
+        let count = votes.present().count() as f64;
+        for (voter, _) in votes.present() {
+            weights[voter] = passes / count;
+        }
+    }
+
+    fn reason(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
+        let any = votes.present().next();
+        any.map_or(f64::NAN, |_| self.judge(errors))
+    }
+
+    fn observe(&self, errors: &mut Errors, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        errors.observe(votes, truth, arrived);
+        if votes.present().next().is_some() {
+            errors.observe_one(self.voters, 0.0, truth, arrived);
+        }
+    }
+}
+
+athermal_core::register!(Guard, Combiner, "guard");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn s(seconds: i64) -> Instant {
+        Instant::from_ns(seconds * 1_000_000_000)
+    }
+
+    #[test]
+    fn a_guard_predicts_zero_while_the_prediction_does_harm_and_says_so() {
+        let mut guard = Guard {
+            memory: Memory::Time(Duration::from_ns(600_000_000_000)),
+            min_truths: 2,
+        }
+        .build(1);
+        let vote = Votes(&[7.0]);
+        assert_eq!((guard.combine(vote), guard.reason(vote)), (7.0, 2.0));
+        guard.observe(vote, 1.0, s(0));
+        let one = (guard.combine(vote), guard.reason(vote));
+        assert_eq!(one, (7.0, 2.0), "one truth is not enough");
+        guard.observe(vote, 1.0, s(60));
+        assert_eq!((guard.combine(vote), guard.reason(vote)), (0.0, 1.0));
+        let mut weights = [f64::NAN];
+        guard.weights(vote, &mut weights);
+        assert_eq!(weights, [0.0]);
+        guard.advance(s(700));
+        let later = (guard.combine(vote), guard.reason(vote));
+        assert_eq!(later, (7.0, 2.0), "what is forgotten does not count");
+        for second in [700, 760] {
+            guard.observe(vote, 6.0, s(second));
+        }
+        assert_eq!((guard.combine(vote), guard.reason(vote)), (7.0, 0.0));
+        assert!(guard.reason(Votes(&[f64::NAN])).is_nan());
+    }
+}

@@ -1,0 +1,245 @@
+//! Exponential weights with a bound on what is lost to the best voter.
+
+use std::cell::RefCell;
+
+use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::time::{Duration, Instant};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::memory::Fading;
+use crate::share::raise;
+
+/// Exponential weights: a vote that loses little to the best voter in hindsight, whatever comes.
+///
+/// `ŷ = Σ w_i ŷ_i` with `w_i ∝ exp(−η L_i)`, where `L_i` is the sum of the squared errors of a voter (Freund and Schapire 1997). Where
+/// `auto_weighted` follows the last quarter of an hour, `hedge` goes by all that it has seen, and soon gives most weight to the voter that
+/// is best over all.
+///
+/// Without `rate` the rate is found on the way (AdaHedge: de Rooij, van Erven, Grünwald and Koolen 2014): `η = ln n / Δ`, with `Δ` the sum
+/// of what the weighted mean of the errors has lost to `−ln(Σ w_i exp(−η ℓ_i)) / η`. It needs no scale: errors in nm or in mm give the same
+/// weights. After `T` truths the squared errors of the vote add up to no more than those of the best of `n` voters and
+/// `2 √(V ln n) + S (4/3 ln n + 2)`, where `S` is the largest difference between squared errors at any one truth and `V`, at most `T S² / 4`,
+/// sums up their variance under the weights (their theorem 6). That holds where each truth is known before the next vote; a horizon or embargo
+/// that holds back `d` truths multiplies it by about `d + 1` (Joulani, György and Szepesvári 2013).
+///
+/// With `rate`, `η = rate / S`: errors are scaled by their own size so far, and the bound is `S ln n / rate + rate · T S / 8` once that has shown
+/// (Cesa-Bianchi and Lugosi 2006, theorem 2.2).
+///
+/// A voter without a prediction drops out, the rest are renormalised, and what it is owed neither grows nor shrinks while it is away (Freund, Schapire,
+/// Singer and Warmuth 1997). Before the first truth all weights are equal. The port `weights` shows them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hedge {
+    /// How fast weights follow errors that are scaled by their own size, above 0, up to 100; without it, the rate is found on the way.
+    #[serde(default)]
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
+    pub rate: Option<f64>,
+    /// The time after which an error counts half, for voters that take turns at being best; without it nothing is forgotten, and
+    /// only then do the bounds hold.
+    #[serde(default)]
+    pub half_life: Option<Duration>,
+    /// The least weight of a voter that is there, 0 to 1, so that one that was bad can come back quickly; where that is more than an equal
+    /// share, all weights are equal.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub floor: f64,
+}
+
+impl Combiner for Hedge {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("voters", "predictions of the same truth"),
+                InputPort::truth("what the voters predict, for their errors"),
+            ]
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if let Some(rate) = self.rate
+            && !(rate > 0.0 && rate <= 100.0)
+        {
+            let message = format!("`rate` is {rate} and must be above 0, up to 100");
+            let help = "leave it out, and the rate is found on the way";
+            mistakes.push(Mistake::at("rate", message).help(help));
+        }
+        if let Some(half_life) = self.half_life
+            && half_life <= Duration::ZERO
+        {
+            let message = format!("`half_life` is {half_life} and must be longer than nothing");
+            mistakes.push(Mistake::at("half_life", message));
+        }
+        if !(0.0..=1.0).contains(&self.floor) {
+            let message = format!("`floor` is {} and must be from 0 to 1", self.floor);
+            mistakes.push(Mistake::at("floor", message));
+        }
+        mistakes
+    }
+
+    fn weighs(&self) -> bool {
+        true
+    }
+
+    fn memory(&self) -> Duration {
+        // After ten half-lives less than a thousandth is left.
+        let half_life = self.half_life.unwrap_or_default();
+        Duration::from_ns(half_life.as_ns().saturating_mul(10))
+    }
+
+    fn build(&self, voters: usize) -> Box<dyn Combine> {
+        Box::new(Hedging {
+            parameters: self.clone(),
+            losses: Losses {
+                sums: vec![0.0; voters],
+                gap: 0.0,
+                widest: 0.0,
+                last: None,
+            },
+            room: RefCell::new(vec![0.0; voters]),
+        })
+    }
+}
+
+struct Hedging {
+    parameters: Hedge,
+    losses: Losses,
+    /// Room for the weights.
+    room: RefCell<Vec<f64>>,
+}
+
+/// What the voters have lost: the state of the vote.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Losses {
+    /// For each voter the sum of its squared errors, less that of the best.
+    sums: Vec<f64>,
+    /// `Δ`: what the weighted means of the losses have lost to the logarithmic ones.
+    gap: f64,
+    /// `S`: the largest difference between the losses of voters at one truth.
+    widest: f64,
+    /// When the last truth arrived.
+    last: Option<Instant>,
+}
+
+impl Hedging {
+    /// The rate; infinite while voters that are not the best deserve nothing.
+    fn rate(&self) -> f64 {
+        let Losses { gap, widest, .. } = self.losses;
+        match self.parameters.rate {
+            Some(rate) => rate / widest,
+            None => (self.losses.sums.len() as f64).ln() / gap,
+        }
+    }
+
+    /// Weighs the votes that are there, without the floor: at one rate, and relative to the best, so that nothing underflows for all.
+    fn weigh(&self, votes: Votes<'_>, rate: f64, weights: &mut [f64]) {
+        let sums = &self.losses.sums;
+        let best = votes.present().map(|(voter, _)| sums[voter]);
+        let best = best.fold(f64::INFINITY, f64::min);
+        let mut total = 0.0;
+        for (voter, _) in votes.present() {
+            weights[voter] = match sums[voter] - best {
+                0.0 => 1.0,
+                behind => (-rate * behind).exp(),
+            };
+            total += weights[voter];
+        }
+        for (voter, _) in votes.present() {
+            weights[voter] /= total;
+        }
+    }
+
+    /// Adds losses, absent voters at what the vote of the others lost.
+    fn lose(&mut self, votes: Votes<'_>, truth: f64) {
+        let loss = |vote: f64| (vote - truth) * (vote - truth);
+        let (least, most) = votes.present().fold(
+            (f64::INFINITY, f64::NEG_INFINITY),
+            |(least, most), (_, vote)| (least.min(loss(vote)), most.max(loss(vote))),
+        );
+        // No vote was there, or one so wild that its square is beyond all numbers.
+        if !(most - least).is_finite() {
+            return;
+        }
+        self.losses.widest = self.losses.widest.max(most - least);
+        let rate = self.rate();
+        let weights = &mut *self.room.borrow_mut();
+        self.weigh(votes, rate, weights);
+        let mean: f64 = votes
+            .present()
+            .map(|(voter, vote)| weights[voter] * (loss(vote) - least))
+            .sum();
+        let mixed = if rate.is_finite() {
+            let left = votes
+                .present()
+                .map(|(voter, vote)| weights[voter] * (-rate * (loss(vote) - least)).exp());
+            // What is lost by no voter is not lost by their mixture, however the logarithm rounds.
+            (-left.sum::<f64>().ln() / rate).max(0.0)
+        } else {
+            let leading = votes.present().filter(|&(voter, _)| weights[voter] > 0.0);
+            let losses = leading.map(|(_, vote)| loss(vote) - least);
+            losses.fold(f64::INFINITY, f64::min)
+        };
+        self.losses.gap += (mean - mixed).max(0.0);
+        let sums = &mut self.losses.sums;
+        for (sum, vote) in sums.iter_mut().zip(votes.0) {
+            *sum += if vote.is_nan() {
+                mixed
+            } else {
+                loss(*vote) - least
+            };
+        }
+        let best = sums.iter().copied().fold(f64::INFINITY, f64::min);
+        sums.iter_mut().for_each(|sum| *sum -= best);
+    }
+}
+
+impl Combine for Hedging {
+    fn combine(&self, votes: Votes<'_>) -> f64 {
+        if votes.present().next().is_none() {
+            return f64::NAN;
+        }
+        let weights = &mut *self.room.borrow_mut();
+        self.weigh(votes, self.rate(), weights);
+        raise(weights, votes, self.parameters.floor);
+        let terms = votes.present().map(|(voter, vote)| weights[voter] * vote);
+        terms.sum()
+    }
+
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        self.weigh(votes, self.rate(), weights);
+        raise(weights, votes, self.parameters.floor);
+    }
+
+    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        if let (Some(half_life), Some(last)) = (self.parameters.half_life, self.losses.last) {
+            let left = Fading { half_life }.left(arrived - last);
+            self.losses.gap *= left;
+            self.losses.sums.iter_mut().for_each(|sum| *sum *= left);
+        }
+        self.losses.last = Some(arrived);
+        self.lose(votes, truth);
+    }
+
+    fn segment(&mut self, shift: Duration) {
+        self.losses.last = self.losses.last.map(|last| last + shift);
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(self.losses.clone()))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known::<Losses>() {
+            Ok(losses) if losses.sums.len() == self.losses.sums.len() => {
+                self.losses = losses;
+                Restored::Accepted
+            }
+            Ok(_) => Restored::cold("the number of voters differs"),
+            Err(cold) => cold,
+        }
+    }
+}
+
+athermal_core::state!(Losses, "hedge/1");
+athermal_core::register!(Hedge, Combiner, "hedge");

@@ -1,0 +1,127 @@
+//! Decides how long errors count: for a time, for so many truths, or ever less.
+
+use std::fmt;
+
+use athermal_core::node::Mistake;
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::de::value::{MapAccessDeserializer, StrDeserializer};
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// How long an error is remembered, counted from the arrival of its truth.
+///
+/// `"15min"` forgets what arrived earlier at once, `{ truths = 12 }` what arrived before the last twelve, and
+/// `{ half_life = "15min" }` counts an error half after that time, a quarter after twice that, and not at all after ten times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Memory {
+    /// For this long.
+    Time(Duration),
+    /// For a number of truths.
+    Truths(LastTruths),
+    /// Ever less.
+    HalfLife(Fading),
+}
+
+/// A memory of so many truths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LastTruths {
+    /// How many of the last truths with a vote count, for each voter; 1 to 10,000.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub truths: usize,
+}
+
+/// A memory that fades.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fading {
+    /// The time after which an error counts half.
+    pub half_life: Duration,
+}
+
+/// After this many half-lives an error counts less than a thousandth, and is forgotten.
+const FORGOTTEN: i64 = 10;
+
+// Not derived, since an untagged enum forgets what was wrong with any form.
+impl<'de> Deserialize<'de> for Memory {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = Memory;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(
+                    "a duration such as \"15min\", { truths = 12 } or { half_life = \"15min\" }",
+                )
+            }
+
+            fn visit_str<E: serde::de::Error>(self, time: &str) -> Result<Memory, E> {
+                Duration::deserialize(StrDeserializer::new(time)).map(Memory::Time)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, form: A) -> Result<Memory, A::Error> {
+                let form = Table::deserialize(MapAccessDeserializer::new(form))?;
+                match (form.truths, form.half_life) {
+                    (Some(truths), None) => Ok(Memory::Truths(LastTruths { truths })),
+                    (None, Some(half_life)) => Ok(Memory::HalfLife(Fading { half_life })),
+                    _ => Err(serde::de::Error::custom(
+                        "a memory has either `truths` or `half_life`",
+                    )),
+                }
+            }
+        }
+        deserializer.deserialize_any(Form)
+    }
+}
+
+/// The keys of a memory that is written as a table.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    truths: Option<usize>,
+    half_life: Option<Duration>,
+}
+
+impl Memory {
+    /// What is wrong with it as the parameter `memory`.
+    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
+        let message = match *self {
+            Self::Time(time) if time <= Duration::ZERO => {
+                format!("`memory` is {time} and must be longer than nothing")
+            }
+            Self::Truths(LastTruths { truths }) if !(1..=10_000).contains(&truths) => {
+                format!("`truths` is {truths} and must be from 1 to 10000")
+            }
+            Self::HalfLife(Fading { half_life }) if half_life <= Duration::ZERO => {
+                format!("`half_life` is {half_life} and must be longer than nothing")
+            }
+            _ => return Vec::new(),
+        };
+        let at = match self {
+            Self::Time(_) => "memory",
+            Self::Truths(_) => "memory.truths",
+            Self::HalfLife(_) => "memory.half_life",
+        };
+        vec![Mistake::at(at, message)]
+    }
+
+    /// How long anything counts; nothing is known of it where truths are counted.
+    pub(crate) fn longest(&self) -> Duration {
+        match *self {
+            Self::Time(time) => time,
+            Self::Truths(_) => Duration::ZERO,
+            Self::HalfLife(Fading { half_life }) => {
+                Duration::from_ns(half_life.as_ns().saturating_mul(FORGOTTEN))
+            }
+        }
+    }
+}
+
+impl Fading {
+    /// What is left of something after a time.
+    pub(crate) fn left(&self, after: Duration) -> f64 {
+        (-after.secs() / self.half_life.secs()).exp2().min(1.0)
+    }
+}

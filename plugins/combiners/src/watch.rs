@@ -1,0 +1,506 @@
+//! Combiners that pass a prediction on and watch whether its errors have changed.
+
+use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{self as numerics, AdwinOptions, MeanChange, PageHinkleyOptions};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
+///
+/// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the root mean
+/// square of the first `first` of them: `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, and an alarm where `m_t` has gone `λ` from its
+/// smallest or largest value (Page 1954; Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins
+/// anew. It takes the errors for independent; those of truths that overlap are not, so let it take one in a while with `every`.
+///
+/// The port `reason` says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
+/// `hold`. Of several predictions the mean is watched.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PageHinkley {
+    /// What is watched.
+    #[serde(default)]
+    pub watch: Watched,
+    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more.
+    #[serde(default = "thirty")]
+    #[schemars(range(min = 2))]
+    pub first: u64,
+    /// `δ`, a change that is not worth an alarm, in multiples of the usual error; 0 or more.
+    #[serde(default = "tolerance")]
+    #[schemars(range(min = 0.0))]
+    pub tolerance: f64,
+    /// `λ`, how large the sum must grow, in multiples of the usual error; above 0.
+    #[serde(default = "threshold")]
+    #[schemars(range(min = 0.0))]
+    pub threshold: f64,
+    /// `φ`, what remains of the sum at each truth; above 0, at most 1.
+    #[serde(default = "factor")]
+    #[schemars(range(max = 1.0))]
+    pub factor: f64,
+    /// The time from one truth that is taken to the next; with none, all are.
+    #[serde(default)]
+    pub every: Duration,
+    /// How long an alarm stands.
+    #[serde(default = "hour")]
+    pub hold: Duration,
+}
+
+/// Passes a prediction on, and watches with adaptive windowing whether the model behind it has drifted.
+///
+/// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the root mean square
+/// of the first `first` of them. It is cut, which is the alarm, where its two sides have means that are farther apart than
+/// chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
+/// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
+/// one in a while with `every`.
+///
+/// The port `reason` says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
+/// `hold`. Of several predictions the mean is watched.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Adwin {
+    /// What is watched.
+    #[serde(default)]
+    pub watch: Watched,
+    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more.
+    #[serde(default = "thirty")]
+    #[schemars(range(min = 2))]
+    pub first: u64,
+    /// `δ`, the probability of a false alarm at a look, above 0, below 1.
+    #[serde(default = "confidence")]
+    #[schemars(range(max = 1.0))]
+    pub confidence: f64,
+    /// At every how many truths the window is looked at; 1 or more.
+    #[serde(default = "eight")]
+    #[schemars(range(min = 1))]
+    pub clock: u64,
+    /// The fewest truths on either side of a cut; 1 or more.
+    #[serde(default = "five")]
+    #[schemars(range(min = 1))]
+    pub shortest: u64,
+    /// The time from one truth that is taken to the next; with none, all are.
+    #[serde(default)]
+    pub every: Duration,
+    /// How long an alarm stands.
+    #[serde(default = "hour")]
+    pub hold: Duration,
+}
+
+/// What of the errors is watched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Watched {
+    /// The error with its sign: whether predictions have become too high or too low.
+    #[default]
+    Error,
+    /// The error without its sign: whether predictions have become worse or better.
+    Size,
+}
+
+fn thirty() -> u64 {
+    30
+}
+
+fn eight() -> u64 {
+    8
+}
+
+fn five() -> u64 {
+    5
+}
+
+fn tolerance() -> f64 {
+    PageHinkleyOptions::default().tolerance
+}
+
+fn threshold() -> f64 {
+    PageHinkleyOptions::default().threshold
+}
+
+fn factor() -> f64 {
+    PageHinkleyOptions::default().factor
+}
+
+fn confidence() -> f64 {
+    AdwinOptions::default().confidence
+}
+
+fn hour() -> Duration {
+    Duration::from_ns(3_600_000_000_000)
+}
+
+/// The numbers of the port `reason`.
+mod reason {
+    pub(super) const NONE: f64 = 0.0;
+    pub(super) const UP: f64 = 1.0;
+    pub(super) const DOWN: f64 = 2.0;
+    pub(super) const UNKNOWN: f64 = 3.0;
+}
+
+const INPUTS: &[InputPort] = &[
+    InputPort::held("voters", "the prediction that is watched"),
+    InputPort::truth("what it predicts, for its errors"),
+];
+
+/// Parameters out of their range, gathered.
+#[derive(Default)]
+struct Checks(Vec<Mistake>);
+
+impl Checks {
+    fn check(&mut self, name: &str, value: impl std::fmt::Display, fits: bool, allowed: &str) {
+        if !fits {
+            let message = format!("`{name}` is {value} and must be {allowed}");
+            self.0.push(Mistake::at(name, message));
+        }
+    }
+
+    fn timing(&mut self, first: u64, every: Duration, hold: Duration) {
+        self.check("first", first, first >= 2, "2 or more");
+        self.check("every", every, every >= Duration::ZERO, "0 or longer");
+        self.check("hold", hold, hold >= Duration::ZERO, "0 or longer");
+    }
+}
+
+impl PageHinkley {
+    fn options(&self) -> PageHinkleyOptions {
+        PageHinkleyOptions {
+            first: self.first,
+            tolerance: self.tolerance,
+            threshold: self.threshold,
+            factor: self.factor,
+        }
+    }
+}
+
+impl Combiner for PageHinkley {
+    fn inputs() -> &'static [InputPort] {
+        INPUTS
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut checks = Checks::default();
+        let Self {
+            tolerance,
+            threshold,
+            factor,
+            ..
+        } = *self;
+        checks.timing(self.first, self.every, self.hold);
+        let fits = tolerance >= 0.0 && tolerance.is_finite();
+        checks.check("tolerance", tolerance, fits, "0 or more");
+        let fits = threshold > 0.0 && threshold.is_finite();
+        checks.check("threshold", threshold, fits, "above 0");
+        let fits = factor > 0.0 && factor <= 1.0;
+        checks.check("factor", factor, fits, "above 0 and at most 1");
+        checks.0
+    }
+
+    fn reasons(&self) -> bool {
+        true
+    }
+
+    fn build(&self, _voters: usize) -> Box<dyn Combine> {
+        let test = numerics::PageHinkley::new(self.options())
+            .expect("a graph with parameters out of range is not compiled");
+        Box::new(Watching::new(
+            self.watch, self.first, self.every, self.hold, test,
+        ))
+    }
+}
+
+athermal_core::register!(PageHinkley, Combiner, "page_hinkley");
+
+impl Adwin {
+    fn options(&self) -> AdwinOptions {
+        AdwinOptions {
+            confidence: self.confidence,
+            clock: self.clock,
+            first: self.first,
+            shortest: self.shortest,
+        }
+    }
+}
+
+impl Combiner for Adwin {
+    fn inputs() -> &'static [InputPort] {
+        INPUTS
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut checks = Checks::default();
+        let Self {
+            confidence,
+            clock,
+            shortest,
+            ..
+        } = *self;
+        checks.timing(self.first, self.every, self.hold);
+        let fits = confidence > 0.0 && confidence < 1.0;
+        checks.check("confidence", confidence, fits, "above 0 and below 1");
+        checks.check("clock", clock, clock >= 1, "1 or more");
+        checks.check("shortest", shortest, shortest >= 1, "1 or more");
+        checks.0
+    }
+
+    fn reasons(&self) -> bool {
+        true
+    }
+
+    fn build(&self, _voters: usize) -> Box<dyn Combine> {
+        let window = numerics::Adwin::new(self.options())
+            .expect("a graph with parameters out of range is not compiled");
+        Box::new(Watching::new(
+            self.watch, self.first, self.every, self.hold, window,
+        ))
+    }
+}
+
+athermal_core::register!(Adwin, Combiner, "adwin");
+
+/// What tells whether the mean of a series has changed.
+trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeOwned + 'static {
+    fn push(&mut self, value: f64) -> Option<MeanChange>;
+
+    /// Goes on with the parameters of another.
+    fn as_told_to(self, other: &Self) -> Self;
+}
+
+impl Detector for numerics::PageHinkley {
+    fn push(&mut self, value: f64) -> Option<MeanChange> {
+        self.push(value)
+    }
+
+    fn as_told_to(self, other: &Self) -> Self {
+        self.with(other.options())
+    }
+}
+
+impl Detector for numerics::Adwin {
+    fn push(&mut self, value: f64) -> Option<MeanChange> {
+        self.push(value)
+    }
+
+    fn as_told_to(self, other: &Self) -> Self {
+        self.with(other.options())
+    }
+}
+
+/// A prediction under watch.
+struct Watching<D> {
+    watch: Watched,
+    first: u64,
+    every: Duration,
+    hold: Duration,
+    seen: Seen<D>,
+}
+
+/// What has been seen of the errors.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Seen<D> {
+    detector: D,
+    /// How many errors say what is usual, and the mean of their squares.
+    count: u64,
+    mean_square: f64,
+    /// When the last truth was taken.
+    taken: Option<Instant>,
+    /// The last alarm: when, and whether the mean had gone up.
+    alarm: Option<(Instant, bool)>,
+    /// Up to when truths have been handed over.
+    newest: Option<Instant>,
+}
+
+athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/1");
+athermal_core::state!(Seen<numerics::Adwin>, "adwin/1");
+
+impl<D: Detector> Watching<D> {
+    fn new(watch: Watched, first: u64, every: Duration, hold: Duration, detector: D) -> Self {
+        Self {
+            watch,
+            first,
+            every,
+            hold,
+            seen: Seen {
+                detector,
+                count: 0,
+                mean_square: 0.0,
+                taken: None,
+                alarm: None,
+                newest: None,
+            },
+        }
+    }
+
+    fn judge(&self) -> f64 {
+        let Seen {
+            count,
+            alarm,
+            newest,
+            ..
+        } = &self.seen;
+        match (alarm, newest) {
+            (Some((at, up)), Some(newest)) if *newest < *at + self.hold => {
+                if *up {
+                    reason::UP
+                } else {
+                    reason::DOWN
+                }
+            }
+            _ if *count < self.first => reason::UNKNOWN,
+            _ => reason::NONE,
+        }
+    }
+}
+
+/// The mean of the votes; NaN where there is none.
+fn mean(votes: Votes<'_>) -> f64 {
+    let add = |(sum, count), (_, vote)| (sum + vote, count + 1.0);
+    let (sum, count) = votes.present().fold((0.0, 0.0), add);
+    sum / count
+}
+
+impl<D: Detector> Combine for Watching<D>
+where
+    Seen<D>: State,
+{
+    fn combine(&self, votes: Votes<'_>) -> f64 {
+        mean(votes)
+    }
+
+    fn reason(&self, votes: Votes<'_>) -> f64 {
+        let any = votes.present().next();
+        any.map_or(f64::NAN, |_| self.judge())
+    }
+
+    fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
+        let error = truth - mean(votes);
+        let seen = &mut self.seen;
+        let too_early = seen.taken.is_some_and(|taken| arrived < taken + self.every);
+        if too_early || !error.is_finite() {
+            return;
+        }
+        seen.taken = Some(arrived);
+        if seen.count < self.first {
+            seen.count += 1;
+            seen.mean_square += (error * error - seen.mean_square) / seen.count as f64;
+            return;
+        }
+        let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
+        let relative = error / usual;
+        let value = match self.watch {
+            Watched::Error => relative,
+            Watched::Size => relative.abs(),
+        };
+        if let Some(change) = seen.detector.push(value) {
+            seen.alarm = Some((arrived, change == MeanChange::Up));
+        }
+    }
+
+    fn advance(&mut self, newest: Instant) {
+        self.seen.newest = Some(newest);
+    }
+
+    fn segment(&mut self, shift: Duration) {
+        let seen = &mut self.seen;
+        let instants = seen.taken.iter_mut().chain(&mut seen.newest);
+        let alarm = seen.alarm.iter_mut().map(|(at, _)| at);
+        instants.chain(alarm).for_each(|at| *at = *at + shift);
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        Some(Box::new(self.seen.clone()))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known::<Seen<D>>() {
+            Ok(mut known) => {
+                known.detector = known.detector.as_told_to(&self.seen.detector);
+                self.seen = known;
+                Restored::Accepted
+            }
+            Err(cold) => cold,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn s(seconds: i64) -> Instant {
+        Instant::from_ns(seconds * 1_000_000_000)
+    }
+
+    /// Tells errors of size 1 and changing sign, then of another mean from a truth on; what was said after each.
+    fn watched(mut node: Box<dyn Combine>, change: i64, gone: f64, truths: i64) -> Vec<f64> {
+        let vote = Votes(&[7.0]);
+        let mut said = Vec::new();
+        for nth in 0..truths {
+            let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+            let error = if nth < change { sign } else { sign + gone };
+            node.observe(vote, 7.0 + 5.0 * error, s(60 * nth));
+            node.advance(s(60 * nth));
+            assert_eq!(node.combine(vote), 7.0);
+            said.push(node.reason(vote));
+        }
+        said
+    }
+
+    fn page_hinkley() -> PageHinkley {
+        serde_json::from_str("{}").unwrap()
+    }
+
+    fn adwin() -> Adwin {
+        serde_json::from_str("{}").unwrap()
+    }
+
+    #[test]
+    fn a_mean_that_goes_up_or_down_is_told_for_an_hour() {
+        for (gone, reason) in [(2.0, reason::UP), (-2.0, reason::DOWN)] {
+            for node in [page_hinkley().build(1), adwin().build(1)] {
+                let said = watched(node, 200, gone, 500);
+                assert!(said[..29].iter().all(|&said| said == reason::UNKNOWN));
+                assert!(said[30..200].iter().all(|&said| said == reason::NONE));
+                let alarm = said.iter().position(|&said| said == reason).unwrap();
+                assert!((200..260).contains(&alarm), "{alarm}");
+                assert!(said[alarm..alarm + 60].iter().all(|&said| said == reason));
+            }
+        }
+    }
+
+    #[test]
+    fn a_model_that_gets_worse_without_bias_is_told_by_the_size_of_its_errors() {
+        let size = PageHinkley {
+            watch: Watched::Size,
+            ..page_hinkley()
+        };
+        let mut node = size.build(1);
+        let vote = Votes(&[0.0]);
+        let mut alarm = None;
+        for nth in 0..600_i64 {
+            let size = if nth < 300 { 1.0 } else { 3.0 };
+            let error = if nth % 2 == 0 { size } else { -size };
+            node.observe(vote, error, s(60 * nth));
+            node.advance(s(60 * nth));
+            if node.reason(vote) == reason::UP {
+                alarm.get_or_insert(nth);
+            }
+        }
+        assert!(
+            alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
+            "{alarm:?}"
+        );
+    }
+
+    #[test]
+    fn with_every_only_some_truths_are_taken() {
+        let seldom = PageHinkley {
+            every: Duration::from_ns(300_000_000_000),
+            ..page_hinkley()
+        };
+        let said = watched(seldom.build(1), 200, 2.0, 200);
+        assert_eq!(
+            said.iter().position(|&said| said == reason::NONE),
+            Some(29 * 5)
+        );
+    }
+}

@@ -1,0 +1,94 @@
+//! The weights of votes against tables made with other libraries, see `tests/oracles/votes/generate.py`.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use athermal_combiners::{AutoWeighted, Fading, Hedge, LastTruths, Memory, Weighting};
+use athermal_core::node::{Combiner, Votes};
+use athermal_core::time::{Duration, Instant};
+
+fn table(file: &str) -> Vec<Vec<f64>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles/votes");
+    let text = std::fs::read_to_string(folder.join(file)).unwrap();
+    let row = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect();
+    text.lines().skip(1).map(row).collect()
+}
+
+/// Follows the rows of the input and compares the weights before each truth with columns of a table.
+fn compare(parameters: &dyn Combiner, file: &str, column: usize, tolerance: f64) {
+    let expected = table(file);
+    let mut running = parameters.build(3);
+    let mut compared = 0;
+    for (row, values) in table("input.csv").iter().enumerate() {
+        let arrived = Instant::from_ns((values[0] * 1e9) as i64);
+        let votes = Votes(&values[2..]);
+        running.advance(arrived);
+        if let Some(expected) = expected.iter().find(|line| line[0] == row as f64) {
+            let mut weights = [f64::NAN; 3];
+            running.weights(votes, &mut weights);
+            for (found, expected) in weights.iter().zip(&expected[column..]) {
+                assert!(
+                    (found - expected).abs() <= tolerance,
+                    "{file}, row {row}: {weights:?} for {expected}"
+                );
+            }
+            let vote: f64 = weights.iter().zip(votes.0).map(|(w, v)| w * v).sum();
+            let found = running.combine(votes);
+            assert!((found - vote).abs() <= 1e-11, "{found} for {vote}");
+            compared += 1;
+        }
+        running.observe(votes, values[1], arrived);
+    }
+    assert_eq!(compared, expected.len());
+    assert!(compared > 250);
+}
+
+fn vote(memory: Memory, shrinkage: f64, floor: f64) -> AutoWeighted {
+    AutoWeighted {
+        memory,
+        power: 2.0,
+        weights: Weighting::InversePower,
+        shrinkage,
+        floor,
+    }
+}
+
+/// The columns of the tables of memories: plain weights, shrunk, raised to a floor, both.
+fn compare_memory(memory: Memory, file: &str, tolerance: f64) {
+    compare(&vote(memory, 0.0, 0.0), file, 1, tolerance);
+    compare(&vote(memory, 0.3, 0.0), file, 4, tolerance);
+    compare(&vote(memory, 0.0, 0.15), file, 7, tolerance);
+    compare(&vote(memory, 0.3, 0.2), file, 10, tolerance);
+}
+
+#[test]
+fn oracle_of_a_memory_of_so_many_truths() {
+    let memory = Memory::Truths(LastTruths { truths: 12 });
+    compare_memory(memory, "truths.csv", 1e-10);
+}
+
+#[test]
+fn oracle_of_a_memory_that_fades() {
+    let half_life = Duration::from_ns(600_000_000_000);
+    let memory = Memory::HalfLife(Fading { half_life });
+    compare_memory(memory, "half_life.csv", 1e-10);
+}
+
+fn hedge(rate: Option<f64>) -> Hedge {
+    Hedge {
+        rate,
+        half_life: None,
+        floor: 0.0,
+    }
+}
+
+#[test]
+fn oracle_of_exponential_weights_at_a_stated_rate() {
+    compare(&hedge(Some(0.8)), "hedge.csv", 1, 1e-11);
+}
+
+#[test]
+fn oracle_of_exponential_weights_that_find_their_rate() {
+    compare(&hedge(None), "hedge.csv", 4, 1e-9);
+}

@@ -1,0 +1,300 @@
+//! The estimator that leaves features out by its penalty: lasso and elastic net share it.
+
+use std::fmt;
+
+use athermal_core::node::{
+    Estimator, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
+};
+use athermal_core::time::Duration;
+use athermal_numerics::{GramBlocks, NumericsError, Standardization, logarithmic_grid};
+use schemars::JsonSchema;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::folds::Folds;
+use crate::regression::{LinearPredictor, told};
+
+/// Linear regression of the truth on features, many coefficients being exactly zero.
+///
+/// Minimises `1/(2n) Σ(y − ŷ)² + α (ρ Σ|w_j| + (1 − ρ)/2 Σ w_j²)` over the coefficients `w` of standardised features, the intercept
+/// free (Zou and Hastie 2005; coordinate descent as in Friedman, Hastie and Tibshirani 2010), with `ρ = l1_ratio`. Of features
+/// that hang together the lasso keeps one or the other; here the second term lets them share. Note that `α` stands against
+/// the *mean* of squares, that of ridge against their sum.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElasticNet {
+    /// The penalty, at least 0; or a table such as `{ folds = 5 }`, and the best of a range is chosen by cross-validation.
+    #[serde(default)]
+    pub alpha: SparsePenalty,
+    /// The share of the absolute values in the penalty, above 0 (towards ridge) up to 1 (lasso).
+    #[serde(default = "half")]
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
+    pub l1_ratio: f64,
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+/// The penalty of lasso and elastic net.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SparsePenalty {
+    /// This one, at least 0.
+    Fixed(#[schemars(range(min = 0.0))] f64),
+    /// The one with the best mean R² over folds, from the smallest that leaves out every feature downwards.
+    Chosen(Path),
+}
+
+/// Which penalties are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Path {
+    /// How the rows are cut: a number of contiguous folds, or a table.
+    #[serde(default = "Folds::three")]
+    pub folds: Folds,
+    /// The smallest penalty tried, as a share of the one that leaves out every feature; above 0, below 1.
+    #[serde(default = "thousandth")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub smallest_share: f64,
+    /// How many are tried to each factor of ten, 1 or more.
+    #[serde(default = "twenty")]
+    #[schemars(range(min = 1, max = 1000))]
+    pub per_decade: u32,
+}
+
+fn thousandth() -> f64 {
+    1e-3
+}
+
+fn twenty() -> u32 {
+    20
+}
+
+impl Default for SparsePenalty {
+    fn default() -> Self {
+        Self::Chosen(Path {
+            folds: Folds::three(),
+            smallest_share: thousandth(),
+            per_decade: twenty(),
+        })
+    }
+}
+
+// Not derived, since an untagged enum forgets what was wrong with either form.
+impl<'de> Deserialize<'de> for SparsePenalty {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = SparsePenalty;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or a table such as `{ folds = 5 }`")
+            }
+
+            fn visit_f64<E>(self, alpha: f64) -> Result<SparsePenalty, E> {
+                Ok(SparsePenalty::Fixed(alpha))
+            }
+
+            fn visit_u64<E>(self, alpha: u64) -> Result<SparsePenalty, E> {
+                Ok(SparsePenalty::Fixed(alpha as f64))
+            }
+
+            fn visit_i64<E>(self, alpha: i64) -> Result<SparsePenalty, E> {
+                Ok(SparsePenalty::Fixed(alpha as f64))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, path: A) -> Result<SparsePenalty, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(path))
+                    .map(SparsePenalty::Chosen)
+            }
+        }
+        deserializer.deserialize_any(Form)
+    }
+}
+
+impl SparsePenalty {
+    /// Parameters out of their range.
+    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
+        match *self {
+            Self::Fixed(alpha) if alpha >= 0.0 && alpha.is_finite() => Vec::new(),
+            Self::Fixed(alpha) => {
+                let message = format!("`alpha` is {alpha} and must be 0 or more");
+                vec![Mistake::at("alpha", message)]
+            }
+            Self::Chosen(path) => {
+                let mut mistakes = path.folds.mistakes("alpha.folds");
+                let share = path.smallest_share;
+                if !(share > 0.0 && share < 1.0) {
+                    let message =
+                        format!("`smallest_share` is {share} and must be above 0 and below 1");
+                    mistakes.push(Mistake::at("alpha.smallest_share", message));
+                }
+                if !(1..=1000).contains(&path.per_decade) {
+                    let found = path.per_decade;
+                    let message = format!("`per_decade` is {found} and must be from 1 to 1000");
+                    mistakes.push(Mistake::at("alpha.per_decade", message));
+                }
+                mistakes
+            }
+        }
+    }
+}
+
+/// The ports of estimators that take features alone.
+pub(crate) const FEATURES_AND_TRUTH: &[InputPort] = &[
+    InputPort::held(
+        "features",
+        "what the prediction is made of, such as slopes of temperatures",
+    ),
+    InputPort::truth("what is predicted, such as the drift of an axis"),
+];
+
+/// The features as they are now.
+pub(crate) fn present_features() -> Regressors {
+    Regressors {
+        feature_lags: vec![Duration::ZERO],
+        ..Regressors::default()
+    }
+}
+
+impl Estimator for ElasticNet {
+    fn inputs() -> &'static [InputPort] {
+        FEATURES_AND_TRUTH
+    }
+
+    fn regressors(&self) -> Regressors {
+        present_features()
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = self.alpha.mistakes();
+        let ratio = self.l1_ratio;
+        if !(ratio > 0.0 && ratio <= 1.0) {
+            let message = format!("`l1_ratio` is {ratio} and must be above 0 up to 1");
+            mistakes.push(
+                Mistake::at("l1_ratio", message)
+                    .help("without absolute values it is `linear` with ridge"),
+            );
+        }
+        mistakes
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(SparseTrainer::new(setup, self.alpha, self.l1_ratio))
+    }
+}
+
+athermal_core::register!(ElasticNet, Estimator, "elastic_net");
+
+/// Takes the rows of a sparse fit as Gram blocks.
+#[derive(Debug)]
+pub(crate) struct SparseTrainer {
+    regressors: Vec<Regressor>,
+    alpha: SparsePenalty,
+    l1_ratio: f64,
+    blocks: GramBlocks,
+}
+
+impl SparseTrainer {
+    pub(crate) fn new(setup: &TrainingSetup, alpha: SparsePenalty, l1_ratio: f64) -> Self {
+        Self {
+            regressors: setup.regressors.clone(),
+            alpha,
+            l1_ratio,
+            blocks: GramBlocks::with_row_memory(setup.regressors.len(), setup.memory),
+        }
+    }
+
+    fn settle(&self, scales: &[f64], report: &mut TrainingReport) -> Result<f64, NumericsError> {
+        let path = match self.alpha {
+            SparsePenalty::Fixed(alpha) => return Ok(alpha),
+            SparsePenalty::Chosen(path) => path,
+        };
+        let all: Vec<usize> = (0..self.regressors.len()).collect();
+        let how = athermal_numerics::ElasticNet {
+            alpha: 0.0,
+            l1_ratio: self.l1_ratio,
+        };
+        let largest = how.largest_alpha(&self.blocks.total(), &all, scales)?;
+        if largest <= 0.0 {
+            return Ok(0.0);
+        }
+        let alphas = logarithmic_grid(path.smallest_share * largest, largest, path.per_decade);
+        let splits = self.blocks.splits(&path.folds.cut())?;
+        let folds = how.cross_validated(&splits, &all, scales, &alphas)?;
+        let means: Vec<f64> = folds
+            .iter()
+            .map(|scores| scores.iter().sum::<f64>() / scores.len() as f64)
+            .collect();
+        // Of several as good the largest, which leaves out most.
+        let best = (0..alphas.len()).reduce(|a, b| if means[b] >= means[a] { b } else { a });
+        let best = best.unwrap_or(0);
+        let edge = if best == 0 {
+            "; it is the smallest tried, a smaller one may be better"
+        } else {
+            ""
+        };
+        report.notes.push(format!(
+            "penalty {:.3e} chosen by cross-validation from {} up to {largest:.3e}, R² {:.4}{edge}",
+            alphas[best],
+            alphas.len(),
+            means[best]
+        ));
+        Ok(alphas[best])
+    }
+
+    fn solve(&self, report: &mut TrainingReport) -> Result<LinearPredictor, NumericsError> {
+        let gram = self.blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        let alpha = self.settle(&scales, report)?;
+        let how = athermal_numerics::ElasticNet {
+            alpha,
+            l1_ratio: self.l1_ratio,
+        };
+        let all: Vec<usize> = (0..self.regressors.len()).collect();
+        let fit = how.solve(&gram, &all, &scales)?;
+        if !fit.converged {
+            report.notes.push(
+                "the descent did not come to its end: a larger penalty or fewer features would help"
+                    .to_owned(),
+            );
+        }
+        let kept: Vec<usize> = all
+            .into_iter()
+            .filter(|&j| fit.coefficients[j] != 0.0)
+            .collect();
+        report.notes.push(format!(
+            "{} of {} features have a coefficient",
+            kept.len(),
+            self.regressors.len()
+        ));
+        report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
+        Ok(LinearPredictor {
+            regressors: kept
+                .iter()
+                .map(|&j| self.regressors[j].name.clone())
+                .collect(),
+            coefficients: kept.iter().map(|&j| fit.coefficients[j]).collect(),
+            intercept: fit.intercept,
+            variance: None,
+        })
+    }
+}
+
+impl Trainer for SparseTrainer {
+    fn row(&mut self, regressors: &[f64], truth: f64) {
+        self.blocks.push(regressors, truth);
+    }
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        let mut report = TrainingReport::default();
+        let predictor = self.solve(&mut report).map_err(told)?;
+        Ok(Trained {
+            predictor: Box::new(predictor),
+            report,
+        })
+    }
+}

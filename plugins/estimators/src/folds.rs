@@ -1,0 +1,122 @@
+//! Decides how a user says in which folds rows are cut for cross-validation.
+
+use std::fmt;
+
+use athermal_core::node::Mistake;
+use schemars::JsonSchema;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// How rows, in the order of time, are cut for cross-validation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Folds {
+    /// Into so many contiguous parts, 2 or more, each of which is tested on once.
+    Contiguous(#[schemars(range(min = 2))] usize),
+    /// In a way of its own.
+    Cut(Cut),
+}
+
+/// A way to cut rows for cross-validation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Cut {
+    /// Each of so many contiguous parts is tested on once; the rest trains, apart from what is too near to be independent
+    /// (López de Prado 2018, section 7.4).
+    Blocked {
+        /// How many parts, 2 or more.
+        #[schemars(range(min = 2))]
+        count: usize,
+        /// Rows left out on either side of the tested part: windows that reach across the edge share measurements.
+        #[serde(default)]
+        gap_rows: u64,
+        /// Rows left out after the tested part and its gap: what follows remembers it.
+        #[serde(default)]
+        embargo_rows: u64,
+    },
+    /// Each of the last parts is tested on by what came before it, as it would have been at the time.
+    Expanding {
+        /// How many tests, 2 or more; the rows are cut into one part more.
+        #[schemars(range(min = 2))]
+        count: usize,
+        /// Rows left out between what trains and what is tested.
+        #[serde(default)]
+        gap_rows: u64,
+    },
+}
+
+// Not derived, since an untagged enum forgets what was wrong with either form.
+impl<'de> Deserialize<'de> for Folds {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = Folds;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a whole number or a table with `type` and `count`")
+            }
+
+            fn visit_u64<E: serde::de::Error>(self, count: u64) -> Result<Folds, E> {
+                Ok(Folds::Contiguous(
+                    usize::try_from(count).unwrap_or(usize::MAX),
+                ))
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, count: i64) -> Result<Folds, E> {
+                u64::try_from(count)
+                    .map_err(|_| E::invalid_value(serde::de::Unexpected::Signed(count), &self))
+                    .and_then(|count| self.visit_u64(count))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, cut: A) -> Result<Folds, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(cut)).map(Folds::Cut)
+            }
+        }
+        deserializer.deserialize_any(Form)
+    }
+}
+
+impl Folds {
+    /// Three contiguous parts.
+    pub(crate) fn three() -> Self {
+        Self::Contiguous(3)
+    }
+
+    /// A count out of its range; `place` is the key that holds the folds.
+    pub(crate) fn mistakes(&self, place: &str) -> Vec<Mistake> {
+        let (count, key) = match *self {
+            Self::Contiguous(count) => (count, place.to_owned()),
+            Self::Cut(Cut::Blocked { count, .. } | Cut::Expanding { count, .. }) => {
+                (count, format!("{place}.count"))
+            }
+        };
+        let name = key.rsplit('.').next().unwrap_or(place).to_owned();
+        if (2..=1000).contains(&count) {
+            Vec::new()
+        } else {
+            let message = format!("`{name}` is {count} and must be from 2 to 1000");
+            vec![Mistake::at(key, message)]
+        }
+    }
+
+    /// As the numerics have it.
+    pub(crate) fn cut(&self) -> athermal_numerics::Folds {
+        match *self {
+            Self::Contiguous(count) => athermal_numerics::Folds::contiguous(count),
+            Self::Cut(Cut::Blocked {
+                count,
+                gap_rows,
+                embargo_rows,
+            }) => athermal_numerics::Folds::Blocked {
+                folds: count,
+                gap: gap_rows,
+                embargo: embargo_rows,
+            },
+            Self::Cut(Cut::Expanding { count, gap_rows }) => athermal_numerics::Folds::Expanding {
+                folds: count,
+                gap: gap_rows,
+            },
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Decides what a structural model learns from its rows; not how it is followed afterwards.
+
+use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
+use athermal_core::quantity::Quantity;
+use athermal_core::time::{Duration, Instant};
+use athermal_core::unit::Unit;
+use athermal_numerics::{
+    Followed, NumericsError, Passage, Series, Standardizer, Structural, follow, most_likely,
+};
+
+use super::{Kalman, KalmanPredictor, Noises, Scaling};
+
+/// The most rows that the search for variances goes through, again and again.
+const MOST_ROWS: usize = 20_000;
+
+/// Takes rows that lie far enough apart, and fewer of them the more there are.
+#[derive(Debug)]
+pub(super) struct KalmanTrainer {
+    parameters: Kalman,
+    names: Vec<String>,
+    unit: String,
+    every: Duration,
+    most: usize,
+    /// Of the rows that are far enough apart, one in so many is kept.
+    stride: usize,
+    far_enough: usize,
+    last: Option<Instant>,
+    segment_pending: bool,
+    kept: Vec<Kept>,
+    regressors: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    at: Instant,
+    truth: f64,
+    /// Whether a segment begins with it, or one has between the row before and it.
+    begins: bool,
+}
+
+impl KalmanTrainer {
+    pub(super) fn new(setup: &TrainingSetup, parameters: Kalman) -> Self {
+        let names: Vec<_> = setup
+            .regressors
+            .iter()
+            .map(|regressor| regressor.name.clone())
+            .collect();
+        let bytes = size_of::<Kept>() + names.len() * size_of::<f64>();
+        Self {
+            every: parameters.every.unwrap_or(setup.span),
+            parameters,
+            unit: setup.truth_unit.clone(),
+            most: (setup.memory / bytes).clamp(16, MOST_ROWS),
+            names,
+            stride: 1,
+            far_enough: 0,
+            last: None,
+            segment_pending: true,
+            kept: Vec::new(),
+            regressors: Vec::new(),
+        }
+    }
+
+    /// Lets every second row go.
+    fn thin(&mut self) {
+        let width = self.names.len();
+        let mut begins = false;
+        let mut kept = Vec::with_capacity(self.most);
+        let mut regressors = Vec::with_capacity(self.most * width);
+        for (nth, row) in self.kept.iter().enumerate() {
+            begins |= row.begins;
+            if nth % 2 == 0 {
+                kept.push(Kept { begins, ..*row });
+                regressors.extend_from_slice(&self.regressors[nth * width..(nth + 1) * width]);
+                begins = false;
+            }
+        }
+        (self.kept, self.regressors) = (kept, regressors);
+        self.segment_pending |= begins;
+        self.stride *= 2;
+    }
+
+    fn solve(&self, report: &mut TrainingReport) -> Result<KalmanPredictor, TrainingError> {
+        let width = self.names.len();
+        let mut standard = Standardizer::new(width);
+        for nth in 0..self.kept.len() {
+            standard.partial_fit(&self.regressors[nth * width..(nth + 1) * width]);
+        }
+        let standard = standard.standardization();
+        let mut scaled = self.regressors.clone();
+        if width > 0 {
+            for row in scaled.chunks_exact_mut(width) {
+                standard.apply(row);
+            }
+        }
+        let before = std::iter::once(None).chain(self.kept.iter().map(|row| Some(row.at)));
+        let times: Vec<f64> = self
+            .kept
+            .iter()
+            .zip(before)
+            .map(|(row, before)| match before {
+                Some(before) if !row.begins => (row.at - before).secs(),
+                _ => f64::NAN,
+            })
+            .collect();
+        let truths: Vec<f64> = self.kept.iter().map(|row| row.truth).collect();
+        let series = Series {
+            times: &times,
+            observations: &truths,
+            regressors: &scaled,
+            prior: 1.0 / self.parameters.penalty,
+        };
+        let followed = match &self.parameters.noises {
+            Some(noises) => follow(noises.model(&self.unit)?, &series),
+            None => most_likely(self.parameters.trend, Passage::Continuous, &series),
+        };
+        let followed = followed.map_err(|error| match error {
+            NumericsError::TooFewRows { needed, found } => TrainingError::TooFewRows {
+                rows: usize::try_from(found).unwrap_or(usize::MAX),
+                needed: usize::try_from(needed).unwrap_or(usize::MAX),
+            },
+            NumericsError::NoConvergence => unsolvable(
+                "the truths are predicted without any error, so there are no noises to find",
+            ),
+            error => unsolvable(&error.to_string()),
+        })?;
+        if followed.filter.is_diffuse() {
+            return Err(unsolvable(
+                "the rows do not determine all coefficients; with a `penalty` above 0 they need not",
+            ));
+        }
+        self.tell(&followed, report);
+        let mut filter = followed.filter;
+        filter.restart_level(&followed.at_large);
+        Ok(KalmanPredictor {
+            regressors: self.names.clone(),
+            scaling: Scaling {
+                means: standard.means,
+                scales: standard.scales,
+            },
+            filter,
+            at_large: followed.at_large,
+            every: self.every,
+        })
+    }
+
+    fn tell(&self, followed: &Followed, report: &mut TrainingReport) {
+        report.in_sample_rmse = Some(followed.innovation_rms);
+        if self.parameters.noises.is_none() {
+            let unit = self.unit.parse::<Unit>().map(|unit| unit.difference());
+            let unit = unit.map_or_else(|_| self.unit.clone(), |unit| unit.to_string());
+            let told = Told(followed.model, &unit);
+            report.notes.push(format!("most likely are {told}"));
+        }
+        if self.stride > 1 {
+            report.notes.push(format!(
+                "one row in {} was followed, {} in all",
+                self.stride,
+                self.kept.len()
+            ));
+        }
+    }
+}
+
+impl Trainer for KalmanTrainer {
+    fn row(&mut self, regressors: &[f64], truth: f64) {
+        // Without an instant, rows lie as far apart as they must.
+        let at = self
+            .last
+            .map_or(Instant::from_ns(0), |last| last + self.every);
+        self.row_at(at, regressors, truth);
+    }
+
+    fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
+        if self.last.is_some_and(|last| at < last + self.every) {
+            return;
+        }
+        self.last = Some(at);
+        self.far_enough += 1;
+        if !(self.far_enough - 1).is_multiple_of(self.stride) {
+            return;
+        }
+        if self.kept.len() == self.most {
+            self.thin();
+        }
+        let begins = std::mem::take(&mut self.segment_pending);
+        self.kept.push(Kept { at, truth, begins });
+        self.regressors.extend_from_slice(regressors);
+    }
+
+    fn segment(&mut self) {
+        self.segment_pending = true;
+        self.last = None;
+    }
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        let mut report = TrainingReport::default();
+        let predictor = self.solve(&mut report)?;
+        Ok(Trained {
+            predictor: Box::new(predictor),
+            report,
+        })
+    }
+}
+
+fn unsolvable(reason: &str) -> TrainingError {
+    TrainingError::Unsolvable {
+        reason: reason.to_owned(),
+    }
+}
+
+impl Noises {
+    /// The model that has these noises, its unit of time the second.
+    fn model(&self, unit: &str) -> Result<Structural, TrainingError> {
+        let of_truth: Unit = unit
+            .parse()
+            .map_err(|_| unsolvable("the unit of the truth is not known"))?;
+        let in_unit = |name: &str, given: &Quantity| {
+            given.in_unit(&of_truth.difference()).ok_or_else(|| {
+                let found = &given.unit;
+                unsolvable(&format!(
+                    "`noises.{name}` is in {found}, and the truth in {unit}"
+                ))
+            })
+        };
+        let per = self.per.secs();
+        let level = in_unit("level", &self.level)?;
+        let trend = self.trend.as_ref();
+        let trend = trend.map(|trend| in_unit("trend", trend)).transpose()?;
+        Ok(Structural {
+            observation: in_unit("observation", &self.observation)?.powi(2),
+            level: level * level / per,
+            trend: trend.map(|trend| (trend / per).powi(2) / per),
+            passage: Passage::Continuous,
+        })
+    }
+}
+
+/// Noises as a graph file would give them, over an hour.
+struct Told<'a>(Structural, &'a str);
+
+impl std::fmt::Display for Told<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(model, unit) = self;
+        let per: f64 = 3600.0;
+        let observation = significant(model.observation.sqrt());
+        let level = significant((model.level * per).sqrt());
+        write!(f, "noises = {{ observation = \"{observation} {unit}\", ")?;
+        write!(f, "level = \"{level} {unit}\", ")?;
+        if let Some(trend) = model.trend {
+            let trend = significant((trend * per).sqrt() * per);
+            write!(f, "trend = \"{trend} {unit}\", ")?;
+        }
+        write!(f, "per = \"1h\" }}")
+    }
+}
+
+/// A number to four significant digits.
+fn significant(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

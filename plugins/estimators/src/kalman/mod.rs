@@ -1,0 +1,316 @@
+//! The estimator that follows a level and a trend while truths come in.
+
+use athermal_core::model::numbers;
+use athermal_core::node::{
+    Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored, State,
+    Trainer, TrainingSetup,
+};
+use athermal_core::quantity::Quantity;
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::Kalman as Filter;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+mod fit;
+
+use fit::KalmanTrainer;
+
+/// Kalman filter of a structural model: a level that wanders, maybe with a trend, and linear regression on features.
+///
+/// `y = μ + Σ b_j x_j + ε`; the level `μ` is a random walk (local level) or has a slope that is one (local linear trend), in
+/// continuous time, so that truths may come at any instants and be missing (Harvey 1989, sections 2.3 and 9.2; Durbin and
+/// Koopman 2012, chapters 2 to 4). The fit finds the coefficients, which stay, and unless `noises` gives them the variances
+/// that make its rows most likely. Running, the filter takes each truth that the embargo lets through and predicts
+/// `ahead` of now from the newest one; with `learn = false` it stays where the fit ended, which is regression on the
+/// features. Without features it is a forecast from the past of the truth alone, which expects the level to stay: what
+/// returns to zero by itself, as drift does, is better forecast by `ar`.
+///
+/// Truths whose windows overlap share their noise, which the model would take for a level that moves; so only one truth per
+/// `every` is taken. In a new segment level and trend start from what the fit knew of them at large. The port `deviation` is
+/// the standard deviation of the truth about its prediction; it grows while no truth comes. The answer changes with time
+/// alone, so the node runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Kalman {
+    /// Whether the level has a trend that wanders too; it follows a ramp without lag, and is less sure of the level.
+    #[serde(default)]
+    pub trend: bool,
+    /// How large the noises are; without it they are found by maximum likelihood.
+    #[serde(default)]
+    pub noises: Option<Noises>,
+    /// The penalty on the coefficients of standardised features, at least 0, as in ridge: their prior variance is the sum
+    /// of the model's variances over a typical step divided by it.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.0))]
+    pub penalty: f64,
+    /// The shortest time between truths that are taken; without it the span of the truth.
+    #[serde(default)]
+    pub every: Option<Duration>,
+}
+
+/// How large the noises of a structural model are, as standard deviations in units that measure the same as the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Noises {
+    /// Of one truth, such as "3.85 nm/min"; above 0.
+    pub observation: Quantity,
+    /// What the level wanders in the time `per`, 0 or more.
+    pub level: Quantity,
+    /// By what the change of the level within `per` wanders in the time `per`, 0 or more; for a level with a trend.
+    #[serde(default)]
+    pub trend: Option<Quantity>,
+    /// The time in which they do, such as "1h".
+    pub per: Duration,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Estimator for Kalman {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held(
+                    "features",
+                    "what the prediction is made of beside the level",
+                )
+                .or_none(),
+                InputPort::truth("what is predicted, and what the level follows"),
+                InputPort::freeze(),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            every_tick: true,
+            ..Regressors::default()
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if !(self.penalty >= 0.0 && self.penalty.is_finite()) {
+            let message = format!("`penalty` is {} and must be 0 or more", self.penalty);
+            mistakes.push(Mistake::at("penalty", message));
+        }
+        if let Some(every) = self.every
+            && every.is_negative()
+        {
+            let message = format!("`every` is {every} and must be 0s or longer");
+            mistakes.push(Mistake::at("every", message));
+        }
+        if let Some(noises) = &self.noises {
+            noises.find_mistakes(self.trend, &mut mistakes);
+        }
+        mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        Learns::UnlessTold
+    }
+
+    fn deviates(&self) -> bool {
+        true
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(KalmanTrainer::new(setup, self.clone()))
+    }
+}
+
+impl Noises {
+    fn find_mistakes(&self, trend: bool, mistakes: &mut Vec<Mistake>) {
+        let mut check = |name: &str, given: &Quantity, fits: bool, allowed: &str| {
+            if !fits {
+                let message = format!("`{name}` is \"{given}\" and must be {allowed}");
+                mistakes.push(Mistake::at(format!("noises.{name}"), message));
+            }
+        };
+        let observation = &self.observation;
+        check(
+            "observation",
+            observation,
+            observation.value > 0.0,
+            "above 0",
+        );
+        check("level", &self.level, self.level.value >= 0.0, "0 or more");
+        if let Some(given) = &self.trend {
+            check("trend", given, given.value >= 0.0, "0 or more");
+        }
+        if self.per <= Duration::ZERO {
+            let message = format!("`per` is {} and must be longer than nothing", self.per);
+            mistakes.push(Mistake::at("noises.per", message));
+        }
+        match (&self.trend, trend) {
+            (None, true) => mistakes.push(
+                Mistake::at(
+                    "noises",
+                    "the level has a trend, and `noises` lacks `trend`",
+                )
+                .help("0 of the unit of the level is a trend that stays as it is"),
+            ),
+            (Some(_), false) => mistakes.push(
+                Mistake::at("noises.trend", "the level has no trend that could wander")
+                    .help("say `trend = true` beside `noises`"),
+            ),
+            _ => {}
+        }
+    }
+}
+
+/// How regressors are brought to a common scale.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Scaling {
+    #[serde(with = "numbers")]
+    means: Vec<f64>,
+    #[serde(with = "numbers")]
+    scales: Vec<f64>,
+}
+
+impl Scaling {
+    fn of<'a>(&'a self, regressors: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
+        |nth| (regressors[nth] - self.means[nth]) / self.scales[nth]
+    }
+}
+
+/// A fitted structural model: where its filter starts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KalmanPredictor {
+    regressors: Vec<String>,
+    scaling: Scaling,
+    /// The coefficients of scaled regressors as the fit left them, and level and trend as they are at large. Its unit of
+    /// time is the second.
+    filter: Filter,
+    /// Mean and variance of level and trend at large.
+    at_large: Vec<(f64, f64)>,
+    every: Duration,
+}
+
+#[typetag::serde(name = "kalman")]
+impl Predictor for KalmanPredictor {
+    fn uses(&self) -> &[String] {
+        &self.regressors
+    }
+
+    fn predict(&self, regressors: &[f64]) -> f64 {
+        self.filter.expected(0.0, self.scaling.of(regressors))
+    }
+
+    fn deviation(&self, regressors: &[f64]) -> f64 {
+        deviation(&self.filter, 0.0, self.scaling.of(regressors))
+    }
+
+    fn learner(&self) -> Option<Box<dyn Learner>> {
+        Some(Box::new(Following {
+            known: Known {
+                filter: self.filter.clone(),
+                scaling: self.scaling.clone(),
+                last: None,
+            },
+            at_large: self.at_large.clone(),
+            every: self.every,
+            row: vec![0.0; self.regressors.len()],
+        }))
+    }
+}
+
+fn deviation(filter: &Filter, time: f64, regressors: impl Fn(usize) -> f64) -> f64 {
+    let forecast = filter.forecast_of(time, regressors);
+    forecast.map_or(f64::NAN, |forecast| {
+        (forecast.variance + filter.model().observation).sqrt()
+    })
+}
+
+/// Follows the level as truths come in.
+#[derive(Debug)]
+struct Following {
+    known: Known,
+    at_large: Vec<(f64, f64)>,
+    every: Duration,
+    row: Vec<f64>,
+}
+
+/// What is known of level, trend and coefficients.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Known {
+    /// As of the last truth taken.
+    filter: Filter,
+    scaling: Scaling,
+    /// When that was.
+    last: Option<Instant>,
+}
+
+impl Known {
+    /// The time in seconds from the last truth taken.
+    fn since(&self, of: Instant) -> f64 {
+        self.last.map_or(0.0, |last| (of - last).secs().max(0.0))
+    }
+}
+
+impl Learner for Following {
+    fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
+        let Known {
+            filter, scaling, ..
+        } = &self.known;
+        filter.expected(self.known.since(of), scaling.of(regressors))
+    }
+
+    fn deviation(&self, regressors: &[f64], of: Instant) -> f64 {
+        let Known {
+            filter, scaling, ..
+        } = &self.known;
+        deviation(filter, self.known.since(of), scaling.of(regressors))
+    }
+
+    fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
+        if self.known.last.is_some_and(|last| at < last + self.every) {
+            return;
+        }
+        let since = self.known.since(at);
+        let Known {
+            filter,
+            scaling,
+            last,
+        } = &mut self.known;
+        let scaled = scaling.of(regressors);
+        for (nth, value) in self.row.iter_mut().enumerate() {
+            *value = scaled(nth);
+        }
+        filter.advance(since);
+        filter.observe(&self.row, truth);
+        *last = Some(at);
+    }
+
+    fn segment(&mut self, _shift: Duration) {
+        // How long the machine was not watched is unknown, and so is where the level has gone meanwhile.
+        self.known.filter.restart_level(&self.at_large);
+        self.known.last = None;
+    }
+
+    fn snapshot(&self) -> Box<dyn State> {
+        Box::new(self.known.clone())
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        let known = match state.known::<Known>() {
+            Ok(known) => known,
+            Err(cold) => return cold,
+        };
+        if known.scaling != self.known.scaling {
+            return Restored::cold("its coefficients are for features on another scale");
+        }
+        if !self.known.filter.resume(&known.filter) {
+            return Restored::cold("it has other states: a trend more or less, or other features");
+        }
+        self.known.last = known.last;
+        Restored::Accepted
+    }
+}
+
+athermal_core::state!(Known, "kalman/1");
+athermal_core::register!(Kalman, Estimator, "kalman");

@@ -1,0 +1,263 @@
+//! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
+
+use athermal_core::model::{number, numbers};
+use athermal_core::node::{Learner, Predictor, Restored, State, TrainedRange};
+use athermal_core::time::Instant;
+use athermal_numerics::{Rls, Sgd, Standardization};
+use serde::{Deserialize, Serialize};
+
+/// Regressors as the recursion sees them: standardised as in the fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Frame {
+    pub(crate) regressors: Vec<String>,
+    #[serde(with = "numbers")]
+    means: Vec<f64>,
+    #[serde(with = "numbers")]
+    scales: Vec<f64>,
+    /// What is subtracted from the truth.
+    #[serde(with = "number")]
+    level: f64,
+}
+
+/// What goes on, row by row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Recursion {
+    /// Stochastic gradients, with an intercept of their own.
+    Sgd(Sgd),
+    /// Recursive least squares, the intercept being the last coefficient.
+    Rls {
+        /// The recursion.
+        rls: Rls,
+        /// The standard deviation of the noise, in the unit of the truth.
+        #[serde(with = "number")]
+        noise: f64,
+    },
+}
+
+impl Frame {
+    pub(crate) fn new(
+        regressors: Vec<String>,
+        columns: &[usize],
+        standard: &Standardization,
+        level: f64,
+    ) -> Self {
+        let of = |all: &[f64]| columns.iter().map(|&column| all[column]).collect();
+        Self {
+            regressors,
+            means: of(&standard.means),
+            scales: of(&standard.scales),
+            level,
+        }
+    }
+
+    /// Puts the standardised values at the beginning of a row.
+    fn standardise(&self, regressors: &[f64], row: &mut [f64]) {
+        let ends = self.means.iter().zip(&self.scales);
+        for ((place, x), (mean, scale)) in row.iter_mut().zip(regressors).zip(ends) {
+            *place = (x - mean) / scale;
+        }
+    }
+
+    /// Coefficients on the scale of the data as those of standardised regressors, the intercept last.
+    pub(crate) fn scaled(&self, coefficients: &[f64], intercept: f64) -> Vec<f64> {
+        let ends = self.means.iter().zip(&self.scales);
+        let products = coefficients.iter().zip(&self.means);
+        let shift: f64 = products.map(|(b, mean)| b * mean).sum();
+        let scaled = coefficients
+            .iter()
+            .zip(ends)
+            .map(|(b, (_, scale))| b * scale);
+        scaled.chain([intercept + shift - self.level]).collect()
+    }
+
+    /// The coefficients on the scale of the data, and the intercept.
+    fn unscaled(&self, recursion: &Recursion, coefficients: &mut [f64]) -> f64 {
+        let (weights, mut intercept) = recursion.weights();
+        let ends = self.means.iter().zip(&self.scales);
+        for ((place, weight), (mean, scale)) in coefficients.iter_mut().zip(weights).zip(ends) {
+            *place = weight / scale;
+            intercept -= *place * mean;
+        }
+        intercept + self.level
+    }
+
+    /// `s √(1 + zᵀPz)`: the noise, and what is not known of the coefficients; NaN where the recursion knows neither.
+    fn deviation(&self, recursion: &Recursion, regressors: &[f64]) -> f64 {
+        let Recursion::Rls { rls, noise } = recursion else {
+            return f64::NAN;
+        };
+        let spread = rls.spread(|i| match regressors.get(i) {
+            Some(x) => (x - self.means[i]) / self.scales[i],
+            None => 1.0,
+        });
+        noise * (1.0 + spread).sqrt()
+    }
+}
+
+impl Recursion {
+    /// The weights of the standardised regressors, and the intercept.
+    fn weights(&self) -> (&[f64], f64) {
+        match self {
+            Self::Sgd(sgd) => (sgd.weights(), sgd.intercept()),
+            Self::Rls { rls, .. } => {
+                let (intercept, weights) = rls
+                    .coefficients()
+                    .split_last()
+                    .expect("the intercept is always a coefficient");
+                (weights, *intercept)
+            }
+        }
+    }
+}
+
+/// A fitted linear model that can go on learning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OnlinePredictor {
+    /// The model as it was fitted, on the scale of the data.
+    #[serde(with = "numbers")]
+    coefficients: Vec<f64>,
+    #[serde(with = "number")]
+    intercept: f64,
+    frame: Frame,
+    recursion: Recursion,
+    /// The range of the regressors in the fit.
+    range: TrainedRange,
+}
+
+impl OnlinePredictor {
+    pub(crate) fn new(frame: Frame, recursion: Recursion, range: TrainedRange) -> Self {
+        let mut coefficients = vec![0.0; frame.regressors.len()];
+        let intercept = frame.unscaled(&recursion, &mut coefficients);
+        Self {
+            coefficients,
+            intercept,
+            frame,
+            recursion,
+            range,
+        }
+    }
+}
+
+#[typetag::serde(name = "online_linear")]
+impl Predictor for OnlinePredictor {
+    fn uses(&self) -> &[String] {
+        &self.frame.regressors
+    }
+
+    fn predict(&self, regressors: &[f64]) -> f64 {
+        value(&self.coefficients, self.intercept, regressors)
+    }
+
+    fn deviation(&self, regressors: &[f64]) -> f64 {
+        self.frame.deviation(&self.recursion, regressors)
+    }
+
+    fn learner(&self) -> Option<Box<dyn Learner>> {
+        Some(Box::new(OnlineLearner::new(OnlineState {
+            frame: self.frame.clone(),
+            recursion: self.recursion.clone(),
+        })))
+    }
+
+    fn trained_range(&self) -> Option<&TrainedRange> {
+        Some(&self.range)
+    }
+}
+
+/// What has been learned: enough to go on, whatever the fit that it is carried to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct OnlineState {
+    frame: Frame,
+    recursion: Recursion,
+}
+
+athermal_core::state!(OnlineState, "online_linear/1");
+
+/// A linear model that goes on learning.
+#[derive(Debug)]
+struct OnlineLearner {
+    state: OnlineState,
+    /// The model of now, on the scale of the data.
+    coefficients: Vec<f64>,
+    intercept: f64,
+    row: Vec<f64>,
+}
+
+impl OnlineLearner {
+    fn new(state: OnlineState) -> Self {
+        let width = state.frame.regressors.len();
+        let mut learner = Self {
+            coefficients: vec![0.0; width],
+            intercept: 0.0,
+            row: vec![1.0; width + 1],
+            state,
+        };
+        learner.refresh();
+        learner
+    }
+
+    fn refresh(&mut self) {
+        let OnlineState { frame, recursion } = &self.state;
+        self.intercept = frame.unscaled(recursion, &mut self.coefficients);
+    }
+}
+
+impl Learner for OnlineLearner {
+    fn predict(&self, regressors: &[f64], _of: Instant) -> f64 {
+        value(&self.coefficients, self.intercept, regressors)
+    }
+
+    fn deviation(&self, regressors: &[f64], _of: Instant) -> f64 {
+        let OnlineState { frame, recursion } = &self.state;
+        frame.deviation(recursion, regressors)
+    }
+
+    fn learn(&mut self, regressors: &[f64], truth: f64, _at: Instant) {
+        let OnlineState { frame, recursion } = &mut self.state;
+        frame.standardise(regressors, &mut self.row);
+        let truth = truth - frame.level;
+        match recursion {
+            Recursion::Sgd(sgd) => {
+                sgd.step(&self.row[..regressors.len()], truth);
+            }
+            Recursion::Rls { rls, .. } => {
+                rls.step(&self.row, truth);
+            }
+        }
+        self.refresh();
+    }
+
+    fn snapshot(&self) -> Box<dyn State> {
+        Box::new(self.state.clone())
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        let mut known = match state.known::<OnlineState>() {
+            Ok(known) => known,
+            Err(cold) => return cold,
+        };
+        if known.frame.regressors != self.state.frame.regressors {
+            return Restored::cold("another fit chose other regressors");
+        }
+        // What was learned goes on; how it goes on is said by the parameters of now.
+        known.recursion = match (known.recursion, &self.state.recursion) {
+            (Recursion::Sgd(known), Recursion::Sgd(own)) => {
+                Recursion::Sgd(known.with(own.options()))
+            }
+            (Recursion::Rls { rls, .. }, Recursion::Rls { rls: own, noise }) => Recursion::Rls {
+                rls: rls.with(own.options()),
+                noise: *noise,
+            },
+            _ => return Restored::cold("it learned by another recursion"),
+        };
+        *self = Self::new(known);
+        Restored::Accepted
+    }
+}
+
+/// `b₀ + Σ b_j x_j`.
+fn value(coefficients: &[f64], intercept: f64, regressors: &[f64]) -> f64 {
+    let terms = coefficients.iter().zip(regressors);
+    terms.fold(intercept, |sum, (b, x)| sum + b * x)
+}

@@ -1,0 +1,221 @@
+//! Decides how a user states the penalty of ridge, and how the best of several is found.
+
+use std::fmt;
+
+use athermal_core::node::Mistake;
+use athermal_numerics::{
+    GramBlocks, NumericsError, cross_validated_penalties, generalised_cross_validation,
+    logarithmic_grid,
+};
+use schemars::JsonSchema;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::folds::Folds;
+
+/// The penalty of ridge.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Penalty {
+    /// This one, at least 0.
+    Fixed(#[schemars(range(min = 0.0))] f64),
+    /// The best of a range.
+    Chosen(Choice),
+}
+
+/// How the best penalty of a logarithmic range is told.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Choice {
+    /// By the mean R² over folds.
+    CrossValidation {
+        /// How the rows are cut: a number of contiguous folds, or a table.
+        #[serde(default = "Folds::three")]
+        folds: Folds,
+        /// The smallest penalty tried, above 0.
+        #[serde(default = "smallest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        smallest: f64,
+        /// The largest penalty tried, above the smallest.
+        #[serde(default = "largest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        largest: f64,
+        /// How many are tried to each factor of ten, 1 or more.
+        #[serde(default = "four")]
+        #[schemars(range(min = 1, max = 1000))]
+        per_decade: u32,
+    },
+    /// By the error of leaving out each row in turn, told from all rows at once (Golub, Heath and Wahba 1979). It takes
+    /// rows for independent, which those of a drift are not: it tends to penalties that are too small.
+    GeneralisedCrossValidation {
+        /// The smallest penalty tried, above 0.
+        #[serde(default = "smallest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        smallest: f64,
+        /// The largest penalty tried, above the smallest.
+        #[serde(default = "largest")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        largest: f64,
+        /// How many are tried to each factor of ten, 1 or more.
+        #[serde(default = "four")]
+        #[schemars(range(min = 1, max = 1000))]
+        per_decade: u32,
+    },
+}
+
+fn smallest() -> f64 {
+    1e-3
+}
+
+fn largest() -> f64 {
+    1e6
+}
+
+fn four() -> u32 {
+    4
+}
+
+// Not derived, since an untagged enum forgets what was wrong with either form.
+impl<'de> Deserialize<'de> for Penalty {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = Penalty;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or a table with `by`")
+            }
+
+            fn visit_f64<E>(self, alpha: f64) -> Result<Penalty, E> {
+                Ok(Penalty::Fixed(alpha))
+            }
+
+            fn visit_u64<E>(self, alpha: u64) -> Result<Penalty, E> {
+                Ok(Penalty::Fixed(alpha as f64))
+            }
+
+            fn visit_i64<E>(self, alpha: i64) -> Result<Penalty, E> {
+                Ok(Penalty::Fixed(alpha as f64))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, choice: A) -> Result<Penalty, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(choice)).map(Penalty::Chosen)
+            }
+        }
+        deserializer.deserialize_any(Form)
+    }
+}
+
+/// A penalty, and what there is to tell about it.
+pub(crate) struct Settled {
+    pub(crate) alpha: f64,
+    pub(crate) note: Option<String>,
+}
+
+impl Penalty {
+    /// Parameters out of their range; `place` is the key that holds the penalty.
+    pub(crate) fn mistakes(&self, place: &str) -> Vec<Mistake> {
+        let choice = match *self {
+            Self::Fixed(alpha) if alpha >= 0.0 && alpha.is_finite() => return Vec::new(),
+            Self::Fixed(alpha) => {
+                let message = format!("`alpha` is {alpha} and must be 0 or more");
+                return vec![Mistake::at(place, message)];
+            }
+            Self::Chosen(choice) => choice,
+        };
+        let mut mistakes = Vec::new();
+        if let Choice::CrossValidation { folds, .. } = choice {
+            mistakes.extend(folds.mistakes(&format!("{place}.folds")));
+        }
+        let (smallest, largest, per_decade) = choice.range();
+        let mut check = |key: &str, value: f64, fits: bool, allowed: &str| {
+            if !fits {
+                let message = format!("`{key}` is {value} and must be {allowed}");
+                mistakes.push(Mistake::at(format!("{place}.{key}"), message));
+            }
+        };
+        let fits = smallest > 0.0 && smallest.is_finite();
+        check("smallest", smallest, fits, "above 0");
+        let fits = largest > smallest && largest.is_finite();
+        check("largest", largest, fits, "above `smallest`");
+        let fits = (1..=1000).contains(&per_decade);
+        check("per_decade", f64::from(per_decade), fits, "from 1 to 1000");
+        mistakes
+    }
+
+    /// The penalty for these columns of the rows.
+    pub(crate) fn settle(
+        &self,
+        blocks: &GramBlocks,
+        columns: &[usize],
+        scales: &[f64],
+    ) -> Result<Settled, NumericsError> {
+        let choice = match *self {
+            Self::Fixed(alpha) => return Ok(Settled { alpha, note: None }),
+            Self::Chosen(choice) => choice,
+        };
+        let (smallest, largest, per_decade) = choice.range();
+        let alphas = logarithmic_grid(smallest, largest, per_decade);
+        let (scores, how) = match choice {
+            Choice::CrossValidation { folds, .. } => {
+                let splits = blocks.splits(&folds.cut())?;
+                let folds = cross_validated_penalties(&splits, columns, scales, &alphas)?;
+                let mean = |scores: &Vec<f64>| scores.iter().sum::<f64>() / scores.len() as f64;
+                (
+                    folds.iter().map(mean).collect::<Vec<_>>(),
+                    "cross-validation",
+                )
+            }
+            Choice::GeneralisedCrossValidation { .. } => {
+                let scores =
+                    generalised_cross_validation(&blocks.total(), columns, scales, &alphas)?;
+                (
+                    scores.iter().map(|score| -score).collect(),
+                    "generalised cross-validation",
+                )
+            }
+        };
+        // Of several as good the largest.
+        let best = (0..alphas.len()).reduce(|a, b| if scores[b] >= scores[a] { b } else { a });
+        let best = best.unwrap_or(0);
+        let alpha = alphas[best];
+        let told = match choice {
+            Choice::CrossValidation { .. } => format!(", R² {:.4}", scores[best]),
+            Choice::GeneralisedCrossValidation { .. } => String::new(),
+        };
+        let edge = match best {
+            0 => "; it is the smallest tried, a smaller one may be better",
+            _ if best == alphas.len() - 1 => {
+                "; it is the largest tried, a larger one may be better"
+            }
+            _ => "",
+        };
+        let note = format!(
+            "penalty {alpha:.3e} chosen by {how} from {} between {smallest:e} and {largest:e}{told}{edge}",
+            alphas.len()
+        );
+        Ok(Settled {
+            alpha,
+            note: Some(note),
+        })
+    }
+}
+
+impl Choice {
+    fn range(&self) -> (f64, f64, u32) {
+        match *self {
+            Self::CrossValidation {
+                smallest,
+                largest,
+                per_decade,
+                ..
+            }
+            | Self::GeneralisedCrossValidation {
+                smallest,
+                largest,
+                per_decade,
+            } => (smallest, largest, per_decade),
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! Decides how a user asks for a selection of regressors, and how it is run and told.
+
+use athermal_core::node::{CandidateScore, Mistake, Regressor, SelectionStep, TrainingReport};
+use athermal_numerics::{
+    Candidates, Change, Direction, GramBlocks, NumericsError, Search, SelectionScore, Stepwise,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::folds::Folds;
+
+/// How regressors are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "method", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Selection {
+    /// From nothing on, the regressor that raises the mean R² over the folds most is added, the first of several equal
+    /// ones, until the gain is below the tolerance.
+    Forward(CrossValidated),
+    /// From all regressors on, the one that is missed least is taken out, until that loses more than the tolerance.
+    Backward(CrossValidated),
+    /// Forward, and after each step back for as long as that gives a better set than any of that size before (Pudil,
+    /// Novovičová and Kittler 1994).
+    Floating(CrossValidated),
+    /// By F-tests on all rows: the most significant regressor enters, those that have lost their significance leave
+    /// (Efroymson 1960; for thermal errors Chen 1996). It takes rows for independent, which those of a drift are not: it
+    /// tends to take too many.
+    Stepwise {
+        /// The least F with which a regressor enters.
+        #[serde(default = "four")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        f_enter: f64,
+        /// A regressor whose F is below leaves; from 0 to `f_enter`.
+        #[serde(default = "below_four")]
+        #[schemars(range(min = 0.0))]
+        f_remove: f64,
+        /// The most regressors to choose; without it there is no limit.
+        #[serde(default)]
+        #[schemars(range(min = 1))]
+        most: Option<usize>,
+    },
+}
+
+/// How a cross-validated selection goes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline)]
+pub struct CrossValidated {
+    /// How the rows are cut: a number of contiguous folds, 2 or more, or a table such as
+    /// `{ type = "blocked", count = 5, gap_rows = 4, embargo_rows = 8 }` or `{ type = "expanding", count = 5 }`.
+    #[serde(default = "Folds::three")]
+    pub folds: Folds,
+    /// The smallest gain that is worth another regressor, or the largest loss at which one is taken out.
+    #[serde(default = "thousandth")]
+    pub tolerance: f64,
+    /// The most regressors or sensors to end with; without it there is no limit.
+    #[serde(default)]
+    #[schemars(range(min = 1))]
+    pub most: Option<usize>,
+    /// What comes and goes at a time: a `regressor`, or a `sensor` with all regressors that are made from it.
+    #[serde(default)]
+    pub by: By,
+    /// Go back to the smallest set on the way whose score is within one standard error of the best (Breiman et al. 1984).
+    #[serde(default)]
+    pub one_standard_error: bool,
+}
+
+/// What a selection takes or leaves at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum By {
+    /// One regressor.
+    #[default]
+    Regressor,
+    /// A measured channel, with all regressors that are made from it; one made from several needs them all.
+    Sensor,
+}
+
+fn thousandth() -> f64 {
+    1e-3
+}
+
+fn four() -> f64 {
+    4.0
+}
+
+fn below_four() -> f64 {
+    3.9
+}
+
+impl Selection {
+    /// By F-tests with the usual thresholds.
+    pub(crate) fn stepwise() -> Self {
+        Self::Stepwise {
+            f_enter: four(),
+            f_remove: below_four(),
+            most: None,
+        }
+    }
+
+    /// Parameters out of their range.
+    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        let most = match *self {
+            Self::Forward(how) | Self::Backward(how) | Self::Floating(how) => {
+                mistakes.extend(how.folds.mistakes("selection.folds"));
+                let tolerance = how.tolerance;
+                if !tolerance.is_finite() {
+                    mistakes.push(Mistake::at(
+                        "selection.tolerance",
+                        format!("`tolerance` is {tolerance} and must be a number"),
+                    ));
+                }
+                how.most
+            }
+            Self::Stepwise {
+                f_enter,
+                f_remove,
+                most,
+            } => {
+                if !(f_enter > 0.0 && f_enter.is_finite()) {
+                    mistakes.push(Mistake::at(
+                        "selection.f_enter",
+                        format!("`f_enter` is {f_enter} and must be above 0"),
+                    ));
+                } else if !(0.0..=f_enter).contains(&f_remove) {
+                    let message =
+                        format!("`f_remove` is {f_remove} and must be from 0 to `f_enter`");
+                    mistakes.push(
+                        Mistake::at("selection.f_remove", message)
+                            .help("or a regressor would come and go for ever"),
+                    );
+                }
+                most
+            }
+        };
+        if most == Some(0) {
+            mistakes.push(Mistake::at(
+                "selection.most",
+                "`most` is 0 and must be 1 or more",
+            ));
+        }
+        mistakes
+    }
+
+    /// The columns chosen with this penalty, in order; the steps go into the report.
+    pub(crate) fn run(
+        &self,
+        regressors: &[Regressor],
+        blocks: &GramBlocks,
+        scales: &[f64],
+        alpha: f64,
+        report: &mut TrainingReport,
+    ) -> Result<Vec<usize>, NumericsError> {
+        let (direction, how) = match *self {
+            Self::Forward(how) => (Direction::Forward, how),
+            Self::Backward(how) => (Direction::Backward, how),
+            Self::Floating(how) => (Direction::Floating, how),
+            Self::Stepwise {
+                f_enter,
+                f_remove,
+                most,
+            } => {
+                let how = Stepwise {
+                    enter: f_enter,
+                    remove: f_remove,
+                    most,
+                };
+                return stepwise(how, regressors, blocks, scales, report);
+            }
+        };
+        let search = Search {
+            direction,
+            alpha,
+            tolerance: Some(how.tolerance),
+            most: how.most,
+            score: SelectionScore::R2,
+        };
+        let (candidates, names) = how.by.candidates(regressors);
+        let splits = blocks.splits(&how.folds.cut())?;
+        let selected = search.over(&splits, scales, &candidates)?;
+        if !blocks.exact_folds() {
+            let rows = blocks.block_rows();
+            report.notes.push(format!(
+                "the rows did not fit in memory, so folds end at multiples of {rows} rows"
+            ));
+        }
+        let name = |candidate: usize| {
+            let units = candidates.units_of(candidate).iter();
+            let names: Vec<&str> = units.map(|&unit| names[unit].as_str()).collect();
+            names.join(" + ")
+        };
+        let of_step = |step: &athermal_numerics::SelectionStep| SelectionStep {
+            regressor: name(step.candidate),
+            removed: step.change == Change::Removed,
+            score: step.mean,
+            folds: step.folds.clone(),
+            candidates: tried(&step.candidates, &name),
+        };
+        report.selection = selected.steps.iter().map(of_step).collect();
+        report.refused = selected.refused.as_ref().map(of_step);
+        if let Some(start) = &selected.start {
+            report
+                .notes
+                .push(format!("all regressors together have R² {:.4}", start.mean));
+            if !start.left_out.is_empty() {
+                let names: Vec<&str> = start
+                    .left_out
+                    .iter()
+                    .map(|&column| regressors[column].name.as_str())
+                    .collect();
+                report.notes.push(format!(
+                    "combinations of the regressors before them, so left out from the start: {}",
+                    names.join(", ")
+                ));
+            }
+        }
+        if how.one_standard_error
+            && let Some(smallest) = selected.within_one_standard_error()
+        {
+            let after = match smallest.steps {
+                0 => "before the first step".to_owned(),
+                1 => "after the first step".to_owned(),
+                steps => format!("after {steps} of {} steps", selected.steps.len()),
+            };
+            report.notes.push(format!(
+                "the set {after} is the smallest within one standard error ({:.4}) of the best R² {:.4}",
+                smallest.standard_error, smallest.best
+            ));
+            return Ok(smallest.columns);
+        }
+        Ok(selected.columns)
+    }
+}
+
+impl By {
+    /// The candidates, and the names of their units.
+    fn candidates(self, regressors: &[Regressor]) -> (Candidates, Vec<String>) {
+        if self == Self::Regressor {
+            let names = regressors.iter().map(|regressor| regressor.name.clone());
+            return (Candidates::columns(regressors.len()), names.collect());
+        }
+        let mut sensors: Vec<String> = Vec::new();
+        let mut needs = Vec::new();
+        for regressor in regressors {
+            let of = regressor.sensors.iter().map(|sensor| {
+                sensors
+                    .iter()
+                    .position(|known| known == sensor)
+                    .unwrap_or_else(|| {
+                        sensors.push(sensor.clone());
+                        sensors.len() - 1
+                    })
+            });
+            needs.push(of.collect());
+        }
+        (Candidates::of_units(needs), sensors)
+    }
+}
+
+fn tried(
+    candidates: &[athermal_numerics::CandidateScore],
+    name: &impl Fn(usize) -> String,
+) -> Vec<CandidateScore> {
+    let told = candidates.iter().filter(|tried| tried.mean.is_finite());
+    let mut told: Vec<CandidateScore> = told
+        .map(|tried| CandidateScore {
+            name: name(tried.candidate),
+            score: tried.mean,
+        })
+        .collect();
+    told.sort_by(|a, b| b.score.total_cmp(&a.score));
+    told
+}
+
+fn stepwise(
+    how: Stepwise,
+    regressors: &[Regressor],
+    blocks: &GramBlocks,
+    scales: &[f64],
+    report: &mut TrainingReport,
+) -> Result<Vec<usize>, NumericsError> {
+    let selected = how.run(&blocks.total(), scales)?;
+    let name = |column: usize| regressors[column].name.clone();
+    let of_step = |step: &athermal_numerics::StepwiseStep| SelectionStep {
+        regressor: name(step.column),
+        removed: step.change == Change::Removed,
+        score: step.r2,
+        folds: Vec::new(),
+        candidates: tried(&step.candidates, &name),
+    };
+    report.selection = selected.steps.iter().map(of_step).collect();
+    report.notes.push(
+        "chosen by F-tests: the R² are of the rows of the fit, the candidates' figures are their F"
+            .to_owned(),
+    );
+    Ok(selected.columns)
+}

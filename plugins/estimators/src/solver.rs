@@ -1,0 +1,130 @@
+//! Decides which ways there are to find coefficients, and what their parameters may be.
+
+use athermal_core::node::{Learns, Mistake};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::penalty::Penalty;
+
+/// How coefficients are found, on standardised regressors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Solver {
+    /// Minimises the sum of squares plus `alpha · ‖w‖²`, the intercept free (Hoerl and Kennard 1970).
+    Ridge {
+        /// The penalty, at least 0, or how it is chosen.
+        #[serde(default = "one")]
+        alpha: Penalty,
+    },
+    /// Minimises the sum of squares. Above a condition number of 1000 it works on the rows by singular values, where they
+    /// are kept; above 10⁶ it says so.
+    Ols {},
+    /// Stochastic gradients with L2 penalty over the rows in their order (Bottou 2010): the step size of row `t` is
+    /// `eta0 / t^power`.
+    Sgd {
+        /// The penalty per row, at least 0.
+        #[serde(default = "small_penalty")]
+        #[schemars(range(min = 0.0))]
+        alpha: f64,
+        /// The first step size, above 0.
+        #[serde(default = "first_step")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        eta0: f64,
+        /// How fast the step size falls, 0 (not at all) to 1.
+        #[serde(default = "quarter")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        power: f64,
+        /// How often the rows are gone through, at least once.
+        #[serde(default = "five")]
+        #[schemars(range(min = 1))]
+        epochs: usize,
+    },
+}
+
+fn one() -> Penalty {
+    Penalty::Fixed(1.0)
+}
+
+fn small_penalty() -> f64 {
+    1e-4
+}
+
+fn first_step() -> f64 {
+    0.01
+}
+
+fn quarter() -> f64 {
+    0.25
+}
+
+fn five() -> usize {
+    5
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self::Ridge { alpha: one() }
+    }
+}
+
+impl Solver {
+    /// Parameters out of their range.
+    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        let mut check = |name: &str, value: f64, fits: bool, allowed: &str| {
+            if !fits {
+                mistakes.push(Mistake::at(
+                    format!("solver.{name}"),
+                    format!("`{name}` is {value} and must be {allowed}"),
+                ));
+            }
+        };
+        match *self {
+            Self::Ridge { alpha } => mistakes.extend(alpha.mistakes("solver.alpha")),
+            Self::Ols {} => {}
+            Self::Sgd {
+                alpha,
+                eta0,
+                power,
+                epochs,
+            } => {
+                check(
+                    "alpha",
+                    alpha,
+                    alpha >= 0.0 && alpha.is_finite(),
+                    "0 or more",
+                );
+                check("eta0", eta0, eta0 > 0.0 && eta0.is_finite(), "above 0");
+                check("power", power, (0.0..=1.0).contains(&power), "from 0 to 1");
+                check("epochs", epochs as f64, epochs >= 1, "1 or more");
+            }
+        }
+        mistakes
+    }
+
+    /// Whether estimators go on learning with it.
+    pub(crate) fn learns(&self) -> Learns {
+        match self {
+            Self::Sgd { .. } => Learns::WhenTold,
+            Self::Ridge { .. } | Self::Ols {} => Learns::Never {
+                help: Some("write `solver = { type = \"sgd\" }`, or use `type = \"rls\"`"),
+            },
+        }
+    }
+
+    /// Whether theory says how far predictions may be off.
+    pub(crate) fn deviates(&self) -> bool {
+        match self {
+            Self::Ridge { .. } | Self::Ols {} => true,
+            Self::Sgd { .. } => false,
+        }
+    }
+
+    /// The penalty of the least squares that this stands for.
+    pub(crate) fn penalty(&self) -> Penalty {
+        match *self {
+            Self::Ridge { alpha } => alpha,
+            Self::Ols {} | Self::Sgd { .. } => Penalty::Fixed(0.0),
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! One prediction of several, by weights that a fit has found.
+
+use athermal_core::model::numbers;
+use athermal_core::node::{
+    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
+};
+use athermal_core::time::Duration;
+use athermal_numerics::{GramBlocks, NumericsError, non_negative_least_squares};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Stacked regression: the sum of several predictions, by weights that are not negative and found by least squares in the fit.
+///
+/// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson 1974), without an
+/// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Predictions of the rows that
+/// an estimator was itself fitted on would flatter the one that fits them closest, so that weights are found on out-of-fold
+/// predictions: each part of the data is predicted by voters fitted on the rest.
+///
+/// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the others go by the
+/// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over. Only rows with
+/// all predictions take part in the fit, and a voter that lacks more than a tenth of them is left out. At most 10 voters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stack {}
+
+/// The most voters: there are weights for any of them being absent.
+const MOST: usize = 10;
+
+impl Estimator for Stack {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("voters", "predictions of the same truth"),
+                InputPort::truth("what they predict"),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            ..Regressors::default()
+        }
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        let names = setup.regressors.iter();
+        let names: Vec<String> = names.map(|voter| voter.name.clone()).collect();
+        Box::new(Stacking {
+            blocks: GramBlocks::with_row_memory(names.len(), 0),
+            names,
+        })
+    }
+}
+
+struct Stacking {
+    names: Vec<String>,
+    blocks: GramBlocks,
+}
+
+impl Trainer for Stacking {
+    fn row(&mut self, regressors: &[f64], truth: f64) {
+        self.blocks.push(regressors, truth);
+    }
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        let voters = self.names.len();
+        if voters == 0 || voters > MOST {
+            return Err(TrainingError::Unsolvable {
+                reason: format!("{voters} voters, and a stack takes from 1 to {MOST}"),
+            });
+        }
+        let total = self.blocks.total();
+        let moments = total.moments_about(&vec![0.0; voters + 1]);
+        let products = (0..voters).flat_map(|i| (0..voters).map(move |j| (i, j)));
+        let saved = Saved {
+            regressors: self.names,
+            products: products.map(|place| moments[place]).collect(),
+            with_truth: (0..voters).map(|i| moments[(i, voters)]).collect(),
+        };
+        let stacked = Stacked::try_from(saved).map_err(|error| TrainingError::Unsolvable {
+            reason: error.to_string(),
+        })?;
+        let weights = stacked.weights((1 << voters) - 1);
+        let explained: f64 = (0..voters)
+            .map(|i| {
+                let mixed: f64 = (0..voters).map(|j| weights[j] * moments[(i, j)]).sum();
+                weights[i] * (2.0 * moments[(i, voters)] - mixed)
+            })
+            .sum();
+        let squares = (moments[(voters, voters)] - explained).max(0.0);
+        let named = stacked.saved.regressors.iter().zip(weights);
+        let named: Vec<String> = named
+            .map(|(name, weight)| format!("{name} {weight:.3}"))
+            .collect();
+        let report = TrainingReport {
+            in_sample_rmse: Some((squares / total.count() as f64).sqrt()),
+            notes: vec![format!("weights: {}", named.join(", "))],
+            ..TrainingReport::default()
+        };
+        Ok(Trained {
+            predictor: Box::new(stacked),
+            report,
+        })
+    }
+}
+
+/// A fitted stack: the sums that weights follow from, whichever voters are there.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(try_from = "Saved", into = "Saved")]
+struct Stacked {
+    saved: Saved,
+    /// The weights of all voters for each set of those that are there, a bit each.
+    table: Vec<f64>,
+}
+
+/// A stack as a model file has it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Saved {
+    /// The voters.
+    regressors: Vec<String>,
+    /// Sums of the products of their predictions, row by row.
+    #[serde(with = "numbers")]
+    products: Vec<f64>,
+    /// Sums of the products of each with the truth.
+    #[serde(with = "numbers")]
+    with_truth: Vec<f64>,
+}
+
+impl From<Stacked> for Saved {
+    fn from(stacked: Stacked) -> Self {
+        stacked.saved
+    }
+}
+
+impl TryFrom<Saved> for Stacked {
+    type Error = NumericsError;
+
+    fn try_from(saved: Saved) -> Result<Self, NumericsError> {
+        let voters = saved.regressors.len();
+        let found = saved.with_truth.len();
+        if voters > MOST || found != voters || saved.products.len() != voters * voters {
+            let expected = voters.min(MOST);
+            return Err(NumericsError::Width { expected, found });
+        }
+        let mut table = vec![0.0; voters << voters];
+        for (set, weights) in table.chunks_exact_mut(voters.max(1)).enumerate() {
+            let there: Vec<usize> = (0..voters).filter(|voter| set >> voter & 1 == 1).collect();
+            let own = there
+                .iter()
+                .flat_map(|i| there.iter().map(move |j| i * voters + j));
+            let products: Vec<f64> = own.map(|place| saved.products[place]).collect();
+            let with_truth: Vec<f64> = there.iter().map(|&i| saved.with_truth[i]).collect();
+            let solution = non_negative_least_squares(&products, &with_truth)?;
+            for (voter, weight) in there.into_iter().zip(solution) {
+                weights[voter] = weight;
+            }
+        }
+        Ok(Self { saved, table })
+    }
+}
+
+impl Stacked {
+    /// The weights while these voters are there.
+    fn weights(&self, set: usize) -> &[f64] {
+        let voters = self.saved.regressors.len();
+        &self.table[set * voters..(set + 1) * voters]
+    }
+}
+
+#[typetag::serde(name = "stack")]
+impl Predictor for Stacked {
+    fn uses(&self) -> &[String] {
+        &self.saved.regressors
+    }
+
+    fn predict(&self, votes: &[f64]) -> f64 {
+        let set = votes
+            .iter()
+            .enumerate()
+            .filter(|(_, vote)| !vote.is_nan())
+            .fold(0, |set, (voter, _)| set | 1 << voter);
+        let terms = self.weights(set).iter().zip(votes);
+        terms
+            .filter(|(_, vote)| !vote.is_nan())
+            .map(|(weight, vote)| weight * vote)
+            .sum()
+    }
+
+    fn takes_absent(&self) -> bool {
+        true
+    }
+}
+
+athermal_core::register!(Stack, Estimator, "stack");
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use athermal_core::node::Regressor;
+
+    fn stack(rows: &[(&[f64], f64)]) -> Result<Trained, TrainingError> {
+        let regressor = |i: usize| Regressor {
+            name: format!("voter{i}"),
+            unit: "nm/min".to_owned(),
+            sensors: Vec::new(),
+        };
+        let setup = TrainingSetup {
+            regressors: (0..rows[0].0.len()).map(regressor).collect(),
+            truth_unit: "nm/min".to_owned(),
+            memory: 1 << 20,
+            ahead: Duration::ZERO,
+            span: Duration::ZERO,
+            learns: false,
+        };
+        let mut trainer = Stack {}.trainer(&setup);
+        for (row, truth) in rows {
+            trainer.row(row, *truth);
+        }
+        trainer.finish()
+    }
+
+    /// Votes that are wrong in different ways, and the truth.
+    fn rows() -> Vec<([f64; 3], f64)> {
+        let row = |i: i32| {
+            let truth = (0.3 * f64::from(i)).sin();
+            let noise = (1.7 * f64::from(i)).sin();
+            (
+                [2.0 * truth, truth + noise, 2.0 * truth + 0.01 * noise],
+                truth,
+            )
+        };
+        (0..200).map(row).collect()
+    }
+
+    fn fitted() -> Box<dyn Predictor> {
+        let rows = rows();
+        let rows: Vec<(&[f64], f64)> = rows.iter().map(|(row, truth)| (&row[..], *truth)).collect();
+        stack(&rows).unwrap().predictor
+    }
+
+    #[test]
+    fn a_voter_that_promises_twice_as_much_counts_half() {
+        let stacked = fitted();
+        let predicted = stacked.predict(&[2.0, 5.0, 2.0]);
+        assert!((predicted - 1.0).abs() < 0.02, "{predicted}");
+    }
+
+    #[test]
+    fn another_takes_over_from_an_absent_voter() {
+        let stacked = fitted();
+        let without = stacked.predict(&[f64::NAN, 5.0, 2.0]);
+        assert!((without - 1.0).abs() < 0.02, "{without}");
+        let alone = stacked.predict(&[f64::NAN, 1.0, f64::NAN]);
+        assert!(alone > 0.2 && alone < 0.8, "half of it is noise: {alone}");
+    }
+
+    #[test]
+    fn what_is_read_back_gives_the_same_bits() {
+        let stacked = fitted();
+        let text = serde_json::to_string(&stacked).unwrap();
+        let back: Box<dyn Predictor> = serde_json::from_str(&text).unwrap();
+        for votes in [[0.1, 0.2, 0.3], [f64::NAN, 0.2, 0.3], [0.7, f64::NAN, 0.1]] {
+            assert_eq!(
+                stacked.predict(&votes).to_bits(),
+                back.predict(&votes).to_bits()
+            );
+        }
+    }
+
+    #[test]
+    fn more_voters_than_there_can_be_are_told() {
+        let rows: Vec<f64> = (0..11).map(f64::from).collect();
+        let error = stack(&[(&rows, 1.0)]).unwrap_err();
+        assert!(error.to_string().contains("11 voters"), "{error}");
+    }
+}

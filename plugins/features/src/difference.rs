@@ -1,0 +1,166 @@
+//! How much a value has changed.
+
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
+use athermal_core::engine::History;
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
+};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::lag::{Past, max_age};
+
+/// The change of each channel over a time, or from one value to the next: `x(t) − x(t − over)`.
+///
+/// With every new value at `t` it takes the last value at or before `t − over` away; without `over`, the value before. That
+/// one must not have been older than `max_age` at that instant. A difference of two samples has the noise of both, and that of a `slope`
+/// over the same time is smaller; over one sample it is the differencing of Box and Jenkins (1976). Differences of temperatures
+/// are in kelvin.
+///
+/// Two differences share a sample where one ends as the other begins, so that a value summarises `over` and `max_age`: where it
+/// is a truth, the embargo goes by that.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Difference {
+    /// Over which time; without it, from one value to the next.
+    #[serde(default)]
+    pub over: Option<Duration>,
+    /// How old the earlier value may have been; by default as old as a held value of the channel may be.
+    #[serde(default)]
+    pub max_age: Option<Duration>,
+}
+
+/// Just before: at the present instant there is the new value.
+const BEFORE: Duration = Duration::from_ns(1);
+
+impl Difference {
+    fn back(&self) -> Duration {
+        self.over.unwrap_or(BEFORE)
+    }
+
+    fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if self.over.is_some_and(|over| over <= Duration::ZERO) {
+            let mistake = Mistake::at("over", "`over` must be longer than nothing");
+            mistakes.push(mistake.help("leave it out for the change from one value to the next"));
+        }
+        let ages = channels
+            .iter()
+            .map(|channel| max_age(self.max_age, channel));
+        mistakes.extend(ages.filter_map(Result::err).next());
+        mistakes
+    }
+}
+
+impl Feature for Difference {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what changes")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let from = inputs.port("signal");
+        let mistakes = self.mistakes(from);
+        if !mistakes.is_empty() {
+            return Err(mistakes);
+        }
+        let change = |channel: &Channel| Channel {
+            unit: channel.unit.difference(),
+            span: channel.span
+                + self.over.unwrap_or_default()
+                + max_age(self.max_age, channel).unwrap_or_default(),
+            ..channel.clone()
+        };
+        Ok(vec![OutputPort {
+            name: "difference",
+            channels: from.iter().map(change).collect(),
+        }])
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
+    }
+
+    fn memory(&self) -> Duration {
+        self.back() + self.max_age.unwrap_or_default()
+    }
+
+    fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        let channel = |channel: &Channel| Changing {
+            history: History::new(self.back()),
+            place: 0,
+            max_age: max_age(self.max_age, channel).unwrap_or_default(),
+        };
+        Box::new(Differencing {
+            back: self.back(),
+            channels: inputs.port("signal").iter().map(channel).collect(),
+        })
+    }
+}
+
+struct Differencing {
+    back: Duration,
+    channels: Vec<Changing>,
+}
+
+/// The past of one channel.
+struct Changing {
+    history: History,
+    /// Where in the past the earlier value was last found.
+    place: u64,
+    max_age: Duration,
+}
+
+impl Operator for Differencing {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        let inputs = tick.port(0).iter().zip(tick.stamps(0));
+        for (i, (channel, (&value, &stamp))) in self.channels.iter_mut().zip(inputs).enumerate() {
+            if is_unchanged(value) {
+                continue;
+            }
+            let value = if value.is_finite() { value } else { ABSENT };
+            channel.history.push(tick.now, value, stamp);
+            if value.is_nan() {
+                continue;
+            }
+            let earlier = tick.now - self.back;
+            let (past, _) = channel
+                .history
+                .at(earlier, channel.max_age, &mut channel.place);
+            // A NaN says why there is no earlier value, and must stay as it is.
+            let change = if past.is_nan() { past } else { value - past };
+            outputs.set_stamped(i, change, stamp);
+        }
+    }
+
+    fn segment(&mut self) {
+        for channel in &mut self.channels {
+            channel.history.clear();
+            channel.place = 0;
+        }
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn State>> {
+        let history = |channel: &Changing| channel.history.clone();
+        Some(Box::new(Past {
+            channels: self.channels.iter().map(history).collect(),
+        }))
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        match state.known::<Past>() {
+            Ok(state) if state.channels.len() == self.channels.len() => {
+                for (channel, past) in self.channels.iter_mut().zip(&state.channels) {
+                    channel.history.adopt(past);
+                    channel.place = 0;
+                }
+                Restored::Accepted
+            }
+            Ok(_) => Restored::cold("the number of channels differs"),
+            Err(cold) => cold,
+        }
+    }
+}
+
+athermal_core::register!(Difference, Feature, "difference");

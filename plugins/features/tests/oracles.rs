@@ -1,0 +1,269 @@
+//! Features in a running graph against tables made with pandas and scipy, see `tests/oracles/windows/generate.py`.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use athermal_core::compile::{Plan, Wanted, compile};
+use athermal_core::diagnostic::{Diagnostics, Sources};
+use athermal_core::document::{Memory, declare, load_text};
+use athermal_core::engine::{Engine, Fitted};
+use athermal_core::time::Instant;
+use athermal_features as _;
+
+/// A graph of one node on two signals, running.
+struct Bench {
+    plan: Arc<Plan>,
+    engine: Engine,
+}
+
+impl Bench {
+    /// A node that is called `n`; `ports` are all that is read of it.
+    fn new(node: &str, ports: &[&str]) -> Self {
+        let outputs: String = ports
+            .iter()
+            .map(|port| format!("{port} = \"n:{port}\"\n"))
+            .collect();
+        let text = format!(
+            "schema = 1\n[signals.s]\nunit = \"mm\"\nchannels = [\"y\", \"z\"]\nmax_age = \"10s\"\n\
+             [nodes.n]\ninputs.signal = \"s\"\n{node}\n[outputs]\n{outputs}"
+        );
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        let files = Memory::new();
+        let document = load_text("graph.toml", text, &files, &mut sources, &mut diagnostics);
+        let graph = document.and_then(|document| declare(document, &mut diagnostics));
+        let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+        let plan = plan.unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 100)));
+        let plan = Arc::new(plan);
+        let engine = Engine::new(Arc::clone(&plan), &Fitted::new()).unwrap();
+        Self { plan, engine }
+    }
+
+    fn tick(&mut self, row: &[f64]) {
+        let now = Instant::from_ns((row[0] * 1e9).round() as i64);
+        self.engine.step(now, &row[1..]).unwrap();
+    }
+
+    fn output(&self, name: &str) -> f64 {
+        let outputs = &self.plan.outputs;
+        let place = outputs.iter().position(|output| output.name == name);
+        self.engine.outputs()[place.unwrap_or_else(|| panic!("no {name}"))]
+    }
+}
+
+/// Rows of a table as text, without the header.
+fn table(file: &str) -> Vec<Vec<String>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles/windows");
+    let text = std::fs::read_to_string(folder.join(file)).unwrap();
+    let row = |line: &str| line.split(',').map(str::to_owned).collect();
+    text.lines().skip(1).map(row).collect()
+}
+
+fn number(cell: &str) -> f64 {
+    if cell.is_empty() {
+        f64::NAN
+    } else {
+        cell.parse().unwrap()
+    }
+}
+
+fn input() -> Vec<Vec<f64>> {
+    let rows = table("input.csv");
+    rows.iter()
+        .map(|row| row.iter().map(|cell| number(cell)).collect())
+        .collect()
+}
+
+/// Runs the input through a node, and compares what it gives with the rows of a table that begin as stated: the channel, the keys, the
+/// number of the row, the values. `values` names the outputs, each with the column after the row's number.
+fn compare(node: &str, file: &str, keys: &[&str], values: &[(&str, usize)], tolerance: f64) {
+    let expected = table(file);
+    let ports: Vec<&str> = values.iter().map(|(port, _)| *port).collect();
+    let mut bench = Bench::new(node, &ports);
+    let mut compared = 0;
+    for (row, samples) in input().iter().enumerate() {
+        bench.tick(samples);
+        let is_here = |line: &&Vec<String>| {
+            line[1..=keys.len()] == *keys && line[1 + keys.len()] == row.to_string()
+        };
+        for line in expected.iter().filter(is_here) {
+            for (port, column) in values {
+                let expected = number(&line[2 + keys.len() + column]);
+                let found = bench.output(&format!("{port}.{}", line[0]));
+                let close = (found - expected).abs() <= tolerance * expected.abs().max(1.0);
+                assert!(
+                    close || (found.is_nan() && expected.is_nan()),
+                    "{file} {line:?}, {port}: {found} for {expected}"
+                );
+                compared += usize::from(!expected.is_nan());
+            }
+        }
+    }
+    assert!(compared > 250, "{file} {keys:?}: {compared}");
+}
+
+/// A window makes do with what there is, as pandas does.
+const PARTIAL: &str = "cold = \"partial\"\nmin_coverage = 0.0\n";
+
+#[test]
+fn oracle_of_moving_statistics() {
+    let ports = [
+        ("mean", 0),
+        ("std", 1),
+        ("min", 2),
+        ("max", 3),
+        ("median", 4),
+        ("count", 5),
+    ];
+    for window in ["20", "60", "150"] {
+        let node =
+            format!("type = \"moving\"\nwindows = [\"{window}s\"]\nmin_samples = 1\n{PARTIAL}");
+        compare(&node, "moving.csv", &[window], &ports, 1e-11);
+    }
+}
+
+#[test]
+fn oracle_of_the_values_and_shares_of_slopes() {
+    let ports = [("slope", 0), ("stderr", 1), ("value", 2), ("r2", 3)];
+    for window in ["20", "60", "150"] {
+        let node = format!(
+            "type = \"slope\"\nunit = \"mm/s\"\nwindows = [\"{window}s\"]\nmin_samples = 3\n{PARTIAL}"
+        );
+        compare(&node, "lines.csv", &[window], &ports, 1e-9);
+    }
+}
+
+#[test]
+fn oracle_of_the_hampel_filter() {
+    let cases = [
+        ("60", "3.0", "0.0"),
+        ("60", "3.0", "0.02"),
+        ("150", "4.5", "0.0"),
+    ];
+    for (window, threshold, floor) in cases {
+        let node = format!(
+            "type = \"hampel\"\nwindow = \"{window}s\"\nthreshold = {threshold}\nfloor = \"{floor} mm\"\n"
+        );
+        let keys = [window, threshold, floor];
+        compare(&node, "hampel.csv", &keys, &[("outlier", 1)], 0.0);
+        replaced(&format!("{node}replace = \"median\""), &keys);
+        absent(&node, &keys);
+    }
+}
+
+/// An outlier becomes the median of its window, and what is none passes.
+fn replaced(node: &str, keys: &[&str]) {
+    judged(
+        node,
+        keys,
+        |sample, median, outlier| {
+            if outlier { median } else { sample }
+        },
+    );
+}
+
+/// An outlier is absent, and what is none passes.
+fn absent(node: &str, keys: &[&str]) {
+    judged(
+        node,
+        keys,
+        |sample, _, outlier| {
+            if outlier { f64::NAN } else { sample }
+        },
+    );
+}
+
+fn judged(node: &str, keys: &[&str], expected: impl Fn(f64, f64, bool) -> f64) {
+    let lines = table("hampel.csv");
+    let mut bench = Bench::new(node, &["signal"]);
+    let (mut outliers, mut others) = (0, 0);
+    for (row, samples) in input().iter().enumerate() {
+        bench.tick(samples);
+        for line in lines
+            .iter()
+            .filter(|line| line[1..4] == *keys && line[4] == row.to_string())
+        {
+            let sample = samples[if line[0] == "y" { 1 } else { 2 }];
+            let outlier = number(&line[6]) == 1.0;
+            let expected = expected(sample, number(&line[5]), outlier);
+            let found = bench.output(&format!("signal.{}", line[0]));
+            assert!(
+                (found - expected).abs() < 1e-12 || (found.is_nan() && expected.is_nan()),
+                "{line:?}: {found} for {expected}"
+            );
+            *(if outlier { &mut outliers } else { &mut others }) += 1;
+        }
+    }
+    assert!(outliers > 5 && others > 300, "{outliers} {others}");
+}
+
+#[test]
+fn oracle_of_lags() {
+    for (lag, age) in [("0", "10"), ("7", "10"), ("30", "10"), ("30", "4")] {
+        let node = format!("type = \"lag\"\nlags = [\"{lag}s\"]\nmax_age = \"{age}s\"\n");
+        compare(&node, "lag.csv", &[lag, age], &[("lagged", 0)], 0.0);
+    }
+}
+
+#[test]
+fn oracle_of_differences() {
+    for (over, age) in [("7", "10"), ("30", "10"), ("30", "4")] {
+        let node = format!("type = \"difference\"\nover = \"{over}s\"\nmax_age = \"{age}s\"\n");
+        compare(
+            &node,
+            "difference.csv",
+            &[over, age],
+            &[("difference", 0)],
+            1e-12,
+        );
+    }
+    let node = "type = \"difference\"\n";
+    compare(
+        node,
+        "difference.csv",
+        &["0", "10"],
+        &[("difference", 0)],
+        1e-12,
+    );
+}
+
+#[test]
+fn oracle_of_a_regular_clock() {
+    let rows = input();
+    for (every, method, column) in [(10, "mean", 3), (10, "last", 4), (30, "mean", 3)] {
+        let node = format!("type = \"resample\"\nevery = \"{every}s\"\nmethod = \"{method}\"\n");
+        let mut bench = Bench::new(&node, &["signal"]);
+        let expected = table("resample.csv");
+        let periods = |channel: &str, end: f64| {
+            let line = expected.iter().find(|line| {
+                line[0] == channel && line[1] == every.to_string() && number(&line[2]) == end
+            });
+            line.map_or(f64::NAN, |line| number(&line[column]))
+        };
+        let mut compared = 0;
+        let mut before = f64::NEG_INFINITY;
+        for samples in &rows {
+            let now = samples[0];
+            bench.tick(samples);
+            let period = f64::from(every);
+            // The newest period that has ended by now gives a value when it ended since the tick before.
+            let end = (now / period).floor() * period;
+            for channel in ["y", "z"] {
+                let found = bench.output(&format!("signal.{channel}"));
+                let expected = if end > before {
+                    periods(channel, end)
+                } else {
+                    f64::NAN
+                };
+                assert!(
+                    (found - expected).abs() < 1e-12 || (found.is_nan() && expected.is_nan()),
+                    "{every} {method} {channel} at {now}: {found} for {expected}"
+                );
+                compared += usize::from(!expected.is_nan());
+            }
+            before = now;
+        }
+        assert!(compared > 40, "{compared}");
+    }
+}

@@ -1,0 +1,93 @@
+//! Combiners that go by a state or give reasons, in a running graph.
+
+use super::workbench::Bench;
+use super::{SAMPLES, SLOPES};
+
+fn bench() -> Bench {
+    let text = format!(
+        "{SAMPLES}{SLOPES}
+[nodes.state]
+type = \"stability\"
+inputs.drift = \"drift.Z\"
+stable_below = \"30 nm/min\"
+transient_above = \"80 nm/min\"
+[nodes.still]
+type = \"zero\"
+inputs.truth = \"drift.Z\"
+ahead = \"5min\"
+[nodes.same]
+type = \"persistence\"
+inputs.truth = \"drift.Z\"
+ahead = \"5min\"
+[nodes.gate]
+type = \"state_gate\"
+inputs.voters = [\"still\", \"same\"]
+inputs.state = \"state\"
+[nodes.guard]
+type = \"guard\"
+inputs.voters = \"same\"
+inputs.truth = \"drift.Z\"
+memory = {{ truths = 4 }}
+min_truths = 2
+[outputs]
+gate = [\"gate\", \"gate:weights\", \"gate:reason\"]
+guard = [\"guard\", \"guard:weights\", \"guard:reason\"]
+"
+    );
+    Bench::new(&text, &[])
+}
+
+/// Moves the machine by a constant drift for ten minutes, a position every minute.
+fn move_on(bench: &mut Bench, from: f64, position: &mut f64, drift: f64) {
+    for minute in 1..=10 {
+        *position += drift;
+        let at = from + 60.0 * f64::from(minute);
+        bench.tick(at, &[("position.Z", *position), ("temperature.room", 20.0)]);
+    }
+}
+
+fn values(bench: &Bench, names: [&str; 3]) -> [f64; 3] {
+    names.map(|name| bench.value(name))
+}
+
+#[test]
+fn a_gate_follows_the_state_and_shows_whose_vote_it_is() {
+    let (mut bench, mut position) = (bench(), 0.0);
+    let weights = [
+        "gate:weights.weight-still",
+        "gate:weights.weight-same",
+        "gate:reason.Z",
+    ];
+    move_on(&mut bench, 0.0, &mut position, 10.0);
+    assert_eq!(bench.value("gate.Z"), 0.0);
+    assert_eq!(values(&bench, weights), [1.0, 0.0, 0.0]);
+    move_on(&mut bench, 600.0, &mut position, 200.0);
+    assert!((bench.value("gate.Z") - 200.0).abs() < 1e-6);
+    assert_eq!(values(&bench, weights), [0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn a_guard_says_why_it_holds_a_prediction_back() {
+    let (mut bench, mut position) = (bench(), 0.0);
+    let told = ["guard.Z", "guard:weights.weight-same", "guard:reason.Z"];
+    move_on(&mut bench, 0.0, &mut position, 20.0);
+    let [vote, weight, reason] = values(&bench, told);
+    assert!((vote - 20.0).abs() < 1e-6, "{vote}");
+    assert_eq!(
+        [weight, reason],
+        [1.0, 2.0],
+        "five minutes ahead, nothing is compared yet"
+    );
+    move_on(&mut bench, 600.0, &mut position, 20.0);
+    assert_eq!(values(&bench, told)[1..], [1.0, 0.0]);
+    // To and fro: what was is the worst guess of what will be.
+    for turn in 0..4 {
+        let drift = if turn % 2 == 0 { -50.0 } else { 50.0 };
+        for minute in 1..=5 {
+            position += drift;
+            let at = 1200.0 + 300.0 * f64::from(turn) + 60.0 * f64::from(minute);
+            bench.tick(at, &[("position.Z", position)]);
+        }
+    }
+    assert_eq!(values(&bench, told), [0.0, 0.0, 1.0]);
+}

@@ -1,0 +1,111 @@
+//! What a stack learns from, and what it does while voters are absent.
+
+use std::sync::Arc;
+
+use athermal::Engine;
+use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::recording::{Event, Table};
+
+use super::SAMPLES;
+use super::fitting::recording;
+use super::workbench::{plan, problems, slot};
+
+/// A voter with two regressors, and one with so many that it fits its rows far too well.
+fn nodes(stacked: &str) -> String {
+    let lags: Vec<String> = (0..12).map(|lag| format!("\"{}s\"", 10 * lag)).collect();
+    format!(
+        "{SAMPLES}
+[nodes.past]
+type = \"lag\"
+inputs.signal = \"temperature\"
+lags = [{}]
+[nodes.plain]
+type = \"linear\"
+inputs.features = \"temperature\"
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+solver = {{ type = \"ols\" }}
+[nodes.rich]
+type = \"linear\"
+inputs.features = \"past\"
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+solver = {{ type = \"ols\" }}
+[nodes.stack]
+type = \"stack\"
+inputs.voters = [\"plain\", \"rich\"]
+inputs.truth = \"position.Z\"
+{stacked}
+[outputs]
+out = \"stack\"
+",
+        lags.join(", ")
+    )
+}
+
+fn few() -> Table {
+    let mut table = Table::default();
+    for (event, values) in &recording().events()[..70] {
+        let Event::Row(now) = *event else {
+            unreachable!()
+        };
+        table.push(now, values);
+    }
+    table
+}
+
+#[test]
+fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight() {
+    let plan = plan(&nodes("ahead = \"0s\""));
+    let table = few();
+    let (fitted, report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    let of = |node: &str| {
+        report
+            .estimators
+            .iter()
+            .find(|fit| fit.node == node)
+            .unwrap()
+    };
+    let report = |node: &str| match &of(node).outcome {
+        Outcome::Fitted(report) => report.clone(),
+        Outcome::Failed(error) => panic!("{node}: {error}"),
+    };
+    let rmse = |node: &str| report(node).in_sample_rmse.unwrap();
+    assert!(
+        rmse("rich") < 0.9 * rmse("plain"),
+        "on its own rows the rich one looks better: {} {}",
+        rmse("rich"),
+        rmse("plain")
+    );
+    let weights = &report("stack").notes[0];
+    let weight = |name: &str| -> f64 {
+        let after = weights.split(&format!("{name} ")).nth(1).unwrap();
+        after.split(',').next().unwrap().parse().unwrap()
+    };
+    assert!(
+        weight("plain.Z") > 2.0 * weight("rich.Z"),
+        "out of fold it is not: {weights}"
+    );
+
+    // While the lags are cold the rich one is absent, and the plain one goes on alone.
+    let mut engine = Engine::new(Arc::clone(&plan), &fitted).unwrap();
+    for (tick, (event, values)) in table.events().iter().enumerate() {
+        let Event::Row(now) = *event else {
+            unreachable!()
+        };
+        engine.step(now, values).unwrap();
+        let [rich, stack] = ["rich.Z", "stack.Z"].map(|name| engine.value(slot(&plan, name)));
+        assert_eq!(rich.is_nan(), tick < 11, "{tick}");
+        assert!(stack.is_finite(), "{tick}");
+    }
+}
+
+#[test]
+fn votes_for_another_instant_than_the_stack_predicts_are_told() {
+    let told = problems(&nodes("ahead = \"1min\""));
+    assert!(told.contains("A050"), "{told}");
+    assert!(
+        told.contains("`plain.Z` looks 0s ahead and `stack` 1min"),
+        "{told}"
+    );
+}
