@@ -10,14 +10,17 @@ use crate::{Gram, NumericsError, Split};
 const TOLERANCE: f64 = 1e-13;
 const MOST_SWEEPS: usize = 50_000;
 
-/// Minimises `1/(2n) Σ(y − b₀ − xᵀb)² + α (ρ Σ|s_j b_j| + (1 − ρ)/2 Σ(s_j b_j)²)` with column scales `s` by cyclic coordinate
-/// descent on the Gram matrix (Friedman, Hastie and Tibshirani 2010, section 2.2). `ρ = 1` is the lasso.
+/// Minimises `1/(2n) Σ(y − b₀ − xᵀb)² + α (ρ t Σ|s_j b_j| + (1 − ρ)/2 Σ(s_j b_j)²)` with column scales `s` and a scale `t` of the
+/// target by cyclic coordinate descent on the Gram matrix (Friedman, Hastie and Tibshirani 2010, section 2.2). `ρ = 1` is the
+/// lasso. With the scale of the target, the same penalty means the same in all units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElasticNet {
     /// The penalty `α`, on the *mean* of squares, unlike that of ridge.
     pub alpha: f64,
     /// The share `ρ` of the absolute values, above 0 up to 1.
     pub l1_ratio: f64,
+    /// The scale `t` of the target, in its unit, above 0.
+    pub target_scale: f64,
 }
 
 /// A sparse linear model on the original scale of its columns.
@@ -48,7 +51,7 @@ impl ElasticNet {
         self.check(gram, columns, scales)?;
         let problem = Problem::new(true, gram, columns, scales);
         let mut descent = Descent::new(&problem, gram.weight());
-        let converged = descent.run(self.alpha, self.l1_ratio);
+        let converged = descent.run(self, self.alpha);
         let mut coefficients = vec![0.0; columns.len()];
         for (&k, weight) in problem.active.iter().zip(&descent.weights) {
             coefficients[k] = weight / scales[columns[k]];
@@ -76,7 +79,7 @@ impl ElasticNet {
         self.check(gram, columns, scales)?;
         let problem = Problem::new(true, gram, columns, scales);
         let largest = problem.target.iter().fold(0.0_f64, |l, t| l.max(t.abs()));
-        Ok(largest / gram.weight() / self.l1_ratio)
+        Ok(largest / gram.weight() / (self.l1_ratio * self.target_scale))
     }
 
     /// The score of each penalty in each fold: `R²` on its test rows of the model of its training rows.
@@ -103,7 +106,7 @@ impl ElasticNet {
             let mut descent = Descent::new(&problem, split.train.weight());
             for &at in &order {
                 check_penalty(alphas[at])?;
-                descent.run(alphas[at], self.l1_ratio);
+                descent.run(self, alphas[at]);
                 let errors = test.errors(&test.cross, &test.target, &descent.weights);
                 scores[at].push(test.r2(errors));
             }
@@ -115,6 +118,9 @@ impl ElasticNet {
         check_penalty(self.alpha)?;
         let fine = self.l1_ratio > 0.0 && self.l1_ratio <= 1.0;
         check_parameter("l1_ratio", self.l1_ratio, fine, "above 0 up to 1")?;
+        let scale = self.target_scale;
+        let fine = scale > 0.0 && scale.is_finite();
+        check_parameter("target_scale", scale, fine, "above 0")?;
         if scales.len() != gram.width() {
             return Err(NumericsError::Width {
                 expected: gram.width(),
@@ -159,8 +165,9 @@ impl<'a> Descent<'a> {
         }
     }
 
-    fn run(&mut self, alpha: f64, l1_ratio: f64) -> bool {
-        let (threshold, damping) = (alpha * l1_ratio, alpha * (1.0 - l1_ratio));
+    fn run(&mut self, how: &ElasticNet, alpha: f64) -> bool {
+        let threshold = alpha * how.l1_ratio * how.target_scale;
+        let damping = alpha * (1.0 - how.l1_ratio);
         for _ in 0..MOST_SWEEPS {
             let mut largest = 0.0_f64;
             for j in 0..self.weights.len() {
@@ -192,21 +199,25 @@ mod tests {
     use super::*;
     use crate::{Folds, GramBlocks, Standardization, oracle};
 
-    fn own() -> (GramBlocks, Vec<f64>, serde_json::Value) {
+    /// The rows, the scales of their columns, that of the target, and what is expected.
+    fn own() -> (GramBlocks, Vec<f64>, f64, serde_json::Value) {
         let mut blocks = GramBlocks::new(12);
         for row in oracle::own_table("selection/input.csv").numbers() {
             blocks.push(&row[..12], row[12]);
         }
-        let scales = Standardization::of(&blocks.total()).scales;
+        let gram = blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        let target_scale = gram.variances()[12].sqrt();
         let text = oracle::own_text("penalties/expected.json");
-        (blocks, scales, serde_json::from_str(&text).unwrap())
+        let expected = serde_json::from_str(&text).unwrap();
+        (blocks, scales, target_scale, expected)
     }
 
     const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
     #[test]
     fn the_coefficients_are_those_of_the_own_oracle() {
-        let (blocks, scales, expected) = own();
+        let (blocks, scales, target_scale, expected) = own();
         let gram = blocks.total();
         let models = expected["elastic_net"].as_array().unwrap();
         for model in models {
@@ -214,6 +225,7 @@ mod tests {
             let how = ElasticNet {
                 alpha: number("alpha"),
                 l1_ratio: number("l1_ratio"),
+                target_scale,
             };
             let fit = how.solve(&gram, &ALL, &scales).unwrap();
             assert!(fit.converged);
@@ -233,11 +245,12 @@ mod tests {
 
     #[test]
     fn the_scores_of_all_folds_are_those_of_the_own_oracle() {
-        let (blocks, scales, expected) = own();
+        let (blocks, scales, target_scale, expected) = own();
         let splits = blocks.splits(&Folds::contiguous(5)).unwrap();
         let lasso = ElasticNet {
             alpha: 0.0,
             l1_ratio: 1.0,
+            target_scale,
         };
         let rows = expected["lasso_folds"].as_array().unwrap();
         let alphas: Vec<f64> = rows
@@ -258,9 +271,16 @@ mod tests {
 
     #[test]
     fn wrong_requests_are_refused() {
-        let (blocks, scales, _) = own();
+        let (blocks, scales, target_scale, _) = own();
         let gram = blocks.total();
-        let solve = |alpha, l1_ratio| ElasticNet { alpha, l1_ratio }.solve(&gram, &ALL, &scales);
+        let solve = |alpha, l1_ratio| {
+            let how = ElasticNet {
+                alpha,
+                l1_ratio,
+                target_scale,
+            };
+            how.solve(&gram, &ALL, &scales)
+        };
         assert!(solve(f64::NAN, 1.0).is_err());
         assert!(solve(1.0, 0.0).is_err());
         assert!(solve(1.0, f64::NAN).is_err());

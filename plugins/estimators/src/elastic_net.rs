@@ -7,7 +7,7 @@ use athermal_core::node::{
     TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
-use athermal_numerics::{GramBlocks, NumericsError, Standardization, logarithmic_grid};
+use athermal_numerics::{Gram, GramBlocks, NumericsError, Standardization, logarithmic_grid};
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
@@ -18,8 +18,9 @@ use crate::regression::{LinearPredictor, told};
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
 ///
-/// Minimises `1/(2n) Σ(y − ŷ)² + α (ρ Σ|w_j| + (1 − ρ)/2 Σ w_j²)` over the coefficients `w` of standardised features, the intercept
-/// free (Zou and Hastie 2005; coordinate descent as in Friedman, Hastie and Tibshirani 2010), with `ρ = l1_ratio`. Of features
+/// Minimises `1/(2n) Σ(y − ŷ)² + α (ρ Σ|w_j| + (1 − ρ)/2 Σ w_j²)` over the coefficients `w`, the intercept free, with features
+/// and truth standardised (Zou and Hastie 2005; coordinate descent as in Friedman, Hastie and Tibshirani 2010), so that `α`
+/// means the same in all units; `ρ = l1_ratio`. Of features
 /// that hang together the lasso keeps one or the other; here the second term lets them share. Note that `α` stands against
 /// the *mean* of squares, that of ridge against their sum.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -208,19 +209,30 @@ impl SparseTrainer {
         }
     }
 
-    fn settle(&self, scales: &[f64], report: &mut TrainingReport) -> Result<f64, NumericsError> {
+    /// The way to the fit, its penalty chosen.
+    fn settle(
+        &self,
+        gram: &Gram,
+        scales: &[f64],
+        report: &mut TrainingReport,
+    ) -> Result<athermal_numerics::ElasticNet, NumericsError> {
+        let deviation = gram.variances()[gram.width()].sqrt();
+        let mut how = athermal_numerics::ElasticNet {
+            alpha: 0.0,
+            l1_ratio: self.l1_ratio,
+            target_scale: if deviation > 0.0 { deviation } else { 1.0 },
+        };
         let path = match self.alpha {
-            SparsePenalty::Fixed(alpha) => return Ok(alpha),
+            SparsePenalty::Fixed(alpha) => {
+                how.alpha = alpha;
+                return Ok(how);
+            }
             SparsePenalty::Chosen(path) => path,
         };
         let all: Vec<usize> = (0..self.regressors.len()).collect();
-        let how = athermal_numerics::ElasticNet {
-            alpha: 0.0,
-            l1_ratio: self.l1_ratio,
-        };
-        let largest = how.largest_alpha(&self.blocks.total(), &all, scales)?;
+        let largest = how.largest_alpha(gram, &all, scales)?;
         if largest <= 0.0 {
-            return Ok(0.0);
+            return Ok(how);
         }
         let alphas = logarithmic_grid(path.smallest_share * largest, largest, path.per_decade);
         let splits = self.blocks.splits(&path.folds.cut())?;
@@ -243,17 +255,14 @@ impl SparseTrainer {
             alphas.len(),
             means[best]
         ));
-        Ok(alphas[best])
+        how.alpha = alphas[best];
+        Ok(how)
     }
 
     fn solve(&self, report: &mut TrainingReport) -> Result<LinearPredictor, NumericsError> {
         let gram = self.blocks.total();
         let scales = Standardization::of(&gram).scales;
-        let alpha = self.settle(&scales, report)?;
-        let how = athermal_numerics::ElasticNet {
-            alpha,
-            l1_ratio: self.l1_ratio,
-        };
+        let how = self.settle(&gram, &scales, report)?;
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let fit = how.solve(&gram, &all, &scales)?;
         if !fit.converged {

@@ -13,9 +13,9 @@ use crate::regression::{LinearPredictor, rows_gone, told};
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.
 ///
-/// Minimises `Σ(σ + H((y − ŷ)/σ) σ) + α Σ w_j²` over the coefficients `w` of standardised features, the intercept and the scale `σ`,
-/// with `H(z) = z²` up to `|z| = ε` and `2ε|z| − ε²` beyond (Huber 1981, section 7.7). It goes over its rows several times, so
-/// they must fit in memory (`fit --memory`).
+/// Minimises `Σ(σ + H((y − ŷ)/σ) σ) + α Σ w_j²` over the coefficients `w`, the intercept and the scale `σ`, with features and truth
+/// standardised and `H(z) = z²` up to `|z| = ε`, `2ε|z| − ε²` beyond (Huber 1981, section 7.7). It goes over its rows several
+/// times, so they must fit in memory (`fit --memory`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Huber {
@@ -89,7 +89,18 @@ impl Trainer for RobustTrainer {
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let rows = self.blocks.rows().ok_or_else(|| rows_gone(&self.blocks))?;
-        let standard = Standardization::of(&self.blocks.total());
+        let gram = self.blocks.total();
+        let standard = Standardization::of(&gram);
+        let deviation = gram.variances()[gram.width()].sqrt();
+        // The penalty is against coefficients of a standardised truth.
+        let how = athermal_numerics::Huber {
+            alpha: if deviation > 0.0 {
+                self.how.alpha / deviation
+            } else {
+                self.how.alpha
+            },
+            ..self.how
+        };
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let solved = self
             .how

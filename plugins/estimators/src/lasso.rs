@@ -8,8 +8,8 @@ use crate::elastic_net::{FEATURES_AND_TRUTH, SparsePenalty, SparseTrainer, prese
 
 /// Linear regression of the truth on features that leaves out those it can do without.
 ///
-/// Minimises `1/(2n) Σ(y − ŷ)² + α Σ|w_j|` over the coefficients `w` of standardised features, the intercept free (Tibshirani
-/// 1996). Note that `α` stands against the *mean* of squares, that of ridge against their sum.
+/// Minimises `1/(2n) Σ(y − ŷ)² + α Σ|w_j|` over the coefficients `w`, the intercept free, with features and truth standardised
+/// (Tibshirani 1996), so that `α` means the same in all units. Note that `α` stands against the *mean* of squares, that of ridge against their sum.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Lasso {

@@ -29,10 +29,10 @@ pub enum Selection {
         #[serde(default = "four")]
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         f_enter: f64,
-        /// A regressor whose F is below leaves; from 0 to `f_enter`.
-        #[serde(default = "below_four")]
-        #[schemars(range(min = 0.0))]
-        f_remove: f64,
+        /// A regressor whose F is below this share of `f_enter` leaves; above 0 up to 1.
+        #[serde(default = "a_little_below")]
+        #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
+        leave_share: f64,
         /// The most regressors to choose; without it there is no limit.
         #[serde(default)]
         #[schemars(range(min = 1))]
@@ -83,8 +83,8 @@ fn four() -> f64 {
     4.0
 }
 
-fn below_four() -> f64 {
-    3.9
+fn a_little_below() -> f64 {
+    0.975
 }
 
 impl Selection {
@@ -92,7 +92,7 @@ impl Selection {
     pub(crate) fn stepwise() -> Self {
         Self::Stepwise {
             f_enter: four(),
-            f_remove: below_four(),
+            leave_share: a_little_below(),
             most: None,
         }
     }
@@ -114,7 +114,7 @@ impl Selection {
             }
             Self::Stepwise {
                 f_enter,
-                f_remove,
+                leave_share,
                 most,
             } => {
                 if !(f_enter > 0.0 && f_enter.is_finite()) {
@@ -122,12 +122,13 @@ impl Selection {
                         "selection.f_enter",
                         format!("`f_enter` is {f_enter} and must be above 0"),
                     ));
-                } else if !(0.0..=f_enter).contains(&f_remove) {
+                }
+                if !(leave_share > 0.0 && leave_share <= 1.0) {
                     let message =
-                        format!("`f_remove` is {f_remove} and must be from 0 to `f_enter`");
+                        format!("`leave_share` is {leave_share} and must be above 0 up to 1");
                     mistakes.push(
-                        Mistake::at("selection.f_remove", message)
-                            .help("or a regressor would come and go for ever"),
+                        Mistake::at("selection.leave_share", message)
+                            .help("above 1 a regressor would come and go for ever"),
                     );
                 }
                 most
@@ -157,12 +158,12 @@ impl Selection {
             Self::Floating(how) => (Direction::Floating, how),
             Self::Stepwise {
                 f_enter,
-                f_remove,
+                leave_share,
                 most,
             } => {
                 let how = Stepwise {
                     enter: f_enter,
-                    remove: f_remove,
+                    remove: leave_share * f_enter,
                     most,
                 };
                 return stepwise(how, regressors, blocks, scales, report);

@@ -59,7 +59,7 @@ conformance!(
     Case::new(
         r#"
         ahead = "30s"
-        selection = { method = "stepwise", f_enter = 4.0, f_remove = 3.9, most = 2 }
+        selection = { method = "stepwise", f_enter = 4.0, leave_share = 0.9, most = 2 }
         "#
     ),
 );

@@ -1,4 +1,5 @@
-"""Ridge, lasso and elastic net by scikit-learn on ../selection/input.csv, standardised over all rows. Writes expected.json beside itself.
+"""Ridge, lasso and elastic net by scikit-learn on ../selection/input.csv, standardised over all rows, for lasso and elastic
+net the target too. Writes expected.json beside itself.
 
 Generalised cross-validation is computed from its definition with numpy's SVD (Golub, Heath and Wahba 1979); the penalty that
 scikit-learn's RidgeCV chooses by its folds must be the best of the scores that are written.
@@ -17,6 +18,8 @@ raw, y = table[:, :-1], table[:, -1]
 deviation = raw.std(0)
 X = (raw - raw.mean(0)) / deviation
 n = len(y)
+size = y.std()
+target = (y - y.mean()) / size
 splits = list(KFold(5, shuffle=False).split(X))
 
 
@@ -28,8 +31,8 @@ def gcv(alpha):
     return float(n * np.sum((centred - fitted) ** 2) / (n - 1 - shrink.sum()) ** 2)
 
 
-def folds(model):
-    return list(map(float, cross_val_score(model, X, y, cv=splits, scoring="r2")))
+def folds(model, of=y):
+    return list(map(float, cross_val_score(model, X, of, cv=splits, scoring="r2")))
 
 
 alphas = [10.0**k for k in np.arange(-2, 4.01, 0.5)]
@@ -40,10 +43,10 @@ assert RidgeCV(alphas, cv=splits, scoring="r2").fit(X, y).alpha_ == best
 tight = dict(tol=1e-14, max_iter=1_000_000)
 models = []
 for alpha, ratio in [(0.01, 1.0), (0.1, 1.0), (0.5, 1.0), (0.1, 0.5), (0.02, 0.1)]:
-    model = ElasticNet(alpha=alpha, l1_ratio=ratio, **tight).fit(X, y)
+    model = ElasticNet(alpha=alpha, l1_ratio=ratio, **tight).fit(X, target)
     if ratio == 1.0:
-        assert np.allclose(model.coef_, Lasso(alpha=alpha, **tight).fit(X, y).coef_, atol=1e-10)
-    coef = model.coef_ / deviation
+        assert np.allclose(model.coef_, Lasso(alpha=alpha, **tight).fit(X, target).coef_, atol=1e-10)
+    coef = model.coef_ * size / deviation
     models.append({"alpha": alpha, "l1_ratio": ratio, "coef": list(map(float, coef)),
                    "intercept": float(y.mean() - coef @ raw.mean(0)), "zeros": int(np.sum(model.coef_ == 0))})
 
@@ -51,7 +54,7 @@ expected = {
     "penalties": penalties,
     "ridge_cv": {"by_folds": best, "by_gcv": min(penalties, key=lambda p: p["gcv"])["alpha"]},
     "elastic_net": models,
-    "largest_alpha": float(np.max(np.abs(X.T @ (y - y.mean()))) / n),
-    "lasso_folds": [{"alpha": float(a), "folds": folds(Lasso(alpha=a, **tight))} for a in np.logspace(-3, 0, 10)],
+    "largest_alpha": float(np.max(np.abs(X.T @ target)) / n),
+    "lasso_folds": [{"alpha": float(a), "folds": folds(Lasso(alpha=a, **tight), target)} for a in np.logspace(-3, 0, 10)],
 }
 (HERE / "expected.json").write_text(json.dumps(expected, indent=1) + "\n")
