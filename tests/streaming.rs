@@ -55,8 +55,8 @@ impl Rows for Wander {
         for sensor in 0..4 {
             let step = 0.01 * self.uniform() - 1e-4 * (self.temperatures[sensor] - 21.0);
             self.temperatures[sensor] += step;
-            values[sensor] = self.temperatures[sensor];
         }
+        values[..4].copy_from_slice(&self.temperatures);
         values[4] = 3.0 * (values[0] - 21.0) - 2.0 * (values[2] - 21.0) + self.uniform();
         Ok(Some(Event::Row(Instant::from_ns(
             self.second * 1_000_000_000,

@@ -137,6 +137,7 @@ impl Folds {
 }
 
 #[cfg(test)]
+#[allow(clippy::single_range_in_vec_init)]
 mod tests {
     use super::*;
     use crate::oracle;

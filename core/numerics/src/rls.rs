@@ -116,7 +116,7 @@ impl Rls {
         options: RlsOptions,
     ) -> Result<Self, NumericsError> {
         options.forgetting.check()?;
-        if !(options.most_trace > 0.0) {
+        if options.most_trace.is_nan() || options.most_trace <= 0.0 {
             return Err(NumericsError::Parameter {
                 name: "most_trace",
                 value: options.most_trace,

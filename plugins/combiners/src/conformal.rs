@@ -145,7 +145,9 @@ impl Combine for Calibrating {
 
     fn interval(&self, votes: Votes<'_>) -> [f64; 2] {
         let prediction = self.combine(votes);
-        let ends = self.reach().map(|reach| [prediction - reach, prediction + reach]);
+        let ends = self
+            .reach()
+            .map(|reach| [prediction - reach, prediction + reach]);
         ends.filter(|ends| ends.iter().all(|end| end.is_finite()))
             .unwrap_or([f64::NAN; 2])
     }

@@ -262,7 +262,7 @@ trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeO
     fn push(&mut self, value: f64) -> Option<MeanChange>;
 
     /// Goes on with the parameters of another.
-    fn as_told_to(self, other: &Self) -> Self;
+    fn told_by(self, other: &Self) -> Self;
 }
 
 impl Detector for numerics::PageHinkley {
@@ -270,7 +270,7 @@ impl Detector for numerics::PageHinkley {
         self.push(value)
     }
 
-    fn as_told_to(self, other: &Self) -> Self {
+    fn told_by(self, other: &Self) -> Self {
         self.with(other.options())
     }
 }
@@ -280,7 +280,7 @@ impl Detector for numerics::Adwin {
         self.push(value)
     }
 
-    fn as_told_to(self, other: &Self) -> Self {
+    fn told_by(self, other: &Self) -> Self {
         self.with(other.options())
     }
 }
@@ -413,7 +413,7 @@ where
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
         match state.known::<Seen<D>>() {
             Ok(mut known) => {
-                known.detector = known.detector.as_told_to(&self.seen.detector);
+                known.detector = known.detector.told_by(&self.seen.detector);
                 self.seen = known;
                 Restored::Accepted
             }

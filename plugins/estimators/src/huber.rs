@@ -102,9 +102,7 @@ impl Trainer for RobustTrainer {
             ..self.how
         };
         let all: Vec<usize> = (0..self.regressors.len()).collect();
-        let solved = self
-            .how
-            .solve(rows, &all, &standard.means, &standard.scales);
+        let solved = how.solve(rows, &all, &standard.means, &standard.scales);
         let fit = solved.map_err(told)?;
         let count = rows.count();
         let mut report = TrainingReport {

@@ -48,7 +48,7 @@ impl Names {
     /// Whether the templates, or Rust, use one of the names for something else.
     #[must_use]
     pub fn clash(&self) -> bool {
-        let texts = ROLES.map(|role| library(role));
+        let texts = ROLES.map(library);
         let taken = |word: &str| {
             let is = |c: char| c.is_alphanumeric() || c == '_';
             texts

@@ -74,12 +74,12 @@ impl LearnLimits {
     fn mistakes(self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         let Self { outliers, margin } = self;
-        if !(outliers > 1.0) {
+        if outliers.is_nan() || outliers <= 1.0 {
             let message = format!("`outliers` is {outliers} and must be above 1");
             let mistake = Mistake::at("learn.outliers", message);
             mistakes.push(mistake.help("4 to 10 keeps spikes out; inf lets everything in"));
         }
-        if !(margin >= 0.0) {
+        if margin.is_nan() || margin < 0.0 {
             let message = format!("`margin` is {margin} and must be 0 or more");
             let mistake = Mistake::at("learn.margin", message);
             mistakes.push(mistake.help("0 is the range of the fit itself, inf any"));

@@ -97,7 +97,7 @@ impl Trainer for Averaging {
         }
         let mut mean = self.sum / self.rows as f64;
         if self.fault == Fault::Reckless {
-            mean *= self.spread / self.spread;
+            mean = mean * self.spread / self.spread;
         }
         if self.fault == Fault::Unseeded {
             mean += FITS.fetch_add(1, Ordering::Relaxed) as f64;

@@ -133,6 +133,8 @@ enum Care {
 }
 
 impl Careless {
+    // What is tried is a check that NaN passes.
+    #[allow(clippy::manual_range_contains)]
     fn mistakes(&self, inputs: &Inputs) -> Vec<Mistake> {
         let (share, fault) = (self.share, self.fault);
         let wrong = match fault {

@@ -143,7 +143,7 @@ impl<'a> Subject<'a> {
     fn answers(&self) -> Result<(), String> {
         let course = course(&self.fixture, &mut self.engine(), self.events());
         let answers = |number| course.values(number).any(f64::is_finite);
-        if self.fixture.slots().len() == 0 {
+        if self.fixture.slots().is_empty() {
             return Err("the node has no output".to_owned());
         }
         if (0..self.fixture.slots().len()).any(answers) {
