@@ -56,4 +56,6 @@ mod guide {
     struct Estimator;
     #[doc = include_str!("../docs/src/combiner.md")]
     struct Combiner;
+    #[doc = include_str!("../docs/src/source.md")]
+    struct Source;
 }
