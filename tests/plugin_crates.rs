@@ -114,7 +114,10 @@ fn a_crate_that_is_not_made_for_this_athermal_is_refused_before_anything_is_buil
     let scratch = Scratch::new("build-refused");
     let binary = scratch.path("ours");
     let other = scratch.path("other-core");
-    std::fs::create_dir_all(&other).unwrap();
+    std::fs::create_dir_all(other.join("src")).unwrap();
+    let manifest = "[package]\nname = \"athermal-core\"\nversion = \"0.1.0\"\nedition = \"2024\"\n";
+    std::fs::write(other.join("Cargo.toml"), manifest).unwrap();
+    std::fs::write(other.join("src/lib.rs"), "").unwrap();
     let cases = [
         (
             with_core(&scratch, "old-nodes", "athermal-core = \"^99.1\""),

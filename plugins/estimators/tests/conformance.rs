@@ -155,7 +155,7 @@ conformance!(
 
 conformance!(
     Kalman,
-    Case::new(r#"ahead = "1min""#),
+    Case::new(r#"ahead = "1min""#).speaks_without_input(&["prediction", "deviation"]),
     Case::new(
         r#"
         ahead = "0s"
