@@ -502,7 +502,7 @@ fn evaluate_tells_how_often_intervals_hold() {
         .unwrap();
     assert_eq!(interval["stated"], 0.8);
     assert!(
-        (interval["covered"].as_f64().unwrap() - 0.8).abs() < 0.06,
+        (interval["covered"].as_f64().unwrap() - 0.8).abs() < 0.04,
         "{interval}"
     );
 }

@@ -103,7 +103,7 @@ impl Resolver<'_> {
         for &lag in &lags {
             if leaks(lag, link.span, link.ahead) {
                 let place = self.lag_place(instance, &lags, lag);
-                let problem = self.leak(truth, lag, &link, Vec::new());
+                let problem = self.leak((truth, lag), lag, &link, Vec::new());
                 self.diagnostics.report(place, problem);
                 whole = false;
             }

@@ -37,7 +37,7 @@ impl Resolver<'_> {
                 continue;
             };
             let path = self.way(slot, source);
-            let problem = self.leak(slot, lag, &suspect.link, path);
+            let problem = self.leak((slot, suspect.lag), lag, &suspect.link, path);
             let Suspect { place, context, .. } = suspect;
             self.diagnostics.report_in(context, place, problem);
         }
@@ -50,15 +50,16 @@ impl Resolver<'_> {
         shared.min_by_key(|(_, delay)| *delay)
     }
 
+    /// The problem of a slot that is read at a lag, behind its sources by `lag` in all.
     pub(super) fn leak(
         &self,
-        slot: usize,
+        (slot, read_at): (usize, Duration),
         lag: Duration,
         link: &TruthLink,
         path: Vec<String>,
     ) -> CompileProblem {
         CompileProblem::Leak {
-            regressor: self.regressor(slot, lag, slot == link.slot).name,
+            regressor: self.regressor(slot, read_at, slot == link.slot).name,
             lag,
             truth: self.channels[link.slot].name.clone(),
             span: link.span,
