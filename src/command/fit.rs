@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
-use athermal::core::node::SelectionStep;
+use athermal::core::node::{OrderTable, SelectionStep};
 use clap::Args;
 use serde_json::json;
 
 use super::data::{self, Data};
-use crate::figures::{count, number};
+use crate::figures::{count, number, table};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit a graph's estimators on recorded data
@@ -164,6 +164,31 @@ fn tell_step(text: &mut String, nth: &str, step: &SelectionStep, candidates: boo
     }
 }
 
+/// What is told of orders that were compared.
+fn tell_orders(text: &mut String, orders: &OrderTable) {
+    let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
+    let cells = orders.tried.iter().enumerate().map(|(nth, tried)| {
+        let chosen = nth == orders.chosen;
+        let mut cells = vec![
+            format!("  {}", tried.order),
+            tried.coefficients.to_string(),
+            format!("{:.2}", tried.aic),
+            format!("{:.2}", tried.aicc),
+            format!("{:.2}", tried.bic),
+            number(tried.fpe),
+        ];
+        if chosen {
+            cells.push(format!(
+                "smallest {}, on {} rows",
+                orders.by,
+                count(orders.rows as u64)
+            ));
+        }
+        cells
+    });
+    text.push_str(&table(&header, &cells.collect::<Vec<_>>()));
+}
+
 /// What is told of one estimator.
 fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     use std::fmt::Write as _;
@@ -205,6 +230,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     }
     if candidates && let Some(step) = &report.refused {
         tell_step(&mut text, "not", step, candidates);
+    }
+    if let Some(orders) = &report.orders {
+        tell_orders(&mut text, orders);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {

@@ -239,6 +239,8 @@ impl Resolver<'_> {
                 .sources()
                 .map(|(source, _)| self.channels[source].name.clone())
                 .collect(),
+            lag,
+            of_truth,
         }
     }
 
