@@ -24,7 +24,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal compare graphs/die-tester.toml mine.toml --data week.csv --on days.csv
-  athermal compare graphs/zoo.toml --data week.csv --on days.csv --abs-truth-below \"250 nm/min\"")]
+  athermal compare graphs/zoo.toml --data week.csv --on days.csv \\
+      --abs-truth-below \"250 nm/min\"")]
 pub struct Compare {
     /// The graphs, or models whose graphs are fitted anew
     #[arg(required = true, value_name = "GRAPH")]
