@@ -73,6 +73,18 @@ fn that_learning_is_frozen_is_part_of_a_snapshot() {
 }
 
 #[test]
+fn a_segment_that_ends_right_after_a_restart_is_learned_from_as_without_it() {
+    let text = graph(&format!("{RLS}\ninputs.freeze = \"hold\""));
+    let mut first = engine(&text);
+    run(&mut first, 0, &rows(15, 300, 100));
+    let mut second = engine(&text);
+    second.restore(&first.snapshot()).unwrap();
+    first.segment();
+    second.segment();
+    assert_eq!(first.snapshot(), second.snapshot());
+}
+
+#[test]
 fn a_fit_that_was_written_and_read_learns_with_the_same_bits() {
     let rows = rows(10, 500, 200);
     for node in [RLS, SGD] {

@@ -7,6 +7,7 @@ use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
 use super::estimate::Estimate;
 use super::state::{NodeState, SlotState};
 use super::{Engine, EngineState, RestoreError, Running};
+use crate::compile::PlannedRole;
 use crate::node::Restored;
 
 impl Engine {
@@ -233,6 +234,18 @@ impl Engine {
         self.before_break = state.before_break;
         self.refused = state.refused;
         self.frozen = state.frozen;
+        // A segment may end before the next tick, and what freezes learning then decides what is learned of it.
+        for node in &self.plan.nodes {
+            if let PlannedRole::Estimator {
+                learning: Some(learning),
+                ..
+            } = &node.role
+                && let Some(freeze) = learning.freeze
+            {
+                let gather = &self.plan.gathers[freeze];
+                self.gathered[freeze].read(gather, &self.slots, &self.histories, self.last);
+            }
+        }
     }
 }
 
