@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use athermal::core::engine::Engine;
-use athermal::core::live::{LiveOptions, pair};
+use athermal::core::live::{LiveOptions, Notice, pair};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
 use athermal::{Instant, Model};
@@ -176,4 +176,38 @@ fn a_replica_freezes_when_the_engine_does() {
             assert_eq!(replica.snapshot(), stepper.engine().snapshot());
         }
     }
+}
+
+#[test]
+fn a_graph_that_takes_over_is_frozen_although_the_command_was_missed() {
+    let rows = rows(16, 60, 30);
+    let model = model("missed", &graph(RLS));
+    let options = LiveOptions {
+        mirrored: 4,
+        ..LiveOptions::default()
+    };
+    let (mut stepper, mut control) = pair(&model, options).unwrap();
+    let mut took_over = 0;
+    for (tick, row) in rows.iter().enumerate() {
+        match tick {
+            20 => stepper.freeze(true),
+            40 => {
+                control.stage(&model, false).unwrap();
+                control.commit().unwrap();
+            }
+            _ => {}
+        }
+        stepper.step(secs(10.0 * tick as f64), row).unwrap();
+        // For a while nobody looks.
+        if !(10..30).contains(&tick) {
+            let notices = control.pump();
+            let swaps = notices
+                .iter()
+                .filter(|notice| matches!(notice, Notice::TookOver { .. }));
+            took_over += swaps.count();
+        }
+    }
+    assert!(stepper.missed() > 0);
+    assert_eq!(took_over, 1);
+    assert!(stepper.engine().frozen());
 }

@@ -67,7 +67,8 @@ impl Engine {
         })
     }
 
-    /// Lets outputs pass over from what another engine put out last; `from` says which of its outputs each follows.
+    /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
+    /// each follows, and what is frozen on command stays so.
     pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
         for ((_, blending), from) in self.blending.iter_mut().zip(from) {
             if let Some((_, last)) = from.and_then(|from| before.blending.get(from)) {
@@ -75,6 +76,8 @@ impl Engine {
             }
         }
         self.refused = before.refused;
+        // Whoever made this engine ready may have missed the command.
+        self.frozen = before.frozen;
     }
 
     /// All that the engine knows, by name.
