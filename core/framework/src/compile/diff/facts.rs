@@ -238,7 +238,9 @@ fn measured_parameters(kind: &'static Kind) -> &'static [String] {
     measured.get_or_init(|| {
         let schema = Value::from((kind.schema)());
         let parameters = schema["properties"].as_object().into_iter().flatten();
-        let measured = parameters.filter(|(_, schema)| is_measured(schema));
+        let definitions = &schema["$defs"];
+        let measured =
+            parameters.filter(|(_, schema)| is_measured(schema, definitions, &mut Vec::new()));
         measured.map(|(name, _)| name.clone()).collect()
     })
 }
@@ -284,12 +286,23 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     facts
 }
 
-/// Whether a parameter has units or quantities anywhere in it.
-fn is_measured(schema: &Value) -> bool {
+/// Whether a parameter has units or quantities anywhere in it, be it by way of the definitions that it names.
+fn is_measured<'a>(schema: &'a Value, definitions: &'a Value, followed: &mut Vec<&'a str>) -> bool {
     match schema {
-        Value::String(text) => text == "#/$defs/Unit" || text == "#/$defs/Quantity",
-        Value::Array(parts) => parts.iter().any(is_measured),
-        Value::Object(parts) => parts.values().any(is_measured),
+        Value::String(text) => match text.strip_prefix("#/$defs/") {
+            Some("Unit" | "Quantity") => true,
+            Some(name) if !followed.contains(&name) => {
+                followed.push(name);
+                is_measured(&definitions[name], definitions, followed)
+            }
+            _ => false,
+        },
+        Value::Array(parts) => parts
+            .iter()
+            .any(|part| is_measured(part, definitions, followed)),
+        Value::Object(parts) => parts
+            .values()
+            .any(|part| is_measured(part, definitions, followed)),
         _ => false,
     }
 }
