@@ -7,6 +7,7 @@ mod first_order;
 mod hampel;
 mod lag;
 mod moving;
+mod past;
 mod pick;
 mod resample;
 pub mod slope;
