@@ -7,6 +7,8 @@ use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::mean::mean;
+
 /// Adaptive conformal inference: intervals about any prediction, calibrated by its recent errors.
 ///
 /// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
@@ -137,10 +139,7 @@ impl Calibrating {
 
 impl Combine for Calibrating {
     fn combine(&self, votes: Votes<'_>) -> f64 {
-        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
-            (sum + vote, count + 1.0)
-        });
-        if count > 0.0 { sum / count } else { f64::NAN }
+        mean(votes)
     }
 
     fn interval(&self, votes: Votes<'_>) -> [f64; 2] {

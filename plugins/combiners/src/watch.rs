@@ -7,6 +7,8 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::mean::mean;
+
 /// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
 ///
 /// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the root mean
@@ -349,13 +351,6 @@ impl<D: Detector> Watching<D> {
             _ => reason::NONE,
         }
     }
-}
-
-/// The mean of the votes; NaN where there is none.
-fn mean(votes: Votes<'_>) -> f64 {
-    let add = |(sum, count), (_, vote)| (sum + vote, count + 1.0);
-    let (sum, count) = votes.present().fold((0.0, 0.0), add);
-    sum / count
 }
 
 impl<D: Detector> Combine for Watching<D>
