@@ -11,6 +11,7 @@ use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::slope::kernel::LIMIT;
 use crate::sorted::Sorted;
 use crate::summary::Summary;
 use crate::windows::{Cold, Windows, half, over, three, window_mistakes};
@@ -52,9 +53,6 @@ const MIN: usize = 2;
 const MAX: usize = 3;
 const RANGE: usize = 4;
 const MEDIAN: usize = 5;
-
-/// Samples of this size or above count as absent, like infinities: their squares would overflow.
-const LIMIT: f64 = 1e100;
 
 impl Feature for Moving {
     fn inputs() -> &'static [InputPort] {
