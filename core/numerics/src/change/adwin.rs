@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::MeanChange;
 use crate::NumericsError;
+use crate::checks::check_parameter;
 
 /// How many buckets of a size there are before two of them are put together.
 const BUCKETS: usize = 5;
@@ -100,21 +101,11 @@ impl Adwin {
     /// # Errors
     /// [`NumericsError::Parameter`] for options out of range.
     pub fn new(options: AdwinOptions) -> Result<Self, NumericsError> {
-        if !(options.confidence > 0.0 && options.confidence < 1.0) {
-            return Err(NumericsError::Parameter {
-                name: "confidence",
-                value: options.confidence,
-                allowed: "between 0 and 1",
-            });
-        }
+        let confidence = options.confidence;
+        let fine = confidence > 0.0 && confidence < 1.0;
+        check_parameter("confidence", confidence, fine, "between 0 and 1")?;
         for (name, value) in [("clock", options.clock), ("shortest", options.shortest)] {
-            if value == 0 {
-                return Err(NumericsError::Parameter {
-                    name,
-                    value: 0.0,
-                    allowed: "1 or more",
-                });
-            }
+            check_parameter(name, value as f64, value >= 1, "1 or more")?;
         }
         Ok(Self {
             options,

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::MeanChange;
 use crate::NumericsError;
+use crate::checks::check_parameter;
 
 /// How sensitive the test is, in the unit of the series.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,20 +57,12 @@ impl PageHinkley {
             factor,
             ..
         } = options;
-        let parameter = |name, value, allowed| NumericsError::Parameter {
-            name,
-            value,
-            allowed,
-        };
-        if !(tolerance >= 0.0 && tolerance.is_finite()) {
-            return Err(parameter("tolerance", tolerance, "0 or more"));
-        }
-        if !(threshold > 0.0 && threshold.is_finite()) {
-            return Err(parameter("threshold", threshold, "above 0"));
-        }
-        if !(factor > 0.0 && factor <= 1.0) {
-            return Err(parameter("factor", factor, "above 0 and at most 1"));
-        }
+        let fine = tolerance >= 0.0 && tolerance.is_finite();
+        check_parameter("tolerance", tolerance, fine, "0 or more")?;
+        let fine = threshold > 0.0 && threshold.is_finite();
+        check_parameter("threshold", threshold, fine, "above 0")?;
+        let fine = factor > 0.0 && factor <= 1.0;
+        check_parameter("factor", factor, fine, "above 0 and at most 1")?;
         Ok(Self::begin(options))
     }
 
