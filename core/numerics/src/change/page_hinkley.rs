@@ -129,32 +129,22 @@ impl PageHinkley {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle;
+    use crate::change::tests::{alarms, ignores_what_is_not_finite};
 
     #[test]
     fn alarms_are_those_of_the_oracle() {
-        let Some(input) = oracle::table("online_river/drift_input.csv") else {
+        let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
+        let Some(alarms) = alarms(|value| test.push(value)) else {
             return;
         };
-        let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
-        let rows = input.numbers();
-        let alarms: Vec<_> = (0..rows.len())
-            .filter_map(|row| Some((row, test.push(rows[row][0])?)))
-            .collect();
         // `page_hinkley_default` of drift_expected.json; the mean goes up at 800 and down at 1500.
         assert_eq!(alarms, [(833, MeanChange::Up), (1505, MeanChange::Down)]);
     }
 
     #[test]
     fn a_value_that_is_not_finite_changes_nothing_and_options_are_checked() {
-        let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
-        test.push(1.0);
-        let before = test.clone();
-        assert_eq!(
-            (test.push(f64::NAN), test.push(f64::INFINITY)),
-            (None, None)
-        );
-        assert_eq!(test, before);
+        let test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
+        ignores_what_is_not_finite(test, PageHinkley::push);
         let with = |tolerance, threshold, factor| {
             PageHinkley::new(PageHinkleyOptions {
                 tolerance,
