@@ -61,8 +61,7 @@ pub fn ljung_box(correlation: &[f64], count: usize) -> Vec<LjungBox> {
 
 /// The probability that `χ²` with so many degrees of freedom exceeds a value, by its finite series (Abramowitz and Stegun 1964,
 /// 26.4.4 and 26.4.5).
-#[must_use]
-pub fn chi_squared_tail(value: f64, degrees: usize) -> f64 {
+fn chi_squared_tail(value: f64, degrees: usize) -> f64 {
     if value.is_nan() || degrees == 0 {
         return f64::NAN;
     }
