@@ -2,7 +2,7 @@
 //! decide the coefficients.
 
 use crate::normal_equations::Problem;
-use crate::{Gram, LeastSquares, LinearFit, NumericsError};
+use crate::{Gram, LeastSquares, LinearFit, NumericsError, SINGULAR_BOUND};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Mat, Par, Side};
 use serde::{Deserialize, Serialize};
@@ -67,7 +67,7 @@ impl LeastSquares {
         let penalised = problem.penalised(self.alpha);
         let order = penalised.order();
         // What the rows do not determine at all must not make the whole unsolvable.
-        let least = order as f64 / self.condition_bound.powi(2);
+        let least = order as f64 / SINGULAR_BOUND.powi(2);
         let inverse = penalised
             .inverse_root(0.0)
             .or_else(|| penalised.inverse_root(least))
