@@ -4,6 +4,7 @@ mod arithmetic;
 mod delay;
 mod difference;
 mod first_order;
+mod forms;
 mod hampel;
 mod lag;
 mod moving;
