@@ -204,7 +204,7 @@ impl State<'_> {
                 let Some(step) = self.best(&old, Change::Removed) else {
                     break;
                 };
-                let record = &mut records[self.units.iter().filter(|there| **there).count() - 1];
+                let record = &mut records[self.size() - 1];
                 if step.mean.is_nan() || step.mean <= *record {
                     break;
                 }
