@@ -212,6 +212,8 @@ impl Rls {
     #[must_use]
     pub fn with(mut self, options: RlsOptions) -> Self {
         self.options = options;
+        // What has been read back must not have to make room later.
+        self.projected.resize(self.coefficients.len(), 0.0);
         self
     }
 
