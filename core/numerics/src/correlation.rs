@@ -137,8 +137,12 @@ fn about_mean(x: &[f64]) -> Vec<f64> {
 
 /// The same with missing values kept.
 fn about_mean_or_nan(x: &[f64]) -> Vec<f64> {
-    let present = || x.iter().filter(|value| !value.is_nan());
-    let mean = present().sum::<f64>() / present().count() as f64;
+    let present = || x.iter().copied().filter(|value| !value.is_nan());
+    let mean = match present().next() {
+        // Rounding would make their mean another, and the series one that varies.
+        Some(first) if present().all(|value| value == first) => first,
+        _ => present().sum::<f64>() / present().count() as f64,
+    };
     x.iter().map(|value| value - mean).collect()
 }
 
@@ -241,6 +245,7 @@ mod tests {
     #[test]
     fn a_constant_series_has_no_correlation() {
         assert!(autocorrelation(&[1.0; 5], 2)[1].is_nan());
+        assert!(autocorrelation(&[0.1; 10], 2)[1].is_nan());
         assert!(cross_correlation(&[1.0; 5], &[1.0, 2.0, 3.0, 4.0, 5.0], 1)[1].is_nan());
     }
 }
