@@ -482,6 +482,8 @@ fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
     never.ended(2).tells(&["--day is 0s"]);
     let short = athermal(&[&"diagnose", &model, &"--data", &log]);
     short.ended(0).tells(&["a shorter --day"]);
+    let countless = athermal(&[&"diagnose", &model, &"--data", &log, &"--day", &"1ns"]);
+    countless.ended(0).tells(&["a longer --day"]);
     let graph = athermal(&[&"diagnose", &graph("die-tester"), &"--data", &log]);
     graph.ended(2).tells(&["fit"]);
 }
