@@ -191,9 +191,8 @@ fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_t
     assert!(cause.residual.best > 0.9 && cause.residual.significance() > 5.0);
 }
 
-#[test]
-fn white_residuals_are_told_from_others() {
-    let text = r#"
+/// Two series that nothing predicts: each truth is all residual.
+const NOISE: &str = r#"
 schema = 1
 name = "noise"
 [time]
@@ -212,7 +211,10 @@ channel = ["white", "smooth"]
 [outputs]
 predicted = "nothing"
 "#;
-    let model = model("white", text, &[]);
+
+#[test]
+fn white_residuals_are_told_from_others() {
+    let model = model("white", NOISE, &[]);
     let mut random = Prng::stream(1, "noise");
     let (mut table, mut smooth) = (Table::default(), 0.0);
     for row in 0..2000 {
@@ -225,6 +227,18 @@ predicted = "nothing"
     assert_eq!(found[1].white(), Some(false));
     assert_eq!((found[1].spaced, found[1].spacing_s), (2000, 1.0));
     assert!((found[1].autocorrelation[0] - 0.6).abs() < 0.05);
+}
+
+#[test]
+fn a_single_truth_long_after_the_first_row_is_one_residual() {
+    let model = model("single", NOISE, &[]);
+    let mut table = Table::default();
+    table.push(secs(0.0), &[f64::NAN; 2]);
+    table.push(secs(36_000.0), &[1.0, f64::NAN]);
+    let observation = observe(&model, &table).unwrap();
+    let found = residual::residuals(&model.plan, &observation);
+    assert_eq!((found[0].count, found[0].spaced), (1, 1));
+    assert_eq!(found[0].white(), None);
 }
 
 #[test]
