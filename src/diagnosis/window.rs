@@ -142,7 +142,7 @@ fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
         .map(|of| of.slot)
 }
 
-/// 1, 2, 3, 5, 10, 20, 30, 50 of seconds, minutes, hours and days, as people choose windows; in s.
+/// Round lengths from a hundredth of a second to a week, as people choose windows; in s.
 pub fn nice_widths() -> impl Iterator<Item = f64> {
     const STEPS: [f64; 12] = [
         1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0,
