@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::data::{self, Data};
 use super::evaluate::check_limit;
-use super::fit::fit_on;
+use super::fit::fit_without_card;
 use crate::figures::{count, length, matrix, number, or_dash};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -65,7 +65,8 @@ impl Compare {
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
         for (path, mut model) in models {
             let began = Instant::now();
-            let report = fit_on(&mut model, &self.data, &FitOptions::default(), terminal)?;
+            let options = FitOptions::default();
+            let (_, report) = fit_without_card(&mut model, &self.data, &options, terminal)?;
             let seconds = began.elapsed().as_secs_f64();
             let path = path.display().to_string();
             // Graphs that share a name are told apart by their files.
