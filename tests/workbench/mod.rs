@@ -1,14 +1,16 @@
-//! What the tests share: where recorded data are, a graph from text, an engine stepped by hand, the program as a user calls
-//! it. Decides nothing that is expected.
+//! What the tests share: where recorded data are, a graph from text, an engine stepped by hand, an estimator fitted on rows, the
+//! program as a user calls it. Decides nothing that is expected.
 
 #![allow(dead_code, unused_imports)] // each test file uses its part
 
 mod bench;
 mod program;
+mod regression;
 mod simulated;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
 pub use program::{Finished, Scratch, athermal, athermal_fed};
+pub use regression::{coefficients, fitted, regression};
 pub use simulated::simulated;
 
 use std::path::{Path, PathBuf};
