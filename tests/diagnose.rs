@@ -5,6 +5,8 @@
 
 mod workbench;
 
+use std::ffi::OsStr;
+use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::fit::{FitOptions, fit};
@@ -17,7 +19,7 @@ use athermal::diagnosis::{
 };
 use athermal::files::Dataset;
 use athermal::{Duration, Instant, Model};
-use workbench::{Scratch, athermal, graph, linear, secs, simulated};
+use workbench::{Scratch, athermal_on, graph, linear, secs, simulated};
 
 /// Two temperatures and a position, every 10 s, and an estimator whose coefficients the test gives.
 const TWO_SENSORS: &str = r#"
@@ -397,25 +399,10 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
     let scratch = Scratch::new("diagnose");
     let week = simulated(&scratch, "log.csv", "die-tester", 2.5, 1);
     let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
-    athermal(&[
-        &"fit",
-        &graph("die-tester"),
-        &"--data",
-        &week,
-        &"-o",
-        &model,
-    ])
-    .ended(0);
-    let told = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &week,
-        &"--window",
-        &"--plots",
-        &plots,
-    ])
-    .ended(0);
+    athermal_on("fit", &graph("die-tester"), &week, &[&"-o", &model]).ended(0);
+    let diagnosed =
+        |more: &[&dyn AsRef<OsStr>]| athermal_on("diagnose", &model, &week, more).ended(0);
+    let told = diagnosed(&[&"--window", &"--plots", &plots]);
     for line in told.out.lines() {
         assert!(line.chars().count() <= 80, "{line}");
     }
@@ -447,28 +434,10 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
         let svg = std::fs::read_to_string(plots.join(&name)).unwrap();
         assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{name}");
     }
-    let facts = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &week,
-        &"--no-fit",
-        &"--format",
-        &"json",
-    ]);
-    let facts = facts.ended(0).json();
+    let facts = diagnosed(&[&"--no-fit", &"--format", &"json"]).json();
     assert_eq!(facts["diagnosis"]["main"].as_array().unwrap().len(), 6);
     assert!(facts["diagnosis"]["days"].is_null());
-    let of_one = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &week,
-        &"--no-fit",
-        &"--of",
-        &"thermal.Z1",
-    ]);
-    let of_one = of_one.ended(0);
+    let of_one = diagnosed(&[&"--no-fit", &"--of", &"thermal.Z1"]);
     assert!(
         of_one.out.contains("per σ") && !of_one.out.contains("vote.X1"),
         "{}",
@@ -481,25 +450,18 @@ fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
     let scratch = Scratch::new("undiagnosed");
     let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);
     let model = scratch.path("model.json");
-    athermal(&[&"fit", &graph("die-tester"), &"--data", &log, &"-o", &model]).ended(0);
-    let unknown = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &log,
-        &"--no-fit",
-        &"--of",
-        &"Z9",
-    ]);
+    athermal_on("fit", &graph("die-tester"), &log, &[&"-o", &model]).ended(0);
+    let of = |graph: &Path, more: &[&dyn AsRef<OsStr>]| athermal_on("diagnose", graph, &log, more);
+    let unknown = of(&model, &[&"--no-fit", &"--of", &"Z9"]);
     unknown.ended(2).tells(&["nothing called `Z9`", "vote.Z1"]);
-    let never = athermal(&[&"diagnose", &model, &"--data", &log, &"--day", &"0s"]);
+    let never = of(&model, &[&"--day", &"0s"]);
     never.ended(2).tells(&["--day is 0s"]);
-    let short = athermal(&[&"diagnose", &model, &"--data", &log]);
+    let short = of(&model, &[]);
     short.ended(0).tells(&["a shorter --day"]);
-    let countless = athermal(&[&"diagnose", &model, &"--data", &log, &"--day", &"1ns"]);
+    let countless = of(&model, &[&"--day", &"1ns"]);
     countless.ended(0).tells(&["a longer --day"]);
-    let graph = athermal(&[&"diagnose", &graph("die-tester"), &"--data", &log]);
-    graph.ended(2).tells(&["fit"]);
+    let unfitted = of(&graph("die-tester"), &[]);
+    unfitted.ended(2).tells(&["fit"]);
 }
 
 #[test]
