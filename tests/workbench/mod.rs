@@ -33,6 +33,18 @@ pub fn graph(name: &str) -> PathBuf {
     folder.join(name).with_extension("toml")
 }
 
+/// The graph files in a folder of this project, such as `graphs`, in the order of their names.
+pub fn graphs(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let files = std::fs::read_dir(folder).unwrap();
+    let mut graphs: Vec<_> = files
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .collect();
+    graphs.sort();
+    graphs
+}
+
 /// A file of reference results, as text; nothing, with a remark, where this machine lacks it.
 pub fn oracle(file: &str) -> Option<String> {
     let path = data()?.with_file_name("oracles").join(file);
