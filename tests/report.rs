@@ -380,6 +380,16 @@ fn a_sensor_that_failed_is_told_with_what_was_wrong() {
 }
 
 #[test]
+fn data_without_a_channel_are_a_wrong_request_to_report_as_to_evaluate() {
+    let scratch = Scratch::new("data_without_a_channel");
+    let data = scratch.file("data.csv", "time_s,room_degC\n0,20\n10,21\n");
+    let model = fitted(&scratch, "linear-axis", "linear-axis");
+    for command in ["evaluate", "report"] {
+        athermal_on(command, &model, &data, &[]).ended(2);
+    }
+}
+
+#[test]
 fn a_graph_without_a_prediction_is_told_so() {
     let scratch = Scratch::new("a_graph_without_a_prediction");
     let text = "schema = 1\nname = \"air\"\n[time]\ncolumn = \"time_s\"\n[signals.air]\nunit = \"Cel\"\nchannels = [\"room\"]\ncolumn = \"room_degC\"\n\
