@@ -7,6 +7,7 @@ use athermal::Model;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
 use athermal::core::node::SelectionStep;
+use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
 
@@ -120,13 +121,7 @@ pub fn fit_on(
     options: &FitOptions,
     terminal: &Terminal,
 ) -> Result<FitReport, Failure> {
-    let dataset = data.dataset();
-    let mut progress = terminal.progress("fitting");
-    let (fitted, report) = fit(&model.plan, &dataset, options, &mut |ticks| {
-        progress.tell(ticks);
-    })?;
-    drop(progress);
-    model.fitted = fitted;
+    let (dataset, report) = fit_without_card(model, data, options, terminal)?;
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),
@@ -138,13 +133,33 @@ pub fn fit_on(
         ticks: report.ticks,
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
+    Ok(report)
+}
+
+/// The same for a model that is not kept: a card has the checksums of all data.
+///
+/// # Errors
+/// When the data cannot be read.
+pub fn fit_without_card(
+    model: &mut Model,
+    data: &Data,
+    options: &FitOptions,
+    terminal: &Terminal,
+) -> Result<(Dataset, FitReport), Failure> {
+    let dataset = data.dataset();
+    let mut progress = terminal.progress("fitting");
+    let (fitted, report) = fit(&model.plan, &dataset, options, &mut |ticks| {
+        progress.tell(ticks);
+    })?;
+    drop(progress);
+    model.fitted = fitted;
     data::tell(
         terminal,
         &dataset.reports(),
         report.refused,
         &report.rejected,
     );
-    Ok(report)
+    Ok((dataset, report))
 }
 
 /// What is told of a step of a selection.

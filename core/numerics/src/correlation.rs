@@ -220,6 +220,15 @@ mod tests {
     }
 
     #[test]
+    fn autocorrelation_is_that_of_the_definition_and_gaps_do_not_count() {
+        // Mean 0: squares add up to 10, neighbours to 1·2 + 2·(−2) + (−2)·(−1) = 0, next but one to −2 − 2 = −4.
+        let found = autocorrelation(&[1.0, 2.0, -2.0, -1.0], 3);
+        assert_eq!(found, [1.0, 0.0, -0.4, -0.1]);
+        let with_gap = autocorrelation(&[1.0, 2.0, f64::NAN, -2.0, -1.0], 2);
+        assert_eq!(with_gap, [1.0, 0.4, -0.4]);
+    }
+
+    #[test]
     fn missing_values_are_left_out_and_not_taken_for_zero() {
         let x: Vec<f64> = (0..200).map(|i| 5.0 + f64::from(i % 7)).collect();
         let mut gappy = x.clone();
