@@ -33,8 +33,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
-                        athermal evaluate model.json --data test.csv --abs-truth-below \"250 nm/min\" --format json\n  \
-                        athermal evaluate model.json --data test.csv --mode k-step --steps 5\n  \
+                        athermal evaluate model.json --data test.csv --format json \\\n      \
+                        --abs-truth-below \"250 nm/min\"\n  \
                         athermal evaluate model.json --data test.csv --mode free-run"
 )]
 pub struct Evaluate {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 pub use crate::engine::Mode;
 pub use interval::IntervalScore;
-pub use table::{Score, Scores};
+pub use table::{RESTRICTS, Score, Scores};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
 pub(crate) use watch::{Prediction, Watch};
 

@@ -4,6 +4,7 @@ use super::filter::diagonal;
 use super::simplex::minimum;
 use super::{Kalman, Passage, Structural};
 use crate::NumericsError;
+use crate::checks::check_parameter;
 
 /// The logarithms of variances, relative to that of an observation and per typical step, that are tried before the search.
 const TRIED: [f64; 7] = [-14.0, -9.0, -6.0, -3.5, -1.5, 1.0, 5.0];
@@ -60,13 +61,7 @@ impl Series<'_> {
                 return Err(NumericsError::Width { expected, found });
             }
         }
-        if self.prior.is_nan() || self.prior <= 0.0 {
-            return Err(NumericsError::Parameter {
-                name: "prior",
-                value: self.prior,
-                allowed: "positive",
-            });
-        }
+        check_parameter("prior", self.prior, self.prior > 0.0, "positive")?;
         let infinite = |values: &[f64]| values.iter().any(|value| value.is_infinite());
         let negative = self.times.iter().any(|time| *time < 0.0);
         let unknown = self.regressors.iter().any(|x| x.is_nan());
