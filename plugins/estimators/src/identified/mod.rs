@@ -39,23 +39,19 @@ impl Asked {
             self.nk.is_some(),
         ];
         let of_all = [("na", self.na), ("nc", self.nc), ("nd", self.nd)];
-        let of_inputs = [
-            ("nb", &self.nb, 1),
-            ("nf", &self.nf, 0),
-            ("nk", &self.nk, 0),
-        ];
-        let mut check = |name: &str, order: usize, least: usize| {
-            if !(least..=LARGEST).contains(&order) {
-                let message = format!("`{name}` is {order} and must be {least} to {LARGEST}");
+        let of_inputs = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
+        let mut check = |name: &str, order: usize| {
+            if order > LARGEST {
+                let message = format!("`{name}` is {order} and must be 0 to {LARGEST}");
                 mistakes.push(Mistake::at(name, message));
             }
         };
         for (name, order) in of_all {
-            order.into_iter().for_each(|order| check(name, order, 0));
+            order.into_iter().for_each(|order| check(name, order));
         }
-        for (name, orders, least) in of_inputs {
+        for (name, orders) in of_inputs {
             let orders = orders.iter().flat_map(PerInput::each);
-            orders.for_each(|order| check(name, order, least));
+            orders.for_each(|order| check(name, order));
         }
         if self.differences > 2 {
             let message = format!("`differences` is {} and must be 0 to 2", self.differences);
@@ -94,8 +90,8 @@ impl Asked {
         ]
     }
 
-    /// The orders of a model with so many inputs, the open ones as in `chosen`.
-    fn orders(&self, inputs: usize, chosen: &[usize; 6]) -> Orders {
+    /// The orders of a model with inputs at these places among the features, the open ones as in `chosen`.
+    fn orders(&self, inputs: &[usize], chosen: &[usize; 6]) -> Orders {
         let open = self.order.as_ref().map_or([false; 6], Order::open);
         let of = |orders: &Option<PerInput>, letter: usize, nth: usize| match orders {
             Some(orders) if !open[letter] => orders.of(nth),
@@ -103,8 +99,9 @@ impl Asked {
         };
         Orders {
             na: chosen[0],
-            inputs: (0..inputs)
-                .map(|nth| InputOrders {
+            inputs: inputs
+                .iter()
+                .map(|&nth| InputOrders {
                     nb: of(&self.nb, 1, nth),
                     nf: of(&self.nf, 4, nth),
                     nk: of(&self.nk, 5, nth),

@@ -3,7 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    PredictionError, PredictionErrorFit, Samples, Standardization, Standardizer, Stepper,
+    InformationCriteria, PredictionError, PredictionErrorFit, Samples, Standardization,
+    Standardizer, Stepper,
 };
 
 use super::Asked;
@@ -20,6 +21,9 @@ const STEPS_AHEAD: usize = 256;
 pub(super) struct IdentifiedTrainer {
     asked: Asked,
     names: Vec<String>,
+    /// Where each stands among the features, of which there are so many.
+    places: Vec<usize>,
+    features: usize,
     span: Duration,
     memory: usize,
     rows: Vec<Row>,
@@ -45,6 +49,8 @@ impl IdentifiedTrainer {
         Self {
             asked,
             names: names.collect(),
+            places: setup.places.clone(),
+            features: setup.asked_for,
             span: setup.span,
             memory: setup.memory,
             rows: Vec::new(),
@@ -74,10 +80,15 @@ impl IdentifiedTrainer {
     }
 
     /// The rows as samples of several interleaved series, each as far apart as a step; where one is missing, a series ends and
-    /// another begins.
-    fn samples(&self, pace: Pace, standard: &Standardization) -> Samples {
+    /// another begins. Truths are in units of their spread, which is told too: the search must not depend on their unit.
+    fn samples(&self, pace: Pace, standard: &Standardization) -> (Samples, f64) {
         let width = self.names.len();
         let step = pace.step.secs();
+        let mut truths = Standardizer::new(1);
+        self.rows
+            .iter()
+            .for_each(|row| truths.partial_fit(&[row.truth]));
+        let spread = truths.standardization().scales[0];
         let mut samples = Samples::new(width);
         let mut from = 0;
         while from < self.rows.len() {
@@ -98,12 +109,12 @@ impl IdentifiedTrainer {
                     last = Some(at);
                     let mut inputs = self.regressors[nth * width..(nth + 1) * width].to_vec();
                     standard.apply(&mut inputs);
-                    samples.push(inputs, truth);
+                    samples.push(inputs, truth / spread);
                 }
             }
             from += length;
         }
-        samples
+        (samples, spread)
     }
 
     fn solve(&self, report: &mut TrainingReport) -> Result<Identified, TrainingError> {
@@ -115,7 +126,7 @@ impl IdentifiedTrainer {
                 (bytes / f64::from(1 << 20)).ceil() + 1.0
             )));
         }
-        if let Some(misfit) = self.asked.misfit(self.names.len()) {
+        if let Some(misfit) = self.asked.misfit(self.features) {
             return Err(unsolvable(misfit));
         }
         let too_few = TrainingError::TooFewRows {
@@ -130,8 +141,10 @@ impl IdentifiedTrainer {
                 .for_each(|row| standard.partial_fit(row));
         }
         let standard = standard.standardization();
-        let samples = self.samples(pace, &standard);
-        let fit = self.fit(&samples, report)?;
+        let (samples, spread) = self.samples(pace, &standard);
+        let mut fit = self.fit(&samples, spread, report)?;
+        fit.model.rescale(spread);
+        fit.residual_sum_of_squares *= spread * spread;
         if !fit.converged {
             report.notes.push(format!(
                 "the search had not ended after {} steps",
@@ -162,21 +175,22 @@ impl IdentifiedTrainer {
     fn fit(
         &self,
         samples: &Samples,
+        spread: f64,
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
         let search = PredictionError {
             penalty: self.asked.penalty,
             ..PredictionError::default()
         };
-        let width = self.names.len();
+        let inputs = &self.places;
         let Some(order) = self.asked.order else {
-            let orders = self.asked.orders(width, &self.asked.given());
+            let orders = self.asked.orders(inputs, &self.asked.given());
             return search.fit(&orders, samples, 0).map_err(told);
         };
         let candidates = order.combinations(self.asked.given());
         let orders: Vec<_> = candidates
             .iter()
-            .map(|one| self.asked.orders(width, one))
+            .map(|one| self.asked.orders(inputs, one))
             .collect();
         let first = orders
             .iter()
@@ -189,7 +203,10 @@ impl IdentifiedTrainer {
         for (candidate, orders) in candidates.iter().zip(&orders) {
             match search.fit(orders, samples, first) {
                 Ok(fit) => {
-                    tried.push((*candidate, orders.coefficients(), fit.criteria()));
+                    let squares = fit.residual_sum_of_squares * spread * spread;
+                    let coefficients = orders.coefficients();
+                    let figures = InformationCriteria::of(fit.rows, coefficients, squares);
+                    tried.push((*candidate, coefficients, figures));
                     fits.push(fit);
                 }
                 Err(error) => failed = Some(error),
