@@ -32,11 +32,11 @@ impl Names {
         let mut letters = name.chars();
         let begins = letters.next().is_some_and(|c| c.is_ascii_lowercase());
         let goes_on = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
-        if !begins || !letters.all(goes_on) || name.ends_with(['-', '_']) {
+        let kind = name.replace('-', "_");
+        let words = kind.split('_');
+        if !begins || !letters.all(goes_on) || words.clone().any(str::is_empty) {
             return None;
         }
-        let kind = name.replace('-', "_");
-        let words = kind.split('_').filter(|word| !word.is_empty());
         let capital = |word: &str| word[..1].to_ascii_uppercase() + &word[1..];
         Some(Self {
             package: name.to_owned(),

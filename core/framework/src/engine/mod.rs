@@ -326,6 +326,16 @@ impl Engine {
         &self.rejected
     }
 
+    /// The measured channels of which samples were rejected, and how many.
+    #[must_use]
+    pub fn rejected_channels(&self) -> Vec<(String, u64)> {
+        let counted = self.plan.sources.iter().zip(&self.rejected);
+        counted
+            .filter(|&(_, &count)| count > 0)
+            .map(|(source, &count)| (source.name.clone(), count))
+            .collect()
+    }
+
     /// How many ticks were refused because their time was not after the last one.
     #[must_use]
     pub fn refused(&self) -> u64 {
