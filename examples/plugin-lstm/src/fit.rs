@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::network::{Memory, Network};
+use crate::network::{MOST_UNITS, Memory, Network};
 
 /// A network with the scales of what it reads and answers, as a model file holds it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,10 +80,10 @@ impl Fit {
     }
 
     /// What each unit shows at the end of a row.
-    pub(crate) fn encode(&self, row: &[f64], codes: &mut [f64]) {
-        match self.remember(row) {
-            Some(memory) => codes.copy_from_slice(&memory.hidden()[..codes.len()]),
-            None => codes.fill(f64::NAN),
+    pub(crate) fn encode(&self, row: &[f64], code: &mut [f64; MOST_UNITS]) {
+        if let Some(memory) = self.remember(row) {
+            let units = self.network.units();
+            code[..units].copy_from_slice(memory.hidden(units));
         }
     }
 }

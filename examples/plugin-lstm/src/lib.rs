@@ -15,6 +15,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod adam;
+mod encoder;
 mod estimator;
 mod fit;
 mod gradient;
@@ -23,6 +24,7 @@ mod network;
 mod sequence;
 mod training;
 
+pub use encoder::LstmEncoder;
 pub use estimator::Lstm;
 pub use sequence::Sequence;
 pub use training::Training;

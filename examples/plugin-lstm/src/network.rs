@@ -116,9 +116,9 @@ impl Memory {
         }
     }
 
-    /// The hidden state: of each unit what it shows, between −1 and 1.
-    pub(crate) fn hidden(&self) -> &[f64; MOST_UNITS] {
-        &self.hidden
+    /// What each of so many units shows, between −1 and 1.
+    pub(crate) fn hidden(&self, units: usize) -> &[f64] {
+        &self.hidden[..units]
     }
 }
 
@@ -157,7 +157,7 @@ mod tests {
         let mut memory = Memory::empty();
         network.step(&[1.5], &mut memory);
         network.step(&[-0.7], &mut memory);
-        assert!((memory.hidden()[0] - h).abs() < 1e-15);
+        assert!((memory.hidden(1)[0] - h).abs() < 1e-15);
         assert!((network.read_out(&memory) - (2.0 * h - 0.25)).abs() < 1e-15);
     }
 

@@ -2,7 +2,7 @@
 
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
-use athermal_lstm::Lstm;
+use athermal_lstm::{Lstm, LstmEncoder};
 
 conformance!(
     Lstm,
@@ -23,6 +23,28 @@ conformance!(
         "#
     )
     .input("features", 1, "Cel"),
+);
+
+conformance!(
+    LstmEncoder,
+    Case::new(
+        r#"
+        ahead = "1min"
+        sequence = { steps = 3, every = "30s" }
+        units = 3
+        training = { epochs = 4, batch = 32 }
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "0s"
+        train.abs_truth = { below = "60 nm" }
+        sequence = { steps = 2, every = "1min" }
+        units = 1
+        training = { epochs = 2, rate = 0.02 }
+        "#
+    )
+    .input("features", 2, "Cel"),
 );
 
 #[test]
