@@ -228,7 +228,11 @@ fn it_learns_from_its_inputs_at_the_run_that_a_truth_belongs_to() {
 fn what_reads_it_is_fitted_after_it_on_what_it_then_gives() {
     let plan = plan(&with_output(&nodes("order", ""), "plain"));
     let (fitted, report) = fitted(&plan);
-    let told: Vec<_> = report.estimators.iter().map(|fit| (&*fit.node, fit.kind)).collect();
+    let told: Vec<_> = report
+        .estimators
+        .iter()
+        .map(|fit| (&*fit.node, fit.kind))
+        .collect();
     assert_eq!(told, [("code", "test_along"), ("plain", "linear")]);
     let mut engine = Engine::new(Arc::clone(&plan), &fitted).unwrap();
     let (code, out) = (slot(&plan, "code.along"), slot(&plan, "plain.Z"));
@@ -248,7 +252,10 @@ fn what_reads_it_is_fitted_after_it_on_what_it_then_gives() {
         athermal::core::fit::Outcome::Failed(error) => panic!("{error}"),
     };
     let rmse = f64::sqrt(squares / rows);
-    assert!((rmse - in_sample).abs() < 1e-9 * rmse, "{rmse} and {in_sample}");
+    assert!(
+        (rmse - in_sample).abs() < 1e-9 * rmse,
+        "{rmse} and {in_sample}"
+    );
 }
 
 #[test]
@@ -272,9 +279,15 @@ ahead = \"30s\"
 fn its_fit_stands_in_the_model_and_comes_back_to_the_last_bit() {
     let text = with_output(&nodes("model", ""), "plain");
     let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let graph = load_text("graph.toml", &text, &Memory::new(), &mut sources, &mut diagnostics)
-        .and_then(|read| declare(read, &mut diagnostics))
-        .unwrap();
+    let graph = load_text(
+        "graph.toml",
+        &text,
+        &Memory::new(),
+        &mut sources,
+        &mut diagnostics,
+    )
+    .and_then(|read| declare(read, &mut diagnostics))
+    .unwrap();
     let mut model = Model {
         graph,
         plan: plan(&text),
@@ -329,7 +342,10 @@ fn a_dead_channel_costs_it_a_regressor_and_not_its_rows() {
     let (fitted, report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
     let dropped: Vec<_> = report.estimators[0].dropped_candidates.iter().collect();
     assert_eq!(dropped.len(), 2, "{dropped:?}");
-    assert_eq!(fitted["code"].uses(), ["temperature.room", "temperature.room lag 20s"]);
+    assert_eq!(
+        fitted["code"].uses(),
+        ["temperature.room", "temperature.room lag 20s"]
+    );
     let mut engine = Engine::new(plan, &fitted).unwrap();
     for (tick, (now, values)) in samples().iter().take(20).enumerate() {
         assert_eq!(engine.step(*now, values).unwrap()[0].is_nan(), tick < 2);
@@ -342,7 +358,11 @@ fn it_needs_a_horizon_and_sees_nothing_of_the_future() {
     let told = problems(&with_output(&without, "code"));
     assert!(told.contains("A055"), "{told}");
     let leaking = nodes("mistakes", "")
-        .replacen("inputs.features = \"temperature\"", "inputs.features = { from = \"position.Z\", max_age = \"3min\" }", 1)
+        .replacen(
+            "inputs.features = \"temperature\"",
+            "inputs.features = { from = \"position.Z\", max_age = \"3min\" }",
+            1,
+        )
         .replacen("ahead = \"30s\"", "ahead = \"0s\"", 1);
     let told = problems(&with_output(&leaking, "code"));
     assert!(told.contains("position.Z"), "{told}");

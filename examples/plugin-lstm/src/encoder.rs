@@ -162,3 +162,51 @@ impl Predictor for FittedEncoder {
 }
 
 athermal_core::register!(LstmEncoder, Feature, "lstm_encoder");
+
+#[cfg(test)]
+mod tests {
+    use athermal_core::testkit::Bench;
+
+    use super::*;
+
+    #[test]
+    fn it_shows_its_memory_and_nothing_while_a_step_is_absent() {
+        let node = LstmEncoder {
+            sequence: Sequence {
+                steps: 3,
+                every: "10s".parse().unwrap(),
+            },
+            units: 2,
+            training: Training {
+                epochs: 5,
+                ..Training::default()
+            },
+        };
+        let wave = |tick: usize| (tick as f64 / 7.0).sin();
+        let rows = (0..200).map(|tick| (10.0 * tick as f64, [wave(tick), wave(tick + 3)]));
+        let mut bench = Bench::of(&node)
+            .input("features", 1, "K")
+            .with("ahead = \"0s\"")
+            .fitted_on(rows);
+        // The value of tick 5 is absent, and a held value counts for 1 min: it is missed from when that has passed.
+        let feature = |tick: usize| {
+            if (5..14).contains(&tick) {
+                f64::NAN
+            } else {
+                wave(tick)
+            }
+        };
+        let fed = (0..30).map(|tick| (10.0 * tick as f64, [feature(tick), 1.0]));
+        bench.feed(fed);
+        let [one, two] = ["node.unit1", "node.unit2"].map(|unit| bench.output(unit));
+        assert!(
+            one.iter()
+                .chain(&two)
+                .all(|shown| shown.is_nan() || shown.abs() < 1.0)
+        );
+        let given: Vec<usize> = (0..30).filter(|&tick| !one[tick].is_nan()).collect();
+        assert_eq!(given[..3], [2, 3, 4]);
+        assert!(!given.contains(&12) && given.contains(&20), "{given:?}");
+        assert_ne!(one[20], one[25]);
+    }
+}

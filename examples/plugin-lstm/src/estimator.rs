@@ -106,3 +106,69 @@ impl Predictor for FittedLstm {
 }
 
 athermal_core::register!(Lstm, Estimator, "lstm");
+
+#[cfg(test)]
+mod tests {
+    use athermal_core::prng::Prng;
+    use athermal_core::testkit::Bench;
+
+    use super::*;
+
+    /// A feature that jumps every 10 s, and a truth that is twice what it was 20 s before, unless it has turned round since.
+    fn rows() -> Vec<(f64, [f64; 2])> {
+        let mut random = Prng::stream(11, "rows");
+        let features: Vec<f64> = (0..1200).map(|_| random.between(-1.0, 1.0)).collect();
+        let row = |tick: usize| {
+            let (now, before) = (features[tick], features[tick.saturating_sub(2)]);
+            let truth = if now * before > 0.0 {
+                2.0 * before
+            } else {
+                0.0
+            };
+            (10.0 * tick as f64, [now, truth])
+        };
+        (0..features.len()).map(row).collect()
+    }
+
+    #[test]
+    fn what_no_linear_model_of_the_past_finds_is_predicted() {
+        let node = Lstm {
+            sequence: Sequence {
+                steps: 3,
+                every: "10s".parse().unwrap(),
+            },
+            units: 8,
+            training: Training {
+                epochs: 150,
+                patience: 30,
+                rate: 0.02,
+                ..Training::default()
+            },
+        };
+        let rows = rows();
+        let mut bench = Bench::of(&node)
+            .input("features", 1, "K")
+            .with("ahead = \"0s\"")
+            .fitted_on(rows.iter().copied());
+        bench.feed(
+            rows.iter()
+                .map(|&(at, [feature, _])| (at, [feature, f64::NAN])),
+        );
+        let predictions = bench.output("node.a");
+        assert!(
+            predictions[..2]
+                .iter()
+                .all(|prediction| prediction.is_nan())
+        );
+        let pairs = || rows.iter().zip(&predictions).skip(2);
+        let mean_square = |of: &dyn Fn(f64, f64) -> f64| {
+            let squares =
+                pairs().map(|((_, [_, truth]), prediction)| of(*truth, *prediction).powi(2));
+            squares.sum::<f64>() / pairs().count() as f64
+        };
+        let left = mean_square(&|truth, prediction| truth - prediction);
+        let all = mean_square(&|truth, _| truth);
+        // The best line through the value 20 s before explains half.
+        assert!(left < 0.15 * all, "{left} of {all}");
+    }
+}

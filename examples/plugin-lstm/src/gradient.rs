@@ -37,6 +37,8 @@ pub(crate) struct Passage {
     gates: Vec<Vec<f64>>,
     /// For each step `c`, before the first too.
     cells: Vec<Vec<f64>>,
+    /// For each step `tanh(c)`.
+    shown: Vec<Vec<f64>>,
     /// The gradients of a step's gates, of what entered it, and of its cells.
     of_gates: Vec<f64>,
     of_entering: Vec<f64>,
@@ -54,6 +56,7 @@ impl Passage {
             entering: room(steps + 1, entering),
             gates: room(steps, 4 * units),
             cells: room(steps + 1, units),
+            shown: room(steps, units),
             of_gates: vec![0.0; 4 * units * batch],
             of_entering: vec![0.0; entering * batch],
             of_cells: vec![0.0; units * batch],
@@ -139,8 +142,9 @@ impl Passage {
             let cells = known[step]
                 .chunks_exact(units)
                 .zip(new[0].chunks_exact_mut(units));
-            let hidden = after[0].chunks_exact_mut(wide);
-            for ((gates, (known, new)), hidden) in
+            let shown = self.shown[step].chunks_exact_mut(units);
+            let hidden = after[0].chunks_exact_mut(wide).zip(shown);
+            for ((gates, (known, new)), (hidden, shown)) in
                 gates.chunks_exact_mut(rows).zip(cells).zip(hidden)
             {
                 for unit in 0..units {
@@ -151,7 +155,8 @@ impl Passage {
                     gates[candidate] = gates[candidate].tanh();
                     gates[output] = sigmoid(gates[output]);
                     new[unit] = gates[forget] * known[unit] + gates[input] * gates[candidate];
-                    hidden[channels + unit] = gates[output] * new[unit].tanh();
+                    shown[unit] = new[unit].tanh();
+                    hidden[channels + unit] = gates[output] * shown[unit];
                 }
             }
         }
@@ -169,19 +174,19 @@ impl Passage {
         let (rows, wide) = (4 * units, channels + units + 1);
         let gates = self.gates[step].chunks_exact(rows);
         let cells = self.cells[step].chunks_exact(units);
-        let cells = cells.zip(self.cells[step + 1].chunks_exact(units));
+        let cells = cells.zip(self.shown[step].chunks_exact(units));
         let of_cells = self.of_cells.chunks_exact_mut(units);
         let of_gates = self.of_gates.chunks_exact_mut(rows);
         let of_hidden = self.of_entering.chunks_exact(wide);
         let gradients = of_cells.zip(of_gates).zip(of_hidden).take(count);
-        for ((gates, (before, after)), ((of_cells, of_gates), of_hidden)) in
+        for ((gates, (before, shown)), ((of_cells, of_gates), of_hidden)) in
             gates.zip(cells).zip(gradients)
         {
             for unit in 0..units {
                 let [input, forget, candidate, output] =
                     [0, 1, 2, 3].map(|gate| gate * units + unit);
                 let (i, f, g, o) = (gates[input], gates[forget], gates[candidate], gates[output]);
-                let shown = after[unit].tanh();
+                let shown = shown[unit];
                 let of_hidden = of_hidden[channels + unit];
                 let of_cell = of_cells[unit] + of_hidden * o * (1.0 - shown * shown);
                 of_gates[input] = of_cell * g * i * (1.0 - i);

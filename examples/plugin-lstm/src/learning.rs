@@ -418,6 +418,6 @@ mod tests {
         }
         let trained = Box::new(learning).finish().unwrap();
         let told = &trained.report.notes[0];
-        assert!(!told.contains("60 of 60 epochs"), "{told}");
+        assert!(!told.contains("40 of 40 epochs"), "{told}");
     }
 }

@@ -30,8 +30,8 @@ pub struct Training {
 impl Default for Training {
     fn default() -> Self {
         Self {
-            epochs: 60,
-            patience: 8,
+            epochs: 40,
+            patience: 5,
             batch: 64,
             rate: 5e-3,
             validation: 0.2,
