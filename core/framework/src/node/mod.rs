@@ -22,8 +22,8 @@ pub use combiner::{Combine, Combiner, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup, TruthLags,
+    CandidateScore, Estimator, OrderTable, Predictor, Regressor, Regressors, SelectionStep,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use learner::{Learner, Learns, TrainedRange};
