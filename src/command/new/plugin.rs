@@ -151,7 +151,7 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
         ),
         Role::Source | Role::Sink => (
             format!("a {}", role.word()),
-            "run a graph with it (README.md has rows to try)",
+            "run a graph with it (README.md says more)",
         ),
     };
     let graph = format!("graphs/{package}.toml");
@@ -160,8 +160,13 @@ fn next(folder: &Path, names: &Names, role: Role) -> String {
         "  cargo test".to_owned(),
     ];
     match role {
-        Role::Source => lines.push(command(&["cargo run --example run --", &graph])),
-        Role::Sink => lines.push(command(&["cargo run --example run --", &graph, "-"])),
+        Role::Source => {
+            let line = "echo '0 plate=21.5' |";
+            lines.push(command(&[line, "cargo run --example run --", &graph]));
+        }
+        Role::Sink => {
+            lines.push(command(&["cargo run --example run --", &graph, "log.csv"]));
+        }
         _ => {
             let build = "build --with path:. -o target/athermal";
             lines.push(command(&[&program(), build]));
