@@ -37,15 +37,7 @@ impl Resolver<'_> {
         let mistakes = estimator.mistakes();
         let sound = mistakes.is_empty();
         self.mistakes(instance, mistakes);
-        let ahead = instance.read.estimator.ahead;
-        if ahead.is_none() {
-            self.diagnostics.report(
-                instance.node.place,
-                CompileProblem::NoHorizon {
-                    kind: instance.kind.name,
-                },
-            );
-        }
+        let ahead = self.horizon(instance);
         let mut features = Some((None, Vec::new()));
         let mut truth = None;
         for port in (instance.kind.inputs)() {
@@ -167,6 +159,17 @@ impl Resolver<'_> {
         self.add(instance, ports, role, behind, Some(truth))
     }
 
+    /// How far ahead of now the truth is that is learned from.
+    pub(super) fn horizon(&mut self, instance: &Instance<'_>) -> Option<Duration> {
+        let ahead = instance.read.estimator.ahead;
+        if ahead.is_none() {
+            let kind = instance.kind.name;
+            let problem = CompileProblem::NoHorizon { kind };
+            self.diagnostics.report(instance.node.place, problem);
+        }
+        ahead
+    }
+
     /// Whether predictions are of the truth that is predicted from them, as far ahead.
     fn votes_fit(
         &mut self,
@@ -266,7 +269,11 @@ impl Resolver<'_> {
         instance.element_place("lags", nth)
     }
 
-    fn limits(&mut self, instance: &Instance<'_>, link: &TruthLink) -> Option<TrainingLimits> {
+    pub(super) fn limits(
+        &mut self,
+        instance: &Instance<'_>,
+        link: &TruthLink,
+    ) -> Option<TrainingLimits> {
         let Limits { below, above } = instance.read.estimator.train.abs_truth.clone();
         let unit = self.channels[link.slot].channel.unit.clone();
         let mut whole = true;

@@ -7,8 +7,44 @@ use super::gather::Gathered;
 use super::learning::Learning;
 use super::state::NodeState;
 use crate::compile::{PlannedNode, PlannedRole};
-use crate::node::{Predictor, Restored};
+use crate::node::{FeatureFit, Predictor, Regressor, Restored};
 use crate::time::Instant;
+
+/// Where each of the regressors that a fit uses is among those of its node.
+///
+/// # Errors
+/// When the node has none of a name that the fit uses.
+fn places_of(
+    node: &PlannedNode,
+    regressors: &[Regressor],
+    fit: &dyn Predictor,
+) -> Result<Vec<usize>, EngineError> {
+    let names = || regressors.iter().map(|regressor| &regressor.name);
+    let place = |name: &String| {
+        let place = names().position(|known| known == name);
+        place.ok_or_else(|| EngineError::UnknownRegressor {
+            node: node.instance(),
+            regressor: name.clone(),
+            known: names().cloned().collect(),
+        })
+    };
+    fit.uses().iter().map(place).collect()
+}
+
+/// What a feature was fitted to, as what runs is built from it.
+///
+/// # Errors
+/// When the node has no regressor of a name that the fit uses.
+pub(super) fn fit_of(
+    node: &PlannedNode,
+    regressors: &[Regressor],
+    predictor: &Arc<dyn Predictor>,
+) -> Result<FeatureFit, EngineError> {
+    Ok(FeatureFit {
+        places: places_of(node, regressors, &**predictor)?,
+        predictor: Arc::clone(predictor),
+    })
+}
 
 /// A fitted estimator in a running plan.
 #[derive(Debug)]
@@ -49,25 +85,8 @@ impl Estimate {
             .iter()
             .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
             .collect();
-        let place = |name: &String| match regressors
-            .iter()
-            .position(|regressor| regressor.name == *name)
-        {
-            Some(index) => Ok(places[index]),
-            None => Err(EngineError::UnknownRegressor {
-                node: node.instance(),
-                regressor: name.clone(),
-                known: regressors
-                    .iter()
-                    .map(|regressor| regressor.name.clone())
-                    .collect(),
-            }),
-        };
-        let places = predictor
-            .uses()
-            .iter()
-            .map(place)
-            .collect::<Result<Vec<_>, _>>()?;
+        let used = places_of(node, regressors, &*predictor)?;
+        let places: Vec<_> = used.into_iter().map(|index| places[index]).collect();
         let learning = match learning {
             None => None,
             Some(planned) => {

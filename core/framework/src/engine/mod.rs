@@ -33,13 +33,13 @@ pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
 use crate::compile::{Plan, PlannedRole, Step};
-use crate::node::{Operator, Outputs, Predictor, Role, Tick};
+use crate::node::{Inputs, Operator, Outputs, Predictor, Role, Tick};
 use crate::time::{Duration, Instant};
 use blend::Blending;
 use estimate::Estimate;
 use vote::Vote;
 
-/// The fitted estimators of a graph, by instance: `thermal.Z1`.
+/// What was fitted of a graph, estimators and features, by instance: `thermal.Z1`.
 pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
 
 /// A running plan.
@@ -118,14 +118,30 @@ impl Engine {
                         wanted,
                         every_tick,
                         closes_loops,
+                        fit,
                     },
                     Role::Feature(spec),
-                ) => Running::Operator {
-                    operator: spec.build(inputs, wanted),
-                    gathers: gathers.clone(),
-                    every_tick: *every_tick,
-                    closes_loops: *closes_loops,
-                },
+                ) => {
+                    let given = fitted.get(&node.instance());
+                    let operator = match (fit, given) {
+                        (Some(fit), Some(given)) => {
+                            used += 1;
+                            let fit = estimate::fit_of(node, &fit.regressors, given)?;
+                            let inputs = Inputs {
+                                fit: Some(fit),
+                                ..inputs.clone()
+                            };
+                            spec.build(&inputs, wanted)
+                        }
+                        _ => spec.build(inputs, wanted),
+                    };
+                    Running::Operator {
+                        operator,
+                        gathers: gathers.clone(),
+                        every_tick: *every_tick,
+                        closes_loops: *closes_loops,
+                    }
+                }
                 (
                     PlannedRole::Estimator {
                         regressors,
@@ -162,7 +178,7 @@ impl Engine {
         if used < fitted.len() {
             let known = |name: &&String| {
                 let is = |node: &crate::compile::PlannedNode| {
-                    matches!(node.role, PlannedRole::Estimator { .. }) && node.instance() == **name
+                    node.role.learns_from().is_some() && node.instance() == **name
                 };
                 !plan.nodes.iter().any(is)
             };
