@@ -38,6 +38,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("mean", "athermal-combiners"),
         ("median", "athermal-combiners"),
         ("moving", "athermal-features"),
+        ("narx", "athermal-estimators"),
         ("optical_loss", "athermal-control"),
         ("page_hinkley", "athermal-combiners"),
         ("persistence", "athermal-estimators"),

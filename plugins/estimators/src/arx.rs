@@ -7,7 +7,7 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::lags::lag_mistakes;
+use crate::lags::{lag_mistakes, now};
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
 use crate::solver::Solver;
@@ -32,10 +32,6 @@ pub struct Arx {
     /// How features and lags are chosen; without it, all are used.
     #[serde(default)]
     pub selection: Option<Selection>,
-}
-
-fn now() -> Vec<Duration> {
-    vec![Duration::ZERO]
 }
 
 impl Estimator for Arx {
