@@ -26,7 +26,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
-                        athermal evaluate model.json --data test.csv --abs-truth-below \"250 nm/min\" --format json"
+                        athermal evaluate model.json --data test.csv --format json \\\n      \
+                        --abs-truth-below \"250 nm/min\""
 )]
 pub struct Evaluate {
     /// The model, or a graph in which nothing needs fitting

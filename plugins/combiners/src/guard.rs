@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::errors::{ByErrors, Errors, Rule};
+use crate::mean::mean;
 use crate::memory::Memory;
 
 /// Passes a prediction on only while it does no harm: while its recent error is below that of predicting zero.
@@ -122,13 +123,9 @@ impl Guarding {
 
 impl Rule for Guarding {
     fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
-        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
-            (sum + vote, count + 1.0)
-        });
-        if count == 0.0 {
-            f64::NAN
-        } else if self.passes(errors) {
-            sum / count
+        let mean = mean(votes);
+        if mean.is_nan() || self.passes(errors) {
+            mean
         } else {
             0.0
         }

@@ -1,16 +1,14 @@
 //! First-order lags: the thermal masses between a sensor and what it explains.
 
-use std::fmt;
-
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
     Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::forms::list_or_table;
 
 /// A bank of first-order lags: each channel as thermal masses of several time constants would follow it.
 ///
@@ -61,26 +59,10 @@ pub enum FirstOrderOutput {
     Value,
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for TimeConstants {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = TimeConstants;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a list of durations or a logarithmic grid of them")
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<TimeConstants, A::Error> {
-                Deserialize::deserialize(SeqAccessDeserializer::new(list)).map(TimeConstants::List)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, grid: A) -> Result<TimeConstants, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(grid)).map(TimeConstants::Grid)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        let expected = "a list of durations or a logarithmic grid of them";
+        list_or_table(deserializer, expected, Self::List, Self::Grid)
     }
 }
 

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 
 use crate::terminal::{Answer, Failure, Terminal};
 
-/// Begin something of your own
+/// Begin something of your own: a plugin crate
 #[derive(Debug, Args)]
 pub struct New {
     #[command(subcommand)]

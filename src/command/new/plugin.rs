@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::template::{Names, Role, files};
-use crate::checkout::{Checkout, VERSION};
+use crate::checkout::{Checkout, VERSION, in_toml};
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -53,9 +53,9 @@ impl Plugin {
                 folder.display()
             )));
         }
-        let sources = escaped(checkout.folder());
+        let core = in_toml(&checkout.core());
         let mut written = Vec::new();
-        for (path, text) in files(&names, self.role, &sources, VERSION) {
+        for (path, text) in files(&names, self.role, &core, VERSION) {
             let path = folder.join(path);
             write(&path, &text)?;
             written.push(path);
@@ -101,14 +101,6 @@ impl Plugin {
         }
         Ok(names)
     }
-}
-
-/// A path within the quotes of a manifest.
-fn escaped(path: &Path) -> String {
-    path.display()
-        .to_string()
-        .replace('\\', "\\\\")
-        .replace('"', "\\\"")
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {

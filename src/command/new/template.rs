@@ -92,9 +92,9 @@ const CRATES: [&str; 9] = [
     "typetag",
 ];
 
-/// The files of a crate: paths in it and what they say.
+/// The files of a crate: paths in it and what they say. `core` is the folder of the core as it stands in a manifest.
 #[must_use]
-pub fn files(names: &Names, role: Role, athermal: &str, version: &str) -> Vec<(String, String)> {
+pub fn files(names: &Names, role: Role, core: &str, version: &str) -> Vec<(String, String)> {
     let cases = match role {
         Role::Feature => {
             r#"Case::new("samples = 5"),
@@ -109,9 +109,11 @@ pub fn files(names: &Names, role: Role, athermal: &str, version: &str) -> Vec<(S
     Case::new("pace = 1.0").input("voters", 5, "nm"),"#
         }
     };
-    let manifest = include_str!("template/Cargo.toml.txt")
-        .replace("ATHERMAL", athermal)
-        .replace("VERSION", version);
+    // What is put in last is not looked through again: a folder may be called anything.
+    let manifest = names
+        .put_into(include_str!("template/Cargo.toml.txt"))
+        .replace("VERSION", version)
+        .replace("CORE", core);
     let conformance = include_str!("template/conformance.rs.txt").replace(
         "conformance!(MyNode, CASES);",
         &format!("conformance!(\n    MyNode,\n    {cases}\n);"),
@@ -121,8 +123,8 @@ pub fn files(names: &Names, role: Role, athermal: &str, version: &str) -> Vec<(S
         Role::Estimator => include_str!("template/estimator/graph.toml"),
         Role::Combiner => include_str!("template/combiner/graph.toml"),
     };
-    [
-        ("Cargo.toml".to_owned(), manifest.as_str()),
+    let mut files = vec![("Cargo.toml".to_owned(), manifest)];
+    let others = [
         (
             "README.md".to_owned(),
             include_str!("template/README.md.txt"),
@@ -131,9 +133,9 @@ pub fn files(names: &Names, role: Role, athermal: &str, version: &str) -> Vec<(S
         ("src/lib.rs".to_owned(), library(role)),
         ("tests/conformance.rs".to_owned(), conformance.as_str()),
         (format!("graphs/{}.toml", names.package), graph),
-    ]
-    .map(|(path, text)| (path, names.put_into(text)))
-    .into()
+    ];
+    files.extend(others.map(|(path, text)| (path, names.put_into(text))));
+    files
 }
 
 fn library(role: Role) -> &'static str {
@@ -169,13 +171,21 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_may_be_called_like_what_is_replaced() {
+        let names = Names::of("room-lag").unwrap();
+        let core = "\"/srv/my-node/CORE/VERSION\"";
+        let (path, text) = files(&names, Role::Feature, core, "1.2.3").swap_remove(0);
+        assert_eq!(path, "Cargo.toml");
+        let line = format!("athermal-core = {{ path = {core}, version = \"1.2.3\" }}\n");
+        assert!(text.contains(&line), "{text}");
+    }
+
+    #[test]
     fn nothing_of_the_template_is_left_over() {
         let names = Names::of("room-lag").unwrap();
         for role in ROLES {
-            for (path, text) in files(&names, role, "/sources", "1.2.3") {
-                for left in [
-                    "my_node", "my-node", "MyNode", "ATHERMAL", "VERSION", "CASES",
-                ] {
+            for (path, text) in files(&names, role, "\"/sources\"", "1.2.3") {
+                for left in ["my_node", "my-node", "MyNode", "CORE", "VERSION", "CASES"] {
                     assert!(!text.contains(left), "{left} in {path}:\n{text}");
                 }
             }

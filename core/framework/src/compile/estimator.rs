@@ -235,10 +235,29 @@ impl Resolver<'_> {
         Regressor {
             name,
             unit: from.channel.unit.to_string(),
-            sensors: self.provenance[slot]
-                .sources()
-                .map(|(source, _)| self.channels[source].name.clone())
-                .collect(),
+            sensors: Vec::new(),
+        }
+    }
+
+    /// Notes which measured channels each regressor is made from, which is known once loops have been followed.
+    pub(super) fn name_sensors(&mut self) {
+        for node in &mut self.nodes {
+            let PlannedRole::Estimator {
+                regressors,
+                gathers,
+                ..
+            } = &mut node.role
+            else {
+                continue;
+            };
+            let entries = gathers
+                .iter()
+                .flat_map(|&gather| &self.gathers[gather].entries);
+            for (regressor, entry) in regressors.iter_mut().zip(entries) {
+                let sources = self.provenance[entry.slot].sources();
+                let name = |(source, _): (usize, Duration)| self.channels[source].name.clone();
+                regressor.sensors = sources.map(name).collect();
+            }
         }
     }
 

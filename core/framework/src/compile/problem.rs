@@ -282,10 +282,6 @@ impl Problem for CompileProblem {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
             Self::DuplicateName { name, what } => format!("there are two {what} named `{name}`"),
-            Self::UnusedNode { node } if node.contains('/') => {
-                "refer to it, name it under the module's `outputs`, or leave it out of the module"
-                    .to_owned()
-            }
             Self::UnusedNode { node } => {
                 format!("nothing that comes out depends on the node `{node}`")
             }
@@ -409,6 +405,10 @@ impl Problem for CompileProblem {
             Self::LimitUnit { expected, .. } => format!("write the limit in {expected}"),
             Self::DuplicateName { .. } => {
                 "give one of them another name, or refer to fewer channels".to_owned()
+            }
+            Self::UnusedNode { node } if node.contains('/') => {
+                "refer to it, name it under the module's `outputs`, or leave it out of the module"
+                    .to_owned()
             }
             Self::UnusedNode { node } => {
                 format!(

@@ -160,6 +160,7 @@ impl Estimate {
     pub(crate) fn restore(&mut self, state: &NodeState) -> Restored {
         match &mut self.learning {
             Some(learning) => learning.restore(state),
+            None if state.own.is_some() => Restored::cold("it does not learn any more"),
             None => Restored::Accepted,
         }
     }

@@ -229,10 +229,12 @@ impl RecentError {
         if !square.is_finite() {
             return false;
         }
-        let most = if self.seen < Self::FIRST || multiple == f64::INFINITY {
-            f64::INFINITY
-        } else {
+        // Errors that were all 0, as of a machine at rest, say nothing of how large one may be.
+        let judged = self.seen >= Self::FIRST && self.mean_square > 0.0;
+        let most = if judged && multiple < f64::INFINITY {
             multiple * multiple * self.mean_square
+        } else {
+            f64::INFINITY
         };
         self.seen = (self.seen + 1).min(Self::MEMORY);
         self.mean_square += (square.min(most) - self.mean_square) / f64::from(self.seen);
@@ -263,5 +265,14 @@ mod tests {
         for error in [1e-3, 1e3, 0.0, 5.0] {
             assert!(recent.admits(error, 6.0));
         }
+    }
+
+    #[test]
+    fn errors_that_were_all_zero_do_not_end_learning() {
+        let mut recent = RecentError::default();
+        for _ in 0..100 {
+            assert!(recent.admits(0.0, 6.0));
+        }
+        assert!(recent.admits(1.0, 6.0));
     }
 }

@@ -498,6 +498,11 @@ impl Engine {
                     let deviation = vote.deviation(votes, of_voters, value);
                     self.slots.set(slot, deviation, stamp);
                 }
+                for value in &mut self.slots.values[node.slots.clone()] {
+                    if value.is_infinite() {
+                        *value = f64::NAN;
+                    }
+                }
             }
         }
     }

@@ -8,7 +8,7 @@ mod watch;
 use std::sync::Arc;
 
 pub use interval::IntervalScore;
-pub use table::{Score, Scores};
+pub use table::{RESTRICTS, Score, Scores};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
 pub(crate) use watch::{Prediction, Watch};
 

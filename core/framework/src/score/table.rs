@@ -11,7 +11,7 @@ use crate::engine::Engine;
 use crate::time::Instant;
 
 /// The share of instants below which a prediction does not restrict those on which the others are scored.
-const RESTRICTS: f64 = 0.5;
+pub const RESTRICTS: f64 = 0.5;
 
 /// The scores of all predictions of a plan.
 #[derive(Debug, Clone, Default)]

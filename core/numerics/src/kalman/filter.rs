@@ -260,7 +260,7 @@ impl Kalman {
     }
 
     /// Forgets level and trend, of which nothing is known from now on; the coefficients stay.
-    pub fn forget_level(&mut self) {
+    pub(super) fn forget_level(&mut self) {
         for state in 0..self.model.moving() {
             self.forget(state);
         }

@@ -4,6 +4,7 @@ use super::filter::diagonal;
 use super::simplex::minimum;
 use super::{Kalman, Movement, Passage, Structural};
 use crate::NumericsError;
+use crate::checks::check_parameter;
 
 /// The logarithms of variances, relative to that of an observation and per typical step, that are tried before the search.
 const TRIED: [f64; 7] = [-14.0, -9.0, -6.0, -3.5, -1.5, 1.0, 5.0];
@@ -66,20 +67,9 @@ impl Series<'_> {
                 return Err(NumericsError::Width { expected, found });
             }
         }
-        if self.prior.is_nan() || self.prior <= 0.0 {
-            return Err(NumericsError::Parameter {
-                name: "prior",
-                value: self.prior,
-                allowed: "positive",
-            });
-        }
-        if !(self.shared >= 0.0 && self.shared.is_finite()) {
-            return Err(NumericsError::Parameter {
-                name: "shared",
-                value: self.shared,
-                allowed: "finite and not negative",
-            });
-        }
+        check_parameter("prior", self.prior, self.prior > 0.0, "positive")?;
+        let fine = self.shared >= 0.0 && self.shared.is_finite();
+        check_parameter("shared", self.shared, fine, "finite and not negative")?;
         let infinite = |values: &[f64]| values.iter().any(|value| value.is_infinite());
         let negative = self.times.iter().any(|time| *time < 0.0);
         let unknown = self.regressors.iter().any(|x| x.is_nan());

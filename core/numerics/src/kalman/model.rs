@@ -1,6 +1,7 @@
 //! Decides what a structural model is: its variances, and how they add up while time passes.
 
 use crate::NumericsError;
+use crate::checks::check_parameter;
 use serde::{Deserialize, Serialize};
 
 /// The variances of `y = μ + xᵀβ + ε`, where the level `μ` wanders and may have a trend `ν` that wanders too.
@@ -123,13 +124,8 @@ impl Structural {
             ("returning", self.returning),
         ];
         for (name, value) in variances {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(NumericsError::Parameter {
-                    name,
-                    value,
-                    allowed: "finite and not negative",
-                });
-            }
+            let fine = value >= 0.0 && value.is_finite();
+            check_parameter(name, value, fine, "finite and not negative")?;
         }
         if self.trend.is_some() && self.returning > 0.0 {
             return Err(NumericsError::Parameter {

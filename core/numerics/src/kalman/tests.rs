@@ -2,7 +2,7 @@
 
 use super::{Kalman, Movement, Passage, Series, Structural, follow, most_likely};
 use crate::NumericsError;
-use crate::oracle::{Table, table, text};
+use crate::oracle::{own_table, own_text, table, text};
 
 const OWN: Structural = Structural {
     observation: 0.09,
@@ -17,18 +17,13 @@ fn number(scalars: &serde_json::Value, path: &[&str]) -> f64 {
     found.as_f64().unwrap()
 }
 
-fn own(file: &str) -> String {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/oracles/kalman");
-    std::fs::read_to_string(format!("{folder}/{file}")).unwrap()
-}
-
 fn own_scalars() -> serde_json::Value {
-    serde_json::from_str(&own("scalars.json")).unwrap()
+    serde_json::from_str(&own_text("kalman/scalars.json")).unwrap()
 }
 
 /// The own series: times between rows, regressors row by row, observations.
 fn own_series() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let rows = Table::parse(&own("series.csv")).numbers();
+    let rows = own_table("kalman/series.csv").numbers();
     let times = rows.iter().map(|row| row[0]).collect();
     let regressors = rows.iter().flat_map(|row| [row[1], row[2]]).collect();
     (times, regressors, rows.iter().map(|row| row[3]).collect())
@@ -101,7 +96,7 @@ fn a_local_linear_trend_equals_the_oracle() {
 #[test]
 fn an_exactly_diffuse_start_with_regressors_and_gaps_equals_the_oracle() {
     let (times, regressors, observations) = own_series();
-    let expected = Table::parse(&own("filtered.csv")).numbers();
+    let expected = own_table("kalman/filtered.csv").numbers();
     for (passage, columns) in [(Passage::Steps, 1), (Passage::Continuous, 8)] {
         let mut filter = Kalman::diffuse(Structural { passage, ..OWN }, 2).unwrap();
         let mut expected = expected.iter().peekable();
