@@ -1,5 +1,5 @@
 //! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, recursions, correlations; the Kalman
-//! filter of structural models; changes of a mean.
+//! filter of structural models; transfer functions by the prediction error; changes of a mean.
 //!
 //! Decides how rows of regressors become statistics and how statistics become coefficients. Does not decide where rows
 //! come from, what a regressor is called or what its unit is. Everything runs on the calling thread, and the same rows
@@ -41,6 +41,7 @@ mod non_negative;
 mod normal_equations;
 mod orthogonal;
 mod penalty;
+mod prediction_error;
 mod prediction_variance;
 mod rls;
 mod scaler;
@@ -71,6 +72,10 @@ pub use least_squares::{
 };
 pub use non_negative::non_negative_least_squares;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
+pub use prediction_error::{
+    Criterion, InformationCriteria, InputOrders, Orders, Polynomials, PredictionError,
+    PredictionErrorFit, Samples, Stepper, Transfer,
+};
 pub use prediction_variance::PredictionVariance;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use scaler::{Standardization, Standardizer};

@@ -270,6 +270,8 @@ impl Resolver<'_> {
             name,
             unit: from.channel.unit.to_string(),
             sensors: Vec::new(),
+            lag,
+            of_truth,
         }
     }
 

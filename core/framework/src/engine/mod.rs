@@ -5,12 +5,14 @@ mod blend;
 mod carry;
 mod error;
 mod estimate;
+mod feedback;
 mod gather;
 mod history;
 #[cfg(feature = "testkit")]
 mod idle;
 mod keep;
 mod learning;
+mod mode;
 mod pairing;
 mod revision;
 mod slots;
@@ -23,6 +25,7 @@ use std::sync::{Arc, OnceLock};
 
 pub use carry::{Carry, NodeCarry};
 pub use error::EngineError;
+pub use mode::Mode;
 pub use pairing::{Paired, Pairing};
 pub use revision::{fnv_1a, revision};
 pub use state::{EngineState, RestoreError};
@@ -64,6 +67,8 @@ pub struct Engine {
     before_break: Option<Instant>,
     rejected: Vec<u64>,
     refused: u64,
+    /// Estimators whose predictions are fed back, and the slots of their truths.
+    fed_back: Vec<(usize, usize)>,
     /// Whether learning has been frozen on command.
     frozen: bool,
     outputs: Vec<f64>,
@@ -189,6 +194,7 @@ impl Engine {
             before_break: None,
             rejected: vec![0; plan.sources.len()],
             refused: 0,
+            fed_back: Vec::new(),
             frozen: false,
             outputs: vec![f64::NAN; plan.outputs.len()],
             blending: plan
@@ -278,6 +284,29 @@ impl Engine {
         self.frozen = frozen;
     }
 
+    /// Lets estimators predict from such past truths as a mode allows; for evaluations, before the first tick.
+    ///
+    /// Predictions that are fed back are kept in memory that grows as it must.
+    pub fn predict_in(&mut self, mode: Mode) {
+        let Self {
+            plan,
+            nodes,
+            fed_back,
+            ..
+        } = self;
+        fed_back.clear();
+        for (index, (node, running)) in plan.nodes.iter().zip(nodes).enumerate() {
+            if let (Running::Estimate { estimate, .. }, Some(link)) = (running, node.role.truth())
+                && let Some(estimate) = estimate
+            {
+                estimate.predict_in(mode, link, &plan.gathers);
+                if estimate.feedback().is_some() {
+                    fed_back.push((index, link.slot));
+                }
+            }
+        }
+    }
+
     /// Whether learning has been frozen on command.
     #[must_use]
     pub fn frozen(&self) -> bool {
@@ -308,6 +337,9 @@ impl Engine {
                 Running::Estimate { estimate, .. } => {
                     if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
                         learning.segment(self.last, &self.gathered, !self.frozen);
+                    }
+                    if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
+                        feedback.segment();
                     }
                 }
                 Running::Vote(vote) => vote.segment(self.last),
@@ -443,6 +475,9 @@ impl Engine {
                 if trigger.is_some_and(|gather| !self.gathered[gather].fresh) {
                     return;
                 }
+                if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
+                    feedback.before_run(&self.slots, now);
+                }
                 let prediction = estimate
                     .as_mut()
                     .and_then(|estimate| estimate.run(&self.gathered, now, on));
@@ -527,6 +562,14 @@ impl Engine {
                 && self.slots.ran(slot)
             {
                 history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
+            }
+        }
+        for &(node, slot) in &self.fed_back {
+            if let Running::Estimate { estimate, .. } = &mut self.nodes[node]
+                && let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback)
+                && self.slots.ran(slot)
+            {
+                feedback.observe(self.slots.values[slot], self.slots.stamps[slot], now);
             }
         }
         for &(node, slot) in &self.told {

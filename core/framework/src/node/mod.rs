@@ -19,8 +19,8 @@ mod state;
 
 pub use combiner::{Combine, Combiner, Votes};
 pub use estimator::{
-    CandidateScore, Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup, TruthLags,
+    CandidateScore, Estimator, OrderTable, Predictor, Regressor, Regressors, SelectionStep,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use learner::{Learner, Learns, TrainedRange};
