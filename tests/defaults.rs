@@ -17,7 +17,7 @@ use workbench::{Scratch, data, graph};
 const LEFT_OUT: [&str; 3] = ["persistence", "stack", "zero"];
 
 /// Kinds that take products of features: each sensor with the window in the middle alone.
-const OF_FEW: [&str; 2] = ["narx", "polynomial"];
+const OF_FEW: [&str; 3] = ["narx", "polynomial", "state_space"];
 
 struct Machine {
     /// A graph of this project that has `drift` and `gradients`; its other nodes are left out.

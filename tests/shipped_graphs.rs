@@ -54,6 +54,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("stability", "athermal-control"),
         ("stack", "athermal-estimators"),
         ("state_gate", "athermal-combiners"),
+        ("state_space", "athermal-estimators"),
         ("sum", "athermal-features"),
         ("trimmed", "athermal-combiners"),
         ("uncorrected", "athermal-control"),

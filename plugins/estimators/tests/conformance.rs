@@ -4,7 +4,7 @@ use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use athermal_estimators::{
     Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Narx, Persistence, Polynomial, Rls, Stack,
-    Zero,
+    StateSpace, Zero,
 };
 
 conformance!(
@@ -226,6 +226,37 @@ conformance!(
         "#
     )
     .input("features", 3, "Cel"),
+);
+
+conformance!(
+    StateSpace,
+    Case::new(
+        r#"
+        ahead = "1min"
+        horizon = 3
+        "#
+    )
+    .speaks_without_input(&["prediction", "deviation"]),
+    Case::new(
+        r#"
+        ahead = "0s"
+        states = 2
+        horizon = 4
+        weighting = "n4sid"
+        "#
+    )
+    .input("features", 1, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        states = { by = "gap" }
+        horizon = 3
+        weighting = "moesp"
+        every = "1min"
+        learn = false
+        "#
+    )
+    .input("features", 2, "K"),
 );
 
 conformance!(
