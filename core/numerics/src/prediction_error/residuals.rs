@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::{Orders, Polynomials};
+use crate::Record;
 
 /// Evenly spaced samples of the inputs and of what they lead to, in segments.
 #[derive(Debug, Clone, Default)]
@@ -60,6 +61,14 @@ impl Samples {
         self.segments()
             .map(|segment| segment.len().saturating_sub(first))
             .sum()
+    }
+
+    /// The segments, as subspace identification takes them.
+    pub fn records(&self) -> impl Iterator<Item = Record<'_>> {
+        self.segments().map(|segment| Record {
+            inputs: &self.inputs[segment.start * self.width..segment.end * self.width],
+            outputs: &self.values[segment],
+        })
     }
 
     pub(super) fn segments(&self) -> impl Iterator<Item = Range<usize>> + '_ {

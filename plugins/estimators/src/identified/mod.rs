@@ -10,7 +10,7 @@ use athermal_numerics::{InputOrders, Orders};
 
 use crate::order::{LARGEST, Order};
 pub use per_input::PerInput;
-use train::IdentifiedTrainer;
+pub(crate) use train::{Found, IdentifiedTrainer, Identify};
 
 /// What a kind asks for, in the letters of Ljung (1999), chapter 4; those that it does not have are none.
 #[derive(Debug, Clone, Default)]

@@ -3,7 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    PredictionError, PredictionErrorFit, Samples, Standardization, Standardizer, Stepper,
+    Polynomials, PredictionError, PredictionErrorFit, Samples, Standardization, Standardizer,
+    Stepper,
 };
 
 use super::Asked;
@@ -15,10 +16,41 @@ const MOST_SERIES: usize = 16;
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
 const STEPS_AHEAD: usize = 256;
 
-/// Keeps all rows, which the search goes through again and again.
+/// How a model is found from evenly spaced samples.
+pub(crate) trait Identify: std::fmt::Debug + Send {
+    /// How long a step is, where that is stated.
+    fn every(&self) -> Option<Duration>;
+
+    /// What does not fit so many inputs.
+    fn misfit(&self, _inputs: usize) -> Option<String> {
+        None
+    }
+
+    /// The model; what there is to tell goes into the report.
+    ///
+    /// # Errors
+    /// When the samples do not allow one.
+    fn identify(
+        &self,
+        samples: &Samples,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError>;
+}
+
+/// A model, and how far its one-step predictions were off.
 #[derive(Debug)]
-pub(super) struct IdentifiedTrainer {
-    asked: Asked,
+pub(crate) struct Found {
+    pub(crate) model: Polynomials,
+    pub(crate) residual_sum_of_squares: f64,
+    pub(crate) rows: usize,
+    /// The variance of an innovation.
+    pub(crate) variance: f64,
+}
+
+/// Keeps all rows, which are gone through again and again.
+#[derive(Debug)]
+pub(crate) struct IdentifiedTrainer<Kind> {
+    asked: Kind,
     names: Vec<String>,
     span: Duration,
     memory: usize,
@@ -36,8 +68,8 @@ struct Row {
     begins: bool,
 }
 
-impl IdentifiedTrainer {
-    pub(super) fn new(setup: &TrainingSetup, asked: Asked) -> Self {
+impl<Kind: Identify> IdentifiedTrainer<Kind> {
+    pub(crate) fn new(setup: &TrainingSetup, asked: Kind) -> Self {
         let names = setup
             .regressors
             .iter()
@@ -122,7 +154,11 @@ impl IdentifiedTrainer {
             rows: self.rows.len(),
             needed: 3,
         };
-        let pace = Pace::of(self.asked.every, self.span, self.between().ok_or(too_few)?);
+        let pace = Pace::of(
+            self.asked.every(),
+            self.span,
+            self.between().ok_or(too_few)?,
+        );
         let mut standard = Standardizer::new(self.names.len());
         if !self.names.is_empty() {
             self.regressors
@@ -131,17 +167,11 @@ impl IdentifiedTrainer {
         }
         let standard = standard.standardization();
         let samples = self.samples(pace, &standard);
-        let fit = self.fit(&samples, report)?;
-        if !fit.converged {
-            report.notes.push(format!(
-                "the search had not ended after {} steps",
-                fit.steps
-            ));
-        }
+        let found = self.asked.identify(&samples, report)?;
         report.notes.push(pace.told());
-        report.in_sample_rmse = Some((fit.residual_sum_of_squares / fit.rows as f64).sqrt());
-        let variance = fit.variance();
-        let stepper = Stepper::new(fit.model);
+        report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
+        let variance = found.variance;
+        let stepper = Stepper::new(found.model);
         let variances = stepper.variances(STEPS_AHEAD);
         Ok(Identified {
             regressors: self.names.clone(),
@@ -158,25 +188,57 @@ impl IdentifiedTrainer {
             series: pace.series,
         })
     }
+}
 
+impl Identify for Asked {
+    fn every(&self) -> Option<Duration> {
+        self.every
+    }
+
+    fn misfit(&self, inputs: usize) -> Option<String> {
+        Asked::misfit(self, inputs)
+    }
+
+    fn identify(
+        &self,
+        samples: &Samples,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError> {
+        let fit = self.fit(samples, report)?;
+        if !fit.converged {
+            report.notes.push(format!(
+                "the search had not ended after {} steps",
+                fit.steps
+            ));
+        }
+        Ok(Found {
+            residual_sum_of_squares: fit.residual_sum_of_squares,
+            rows: fit.rows,
+            variance: fit.variance(),
+            model: fit.model,
+        })
+    }
+}
+
+impl Asked {
     fn fit(
         &self,
         samples: &Samples,
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
         let search = PredictionError {
-            penalty: self.asked.penalty,
+            penalty: self.penalty,
             ..PredictionError::default()
         };
-        let width = self.names.len();
-        let Some(order) = self.asked.order else {
-            let orders = self.asked.orders(width, &self.asked.given());
+        let width = samples.width();
+        let Some(order) = self.order else {
+            let orders = self.orders(width, &self.given());
             return search.fit(&orders, samples, 0).map_err(told);
         };
-        let candidates = order.combinations(self.asked.given());
+        let candidates = order.combinations(self.given());
         let orders: Vec<_> = candidates
             .iter()
-            .map(|one| self.asked.orders(width, one))
+            .map(|one| self.orders(width, one))
             .collect();
         let first = orders
             .iter()
@@ -234,7 +296,7 @@ impl Pace {
     }
 }
 
-impl Trainer for IdentifiedTrainer {
+impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
     fn row(&mut self, regressors: &[f64], truth: f64) {
         let second = Duration::from_ns(1_000_000_000);
         let last = self.rows.last().map(|row| row.at);
