@@ -129,9 +129,42 @@ pub fn matrix(corner: &str, columns: &[String], rows: &[(String, Vec<String>)]) 
     text
 }
 
+/// Words that follow a label, in lines that fit into [`WIDTH`]; lines after the first are indented by four more than the label.
+#[must_use]
+pub fn paragraph(label: &str, words: &str) -> String {
+    let indent = label.len() - label.trim_start().len() + 4;
+    let mut text = label.to_owned();
+    let mut used = label.chars().count();
+    for word in words.split_whitespace() {
+        let length = word.chars().count();
+        if used + 1 + length > WIDTH && used > indent {
+            let _ = write!(text, "\n{:indent$}{word}", "");
+            used = indent + length;
+        } else {
+            let _ = write!(text, " {word}");
+            used += 1 + length;
+        }
+    }
+    text.push('\n');
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn paragraphs_fit_and_a_word_that_is_too_long_has_a_line_of_its_own() {
+        let told = paragraph(
+            "  note:",
+            &format!("{} {}", "word ".repeat(20), "x".repeat(90)),
+        );
+        let lines: Vec<_> = told.lines().collect();
+        assert_eq!(lines.len(), 3);
+        assert_eq!(lines[0], format!("  note:{}", " word".repeat(14)));
+        assert_eq!(lines[1], format!("     {}", " word".repeat(6)));
+        assert_eq!(lines[2].trim_start().len(), 90);
+    }
 
     #[test]
     fn numbers_keep_the_digits_that_matter() {

@@ -8,7 +8,7 @@ use crate::{command, terminal};
 
 /// Predicts and corrects the thermal drift of precision machines.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true, max_term_width = 100, after_help = EXAMPLES)]
+#[command(version, arg_required_else_help = true, max_term_width = 80, after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     command: command::Command,
@@ -18,11 +18,11 @@ pub(crate) struct Arguments {
 
 const EXAMPLES: &str = "\
 Start here:
-  athermal demo                                     all of it, on a simulated machine
-  athermal init LOG.csv -o graph.toml               a starter graph for a log of yours
+  athermal demo                         all of it, on a simulated machine
+  athermal init LOG.csv -o graph.toml   a starter graph for a log of yours
   athermal fit graph.toml --data LOG.csv -o model.json
   athermal evaluate model.json --data OTHER.csv
-  athermal run model.json --input - --output -      rows in, predictions out
+  athermal run model.json --input - --output -
 
 `athermal COMMAND --help` says more, with examples.
 Exit status: 0 fine, 1 the answer is no, 2 the request was wrong, 3 something outside failed.";

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod workbench;
+
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
@@ -11,22 +13,9 @@ use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::kinds;
 use athermal::core::recording::Table;
 use athermal::{Instant, Model};
+use workbench::graphs;
 
 const STEP_NS: i64 = 10_000_000_000;
-
-fn graphs() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");
-    let mut graphs: Vec<_> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "toml")
-        })
-        .collect();
-    graphs.sort();
-    graphs
-}
 
 /// Temperatures swing at every tick; everything else follows them and is measured at every third.
 fn samples(plan: &Plan, tick: i64) -> Vec<f64> {
@@ -61,7 +50,7 @@ fn fitted(path: &Path) -> Model {
 
 #[test]
 fn a_tick_of_every_shipped_graph_allocates_nothing_once_warm() {
-    let graphs = graphs();
+    let graphs = graphs("graphs");
     assert!(!graphs.is_empty());
     let mut stepped = BTreeSet::new();
     for path in graphs {

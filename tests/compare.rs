@@ -15,7 +15,7 @@ use athermal::core::score::trace;
 use athermal::diagnosis::comparison::{Comparison, Contender, compare};
 use athermal::files::{Dataset, Options};
 use serde_json::Value;
-use workbench::{Scratch, athermal, data, graph, simulated};
+use workbench::{Scratch, athermal, data, graph, graphs, simulated};
 
 /// Kinds that predict the same whatever was measured: baselines, which others are measured by.
 const BASELINES: [&str; 2] = ["zero", "persistence"];
@@ -222,12 +222,7 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
     );
     let probe = |train, test| (train, test, None);
     let mut runs = Vec::new();
-    let folder = graph("x").parent().unwrap().to_owned();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_none_or(|ending| ending != "toml") {
-            continue;
-        }
+    for path in graphs("graphs") {
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
         match &name {
             name if name == "zoo" || name.starts_with("die-tester") => {

@@ -5,6 +5,8 @@
 
 mod workbench;
 
+use std::ffi::OsStr;
+use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::fit::{FitOptions, fit};
@@ -17,7 +19,7 @@ use athermal::diagnosis::{
 };
 use athermal::files::Dataset;
 use athermal::{Duration, Instant, Model};
-use workbench::{Scratch, athermal, graph, linear, secs, simulated};
+use workbench::{Scratch, athermal_on, graph, linear, secs, simulated};
 
 /// Two temperatures and a position, every 10 s, and an estimator whose coefficients the test gives.
 const TWO_SENSORS: &str = r#"
@@ -191,9 +193,8 @@ fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_t
     assert!(cause.residual.best > 0.9 && cause.residual.significance() > 5.0);
 }
 
-#[test]
-fn white_residuals_are_told_from_others() {
-    let text = r#"
+/// Two series that nothing predicts: each truth is all residual.
+const NOISE: &str = r#"
 schema = 1
 name = "noise"
 [time]
@@ -212,7 +213,10 @@ channel = ["white", "smooth"]
 [outputs]
 predicted = "nothing"
 "#;
-    let model = model("white", text, &[]);
+
+#[test]
+fn white_residuals_are_told_from_others() {
+    let model = model("white", NOISE, &[]);
     let mut random = Prng::stream(1, "noise");
     let (mut table, mut smooth) = (Table::default(), 0.0);
     for row in 0..2000 {
@@ -225,6 +229,18 @@ predicted = "nothing"
     assert_eq!(found[1].white(), Some(false));
     assert_eq!((found[1].spaced, found[1].spacing_s), (2000, 1.0));
     assert!((found[1].autocorrelation[0] - 0.6).abs() < 0.05);
+}
+
+#[test]
+fn a_single_truth_long_after_the_first_row_is_one_residual() {
+    let model = model("single", NOISE, &[]);
+    let mut table = Table::default();
+    table.push(secs(0.0), &[f64::NAN; 2]);
+    table.push(secs(36_000.0), &[1.0, f64::NAN]);
+    let observation = observe(&model, &table).unwrap();
+    let found = residual::residuals(&model.plan, &observation);
+    assert_eq!((found[0].count, found[0].spaced), (1, 1));
+    assert_eq!(found[0].white(), None);
 }
 
 #[test]
@@ -383,25 +399,10 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
     let scratch = Scratch::new("diagnose");
     let week = simulated(&scratch, "log.csv", "die-tester", 2.5, 1);
     let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
-    athermal(&[
-        &"fit",
-        &graph("die-tester"),
-        &"--data",
-        &week,
-        &"-o",
-        &model,
-    ])
-    .ended(0);
-    let told = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &week,
-        &"--window",
-        &"--plots",
-        &plots,
-    ])
-    .ended(0);
+    athermal_on("fit", &graph("die-tester"), &week, &[&"-o", &model]).ended(0);
+    let diagnosed =
+        |more: &[&dyn AsRef<OsStr>]| athermal_on("diagnose", &model, &week, more).ended(0);
+    let told = diagnosed(&[&"--window", &"--plots", &plots]);
     for line in told.out.lines() {
         assert!(line.chars().count() <= 80, "{line}");
     }
@@ -433,28 +434,10 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
         let svg = std::fs::read_to_string(plots.join(&name)).unwrap();
         assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{name}");
     }
-    let facts = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &week,
-        &"--no-fit",
-        &"--format",
-        &"json",
-    ]);
-    let facts = facts.ended(0).json();
+    let facts = diagnosed(&[&"--no-fit", &"--format", &"json"]).json();
     assert_eq!(facts["diagnosis"]["main"].as_array().unwrap().len(), 6);
     assert!(facts["diagnosis"]["days"].is_null());
-    let of_one = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &week,
-        &"--no-fit",
-        &"--of",
-        &"thermal.Z1",
-    ]);
-    let of_one = of_one.ended(0);
+    let of_one = diagnosed(&[&"--no-fit", &"--of", &"thermal.Z1"]);
     assert!(
         of_one.out.contains("per σ") && !of_one.out.contains("vote.X1"),
         "{}",
@@ -467,23 +450,18 @@ fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
     let scratch = Scratch::new("undiagnosed");
     let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);
     let model = scratch.path("model.json");
-    athermal(&[&"fit", &graph("die-tester"), &"--data", &log, &"-o", &model]).ended(0);
-    let unknown = athermal(&[
-        &"diagnose",
-        &model,
-        &"--data",
-        &log,
-        &"--no-fit",
-        &"--of",
-        &"Z9",
-    ]);
+    athermal_on("fit", &graph("die-tester"), &log, &[&"-o", &model]).ended(0);
+    let of = |graph: &Path, more: &[&dyn AsRef<OsStr>]| athermal_on("diagnose", graph, &log, more);
+    let unknown = of(&model, &[&"--no-fit", &"--of", &"Z9"]);
     unknown.ended(2).tells(&["nothing called `Z9`", "vote.Z1"]);
-    let never = athermal(&[&"diagnose", &model, &"--data", &log, &"--day", &"0s"]);
+    let never = of(&model, &[&"--day", &"0s"]);
     never.ended(2).tells(&["--day is 0s"]);
-    let short = athermal(&[&"diagnose", &model, &"--data", &log]);
+    let short = of(&model, &[]);
     short.ended(0).tells(&["a shorter --day"]);
-    let graph = athermal(&[&"diagnose", &graph("die-tester"), &"--data", &log]);
-    graph.ended(2).tells(&["fit"]);
+    let countless = of(&model, &[&"--day", &"1ns"]);
+    countless.ended(0).tells(&["a longer --day"]);
+    let unfitted = of(&graph("die-tester"), &[]);
+    unfitted.ended(2).tells(&["fit"]);
 }
 
 #[test]

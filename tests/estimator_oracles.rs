@@ -13,7 +13,7 @@ use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Predictor, TrainingError, TrainingReport};
 use athermal::core::recording::Table;
 use serde_json::Value;
-use workbench::{plan, problems, secs};
+use workbench::{coefficients, fitted, plan, problems, regression, secs};
 
 const COLUMNS: usize = 12;
 
@@ -54,58 +54,37 @@ fn recording(rows: &[Vec<f64>]) -> Table {
 
 fn graph_text(node: &str, features: &str) -> String {
     let channels: Vec<String> = (0..COLUMNS).map(|column| format!("x{column}")).collect();
-    format!(
-        r#"
-schema = 1
-[time]
-column = "row"
-step = "1s"
-[signals.x]
-unit = "1"
-channels = {channels:?}
-max_age = "1 sample"
-[signals.y]
-unit = "1"
-channels = ["y"]
-max_age = "1 sample"
-[nodes.model]
-inputs.features = "{features}"
-inputs.truth = "y.y"
-ahead = "0s"
-{node}
-[outputs]
-predicted = "model"
-x = "x"
-"#
+    regression(
+        &channels,
+        &format!("inputs.features = \"{features}\"\n{node}"),
     )
 }
 
-fn fitted(node: &str, features: &str, rows: &[Vec<f64>]) -> (Arc<dyn Predictor>, TrainingReport) {
-    let plan: Arc<Plan> = plan(&graph_text(node, features));
-    let options = FitOptions::default();
-    let (fitted, mut report) = fit(&plan, &recording(rows), &options, &mut |_| {}).unwrap();
-    let Outcome::Fitted(report) = report.estimators.remove(0).outcome else {
-        panic!("{report:?}")
+/// The predictor of a graph's one estimator, and what was told of its fit.
+fn told(plan: &Arc<Plan>, table: &Table) -> (Arc<dyn Predictor>, TrainingReport) {
+    let (predictor, fit) = fitted(plan, table);
+    let Outcome::Fitted(report) = fit.outcome else {
+        unreachable!()
     };
-    (Arc::clone(fitted.values().next().unwrap()), report)
+    (predictor, report)
+}
+
+fn on_rows(node: &str, features: &str, rows: &[Vec<f64>]) -> (Arc<dyn Predictor>, TrainingReport) {
+    told(&plan(&graph_text(node, features)), &recording(rows))
 }
 
 /// The intercept, and a coefficient for each of the twelve columns.
-fn coefficients(predictor: &dyn Predictor) -> (f64, Vec<f64>) {
-    let written = serde_json::to_value(predictor).unwrap();
+fn columns(predictor: &dyn Predictor) -> (f64, Vec<f64>) {
+    let (intercept, named) = coefficients(predictor);
     let mut all = vec![0.0; COLUMNS];
-    for (name, b) in predictor
-        .uses()
-        .iter()
-        .zip(written["coefficients"].as_array().unwrap())
-    {
-        all[name.strip_prefix("x.x").unwrap().parse::<usize>().unwrap()] = b.as_f64().unwrap();
+    for (name, b) in named {
+        all[name.strip_prefix("x.x").unwrap().parse::<usize>().unwrap()] = b;
     }
-    (written["intercept"].as_f64().unwrap(), all)
+    (intercept, all)
 }
 
 fn assert_model(predictor: &dyn Predictor, wanted: &Value) {
-    let (intercept, found) = coefficients(predictor);
+    let (intercept, found) = columns(predictor);
     assert!((intercept - wanted["intercept"].as_f64().unwrap()).abs() < 1e-8);
     for (found, wanted) in found.iter().zip(wanted["coef"].as_array().unwrap()) {
         let wanted = wanted.as_f64().unwrap();
@@ -125,10 +104,10 @@ fn the_penalty_chosen_is_that_of_the_oracle() {
         let node = format!(
             "type = \"linear\"\nsolver = {{ type = \"ridge\", alpha = {{ {by}, {range} }} }}"
         );
-        let (predictor, report) = fitted(&node, "x", &rows);
+        let (predictor, report) = on_rows(&node, "x", &rows);
         let fixed = format!("type = \"linear\"\nsolver = {{ type = \"ridge\", alpha = {wanted} }}");
-        let (same, _) = fitted(&fixed, "x", &rows);
-        let (found, wanted) = (coefficients(&*predictor), coefficients(&*same));
+        let (same, _) = on_rows(&fixed, "x", &rows);
+        let (found, wanted) = (columns(&*predictor), columns(&*same));
         for (found, wanted) in found.1.iter().zip(&wanted.1) {
             assert!((found - wanted).abs() < 1e-12);
         }
@@ -150,7 +129,7 @@ fn lasso_and_elastic_net_are_those_of_the_oracle() {
         } else {
             format!("type = \"elastic_net\"\nalpha = {alpha}\nl1_ratio = {ratio}")
         };
-        let (predictor, _) = fitted(&node, "x", &rows);
+        let (predictor, _) = on_rows(&node, "x", &rows);
         let used = predictor.uses().len();
         assert_eq!(COLUMNS - used, wanted["zeros"].as_u64().unwrap() as usize);
         assert_model(&*predictor, wanted);
@@ -160,7 +139,7 @@ fn lasso_and_elastic_net_are_those_of_the_oracle() {
 #[test]
 fn the_penalty_of_a_lasso_is_the_best_over_the_folds_of_the_oracle() {
     let expected = expected("penalties");
-    let (_, report) = fitted("type = \"lasso\"\nalpha = { folds = 5 }", "x", &rows(None));
+    let (_, report) = on_rows("type = \"lasso\"\nalpha = { folds = 5 }", "x", &rows(None));
     let note = &report.notes[0];
     let word = |after: &str| {
         let rest = note.split(after).nth(1).unwrap();
@@ -196,7 +175,7 @@ fn a_robust_fit_is_that_of_the_oracle() {
         let alpha = wanted["alpha"].as_f64().unwrap() * deviation;
         let epsilon = &wanted["epsilon"];
         let node = format!("type = \"huber\"\nepsilon = {epsilon}\nalpha = {alpha:?}");
-        let (predictor, report) = fitted(&node, "x", &rows);
+        let (predictor, report) = on_rows(&node, "x", &rows);
         assert_model(&*predictor, wanted);
         let outliers = format!("{} of 400 rows count as outliers", wanted["outliers"]);
         assert!(report.notes[0].starts_with(&outliers), "{:?}", report.notes);
@@ -208,7 +187,7 @@ fn a_polynomial_has_the_terms_and_predictions_of_the_oracle() {
     let expected = expected("polynomial");
     let rows = rows(Some("polynomial/target.csv"));
     let node = "type = \"polynomial\"\nsolver = { type = \"ols\" }";
-    let (predictor, report) = fitted(node, "x.{x2,x4,x8,x9}", &rows);
+    let (predictor, report) = on_rows(node, "x.{x2,x4,x8,x9}", &rows);
     let mut chosen: Vec<&str> = Vec::new();
     for step in &report.selection {
         if step.removed {
@@ -240,7 +219,7 @@ fn a_polynomial_has_the_terms_and_predictions_of_the_oracle() {
 fn a_selection_is_told_with_its_folds_and_what_else_was_tried() {
     let expected = expected("selection");
     let node = "type = \"linear\"\nsolver = { type = \"ols\" }\nselection = { method = \"backward\", folds = 5, tolerance = 0.01 }";
-    let (predictor, report) = fitted(node, "x", &rows(None));
+    let (predictor, report) = on_rows(node, "x", &rows(None));
     let steps = expected["backward_ols"].as_array().unwrap();
     for (found, wanted) in report.selection.iter().zip(steps) {
         assert!(found.removed);
@@ -279,7 +258,7 @@ fn folds_with_gaps_arrive_at_the_search() {
         let node = format!(
             "type = \"linear\"\nsolver = {{ type = \"ols\" }}\nselection = {{ method = \"forward\", folds = {folds} }}"
         );
-        let (_, report) = fitted(&node, "x", &rows(None));
+        let (_, report) = on_rows(&node, "x", &rows(None));
         assert!(report.selection.len() >= 3);
         for (found, wanted) in report
             .selection
@@ -296,7 +275,7 @@ fn folds_with_gaps_arrive_at_the_search() {
 fn the_smallest_set_within_one_standard_error_is_kept() {
     let expected = expected("selection");
     let node = "type = \"linear\"\nsolver = { type = \"ols\" }\nselection = { method = \"forward\", folds = 5, tolerance = -1.0, one_standard_error = true }";
-    let (predictor, report) = fitted(node, "x", &rows(None));
+    let (predictor, report) = on_rows(node, "x", &rows(None));
     assert_eq!(report.selection.len(), COLUMNS);
     let mut used: Vec<usize> = predictor
         .uses()
@@ -362,11 +341,7 @@ predicted = "model"
         ];
         table.push(secs(t), &row);
     }
-    let (fitted, mut report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
-    let Outcome::Fitted(report) = report.estimators.remove(0).outcome else {
-        panic!("{report:?}")
-    };
-    (Arc::clone(fitted.values().next().unwrap()), report)
+    told(&plan, &table)
 }
 
 #[test]

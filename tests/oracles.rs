@@ -8,11 +8,10 @@ mod workbench;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{EstimatorFit, FitOptions, Outcome, fit};
-use athermal::core::node::Predictor;
+use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::recording::Table;
 use athermal::{Engine, Instant};
-use workbench::{oracle, plan, slot};
+use workbench::{coefficients, fitted, oracle, plan, regression, slot};
 
 /// A CSV file without quotes: the names of its columns, and its cells.
 struct Cells {
@@ -57,48 +56,7 @@ impl Cells {
 }
 
 fn graph(inputs: &[&str], node: &str) -> Arc<Plan> {
-    plan(&format!(
-        r#"
-schema = 1
-[time]
-column = "row"
-step = "1s"
-[signals.x]
-unit = "1"
-channels = {inputs:?}
-max_age = "1 sample"
-[signals.y]
-unit = "1"
-channels = ["y"]
-max_age = "1 sample"
-[nodes.model]
-inputs.truth = "y.y"
-ahead = "0s"
-{node}
-[outputs]
-predicted = "model"
-x = "x"
-"#
-    ))
-}
-
-fn fitted(plan: &Arc<Plan>, table: &Table) -> (Arc<dyn Predictor>, EstimatorFit) {
-    let (fitted, mut report) = fit(plan, table, &FitOptions::default(), &mut |_| {}).unwrap();
-    let report = report.estimators.remove(0);
-    assert!(matches!(report.outcome, Outcome::Fitted(_)), "{report:?}");
-    (Arc::clone(fitted.values().next().unwrap()), report)
-}
-
-/// The intercept of a linear predictor, and the coefficient of each regressor that it uses.
-fn coefficients(predictor: &dyn Predictor) -> (f64, Vec<(String, f64)>) {
-    let written = serde_json::to_value(predictor).unwrap();
-    let values = written["coefficients"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|value| value.as_f64().unwrap());
-    let named = predictor.uses().iter().cloned().zip(values).collect();
-    (written["intercept"].as_f64().unwrap(), named)
+    plan(&regression(inputs, node))
 }
 
 fn coefficient(named: &[(String, f64)], name: &str) -> f64 {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use workbench::{Finished, Scratch, athermal, graph, simulated};
+use workbench::{Finished, Scratch, athermal, athermal_on, graph, simulated};
 
 const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
 /// dB min²/µm² as the article prints them for X, Y and Z.
@@ -18,14 +18,12 @@ const LOSS: [f64; 3] = [2.09059, 59.4658, 133.798];
 fn fitted(scratch: &Scratch, name: &str, machine: &str) -> PathBuf {
     let days = simulated(scratch, "fit.csv", machine, 2.0, 1);
     let model = scratch.path("model.json");
-    athermal(&[&"fit", &graph(name), &"--data", &days, &"-o", &model]).ended(0);
+    athermal_on("fit", &graph(name), &days, &[&"-o", &model]).ended(0);
     model
 }
 
 fn report(model: &Path, data: &Path, more: &[&dyn AsRef<std::ffi::OsStr>]) -> Finished {
-    let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"report", &model, &"--data", &data];
-    arguments.extend(more);
-    athermal(&arguments).ended(0)
+    athermal_on("report", model, data, more).ended(0)
 }
 
 /// The columns of a table; NaN where a cell is empty.
@@ -379,6 +377,16 @@ fn a_sensor_that_failed_is_told_with_what_was_wrong() {
     let noise = sensor("t3")["noise"].as_f64().unwrap();
     assert!((0.9e-3..1.1e-3).contains(&noise), "{noise}");
     assert_eq!(sensor("t3")["rejected"], 3);
+}
+
+#[test]
+fn data_without_a_channel_are_a_wrong_request_to_report_as_to_evaluate() {
+    let scratch = Scratch::new("data_without_a_channel");
+    let data = scratch.file("data.csv", "time_s,room_degC\n0,20\n10,21\n");
+    let model = fitted(&scratch, "linear-axis", "linear-axis");
+    for command in ["evaluate", "report"] {
+        athermal_on(command, &model, &data, &[]).ended(2);
+    }
 }
 
 #[test]

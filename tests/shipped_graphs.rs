@@ -5,7 +5,7 @@
 mod workbench;
 
 use athermal::core::node::kinds;
-use workbench::{athermal, graph};
+use workbench::{athermal, graphs};
 
 #[test]
 fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
@@ -38,6 +38,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("mean", "athermal-combiners"),
         ("median", "athermal-combiners"),
         ("moving", "athermal-features"),
+        ("narx", "athermal-estimators"),
         ("optical_loss", "athermal-control"),
         ("page_hinkley", "athermal-combiners"),
         ("persistence", "athermal-estimators"),
@@ -53,6 +54,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("stability", "athermal-control"),
         ("stack", "athermal-estimators"),
         ("state_gate", "athermal-combiners"),
+        ("state_space", "athermal-estimators"),
         ("sum", "athermal-features"),
         ("trimmed", "athermal-combiners"),
         ("uncorrected", "athermal-control"),
@@ -96,34 +98,23 @@ fn every_kind_explains_itself_and_its_parameters() {
 
 #[test]
 fn every_shipped_graph_checks_without_a_warning() {
-    let folder = graph("x").parent().unwrap().to_owned();
-    let mut checked = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_none_or(|ending| ending != "toml") {
-            continue;
-        }
+    let graphs = graphs("graphs");
+    assert!(graphs.len() >= 8, "{graphs:?}");
+    for path in graphs {
         let checks = athermal(&[&"check", &"--strict", &path]).ended(0);
         assert!(!checks.told.contains("warning"), "{}", checks.told);
-        checked += 1;
     }
-    assert!(checked >= 8, "{checked}");
 }
 
 #[test]
 fn every_experiment_checks_and_those_that_are_wrong_on_purpose_are_warned_of() {
-    let folder = graph("experiments/x").parent().unwrap().to_owned();
     let mut warned = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|ending| ending == "toml") {
-            let checks = athermal(&[&"check", &path]).ended(0);
-            if checks.told.contains("warning[A065]") {
-                warned.push(path.file_stem().unwrap().to_str().unwrap().to_owned());
-            }
+    for path in graphs("graphs/experiments") {
+        let checks = athermal(&[&"check", &path]).ended(0);
+        if checks.told.contains("warning[A065]") {
+            warned.push(path.file_stem().unwrap().to_str().unwrap().to_owned());
         }
     }
-    warned.sort();
     assert_eq!(
         warned,
         ["settle-time-forecast", "settle-time-virtual-sensor"]

@@ -9,29 +9,24 @@ mod workbench;
 use std::path::Path;
 use std::sync::Arc;
 
-use athermal::core::compile::{Plan, Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{self, Disk};
+use athermal::core::compile::{Plan, Wanted};
 use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::Predictor;
 use athermal::core::recording::Table;
 use athermal::core::score::{Score, ScoreOptions, score};
 use athermal::files::{Dataset, Options};
 use athermal::{Engine, Instant};
-use workbench::{Bench, Scratch, athermal, data, plan, problems, secs, slot};
+use workbench::{Bench, Read, Scratch, athermal, data, plan, problems, secs, slot};
 
 /// The plan of a graph that gives all intervals it can.
 fn telling(text: &str) -> Arc<Plan> {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/text.toml");
-    let graph = document::load_text(name, text, &Disk, &mut sources, &mut diagnostics)
-        .and_then(|read| document::declare(read, &mut diagnostics));
     let wanted = Wanted {
         intervals: true,
         ..Wanted::default()
     };
-    let plan = graph.and_then(|graph| compile(&graph, wanted, &mut diagnostics));
-    Arc::new(plan.unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 200))))
+    let mut read = Read::wanting(text, wanted);
+    let plan = read.plan.take();
+    Arc::new(plan.unwrap_or_else(|| panic!("{}", read.told())))
 }
 
 /// A machine's virtual sensor, with followers of the level beside it and intervals about all.

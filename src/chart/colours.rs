@@ -20,6 +20,9 @@ pub const COLOURS: &str = "\
 @media print{:root{--ink:#000000;--paper:#ffffff;--line:#777777;--grid:#dddddd;--muted:#444444;--bad:#b3261e;--good:#1b7f4b;\
 --c1:#5d6975;--c2:#0b62a8;--c3:#c2410c;--c4:#1b7f4b;--c5:#7b3fa0;--c6:#8a6d00;--s1:#fff3d6;--s2:#fbdcd8}}";
 
+/// The classes of several lines of one picture, in the order in which they are taken.
+pub(crate) const LINES: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
+
 /// Red, green and blue of a light colour by its name, such as `c2`.
 #[cfg(feature = "png")]
 pub(super) fn light(name: &str) -> Option<[u8; 3]> {

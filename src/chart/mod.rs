@@ -9,6 +9,7 @@ mod png;
 mod scale;
 mod svg;
 
+pub(crate) use colours::LINES;
 pub use colours::{COLOURS, STYLE};
 pub use plot::Plot;
 pub(crate) use svg::escaped;

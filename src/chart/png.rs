@@ -173,7 +173,7 @@ impl Canvas<'_> {
     }
 }
 
-/// A line through the points, broken where there is no value. A point alone is shown as a short stroke.
+/// A line through the points, broken where there is no value. A point alone is no line, and not seen.
 fn joined(points: &[(f64, f64)]) -> PathBuilder {
     let mut path = PathBuilder::new();
     for run in points.split(|(_, y)| y.is_nan()) {

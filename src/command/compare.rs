@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::data::{self, Data};
 use super::evaluate::check_limit;
-use super::fit::fit_on;
+use super::fit::fit_without_card;
 use crate::figures::{count, length, matrix, number, or_dash};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -24,7 +24,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal compare graphs/die-tester.toml mine.toml --data week.csv --on days.csv
-  athermal compare graphs/zoo.toml --data week.csv --on days.csv --abs-truth-below \"250 nm/min\"")]
+  athermal compare graphs/zoo.toml --data week.csv --on days.csv \\
+      --abs-truth-below \"250 nm/min\"")]
 pub struct Compare {
     /// The graphs, or models whose graphs are fitted anew
     #[arg(required = true, value_name = "GRAPH")]
@@ -65,14 +66,11 @@ impl Compare {
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
         for (path, mut model) in models {
             let began = Instant::now();
-            let report = fit_on(&mut model, &self.data, &FitOptions::default(), terminal)?;
+            let options = FitOptions::default();
+            let (_, report) = fit_without_card(&mut model, &self.data, &options, terminal)?;
             let seconds = began.elapsed().as_secs_f64();
             let path = path.display().to_string();
-            // Graphs that share a name are told apart by their files.
-            let mut name = model.plan.name.clone().unwrap_or_else(|| path.clone());
-            if fits.iter().any(|fit| fit.graph == name) {
-                name.clone_from(&path);
-            }
+            let name = free_name(model.plan.name.as_deref(), &path, &fits);
             let dataset = on.dataset();
             let mut progress = terminal.progress("scoring");
             let mut ticks = 0;
@@ -123,6 +121,15 @@ impl Compare {
             Answer::Fine
         })
     }
+}
+
+/// What a graph is called: graphs that share a name are told apart by their files, and files that come again by a number.
+fn free_name(own: Option<&str>, path: &str, fits: &[Fitted]) -> String {
+    let own = own.unwrap_or(path).to_owned();
+    let again = (2..).map(|nth| format!("{path} ({nth})"));
+    let mut names = [own, path.to_owned()].into_iter().chain(again);
+    let free = names.find(|name| fits.iter().all(|fit| fit.graph != *name));
+    free.unwrap_or_default()
 }
 
 /// Whether an estimator could not be fitted; each is told.
@@ -200,4 +207,24 @@ fn describe(comparison: &Comparison) -> String {
     }
     text.push_str(&matrix("", &columns, &rows));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_graph_that_comes_again_has_rows_of_its_own() {
+        let mut fits: Vec<Fitted> = Vec::new();
+        for expected in ["a", "a.toml", "a.toml (2)"] {
+            let graph = free_name(Some("a"), "a.toml", &fits);
+            assert_eq!(graph, expected);
+            fits.push(Fitted {
+                graph,
+                path: "a.toml".to_owned(),
+                seconds: 0.0,
+                report: FitReport::default(),
+            });
+        }
+    }
 }

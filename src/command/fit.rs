@@ -1,16 +1,18 @@
 //! `athermal fit`: fits a graph's estimators on recorded data and writes a model.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use athermal::Model;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
-use athermal::core::node::SelectionStep;
+use athermal::core::node::{OrderTable, SelectionStep};
+use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
 
 use super::data::{self, Data};
-use crate::figures::{count, number};
+use crate::figures::{count, number, paragraph, table};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit a graph's estimators on recorded data
@@ -119,13 +121,7 @@ pub fn fit_on(
     options: &FitOptions,
     terminal: &Terminal,
 ) -> Result<FitReport, Failure> {
-    let dataset = data.dataset();
-    let mut progress = terminal.progress("fitting");
-    let (fitted, report) = fit(&model.plan, &dataset, options, &mut |ticks| {
-        progress.tell(ticks);
-    })?;
-    drop(progress);
-    model.fitted = fitted;
+    let (dataset, report) = fit_without_card(model, data, options, terminal)?;
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),
@@ -137,36 +133,94 @@ pub fn fit_on(
         ticks: report.ticks,
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
+    Ok(report)
+}
+
+/// The same for a model that is not kept: a card has the checksums of all data.
+///
+/// # Errors
+/// When the data cannot be read.
+pub fn fit_without_card(
+    model: &mut Model,
+    data: &Data,
+    options: &FitOptions,
+    terminal: &Terminal,
+) -> Result<(Dataset, FitReport), Failure> {
+    let dataset = data.dataset();
+    let mut progress = terminal.progress("fitting");
+    let (fitted, report) = fit(&model.plan, &dataset, options, &mut |ticks| {
+        progress.tell(ticks);
+    })?;
+    drop(progress);
+    model.fitted = fitted;
     data::tell(
         terminal,
         &dataset.reports(),
         report.refused,
         &report.rejected,
     );
-    Ok(report)
+    Ok((dataset, report))
 }
 
 /// What is told of a step of a selection.
-fn tell_step(text: &mut String, nth: &str, step: &SelectionStep, candidates: bool) {
-    use std::fmt::Write as _;
+fn tell_step(
+    text: &mut String,
+    nth: &str,
+    step: &SelectionStep,
+    (width, candidates): (usize, bool),
+) {
     let folds: Vec<String> = step.folds.iter().map(|r2| format!("{r2:.3}")).collect();
     let folds = folds.join(" ");
     let line = format!(
-        "  {nth:>3} {:<38} R² {:.4}  {folds}",
+        "  {nth:>3} {:<width$}  R² {:.4}  {folds}",
         step.label(),
         step.score
     );
     let _ = writeln!(text, "{}", line.trim_end());
     if candidates {
         for tried in &step.candidates {
-            let _ = writeln!(text, "        {:<37} {:.4}", tried.name, tried.score);
+            let _ = writeln!(text, "      {:<width$}     {:.4}", tried.name, tried.score);
         }
     }
 }
 
+/// What is told of orders that were compared.
+fn tell_orders(text: &mut String, orders: &OrderTable) {
+    let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
+    let cells = orders.tried.iter().enumerate().map(|(nth, tried)| {
+        let chosen = nth == orders.chosen;
+        let mut cells = vec![
+            format!("  {}", tried.order),
+            tried.coefficients.to_string(),
+            format!("{:.2}", tried.aic),
+            format!("{:.2}", tried.aicc),
+            format!("{:.2}", tried.bic),
+            number(tried.fpe),
+        ];
+        if chosen {
+            cells.push(format!(
+                "smallest {}, on {} rows",
+                orders.by,
+                count(orders.rows as u64)
+            ));
+        }
+        cells
+    });
+    text.push_str(&table(&header, &cells.collect::<Vec<_>>()));
+}
+
+/// How wide the longest name in a selection is.
+fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
+    let tried = steps.iter().flat_map(|step| &step.candidates);
+    let tried = tried
+        .filter(|_| candidates)
+        .map(|tried| tried.name.chars().count());
+    let taken = steps.iter().map(|step| step.label().chars().count());
+    taken.chain(tried).max().unwrap_or(0)
+}
+
 /// What is told of one estimator.
 fn describe(fit: &EstimatorFit, candidates: bool) -> String {
-    use std::fmt::Write as _;
     let mut text = String::new();
     let _ = write!(
         text,
@@ -186,25 +240,31 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         .filter(|(n, _)| *n > 0)
         .map(|(n, why)| format!("{} {why}", count(*n)))
         .collect();
-    if !dropped.is_empty() {
-        let _ = write!(text, ", left out {}", dropped.join(", "));
-    }
     text.push('\n');
+    if !dropped.is_empty() {
+        let _ = writeln!(text, "  left out: {}", dropped.join(", "));
+    }
     for (name, share) in &fit.dropped_candidates {
-        let _ = writeln!(
-            text,
-            "  left out {name}: a value in only {:.0} % of the rows",
-            100.0 * share
-        );
+        let why = format!("a value in only {:.0} % of the rows", 100.0 * share);
+        text.push_str(&paragraph(&format!("  left out {name}:"), &why));
     }
     let Outcome::Fitted(report) = &fit.outcome else {
         return text;
     };
-    for (nth, step) in report.selection.iter().enumerate() {
-        tell_step(&mut text, &format!("{:>2}", nth + 1), step, candidates);
+    let refused = report.refused.as_ref().filter(|_| candidates);
+    let steps: Vec<_> = report.selection.iter().chain(refused).collect();
+    let width = width(&steps, candidates);
+    for (nth, step) in steps.into_iter().enumerate() {
+        let taken = nth < report.selection.len();
+        let nth = if taken {
+            (nth + 1).to_string()
+        } else {
+            "not".to_owned()
+        };
+        tell_step(&mut text, &nth, step, (width, candidates));
     }
-    if candidates && let Some(step) = &report.refused {
-        tell_step(&mut text, "not", step, candidates);
+    if let Some(orders) = &report.orders {
+        tell_orders(&mut text, orders);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {
@@ -220,7 +280,7 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         let _ = writeln!(text, "  {}", facts.join(", "));
     }
     for note in &report.notes {
-        let _ = writeln!(text, "  note: {note}");
+        text.push_str(&paragraph("  note:", note));
     }
     text
 }

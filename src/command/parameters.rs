@@ -60,10 +60,6 @@ impl<'a> Page<'a> {
             .and_then(|path| path.rsplit('/').next())
             && let Some(definition) = self.definitions.get(name)
         {
-            let name = self
-                .definitions
-                .get_key_value(name)
-                .map_or("", |(name, _)| name);
             if !self.told.contains(&name) {
                 self.told.push(name);
                 self.forms(definition, depth);

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use athermal::chart::Plot;
+use athermal::core::fit::FitError;
 use athermal::report::{WANTED, gather, page, plots, text};
 use clap::Args;
 
-use super::data::Data;
+use super::data::{self, Data};
 use super::evaluate::load_fitted;
-use crate::terminal::{Answer, Failure, Format, Terminal};
+use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
 /// Show what a model is worth on recorded data, as one page
 ///
@@ -49,9 +50,18 @@ impl Report {
             .iter()
             .map(|path| path.display().to_string())
             .collect();
-        let facts =
-            gather(&model, &dataset, names).map_err(|error| Failure::Outside(error.to_string()))?;
-        if facts.course.axes.is_empty() {
+        let facts = gather(&model, &dataset, names).map_err(|error| {
+            let of_a_pass = error.downcast::<FitError>();
+            of_a_pass.map_or_else(outside, |error| Failure::from(*error))
+        })?;
+        let course = &facts.course;
+        data::tell(
+            terminal,
+            &dataset.reports(),
+            course.refused,
+            &course.rejected,
+        );
+        if course.axes.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is little to report",
             );

@@ -30,7 +30,8 @@ use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
   athermal simulate die-tester -o train.csv
   athermal simulate die-tester -o test.csv --days 2 --seed 2 --truth
   athermal simulate linear-axis -o - --days 0.1 | head
-  athermal simulate die-tester -o faulty.csv --fault temperature.plate1=stuck,from=6h,for=12h \\
+  athermal simulate die-tester -o faulty.csv \\
+      --fault temperature.plate1=stuck,from=6h,for=12h \\
       --fault \"temperature.room=drift,size=0.5 K/h\"
 
 Faults: missing, stuck, offset, spike, drift, noise; `from`, `for` and `size` may be left out.")]

@@ -6,14 +6,11 @@ use std::sync::Arc;
 
 use athermal_core::compile::Plan;
 use athermal_core::quantity::Quantity;
-use athermal_core::score::{PredictionTrace, Trace, TruthTrace};
+use athermal_core::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::report::rms;
-
-/// The share of instants below which a prediction does not restrict those on which the others are scored, as in scoring.
-const RESTRICTS: f64 = 0.5;
 
 /// A graph that takes part.
 #[derive(Debug, Clone)]

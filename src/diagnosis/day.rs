@@ -93,10 +93,9 @@ impl Calendar {
             let Some((from, to)) = *period else {
                 continue;
             };
-            let days = ((to - from).secs() / day.secs()).round().max(1.0) as i64;
             let segment = u32::try_from(segment).unwrap_or(u32::MAX);
             let begin = |nth: i64| (segment, from + Duration::from_ns(nth * day.as_ns()));
-            begins.extend((0..days).map(begin));
+            begins.extend((0..days_in(from, to, day)).map(begin));
         }
         Self { begins }
     }
@@ -111,10 +110,17 @@ impl Calendar {
     }
 }
 
-/// Into how many days a recording falls.
+/// Into how many days a segment falls.
+fn days_in(from: Instant, to: Instant, day: Duration) -> i64 {
+    ((to - from).secs() / day.secs()).round().max(1.0) as i64
+}
+
+/// Into how many days a recording falls. They are not laid out: a week has 6 × 10¹⁴ of a nanosecond.
 #[must_use]
 pub fn count(observation: &Observation, day: Duration) -> usize {
-    Calendar::new(observation, day).count()
+    let each = observation.segments.iter().flatten();
+    let days = each.map(|&(from, to)| days_in(from, to, day));
+    days.fold(0_i64, i64::saturating_add) as usize
 }
 
 /// Fits a model's graph anew on some days and scores it on the others. `progress` is told how many fits of how many are done.
@@ -129,11 +135,11 @@ pub fn days(
     day: Duration,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Option<Days>, FitError> {
-    let calendar = Calendar::new(observation, day);
-    let count = calendar.count();
+    let count = count(observation, day);
     if !(2..=MOST_DAYS).contains(&count) {
         return Ok(None);
     }
+    let calendar = Calendar::new(observation, day);
     let numbers: Vec<usize> = NUMBERS.into_iter().filter(|&n| n + 1 < count).collect();
     let fits: usize = numbers.iter().map(|&n| placings(n, count).len()).sum();
     let (total, mut done) = ((fits + count) as u64, 0);

@@ -17,7 +17,7 @@ pub mod window;
 pub use observation::{Observation, SourceStatistics, observe};
 pub use plot::plots;
 
-use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
+use athermal_core::compile::Plan;
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
 use athermal_core::recording::Recording;
@@ -125,24 +125,17 @@ fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
         if std::mem::replace(&mut of_slot[slot], true) {
             continue;
         }
-        if let Some(node) = plan.channels[slot].node {
-            waiting.extend(reads(plan, &plan.nodes[node]));
+        let Some(node) = plan.channels[slot].node else {
+            continue;
+        };
+        // Truths that a node only learns from are not among its inputs.
+        for gather in plan.nodes[node].role.inputs() {
+            let entries = plan.gathers[gather].entries.iter();
+            waiting.extend(entries.map(|entry| entry.slot));
         }
     }
     of_slot.truncate(plan.sources.len());
     of_slot
-}
-
-/// The slots that a node computes from; truths that it only learns from are not among them.
-fn reads<'a>(plan: &'a Plan, node: &'a PlannedNode) -> impl Iterator<Item = usize> + 'a {
-    let gathers: &[usize] = match &node.role {
-        PlannedRole::Feature { gathers, .. } | PlannedRole::Estimator { gathers, .. } => gathers,
-        PlannedRole::Combiner { voters, .. } => std::slice::from_ref(voters),
-    };
-    let entries = gathers
-        .iter()
-        .flat_map(|&gather| &plan.gathers[gather].entries);
-    entries.map(|entry| entry.slot)
 }
 
 /// The measured channels that a truth is made of. Whatever else is measured is a sensor that may explain it.

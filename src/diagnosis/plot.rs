@@ -6,9 +6,8 @@ use super::lag::{Correlogram, FeatureLags, Lags};
 use super::residual::Residuals;
 use super::response::{Response, Responses};
 use super::window::{Width, Windows};
-use crate::chart::{Chart, Layer, Mark, Plot};
+use crate::chart::{Chart, LINES, Layer, Mark, Plot};
 
-const COLOURS: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
 /// Lines whose labels have room beside each other.
 const MOST_FEATURES: usize = 4;
 /// The colour of bounds.
@@ -30,7 +29,7 @@ impl Points {
         Self {
             x,
             y,
-            class: COLOURS[nth % COLOURS.len()],
+            class: LINES[nth % LINES.len()],
             label: label.to_owned(),
             mark: Mark::Line,
         }
@@ -223,7 +222,7 @@ fn short(name: &str) -> &str {
 fn response(of: &Responses, impulse: bool) -> Picture {
     let mut largest: Vec<&Response> = of.sensors.iter().collect();
     largest.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
-    largest.truncate(COLOURS.len());
+    largest.truncate(LINES.len());
     let lines = largest.iter().enumerate().map(|(nth, sensor)| {
         let x = sensor.time_s.iter().map(|time| time / 60.0).collect();
         let y = if impulse {

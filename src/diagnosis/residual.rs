@@ -128,7 +128,9 @@ fn spaced(
         if value.is_nan() || last.is_some_and(|last| at - last < spacing) {
             continue;
         }
-        let place = ((at - first).as_ns() / spacing.as_ns().max(1)) as usize;
+        // Nothing is spaced where each segment has one truth at most, at an instant and of no horizon.
+        let place = (at - first).as_ns().checked_div(spacing.as_ns());
+        let place = place.unwrap_or(0) as usize;
         last = Some(at);
         spaced.resize((begin + place).max(spaced.len()), f64::NAN);
         spaced.push(value);

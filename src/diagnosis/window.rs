@@ -128,17 +128,21 @@ fn widths(segments: &[Measured], own_s: f64, factor: f64) -> Vec<Width> {
 }
 
 /// The slot that a truth is the slope of.
-fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
+pub(crate) fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
     let node = &plan.nodes[plan.channels[truth].node?];
     let PlannedRole::Feature { gathers, .. } = &node.role else {
         return None;
     };
     let entries = &plan.gathers[*gathers.first()?].entries;
-    let place = truth.checked_sub(node.slots.start)?;
-    (node.kind.name == "slope").then(|| entries.get(place).map(|of| of.slot))?
+    // Each channel has a slope for every window.
+    let (_, slopes) = node.ports.first().filter(|_| node.kind.name == "slope")?;
+    let place = truth.checked_sub(slopes.start)? * entries.len();
+    entries
+        .get(place.checked_div(slopes.len())?)
+        .map(|of| of.slot)
 }
 
-/// 1, 2, 3, 5, 10, 20, 30, 50 of seconds, minutes, hours and days, as people choose windows; in s.
+/// Round lengths from a hundredth of a second to a week, as people choose windows; in s.
 pub fn nice_widths() -> impl Iterator<Item = f64> {
     const STEPS: [f64; 12] = [
         1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0,

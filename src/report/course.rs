@@ -1,6 +1,7 @@
 //! Decides what is written down while a model is stepped over a recording; not what it is worth.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use athermal_control::Stability;
@@ -26,6 +27,10 @@ const TRANSIENT: f64 = 80.0;
 pub struct Course {
     /// Ticks stepped.
     pub ticks: u64,
+    /// Rows refused because their time was not after the one before.
+    pub refused: u64,
+    /// Samples rejected as infinite or out of range, by measured channel.
+    pub rejected: Vec<(String, u64)>,
     /// First and last instant in s; segments follow each other an hour apart.
     pub period_s: Option<(f64, f64)>,
     /// Every predicted truth.
@@ -84,11 +89,16 @@ fn telling(plan: &Plan) -> Plan {
     ask_for_reasons(&mut plan);
     for node in &mut plan.nodes {
         if let PlannedRole::Combiner { beside, .. } = &mut node.role {
-            let weights = node.ports.iter().find(|(name, _)| *name == "weights");
-            beside.weights = weights.map(|(_, slots)| slots.start);
+            beside.weights = weights_of(&node.ports).map(|slots| slots.start);
         }
     }
     plan
+}
+
+/// The slots of the port of weights; other ports stand beside a prediction too, such as the ends of its interval.
+fn weights_of(ports: &[(&'static str, Range<usize>)]) -> Option<Range<usize>> {
+    let weights = ports.iter().find(|(name, _)| *name == "weights");
+    weights.map(|(_, slots)| slots.clone())
 }
 
 /// A prediction being paired with its truth.
@@ -99,7 +109,7 @@ struct Pairs {
     truth: usize,
     pairing: Pairing,
     /// The slots of the weights by which it combines others.
-    weights: std::ops::Range<usize>,
+    weights: Range<usize>,
 }
 
 /// Steps the model over the recording.
@@ -154,6 +164,8 @@ pub(super) fn follow(
         begins = false;
     }
     course.sensors.iter_mut().for_each(SensorFacts::finish);
+    course.refused = engine.refused();
+    course.rejected = engine.rejected_channels();
     Ok((course, found.map(|(_, track)| track)))
 }
 
@@ -213,13 +225,11 @@ fn pairs(plan: &Plan, course: &mut Course) -> Vec<Pairs> {
             course.axes[axis].main = voter;
             course.axes[axis].ahead_s = channel.channel.ahead.secs();
         }
-        let ports = &plan.nodes[node].ports;
-        let weighs = matches!(plan.nodes[node].role, PlannedRole::Combiner { .. });
-        let weights = match ports.get(1) {
-            // One vote is shown, the first: the picture of two would not be read.
-            Some((_, slots)) if weighs && course.axes[axis].weights.is_empty() => slots.clone(),
-            _ => 0..0,
-        };
+        let combines = matches!(plan.nodes[node].role, PlannedRole::Combiner { .. });
+        // One vote is shown, the first: the picture of two would not be read.
+        let shown = combines && course.axes[axis].weights.is_empty();
+        let weights = weights_of(&plan.nodes[node].ports).filter(|_| shown);
+        let weights = weights.unwrap_or_default();
         course.axes[axis]
             .weights
             .extend(weights.clone().map(|slot| {

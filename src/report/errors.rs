@@ -1,5 +1,6 @@
 //! Decides how the errors of a prediction are summarised: their spread and how long they last.
 
+use athermal_numerics::{NORMAL_95, autocorrelation};
 use serde::Serialize;
 
 use super::{Axis, rms};
@@ -23,7 +24,8 @@ pub struct Errors {
     pub lags: Vec<f64>,
     /// The autocorrelation at each lag; pairs of which one is absent do not count.
     pub autocorrelation: Vec<f64>,
-    /// Beyond this an autocorrelation is no chance: 1.96 / √n.
+    /// Beyond this lie 5 % of the autocorrelations of a white series: 1.96 / √n. Truths over windows that overlap share noise,
+    /// so that even the errors of a perfect model go beyond it at lags within their windows.
     pub bound: f64,
 }
 
@@ -62,42 +64,8 @@ impl Errors {
                 .collect(),
             counts,
             lags: (1..=LAGS).map(|lag| lag as f64).collect(),
-            autocorrelation: autocorrelation(&errors),
-            bound: 1.96 / (present.len() as f64).sqrt(),
+            autocorrelation: autocorrelation(&errors, LAGS).split_off(1),
+            bound: NORMAL_95 / (present.len() as f64).sqrt(),
         }
-    }
-}
-
-/// `Σ (e_i − ē)(e_{i+k} − ē) / Σ (e_i − ē)²`, over the pairs of which both are there.
-fn autocorrelation(errors: &[f64]) -> Vec<f64> {
-    let there = || errors.iter().filter(|e| e.is_finite());
-    let mean = there().sum::<f64>() / there().count() as f64;
-    let about: Vec<f64> = errors
-        .iter()
-        .map(|e| if e.is_finite() { e - mean } else { 0.0 })
-        .collect();
-    let total: f64 = about.iter().map(|e| e * e).sum();
-    let at = |lag: usize| {
-        about
-            .iter()
-            .zip(about.iter().skip(lag))
-            .map(|(a, b)| a * b)
-            .sum::<f64>()
-            / total
-    };
-    (1..=LAGS).map(at).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn autocorrelation_is_that_of_the_definition_and_gaps_do_not_count() {
-        // Mean 0: squares add up to 10, neighbours to 1·2 + 2·(−2) + (−2)·(−1) = 0, next but one to −2 − 2 = −4.
-        let found = autocorrelation(&[1.0, 2.0, -2.0, -1.0]);
-        assert_eq!(&found[..3], [0.0, -0.4, -0.1]);
-        let with_gap = autocorrelation(&[1.0, 2.0, f64::NAN, -2.0, -1.0]);
-        assert_eq!(&with_gap[..2], [0.4, -0.4]);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use athermal::core::engine::Engine;
-use athermal::core::live::{LiveOptions, pair};
+use athermal::core::live::{LiveOptions, Notice, pair};
 use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
 use athermal::{Instant, Model};
@@ -70,6 +70,18 @@ fn that_learning_is_frozen_is_part_of_a_snapshot() {
         &run(&mut first, 150, &rows[150..]),
         &run(&mut second, 150, &rows[150..])
     ));
+}
+
+#[test]
+fn a_segment_that_ends_right_after_a_restart_is_learned_from_as_without_it() {
+    let text = graph(&format!("{RLS}\ninputs.freeze = \"hold\""));
+    let mut first = engine(&text);
+    run(&mut first, 0, &rows(15, 300, 100));
+    let mut second = engine(&text);
+    second.restore(&first.snapshot()).unwrap();
+    first.segment();
+    second.segment();
+    assert_eq!(first.snapshot(), second.snapshot());
 }
 
 #[test]
@@ -164,4 +176,38 @@ fn a_replica_freezes_when_the_engine_does() {
             assert_eq!(replica.snapshot(), stepper.engine().snapshot());
         }
     }
+}
+
+#[test]
+fn a_graph_that_takes_over_is_frozen_although_the_command_was_missed() {
+    let rows = rows(16, 60, 30);
+    let model = model("missed", &graph(RLS));
+    let options = LiveOptions {
+        mirrored: 4,
+        ..LiveOptions::default()
+    };
+    let (mut stepper, mut control) = pair(&model, options).unwrap();
+    let mut took_over = 0;
+    for (tick, row) in rows.iter().enumerate() {
+        match tick {
+            20 => stepper.freeze(true),
+            40 => {
+                control.stage(&model, false).unwrap();
+                control.commit().unwrap();
+            }
+            _ => {}
+        }
+        stepper.step(secs(10.0 * tick as f64), row).unwrap();
+        // For a while nobody looks.
+        if !(10..30).contains(&tick) {
+            let notices = control.pump();
+            let swaps = notices
+                .iter()
+                .filter(|notice| matches!(notice, Notice::TookOver { .. }));
+            took_over += swaps.count();
+        }
+    }
+    assert!(stepper.missed() > 0);
+    assert_eq!(took_over, 1);
+    assert!(stepper.engine().frozen());
 }

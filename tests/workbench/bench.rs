@@ -21,13 +21,18 @@ pub struct Read {
 impl Read {
     /// Reads a graph, which may extend those of this project.
     pub fn new(text: &str) -> Self {
+        Self::wanting(text, Wanted::default())
+    }
+
+    /// The same with what else is wanted of it.
+    pub fn wanting(text: &str, wanted: Wanted) -> Self {
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
         let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/text.toml");
         let graph = document::load_text(name, text, &Disk, &mut sources, &mut diagnostics)
             .and_then(|read| document::declare(read, &mut diagnostics));
         let plan = graph
             .as_ref()
-            .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
+            .and_then(|graph| compile(graph, wanted, &mut diagnostics));
         Self {
             graph,
             plan,

@@ -1,14 +1,16 @@
-//! What the tests share: where recorded data are, a graph from text, an engine stepped by hand, the program as a user calls
-//! it. Decides nothing that is expected.
+//! What the tests share: where recorded data are, a graph from text, an engine stepped by hand, an estimator fitted on rows, the
+//! program as a user calls it. Decides nothing that is expected.
 
 #![allow(dead_code, unused_imports)] // each test file uses its part
 
 mod bench;
 mod program;
+mod regression;
 mod simulated;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
-pub use program::{Finished, Scratch, athermal, athermal_fed};
+pub use program::{Finished, Scratch, athermal, athermal_fed, athermal_on};
+pub use regression::{coefficients, fitted, regression};
 pub use simulated::simulated;
 
 use std::path::{Path, PathBuf};
@@ -29,6 +31,18 @@ pub fn data() -> Option<PathBuf> {
 pub fn graph(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs");
     folder.join(name).with_extension("toml")
+}
+
+/// The graph files in a folder of this project, such as `graphs`, in the order of their names.
+pub fn graphs(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let files = std::fs::read_dir(folder).unwrap();
+    let mut graphs: Vec<_> = files
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .collect();
+    graphs.sort();
+    graphs
 }
 
 /// A file of reference results, as text; nothing, with a remark, where this machine lacks it.

@@ -52,6 +52,18 @@ pub fn athermal(arguments: &[&dyn AsRef<OsStr>]) -> Finished {
     athermal_fed(arguments, b"")
 }
 
+/// Calls a command for a graph or model and recorded data, with more arguments.
+pub fn athermal_on(
+    command: &str,
+    graph: &Path,
+    data: &Path,
+    more: &[&dyn AsRef<OsStr>],
+) -> Finished {
+    let mut arguments: Vec<&dyn AsRef<OsStr>> = vec![&command, &graph, &"--data", &data];
+    arguments.extend(more);
+    athermal(&arguments)
+}
+
 /// Calls the program with something on its standard input.
 pub fn athermal_fed(arguments: &[&dyn AsRef<OsStr>], input: &[u8]) -> Finished {
     let mut child = command(arguments)

@@ -71,7 +71,7 @@ impl Collinearity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::GramBlocks;
+    use crate::{GramBlocks, oracle};
 
     fn gram(rows: impl Iterator<Item = [f64; 4]>) -> Gram {
         let mut blocks = GramBlocks::new(4);
@@ -81,22 +81,10 @@ mod tests {
         blocks.total()
     }
 
-    /// Rows of plain text under `tests/`, with their header left out.
-    fn rows(text: &str) -> Vec<Vec<f64>> {
-        let lines = text.lines().skip(1);
-        lines
-            .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
-            .collect()
-    }
-
     #[test]
     fn inflation_and_condition_are_those_of_the_oracle() {
-        let input = rows(include_str!(
-            "../../../tests/oracles/collinearity/input.csv"
-        ));
-        let expected = rows(include_str!(
-            "../../../tests/oracles/collinearity/expected.csv"
-        ));
+        let input = oracle::own_table("collinearity/input.csv").numbers();
+        let expected = oracle::own_table("collinearity/expected.csv").numbers();
         let found = gram(input.iter().map(|row| [row[0], row[1], row[2], row[3]]));
         let found = Collinearity::of(&found, &[0, 1, 2, 3]).unwrap();
         let [expected, condition] = [&expected[0][..4], &expected[0][4..]];

@@ -61,8 +61,7 @@ pub fn ljung_box(correlation: &[f64], count: usize) -> Vec<LjungBox> {
 
 /// The probability that `χ²` with so many degrees of freedom exceeds a value, by its finite series (Abramowitz and Stegun 1964,
 /// 26.4.4 and 26.4.5).
-#[must_use]
-pub fn chi_squared_tail(value: f64, degrees: usize) -> f64 {
+fn chi_squared_tail(value: f64, degrees: usize) -> f64 {
     if value.is_nan() || degrees == 0 {
         return f64::NAN;
     }
@@ -138,8 +137,12 @@ fn about_mean(x: &[f64]) -> Vec<f64> {
 
 /// The same with missing values kept.
 fn about_mean_or_nan(x: &[f64]) -> Vec<f64> {
-    let present = || x.iter().filter(|value| !value.is_nan());
-    let mean = present().sum::<f64>() / present().count() as f64;
+    let present = || x.iter().copied().filter(|value| !value.is_nan());
+    let mean = match present().next() {
+        // Rounding would make their mean another, and the series one that varies.
+        Some(first) if present().all(|value| value == first) => first,
+        _ => present().sum::<f64>() / present().count() as f64,
+    };
     x.iter().map(|value| value - mean).collect()
 }
 
@@ -217,6 +220,15 @@ mod tests {
     }
 
     #[test]
+    fn autocorrelation_is_that_of_the_definition_and_gaps_do_not_count() {
+        // Mean 0: squares add up to 10, neighbours to 1·2 + 2·(−2) + (−2)·(−1) = 0, next but one to −2 − 2 = −4.
+        let found = autocorrelation(&[1.0, 2.0, -2.0, -1.0], 3);
+        assert_eq!(found, [1.0, 0.0, -0.4, -0.1]);
+        let with_gap = autocorrelation(&[1.0, 2.0, f64::NAN, -2.0, -1.0], 2);
+        assert_eq!(with_gap, [1.0, 0.4, -0.4]);
+    }
+
+    #[test]
     fn missing_values_are_left_out_and_not_taken_for_zero() {
         let x: Vec<f64> = (0..200).map(|i| 5.0 + f64::from(i % 7)).collect();
         let mut gappy = x.clone();
@@ -242,6 +254,7 @@ mod tests {
     #[test]
     fn a_constant_series_has_no_correlation() {
         assert!(autocorrelation(&[1.0; 5], 2)[1].is_nan());
+        assert!(autocorrelation(&[0.1; 10], 2)[1].is_nan());
         assert!(cross_correlation(&[1.0; 5], &[1.0, 2.0, 3.0, 4.0, 5.0], 1)[1].is_nan());
     }
 }

@@ -9,7 +9,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    pub(crate) fn parse(text: &str) -> Self {
+    fn parse(text: &str) -> Self {
         let mut lines = text
             .lines()
             .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());

@@ -46,7 +46,9 @@ pub fn generalised_cross_validation(
         }
         let left = n - effective;
         if left > 0.0 {
-            n * (spectrum.spread - explained).max(0.0) / (left * left)
+            // Written so that NaN stays one, and is no model without errors.
+            let squares = spectrum.spread - explained;
+            n * (if squares < 0.0 { 0.0 } else { squares }) / (left * left)
         } else {
             f64::INFINITY
         }
@@ -180,7 +182,8 @@ impl TestMoments {
                 .sum();
             errors += w * (fitted - 2.0 * target[(i, 0)]);
         }
-        errors.max(0.0)
+        // Written so that NaN stays one, and is no model without errors.
+        if errors < 0.0 { 0.0 } else { errors }
     }
 
     /// `R²` as [`crate::SelectionScore::R2`] has it.

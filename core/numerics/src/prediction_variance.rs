@@ -2,7 +2,7 @@
 //! decide the coefficients.
 
 use crate::normal_equations::Problem;
-use crate::{Gram, LeastSquares, LinearFit, NumericsError};
+use crate::{Gram, LeastSquares, LinearFit, NumericsError, SINGULAR_BOUND};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Mat, Par, Side};
 use serde::{Deserialize, Serialize};
@@ -67,7 +67,7 @@ impl LeastSquares {
         let penalised = problem.penalised(self.alpha);
         let order = penalised.order();
         // What the rows do not determine at all must not make the whole unsolvable.
-        let least = order as f64 / self.condition_bound.powi(2);
+        let least = order as f64 / SINGULAR_BOUND.powi(2);
         let inverse = penalised
             .inverse_root(0.0)
             .or_else(|| penalised.inverse_root(least))
@@ -117,20 +117,10 @@ pub(crate) fn inverse_of_factor(matrix: &Mat<f64>) -> Option<Mat<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle::Table;
-    use crate::{GramBlocks, Standardization};
-
-    fn oracle(file: &str) -> Vec<Vec<f64>> {
-        let folder = concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../tests/oracles/prediction_variance"
-        );
-        let text = std::fs::read_to_string(format!("{folder}/{file}")).unwrap();
-        Table::parse(&text).numbers()
-    }
+    use crate::{GramBlocks, Standardization, oracle};
 
     fn fitted(alpha: f64, columns: &[usize]) -> (LinearFit, PredictionVariance) {
-        let rows = oracle("rows.csv");
+        let rows = oracle::own_table("prediction_variance/rows.csv").numbers();
         let mut blocks = GramBlocks::new(4);
         for row in &rows {
             blocks.push(&row[..4], row[4]);
@@ -150,7 +140,7 @@ mod tests {
         // The third column of the rows is constant and stands in the middle, so that its place must be kept.
         for (alpha, column) in [(0.0, 4), (5.0, 5)] {
             let (_, variance) = fitted(alpha, &[0, 1, 2, 3]);
-            for row in oracle("expected.csv") {
+            for row in oracle::own_table("prediction_variance/expected.csv").numbers() {
                 let found = variance.at(&row[..4]).sqrt();
                 let expected = row[column];
                 assert!(

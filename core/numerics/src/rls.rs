@@ -1,6 +1,7 @@
 //! Recursive least squares with forgetting. Decides one step and what keeps it sound over millions of them; does not decide
 //! how regressors are scaled (they should be standardised), nor which rows are learned from.
 
+use crate::checks::check_parameter;
 use crate::{Gram, NumericsError};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -58,17 +59,9 @@ pub struct Rls {
 
 impl Forgetting {
     fn check(self) -> Result<(), NumericsError> {
-        let parameter = |name, value, allowed| NumericsError::Parameter {
-            name,
-            value,
-            allowed,
-        };
         let factor = |name, value: f64| {
-            if value > 0.0 && value <= 1.0 {
-                Ok(())
-            } else {
-                Err(parameter(name, value, "above 0 and at most 1"))
-            }
+            let fine = value > 0.0 && value <= 1.0;
+            check_parameter(name, value, fine, "above 0 and at most 1")
         };
         match self {
             Self::Constant { factor: constant } => factor("factor", constant),
@@ -77,12 +70,10 @@ impl Forgetting {
                 noise,
                 lowest,
             } => {
-                if !(memory > 1.0 && memory.is_finite()) {
-                    return Err(parameter("memory", memory, "above 1"));
-                }
-                if !(noise > 0.0 && noise.is_finite()) {
-                    return Err(parameter("noise", noise, "above 0"));
-                }
+                let fine = memory > 1.0 && memory.is_finite();
+                check_parameter("memory", memory, fine, "above 1")?;
+                let fine = noise > 0.0 && noise.is_finite();
+                check_parameter("noise", noise, fine, "above 0")?;
                 factor("lowest", lowest)
             }
         }
@@ -116,13 +107,8 @@ impl Rls {
         options: RlsOptions,
     ) -> Result<Self, NumericsError> {
         options.forgetting.check()?;
-        if options.most_trace.is_nan() || options.most_trace <= 0.0 {
-            return Err(NumericsError::Parameter {
-                name: "most_trace",
-                value: options.most_trace,
-                allowed: "above 0",
-            });
-        }
+        let most = options.most_trace;
+        check_parameter("most_trace", most, most > 0.0, "above 0")?;
         let width = coefficients.len();
         let symmetric = |i: usize, j: usize| covariance[i * width + j] == covariance[j * width + i];
         let sound = covariance.len() == width * width
@@ -226,6 +212,8 @@ impl Rls {
     #[must_use]
     pub fn with(mut self, options: RlsOptions) -> Self {
         self.options = options;
+        // What has been read back must not have to make room later.
+        self.projected.resize(self.coefficients.len(), 0.0);
         self
     }
 

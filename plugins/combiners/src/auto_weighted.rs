@@ -185,6 +185,9 @@ impl Weigher {
 
 impl Rule for Weigher {
     fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
+        if votes.present().next().is_none() {
+            return f64::NAN;
+        }
         let weights = &mut *self.room.borrow_mut();
         let total = self.weigh(errors, votes, weights);
         let terms = votes.present().map(|(voter, vote)| weights[voter] * vote);

@@ -7,13 +7,15 @@ use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::mean::mean;
+
 /// Adaptive conformal inference: intervals about any prediction, calibrated by its recent errors.
 ///
 /// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
 /// and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by `gain · (1 − coverage − miss)`, `miss` being
 /// 1 where the truth lay outside of the interval that was given for it and 0 where not (Gibbs and Candès 2021, equation 2).
-/// So the share of truths within comes to `coverage` whatever the errors are like, and when a machine changes; it is a share
-/// over time, not at each instant. Only truths that the embargo lets through count.
+/// So the share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep outgrowing
+/// all that are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
 ///
 /// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends. They
 /// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths, and where more is asked for than any
@@ -86,6 +88,7 @@ impl Combiner for Conformal {
         Box::new(Calibrating {
             parameters: self.clone(),
             known: Known {
+                coverage: self.coverage,
                 miscoverage: 1.0 - self.coverage,
                 errors: VecDeque::new(),
             },
@@ -104,6 +107,8 @@ struct Calibrating {
 /// What was learned of the errors of a prediction.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Known {
+    /// The share of truths that was to be covered.
+    coverage: f64,
     /// The share of misses that the next interval allows for, `α`.
     miscoverage: f64,
     /// When truths arrived, and the absolute errors, oldest first.
@@ -137,10 +142,7 @@ impl Calibrating {
 
 impl Combine for Calibrating {
     fn combine(&self, votes: Votes<'_>) -> f64 {
-        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
-            (sum + vote, count + 1.0)
-        });
-        if count > 0.0 { sum / count } else { f64::NAN }
+        mean(votes)
     }
 
     fn interval(&self, votes: Votes<'_>) -> [f64; 2] {
@@ -193,8 +195,13 @@ impl Combine for Calibrating {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known() {
-            Ok(known) => {
+        match state.known::<Known>() {
+            Ok(mut known) => {
+                let coverage = self.parameters.coverage;
+                // What was right for another share would be wrong for this one, and small gains hardly move it.
+                if known.coverage != coverage {
+                    (known.coverage, known.miscoverage) = (coverage, 1.0 - coverage);
+                }
                 self.known = known;
                 let errors = self.known.errors.iter().map(|&(_, error)| error);
                 self.sorted = errors.collect();
@@ -285,6 +292,23 @@ mod tests {
         );
         node.advance(s(62));
         assert_eq!(node.interval(Votes(&[0.0])), [-2.0, 2.0]);
+    }
+
+    #[test]
+    fn errors_are_carried_to_another_share_and_what_it_allows_for_is_not() {
+        let mut half = conformal(0.5, 0.0);
+        for second in 0..19 {
+            half.observe(Votes(&[0.0]), second as f64, s(second));
+        }
+        assert_eq!(half.interval(Votes(&[0.0])), [-9.0, 9.0]);
+        let mut more = conformal(0.8, 0.0);
+        let answer = more.restore(half.snapshot().unwrap());
+        assert_eq!(answer, Restored::Accepted);
+        assert_eq!(
+            more.interval(Votes(&[0.0])),
+            [-15.0, 15.0],
+            "0.8 · 20 is 16"
+        );
     }
 
     #[test]

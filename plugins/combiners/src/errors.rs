@@ -190,6 +190,7 @@ impl Errors {
                 return Restored::cold("of errors that fade only the sum is known, not each");
             }
             (_, Memory::HalfLife(_)) => {
+                *self = Self::new(self.squares.len(), self.memory);
                 for (voter, squares) in known.squares.into_iter().enumerate() {
                     for (arrived, square) in squares {
                         self.remember(voter, arrived, square);

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::errors::{ByErrors, Errors, Rule};
+use crate::mean::mean;
 use crate::memory::Memory;
 
 /// Passes a prediction on only while it does no harm: while its recent error is below that of predicting zero.
@@ -20,7 +21,8 @@ pub struct Guard {
     /// How long an error is remembered, counted from the arrival of its truth: `"15min"`, `{ truths = 12 }`, or ever less by
     /// `{ half_life = "15min" }`.
     pub memory: Memory,
-    /// How many truths must be in memory before a prediction is held back; 1 or more.
+    /// How many truths must be in memory before a prediction is held back; 1 or more. With a `half_life` they count for less
+    /// with age: one so short that fewer are ever left holds nothing back.
     #[serde(default = "five")]
     #[schemars(range(min = 1))]
     pub min_truths: usize,
@@ -122,13 +124,9 @@ impl Guarding {
 
 impl Rule for Guarding {
     fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
-        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
-            (sum + vote, count + 1.0)
-        });
-        if count == 0.0 {
-            f64::NAN
-        } else if self.passes(errors) {
-            sum / count
+        let mean = mean(votes);
+        if mean.is_nan() || self.passes(errors) {
+            mean
         } else {
             0.0
         }

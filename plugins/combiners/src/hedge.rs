@@ -83,9 +83,8 @@ impl Combiner for Hedge {
     }
 
     fn memory(&self) -> Duration {
-        // After ten half-lives less than a thousandth is left.
         let half_life = self.half_life.unwrap_or_default();
-        Duration::from_ns(half_life.as_ns().saturating_mul(10))
+        Fading { half_life }.longest()
     }
 
     fn build(&self, voters: usize) -> Box<dyn Combine> {
@@ -215,6 +214,7 @@ impl Combine for Hedging {
         if let (Some(half_life), Some(last)) = (self.parameters.half_life, self.losses.last) {
             let left = Fading { half_life }.left(arrived - last);
             self.losses.gap *= left;
+            self.losses.widest *= left;
             self.losses.sums.iter_mut().for_each(|sum| *sum *= left);
         }
         self.losses.last = Some(arrived);

@@ -23,14 +23,19 @@ impl Combiner for Mean {
     }
 }
 
+/// The mean of the votes that are there; NaN where there is none.
+pub(crate) fn mean(votes: Votes<'_>) -> f64 {
+    let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
+        (sum + vote, count + 1.0)
+    });
+    if count > 0.0 { sum / count } else { f64::NAN }
+}
+
 struct Average;
 
 impl Combine for Average {
     fn combine(&self, votes: Votes<'_>) -> f64 {
-        let (sum, count) = votes.present().fold((0.0, 0.0), |(sum, count), (_, vote)| {
-            (sum + vote, count + 1.0)
-        });
-        if count > 0.0 { sum / count } else { f64::NAN }
+        mean(votes)
     }
 
     fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {

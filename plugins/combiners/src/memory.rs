@@ -112,14 +112,17 @@ impl Memory {
         match *self {
             Self::Time(time) => time,
             Self::Truths(_) => Duration::ZERO,
-            Self::HalfLife(Fading { half_life }) => {
-                Duration::from_ns(half_life.as_ns().saturating_mul(FORGOTTEN))
-            }
+            Self::HalfLife(fading) => fading.longest(),
         }
     }
 }
 
 impl Fading {
+    /// How long anything counts.
+    pub(crate) fn longest(&self) -> Duration {
+        Duration::from_ns(self.half_life.as_ns().saturating_mul(FORGOTTEN))
+    }
+
     /// What is left of something after a time.
     pub(crate) fn left(&self, after: Duration) -> f64 {
         (-after.secs() / self.half_life.secs()).exp2().min(1.0)

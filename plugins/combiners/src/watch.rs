@@ -7,6 +7,8 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::mean::mean;
+
 /// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
 ///
 /// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the root mean
@@ -287,7 +289,6 @@ impl Detector for numerics::Adwin {
 
 /// A prediction under watch.
 struct Watching<D> {
-    watch: Watched,
     first: u64,
     every: Duration,
     hold: Duration,
@@ -297,6 +298,7 @@ struct Watching<D> {
 /// What has been seen of the errors.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Seen<D> {
+    watch: Watched,
     detector: D,
     /// How many errors say what is usual, and the mean of their squares.
     count: u64,
@@ -315,11 +317,11 @@ athermal_core::state!(Seen<numerics::Adwin>, "adwin/1");
 impl<D: Detector> Watching<D> {
     fn new(watch: Watched, first: u64, every: Duration, hold: Duration, detector: D) -> Self {
         Self {
-            watch,
             first,
             every,
             hold,
             seen: Seen {
+                watch,
                 detector,
                 count: 0,
                 mean_square: 0.0,
@@ -351,13 +353,6 @@ impl<D: Detector> Watching<D> {
     }
 }
 
-/// The mean of the votes; NaN where there is none.
-fn mean(votes: Votes<'_>) -> f64 {
-    let add = |(sum, count), (_, vote)| (sum + vote, count + 1.0);
-    let (sum, count) = votes.present().fold((0.0, 0.0), add);
-    sum / count
-}
-
 impl<D: Detector> Combine for Watching<D>
 where
     Seen<D>: State,
@@ -386,7 +381,7 @@ where
         }
         let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
         let relative = error / usual;
-        let value = match self.watch {
+        let value = match seen.watch {
             Watched::Error => relative,
             Watched::Size => relative.abs(),
         };
@@ -412,6 +407,10 @@ where
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
         match state.known::<Seen<D>>() {
+            // Errors with a sign and sizes are two series; going from one to the other would look like a change.
+            Ok(known) if known.watch != self.seen.watch => {
+                Restored::cold("what is watched of the errors differs")
+            }
             Ok(mut known) => {
                 known.detector = known.detector.told_by(&self.seen.detector);
                 self.seen = known;
@@ -489,6 +488,24 @@ mod tests {
             alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
             "{alarm:?}"
         );
+    }
+
+    #[test]
+    fn what_was_seen_of_errors_is_of_no_use_for_their_sizes() {
+        let size = PageHinkley {
+            watch: Watched::Size,
+            ..page_hinkley()
+        };
+        let mut errors = page_hinkley().build(1);
+        for nth in 0..40 {
+            errors.observe(Votes(&[0.0]), 1.0, s(nth));
+        }
+        let seen = || errors.snapshot().unwrap();
+        assert_eq!(page_hinkley().build(1).restore(seen()), Restored::Accepted);
+        assert!(matches!(
+            size.build(1).restore(seen()),
+            Restored::Cold { .. }
+        ));
     }
 
     #[test]

@@ -129,6 +129,19 @@ fn without_any_errors_all_weights_are_equal_whatever_the_form() {
 }
 
 #[test]
+fn without_any_vote_there_is_none_however_weights_are_kept_from_extremes() {
+    for (shrinkage, floor) in [(0.0, 0.0), (0.3, 0.0), (0.0, 0.2), (0.3, 0.2)] {
+        let parameters = AutoWeighted {
+            shrinkage,
+            floor,
+            ..vote(900, 2.0, Weighting::InversePower)
+        };
+        let found = parameters.build(2).combine(Votes(&[f64::NAN; 2]));
+        assert!(found.is_nan(), "{shrinkage} {floor}: {found}");
+    }
+}
+
+#[test]
 fn the_power_says_how_strongly_errors_count() {
     for power in [0.0, 1.0, 2.0, 3.5] {
         let running = learned(&vote(900, power, Weighting::InversePower), &[1.0, 2.0]);

@@ -69,18 +69,19 @@ mod reason {
 /// What a number of the port `reason` says; nothing for a number that says nothing.
 #[must_use]
 pub fn health_reason(number: f64) -> Option<&'static str> {
-    const REASONS: [&str; 8] = [
-        "healthy",
-        "out of range",
-        "changes too fast",
-        "stuck",
-        "too little noise",
-        "too much noise",
-        "silent",
-        "recovering",
-    ];
-    let known = number.fract() == 0.0 && (0.0..8.0).contains(&number);
-    known.then(|| REASONS[number as usize])
+    let whole = number.fract() == 0.0 && (0.0..256.0).contains(&number);
+    let known = match whole.then_some(number as u8)? {
+        reason::HEALTHY => "healthy",
+        reason::RANGE => "out of range",
+        reason::RATE => "changes too fast",
+        reason::STUCK => "stuck",
+        reason::QUIET => "too little noise",
+        reason::NOISY => "too much noise",
+        reason::SILENT => "silent",
+        reason::RECOVERING => "recovering",
+        _ => return None,
+    };
+    Some(known)
 }
 
 /// The limits in the unit of a channel and seconds; infinite or 0 where nothing is checked.

@@ -1,7 +1,6 @@
 //! How much a value has changed.
 
-use athermal_core::channel::{ABSENT, Channel, is_unchanged};
-use athermal_core::engine::History;
+use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
     Tick,
@@ -10,7 +9,7 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::lag::{Past, max_age};
+use crate::past::{LookingBack, max_age, max_age_mistake};
 
 /// The change of each channel over a time, or from one value to the next: `x(t) − x(t − over)`.
 ///
@@ -46,10 +45,7 @@ impl Difference {
             let mistake = Mistake::at("over", "`over` must be longer than nothing");
             mistakes.push(mistake.help("leave it out for the change from one value to the next"));
         }
-        let ages = channels
-            .iter()
-            .map(|channel| max_age(self.max_age, channel));
-        mistakes.extend(ages.filter_map(Result::err).next());
+        mistakes.extend(max_age_mistake(self.max_age, channels));
         mistakes
     }
 }
@@ -87,79 +83,42 @@ impl Feature for Difference {
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
-        let channel = |channel: &Channel| Changing {
-            history: History::new(self.back()),
-            place: 0,
-            max_age: max_age(self.max_age, channel).unwrap_or_default(),
-        };
+        let channels = inputs.port("signal");
         Box::new(Differencing {
-            back: self.back(),
-            channels: inputs.port("signal").iter().map(channel).collect(),
+            past: LookingBack::new(vec![self.back()], self.max_age, channels),
         })
     }
 }
 
 struct Differencing {
-    back: Duration,
-    channels: Vec<Changing>,
-}
-
-/// The past of one channel.
-struct Changing {
-    history: History,
-    /// Where in the past the earlier value was last found.
-    place: u64,
-    max_age: Duration,
+    past: LookingBack,
 }
 
 impl Operator for Differencing {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let inputs = tick.port(0).iter().zip(tick.stamps(0));
-        for (i, (channel, (&value, &stamp))) in self.channels.iter_mut().zip(inputs).enumerate() {
-            if is_unchanged(value) {
+        for (i, (&value, &stamp)) in inputs.enumerate() {
+            if is_unchanged(value) || !self.past.take(i, tick.now, value, stamp) {
                 continue;
             }
-            let value = if value.is_finite() { value } else { ABSENT };
-            channel.history.push(tick.now, value, stamp);
-            if value.is_nan() {
-                continue;
+            for (_, past, _) in self.past.before(i, tick.now) {
+                // A NaN says why there is no earlier value, and must stay as it is.
+                let change = if past.is_nan() { past } else { value - past };
+                outputs.set_stamped(i, change, stamp);
             }
-            let earlier = tick.now - self.back;
-            let (past, _) = channel
-                .history
-                .at(earlier, channel.max_age, &mut channel.place);
-            // A NaN says why there is no earlier value, and must stay as it is.
-            let change = if past.is_nan() { past } else { value - past };
-            outputs.set_stamped(i, change, stamp);
         }
     }
 
     fn segment(&mut self) {
-        for channel in &mut self.channels {
-            channel.history.clear();
-            channel.place = 0;
-        }
+        self.past.clear();
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
-        let history = |channel: &Changing| channel.history.clone();
-        Some(Box::new(Past {
-            channels: self.channels.iter().map(history).collect(),
-        }))
+        Some(self.past.snapshot())
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Past>() {
-            Ok(state) if state.channels.len() == self.channels.len() => {
-                for (channel, past) in self.channels.iter_mut().zip(&state.channels) {
-                    channel.history.adopt(past);
-                    channel.place = 0;
-                }
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
-        }
+        self.past.restore(state)
     }
 }
 

@@ -1,16 +1,14 @@
 //! First-order lags: the thermal masses between a sensor and what it explains.
 
-use std::fmt;
-
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
     Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::forms::list_or_table;
 
 /// A bank of first-order lags: each channel as thermal masses of several time constants would follow it.
 ///
@@ -25,6 +23,10 @@ pub struct FirstOrder {
     /// What is given: the lagged value, or how far the input is from it.
     #[serde(default)]
     pub output: FirstOrderOutput,
+    /// How much of the past one value is taken to summarise, longer than nothing; a truth can be made of it only where this
+    /// is stated, since a lag forgets nothing entirely. Three time constants leave 5 %, five less than 1 %.
+    #[serde(default)]
+    pub span: Option<Duration>,
 }
 
 /// The time constants of a bank.
@@ -61,26 +63,10 @@ pub enum FirstOrderOutput {
     Value,
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for TimeConstants {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = TimeConstants;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a list of durations or a logarithmic grid of them")
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<TimeConstants, A::Error> {
-                Deserialize::deserialize(SeqAccessDeserializer::new(list)).map(TimeConstants::List)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, grid: A) -> Result<TimeConstants, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(grid)).map(TimeConstants::Grid)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        let expected = "a list of durations or a logarithmic grid of them";
+        list_or_table(deserializer, expected, Self::List, Self::Grid)
     }
 }
 
@@ -140,10 +126,20 @@ impl Feature for FirstOrder {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        let constants = self
-            .time_constants
-            .list()
-            .map_err(|mistake| vec![mistake])?;
+        let mut mistakes = Vec::new();
+        if let Some(span) = self.span
+            && span <= Duration::ZERO
+        {
+            let message = format!("`span` is {span} and must be longer than nothing");
+            mistakes.push(Mistake::at("span", message));
+        }
+        let constants = match self.time_constants.list() {
+            Ok(constants) if mistakes.is_empty() => constants,
+            found => {
+                mistakes.extend(found.err());
+                return Err(mistakes);
+            }
+        };
         let mut channels = Vec::new();
         for from in inputs.port("signal") {
             for constant in &constants {
@@ -154,6 +150,7 @@ impl Feature for FirstOrder {
                 if self.output == FirstOrderOutput::Difference {
                     channel.unit = from.unit.difference();
                 }
+                channel.span = channel.span + self.span.unwrap_or_default();
                 channels.push(channel);
             }
         }
@@ -178,6 +175,10 @@ impl Feature for FirstOrder {
             last: vec![None; inputs.port("signal").len()],
             values: vec![f64::NAN; inputs.port("signal").len() * constants.len()],
         })
+    }
+
+    fn is_endless(&self) -> bool {
+        self.span.is_none()
     }
 
     fn memory(&self) -> Duration {

@@ -13,6 +13,7 @@ use athermal_core::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::slope::kernel::LIMIT;
 use crate::sorted::Sorted;
 use crate::windows::three;
 
@@ -65,9 +66,6 @@ pub enum Replacement {
 
 /// What makes the median absolute deviation of normal noise its standard deviation: `1 / Φ⁻¹(3/4)`.
 const TO_DEVIATION: f64 = 1.482_602_218_505_602;
-
-/// Samples of this size or above count as absent, like infinities.
-const LIMIT: f64 = 1e100;
 
 impl Hampel {
     /// The floor in the unit of a channel.

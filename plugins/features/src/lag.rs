@@ -1,7 +1,6 @@
 //! Values as they were some time ago.
 
-use athermal_core::channel::{ABSENT, Channel, is_unchanged};
-use athermal_core::engine::History;
+use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
     Tick,
@@ -9,6 +8,8 @@ use athermal_core::node::{
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::past::{LookingBack, max_age_mistake};
 
 /// Each channel as it was some time ago, at one lag or several: past values as regressors.
 ///
@@ -27,22 +28,6 @@ pub struct Lag {
     pub max_age: Option<Duration>,
 }
 
-/// How old a value of the past may be: as stated, or as a held value of the channel.
-pub(crate) fn max_age(stated: Option<Duration>, of: &Channel) -> Result<Duration, Mistake> {
-    match stated.or_else(|| of.default_max_age()) {
-        Some(age) if age > Duration::ZERO => Ok(age),
-        Some(age) => {
-            let message = format!("`max_age` is {age} and must be longer than nothing");
-            Err(Mistake::at("max_age", message))
-        }
-        None => {
-            let message = format!("how old a value of `{}` may be is not known", of.name);
-            let help = "add `max_age = \"1min\"` here, or to the signal";
-            Err(Mistake::at("max_age", message).help(help))
-        }
-    }
-}
-
 impl Lag {
     fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
@@ -56,10 +41,7 @@ impl Lag {
                 mistakes.push(Mistake::at(format!("lags.{i}"), message));
             }
         }
-        let ages = channels
-            .iter()
-            .map(|channel| max_age(self.max_age, channel));
-        mistakes.extend(ages.filter_map(Result::err).next());
+        mistakes.extend(max_age_mistake(self.max_age, channels));
         mistakes
     }
 }
@@ -102,85 +84,44 @@ impl Feature for Lag {
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
-        let longest = self.lags.iter().copied().max().unwrap_or_default();
-        let channel = |channel: &Channel| Looking {
-            history: History::new(longest),
-            places: vec![0; self.lags.len()],
-            max_age: max_age(self.max_age, channel).unwrap_or_default(),
-        };
-        Box::new(LookingBack {
-            lags: self.lags.clone(),
-            channels: inputs.port("signal").iter().map(channel).collect(),
+        let channels = inputs.port("signal");
+        Box::new(Lagging {
+            lags: self.lags.len(),
+            past: LookingBack::new(self.lags.clone(), self.max_age, channels),
         })
     }
 }
 
-struct LookingBack {
-    lags: Vec<Duration>,
-    channels: Vec<Looking>,
+struct Lagging {
+    /// How many lags there are.
+    lags: usize,
+    past: LookingBack,
 }
 
-/// The past of one channel.
-struct Looking {
-    history: History,
-    /// For each lag, where in the past it was last found.
-    places: Vec<u64>,
-    max_age: Duration,
-}
-
-impl Operator for LookingBack {
+impl Operator for Lagging {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let inputs = tick.port(0).iter().zip(tick.stamps(0));
-        for (nth, (channel, (&value, &stamp))) in self.channels.iter_mut().zip(inputs).enumerate() {
-            if is_unchanged(value) {
+        for (nth, (&value, &stamp)) in inputs.enumerate() {
+            if is_unchanged(value) || !self.past.take(nth, tick.now, value, stamp) {
                 continue;
             }
-            let value = if value.is_finite() { value } else { ABSENT };
-            channel.history.push(tick.now, value, stamp);
-            if value.is_nan() {
-                continue;
-            }
-            for (i, (&lag, place)) in self.lags.iter().zip(&mut channel.places).enumerate() {
-                let (past, stamp) = channel.history.at(tick.now - lag, channel.max_age, place);
-                outputs.set_stamped(nth * self.lags.len() + i, past, stamp + lag);
+            for (i, (lag, past, stamp)) in self.past.before(nth, tick.now).enumerate() {
+                outputs.set_stamped(nth * self.lags + i, past, stamp + lag);
             }
         }
     }
 
     fn segment(&mut self) {
-        for channel in &mut self.channels {
-            channel.history.clear();
-            channel.places.fill(0);
-        }
+        self.past.clear();
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
-        let history = |channel: &Looking| channel.history.clone();
-        Some(Box::new(Past {
-            channels: self.channels.iter().map(history).collect(),
-        }))
+        Some(self.past.snapshot())
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Past>() {
-            Ok(state) if state.channels.len() == self.channels.len() => {
-                for (channel, past) in self.channels.iter_mut().zip(&state.channels) {
-                    channel.history.adopt(past);
-                    channel.places.fill(0);
-                }
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
-        }
+        self.past.restore(state)
     }
 }
 
-/// The state of nodes that look back: the past of each channel.
-#[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Past {
-    pub(crate) channels: Vec<History>,
-}
-
-athermal_core::state!(Past, "past/1");
 athermal_core::register!(Lag, Feature, "lag");

@@ -11,6 +11,7 @@ use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::slope::kernel::LIMIT;
 use crate::sorted::Sorted;
 use crate::summary::Summary;
 use crate::windows::{Cold, Windows, half, over, three, window_mistakes};
@@ -46,10 +47,12 @@ pub struct Moving {
 
 /// The output ports, in order.
 const PORTS: [&str; 7] = ["mean", "std", "min", "max", "range", "median", "count"];
+const MEAN: usize = 0;
+const STD: usize = 1;
+const MIN: usize = 2;
+const MAX: usize = 3;
+const RANGE: usize = 4;
 const MEDIAN: usize = 5;
-
-/// Samples of this size or above count as absent, like infinities: their squares would overflow.
-const LIMIT: f64 = 1e100;
 
 impl Feature for Moving {
     fn inputs() -> &'static [InputPort] {
@@ -223,15 +226,15 @@ impl Series {
         }
     }
 
-    /// Why a window has no value, if it has none.
-    fn lacks(&self, window: &Window, spec: &Moving, now: Instant) -> Option<f64> {
+    /// Why a window of so many samples has no value, if it has none.
+    fn lacks(&self, window: &Window, count: f64, spec: &Moving, now: Instant) -> Option<f64> {
         let open = self.first.map_or(Duration::ZERO, |first| now - first);
         if spec.cold == Cold::Absent && open < window.length {
             return Some(COLD);
         }
         let head = usize::try_from(window.head - self.dropped).unwrap_or(usize::MAX);
         let span = self.samples.get(head).map(|&(oldest, _)| now - oldest);
-        let enough = window.summary().count >= spec.min_samples as f64
+        let enough = count >= spec.min_samples as f64
             && span.is_some_and(|span| span.secs() >= spec.min_coverage * window.length.secs());
         (!enough).then_some(ABSENT)
     }
@@ -264,16 +267,16 @@ impl Operator for Running {
             series.push(tick.now, value);
             for (i, window) in series.windows.iter().enumerate() {
                 let summary = window.summary();
-                let lacks = series.lacks(window, &self.spec, tick.now);
+                let lacks = series.lacks(window, summary.count, &self.spec, tick.now);
                 for port in (0..PORTS.len()).filter(|&port| self.wanted[port]) {
-                    let value = lacks.unwrap_or_else(|| match PORTS[port] {
-                        "mean" => summary.mean,
-                        "std" => summary.deviation().unwrap_or(ABSENT),
-                        "min" => summary.min,
-                        "max" => summary.max,
-                        "range" => summary.max - summary.min,
-                        "count" => summary.count,
-                        _ => window.sorted.as_ref().map_or(ABSENT, Sorted::median),
+                    let value = lacks.unwrap_or_else(|| match port {
+                        MEAN => summary.mean,
+                        STD => summary.deviation().unwrap_or(ABSENT),
+                        MIN => summary.min,
+                        MAX => summary.max,
+                        RANGE => summary.max - summary.min,
+                        MEDIAN => window.sorted.as_ref().map_or(ABSENT, Sorted::median),
+                        _ => summary.count,
                     });
                     outputs.set_stamped(port * width + first + i, value, tick.now);
                 }

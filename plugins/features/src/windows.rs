@@ -1,14 +1,12 @@
 //! Decides which trailing windows a node looks back over, and what a window must hold before it has a value.
 
-use std::fmt;
-
 use athermal_core::channel::Channel;
 use athermal_core::node::Mistake;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::forms::list_or_table;
 
 /// Trailing windows.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -121,26 +119,10 @@ pub struct DynamicRange {
     pub harmonics: u32,
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for Windows {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = Windows;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a list of durations or a dynamic range")
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, lengths: A) -> Result<Windows, A::Error> {
-                Deserialize::deserialize(SeqAccessDeserializer::new(lengths)).map(Windows::Lengths)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, range: A) -> Result<Windows, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(range)).map(Windows::Range)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        let expected = "a list of durations or a dynamic range";
+        list_or_table(deserializer, expected, Self::Lengths, Self::Range)
     }
 }
 

@@ -77,8 +77,11 @@ impl Build {
         let built = Path::new(target)
             .join("release")
             .join(project::executable());
+        let kinds = kinds(&built)?;
+        twice(&kinds)?;
         place(&built, &self.output)?;
-        self.tell(terminal, &wishes, &resolved)
+        self.tell(terminal, &wishes, &resolved, &kinds);
+        Ok(Answer::Fine)
     }
 
     fn folder(&self) -> PathBuf {
@@ -89,21 +92,14 @@ impl Build {
         })
     }
 
-    /// Asks the new binary for its kinds.
-    fn tell(
-        &self,
-        terminal: &Terminal,
-        wishes: &[Wish],
-        resolved: &Value,
-    ) -> Result<Answer, Failure> {
-        let kinds = kinds(&self.output)?;
-        twice(&kinds)?;
+    /// Tells what the new binary has.
+    fn tell(&self, terminal: &Terminal, wishes: &[Wish], resolved: &Value, kinds: &[Known]) {
         if terminal.format == Format::Json {
             println!(
                 "{:#}",
                 json!({ "binary": self.output, "project": self.folder(), "nodes": kinds })
             );
-            return Ok(Answer::Fine);
+            return;
         }
         println!("{} has {} node types", self.output.display(), kinds.len());
         for wish in wishes {
@@ -129,7 +125,6 @@ impl Build {
             "its cargo project is {}; keep it, with its Cargo.lock, to build the same again",
             self.folder().display()
         ));
-        Ok(Answer::Fine)
     }
 }
 
@@ -142,6 +137,7 @@ struct Known {
     version: String,
 }
 
+/// Asks a binary for its kinds.
 fn kinds(binary: &Path) -> Result<Vec<Known>, Failure> {
     let binary = std::fs::canonicalize(binary).unwrap_or_else(|_| binary.to_owned());
     let failed = |reason: String| {

@@ -79,7 +79,7 @@ impl Project {
 /// The manifest. With `registry`, crates that ask a registry for the core get the one at hand.
 pub(super) fn manifest(wishes: &[Wish], checkout: &Checkout, registry: bool) -> String {
     let athermal = in_toml(checkout.folder());
-    let core = in_toml(&checkout.folder().join("core/framework"));
+    let core = in_toml(&checkout.core());
     let numerics = in_toml(&checkout.folder().join("core/numerics"));
     let plugins: String = wishes.iter().map(|wish| wish.dependency() + "\n").collect();
     let patch = format!(

@@ -146,7 +146,7 @@ fn made_for(package: &str, core: &Value, checkout: &Checkout) -> Result<(), Fail
              use a version of it for {VERSION}, or the athermal that it is made for"
         )));
     }
-    let ours = checkout.folder().join("core/framework");
+    let ours = checkout.core();
     if let Some(theirs) = core["path"].as_str()
         && std::fs::canonicalize(theirs).ok() != std::fs::canonicalize(&ours).ok()
     {
@@ -200,7 +200,7 @@ mod tests {
         let there =
             json!({ "name": "athermal-core", "req": "*", "path": env!("CARGO_MANIFEST_DIR") });
         assert!(told(made_for("nodes", &there, &checkout)).contains("two copies"));
-        let here = checkout.folder().join("core/framework");
+        let here = checkout.core();
         let here = json!({ "name": "athermal-core", "req": "*", "path": here });
         assert!(made_for("nodes", &here, &checkout).is_ok());
     }

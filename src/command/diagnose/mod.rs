@@ -5,7 +5,7 @@ mod tables;
 use std::path::PathBuf;
 
 use athermal::Duration;
-use athermal::core::compile::Wanted;
+use athermal::core::compile::{Plan, Wanted};
 use athermal::diagnosis::{Diagnosis, Options, day, diagnose, plots};
 use clap::Args;
 use serde_json::json;
@@ -69,6 +69,7 @@ impl Diagnose {
             )));
         }
         let model = load_fitted(&self.model, Wanted::default())?;
+        self.check_names(&model.plan)?;
         let dataset = self.data.dataset();
         let options = Options {
             day: (!self.no_fit).then_some(self.day),
@@ -81,7 +82,6 @@ impl Diagnose {
         };
         let (diagnosis, observation) = diagnose(&model, &dataset, &options, &mut progress)?;
         drop(bar);
-        self.check_names(&model.plan, &diagnosis)?;
         if terminal.format == Format::Json {
             let files = dataset.paths().iter();
             let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
@@ -118,16 +118,9 @@ impl Diagnose {
     }
 
     /// Whether every name of `--of` stands for something.
-    fn check_names(
-        &self,
-        plan: &athermal::core::compile::Plan,
-        diagnosis: &Diagnosis,
-    ) -> Result<(), Failure> {
-        let known: Vec<&str> = diagnosis
-            .residuals
-            .iter()
-            .map(|of| of.prediction.as_str())
-            .collect();
+    fn check_names(&self, plan: &Plan) -> Result<(), Failure> {
+        let predictions = plan.channels.iter().filter(|of| of.predicts.is_some());
+        let known: Vec<&str> = predictions.map(|of| of.name.as_str()).collect();
         let unknown = self
             .of
             .iter()

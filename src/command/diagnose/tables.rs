@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 
 use athermal::Duration;
-use athermal::diagnosis::day::{CurvePoint, DayScore};
+use athermal::diagnosis::day::{CurvePoint, DayScore, Days};
 use athermal::diagnosis::lag::{Correlogram, FeatureLags};
 use athermal::diagnosis::regressor::Design;
+use athermal::diagnosis::residual::Residuals;
 use athermal::diagnosis::response::Response;
 use athermal::diagnosis::{Diagnosis, Main};
 
@@ -79,60 +80,25 @@ impl<'a> Tables<'a> {
         self.asked.is_empty() || self.asked.iter().any(|name| is_called(node, name))
     }
 
+    /// A text for the predictions of each unit, since headings tell it.
+    fn of_each_unit(&self, text: impl Fn(&str, &[&str]) -> String) -> String {
+        let all = self.diagnosis.residuals.iter();
+        let shown = all.filter(|of| self.shows(&of.prediction));
+        let mut texts = Vec::new();
+        for group in grouped(shown, |of| of.unit.clone()) {
+            let names: Vec<&str> = group.iter().map(|of| of.prediction.as_str()).collect();
+            texts.push(text(&group[0].unit, &names));
+        }
+        texts.retain(|text| !text.is_empty());
+        texts.join("\n")
+    }
+
     fn residuals(&self) -> String {
-        let shown = self.diagnosis.residuals.iter();
-        let shown: Vec<_> = shown.filter(|of| self.shows(&of.prediction)).collect();
-        let Some(first) = shown.first() else {
-            return String::new();
-        };
-        let rows: Vec<Vec<String>> = shown
-            .iter()
-            .map(|of| {
-                let lags = of.autocorrelation.len();
-                let largest = (0..lags).max_by(|&a, &b| {
-                    let size = |lag: usize| of.autocorrelation[lag].abs();
-                    size(a).total_cmp(&size(b))
-                });
-                let largest = largest.map_or("-".to_owned(), |lag| {
-                    let after = seconds((lag + 1) as f64 * of.spacing_s);
-                    format!("{:.2} at {after}", of.autocorrelation[lag])
-                });
-                let verdict = match of.white() {
-                    Some(true) => "white",
-                    Some(false) => "not white",
-                    None => "too few",
-                };
-                vec![
-                    format!("  {}", of.prediction),
-                    number(of.rms),
-                    number(of.mean),
-                    count(of.spaced as u64),
-                    largest,
-                    of.bound.first().map_or("-".into(), |b| format!("±{b:.2}")),
-                    or_dash(of.ljung_box),
-                    of.p_value.map_or("-".to_owned(), |p| format!("{p:.3}")),
-                    verdict.to_owned(),
-                ]
-            })
-            .collect();
-        let header = [
-            "  prediction",
-            "RMS",
-            "mean",
-            "n",
-            "autocorrelation",
-            "95 %",
-            "Q",
-            "p",
-            "",
-        ];
-        format!(
-            "residuals: measured less predicted in {}, of which n are {} apart, so that\n\
-             neither windows nor horizons overlap; Q of Ljung and Box\n{}",
-            first.unit,
-            seconds(first.spacing_s),
-            table(&header, &rows)
-        )
+        let all = self.diagnosis.residuals.iter();
+        let shown = all.filter(|of| self.shows(&of.prediction));
+        let groups = grouped(shown, |of| (of.unit.clone(), of.spacing_s));
+        let tables: Vec<String> = groups.iter().map(|of| residuals(of)).collect();
+        tables.join("\n")
     }
 
     fn lags(&self) -> String {
@@ -197,10 +163,12 @@ impl<'a> Tables<'a> {
                     sensors.push(sensor);
                 }
             }
-            let Some(first) = sensors.first() else {
+            if sensors.is_empty() {
                 continue;
-            };
-            let cells = |cell: fn(&Response) -> String| -> Vec<(String, Vec<String>)> {
+            }
+            let cells = |sensors: &[&Response],
+                         cell: fn(&Response) -> String|
+             -> Vec<(String, Vec<String>)> {
                 let row = |sensor: &&Response| {
                     let find = |of: &&&athermal::diagnosis::response::Responses| {
                         let mut of = of.sensors.iter();
@@ -212,19 +180,18 @@ impl<'a> Tables<'a> {
                 sensors.iter().map(row).collect()
             };
             let in_the_end = in_the_end(&of_node[0].unit);
-            let _ = writeln!(
-                text,
-                "{node}: how far a step of 1 {} moves what it predicts in the end, in {in_the_end}",
-                first.sensor_unit
-            );
-            text.push_str(&matrix(
-                "sensor",
-                &columns,
-                &cells(|of| of.total.map_or("no end".to_owned(), number)),
-            ));
+            for alike in grouped(sensors.iter().copied(), |of| of.sensor_unit.clone()) {
+                let _ = writeln!(
+                    text,
+                    "{node}: how far a step of 1 {} moves what it predicts in the end, in {in_the_end}",
+                    alike[0].sensor_unit
+                );
+                let total = |of: &Response| of.total.map_or("no end".to_owned(), number);
+                text.push_str(&matrix("sensor", &columns, &cells(&alike, total)));
+            }
             let _ = writeln!(text, "{node}: time until nine tenths of that have come");
             let settled = |of: &Response| of.settled_s.map_or("no end".to_owned(), seconds);
-            text.push_str(&matrix("sensor", &columns, &cells(settled)));
+            text.push_str(&matrix("sensor", &columns, &cells(&sensors, settled)));
             let bent = of_node.iter().flat_map(|of| &of.sensors);
             if bent.clone().any(|of| of.asymmetry > 1e-6) {
                 let largest = bent.map(|of| of.asymmetry).fold(0.0, f64::max);
@@ -275,13 +242,10 @@ impl<'a> Tables<'a> {
     }
 
     fn contributions(&self) -> String {
-        let shown: Vec<&str> = self
-            .diagnosis
-            .residuals
-            .iter()
-            .map(|of| of.prediction.as_str())
-            .filter(|name| self.shows(name))
-            .collect();
+        self.of_each_unit(|unit, shown| self.contributions_in(unit, shown))
+    }
+
+    fn contributions_in(&self, unit: &str, shown: &[&str]) -> String {
         let all = &self.diagnosis.contributions;
         let of = |sensor: &str, prediction: &str| {
             let mut all = all.iter();
@@ -296,13 +260,9 @@ impl<'a> Tables<'a> {
                 sensors.push(&of.sensor);
             }
         }
-        let Some(unit) = all
-            .first()
-            .map(|of| &of.unit)
-            .filter(|_| !sensors.is_empty())
-        else {
+        if sensors.is_empty() {
             return String::new();
-        };
+        }
         let columns: Vec<String> = shown.iter().map(|name| (*name).to_owned()).collect();
         let row =
             |sensor: &&str, cell: &dyn Fn(&athermal::diagnosis::sensor::Contribution) -> String| {
@@ -337,52 +297,7 @@ impl<'a> Tables<'a> {
         let Some(days) = &self.diagnosis.days else {
             return String::new();
         };
-        let residuals = self.diagnosis.residuals.iter();
-        let shown = residuals.map(|of| of.prediction.clone());
-        let shown: Vec<String> = shown.filter(|name| self.shows(name)).collect();
-        let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<f64>| -> Vec<String> {
-            let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
-            let texts = shown.iter().map(|name| or_dash(of(name).and_then(cell)));
-            texts.collect()
-        };
-        let unit = self.main().next().map_or("", |main| main.unit.as_str());
-        let left_out = days.left_out.iter();
-        let left_out = left_out.map(|of| {
-            let label = format!("day {}", of.day);
-            (label, cells(&of.scores, |score| score.rmse))
-        });
-        let curve = days.curve.iter().map(|point| {
-            let plural = if point.days == 1 { "" } else { "s" };
-            let label = format!("{} day{plural} ({} fits)", point.days, point.fits);
-            (label, cells(&point.scores, DayScore::ratio))
-        });
-        let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
-        let near = |point: &CurvePoint| {
-            let scores = point.scores.iter();
-            let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
-            of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
-        };
-        let last_far = days.curve.iter().rposition(|point| !near(point));
-        let enough = days.curve.get(last_far.map_or(0, |last| last + 1));
-        let verdict = match enough.map_or(days.count, |point| point.days) {
-            1 => "1 day is enough to come within 5 %".to_owned(),
-            enough if enough + 1 < days.count => {
-                format!("{enough} days are enough to come within 5 %")
-            }
-            _ => "more days may still make it better".to_owned(),
-        };
-        let of_day = if days.day_s == 86_400.0 {
-            String::new()
-        } else {
-            format!(" of {}", seconds(days.day_s))
-        };
-        format!(
-            "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
-             how many times that the error is of a fit on so many days that follow each\n\
-             other, on the same days: {verdict}\n{}",
-            matrix("left out", &shown, &left_out),
-            matrix("fitted on", &shown, &curve)
-        )
+        self.of_each_unit(|unit, shown| days_in(days, unit, shown))
     }
 
     fn windows(&self) -> String {
@@ -417,6 +332,120 @@ impl<'a> Tables<'a> {
             matrix("window", &columns, &rows)
         )
     }
+}
+
+/// Residuals of one unit and spacing.
+fn residuals(shown: &[&Residuals]) -> String {
+    let Some(first) = shown.first() else {
+        return String::new();
+    };
+    let rows: Vec<Vec<String>> = shown
+        .iter()
+        .map(|of| {
+            let lags = of.autocorrelation.len();
+            let largest = (0..lags).max_by(|&a, &b| {
+                let size = |lag: usize| of.autocorrelation[lag].abs();
+                size(a).total_cmp(&size(b))
+            });
+            let largest = largest.map_or("-".to_owned(), |lag| {
+                let after = seconds((lag + 1) as f64 * of.spacing_s);
+                format!("{:.2} at {after}", of.autocorrelation[lag])
+            });
+            let verdict = match of.white() {
+                Some(true) => "white",
+                Some(false) => "not white",
+                None => "too few",
+            };
+            vec![
+                format!("  {}", of.prediction),
+                number(of.rms),
+                number(of.mean),
+                count(of.spaced as u64),
+                largest,
+                of.bound.first().map_or("-".into(), |b| format!("±{b:.2}")),
+                or_dash(of.ljung_box),
+                of.p_value.map_or("-".to_owned(), |p| format!("{p:.3}")),
+                verdict.to_owned(),
+            ]
+        })
+        .collect();
+    let header = [
+        "  prediction",
+        "RMS",
+        "mean",
+        "n",
+        "autocorrelation",
+        "95 %",
+        "Q",
+        "p",
+        "",
+    ];
+    format!(
+        "residuals: measured less predicted in {}, of which n are {} apart, so that\n\
+         neither windows nor horizons overlap; Q of Ljung and Box\n{}",
+        first.unit,
+        seconds(first.spacing_s),
+        table(&header, &rows)
+    )
+}
+
+fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
+    let shown: Vec<String> = shown.iter().map(|&name| name.to_owned()).collect();
+    let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<f64>| -> Vec<String> {
+        let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
+        let texts = shown.iter().map(|name| or_dash(of(name).and_then(cell)));
+        texts.collect()
+    };
+    let left_out = days.left_out.iter();
+    let left_out = left_out.map(|of| {
+        let label = format!("day {}", of.day);
+        (label, cells(&of.scores, |score| score.rmse))
+    });
+    let curve = days.curve.iter().map(|point| {
+        let plural = if point.days == 1 { "" } else { "s" };
+        let label = format!("{} day{plural} ({} fits)", point.days, point.fits);
+        (label, cells(&point.scores, DayScore::ratio))
+    });
+    let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
+    let near = |point: &CurvePoint| {
+        let scores = point.scores.iter();
+        let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
+        of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
+    };
+    let last_far = days.curve.iter().rposition(|point| !near(point));
+    let enough = days.curve.get(last_far.map_or(0, |last| last + 1));
+    let verdict = match enough.map_or(days.count, |point| point.days) {
+        1 => "1 day is enough to come within 5 %".to_owned(),
+        enough if enough + 1 < days.count => {
+            format!("{enough} days are enough to come within 5 %")
+        }
+        _ => "more days may still make it better".to_owned(),
+    };
+    let of_day = if days.day_s == 86_400.0 {
+        String::new()
+    } else {
+        format!(" of {}", seconds(days.day_s))
+    };
+    format!(
+        "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
+         how many times that the error is of a fit on so many days that follow each\n\
+         other, on the same days: {verdict}\n{}",
+        matrix("left out", &shown, &left_out),
+        matrix("fitted on", &shown, &curve)
+    )
+}
+
+/// What is alike in `by` together, in the order in which the first of each comes.
+fn grouped<T, K: PartialEq>(all: impl Iterator<Item = T>, by: impl Fn(&T) -> K) -> Vec<Vec<T>> {
+    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
+    for one in all {
+        let key = by(&one);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, group)) => group.push(one),
+            None => groups.push((key, vec![one])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
 }
 
 fn regressors(of: &Design) -> String {

@@ -1,9 +1,7 @@
 //! Decides which pictures there are of an axis and of a correction; how one is drawn is decided by [`crate::chart`].
 
 use super::super::{Axis, Errors, Facts, Worth};
-use crate::chart::{Chart, Layer, Mark};
-
-const COLOUR: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
+use crate::chart::{Chart, LINES, Layer, Mark};
 
 /// Stretches that are quasi-stable or transient, run together where they follow each other.
 fn bands(axis: &Axis) -> Vec<(f64, f64, &'static str)> {
@@ -68,7 +66,7 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
 
 /// What each voter says.
 pub(super) fn votes(axis: &Axis) -> Chart<'_> {
-    let voters = axis.voters.iter().zip(COLOUR.iter().cycle());
+    let voters = axis.voters.iter().zip(LINES.iter().cycle());
     Chart {
         layers: voters
             .map(|(voter, class)| {
@@ -84,7 +82,7 @@ pub(super) fn weights(axis: &Axis) -> Option<Chart<'_>> {
     let first = axis.weights.first()?;
     let colour = |name: &str| {
         let nth = axis.voters.iter().position(|voter| voter.node == name);
-        COLOUR[nth.unwrap_or(0) % COLOUR.len()]
+        LINES[nth.unwrap_or(0) % LINES.len()]
     };
     Some(Chart {
         y_label: format!("{} weights in {}", axis.name, first.node),

@@ -2,10 +2,8 @@
 
 use super::super::verdict::is_channel;
 use super::super::{Axis, Facts};
-use crate::chart::{Chart, Layer};
+use crate::chart::{Chart, LINES, Layer};
 use crate::diagnosis::response::Response;
-
-const COLOUR: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
 
 /// Lines over lags or times in minutes.
 pub(super) struct Curves {
@@ -26,7 +24,7 @@ struct Line {
 
 impl Curves {
     pub(super) fn chart(&self) -> Chart<'_> {
-        let lines = self.lines.iter().zip(COLOUR);
+        let lines = self.lines.iter().zip(LINES);
         Chart {
             title: self.title.clone(),
             x_label: self.x_label,
@@ -78,7 +76,7 @@ fn lags(axis: &Axis, facts: &Facts) -> Option<Curves> {
             .split_once('.')
             .unwrap_or(("", &feature.feature));
         let sensor = channel.split('@').next().unwrap_or(channel);
-        if lines.len() < COLOUR.len() && !sensors.contains(&sensor) {
+        if lines.len() < LINES.len() && !sensors.contains(&sensor) {
             sensors.push(sensor);
             lines.push(Line {
                 name: channel.to_owned(),
@@ -118,7 +116,7 @@ fn responses(axis: &Axis, facts: &Facts, impulse: bool) -> Option<Curves> {
         minutes: minutes(&of.time_s),
         value: if impulse { &of.impulse } else { &of.step }.clone(),
     };
-    let lines: Vec<Line> = sensors.iter().take(COLOUR.len()).map(line).collect();
+    let lines: Vec<Line> = sensors.iter().take(LINES.len()).map(line).collect();
     let (kind, name, per) = if impulse {
         ("impulses", "Impulse", "unit and minute")
     } else {

@@ -27,7 +27,7 @@ impl Resolver<'_> {
         let mut state = Some(None);
         for port in (instance.kind.inputs)() {
             match port.name {
-                "truth" if port.optional && instance.input("truth").is_none() => {}
+                "truth" | "state" if port.optional && instance.input(port.name).is_none() => {}
                 "truth" => truth = self.single(instance, port).map(Some),
                 "state" => state = self.single(instance, port).map(|slot| Some((*port, slot))),
                 _ => voters = self.slots(instance, port).map(|slots| (*port, slots)),

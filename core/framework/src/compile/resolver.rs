@@ -107,6 +107,7 @@ impl<'g> Resolver<'g> {
         if has_loops {
             self.follow_loops();
         }
+        self.name_sensors();
         self.find_leaks();
         let outputs = self.outputs();
         self.finish(outputs, wanted)

@@ -41,7 +41,10 @@ impl Scopes {
     }
 
     pub(crate) fn get_mut(&mut self, name: &str) -> &mut Scope {
-        self.scopes.entry(name.to_owned()).or_default()
+        if !self.scopes.contains_key(name) {
+            self.declare(name);
+        }
+        &mut self.scopes[name]
     }
 
     pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {

@@ -65,7 +65,7 @@ pub enum TimeForm {
 }
 
 impl fmt::Display for TimeBase {
-    /// "the column `time_s` in s", to stand in a sentence.
+    /// "the column `time_s` in steps of 1s", to stand in a sentence.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let TimeBase::Column { column, form } = self;
         write!(f, "the column `{column}` ")?;

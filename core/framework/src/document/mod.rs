@@ -16,6 +16,7 @@ mod tree;
 pub use declare::declare;
 pub(crate) use declare::{TIME_UNITS, known_keys};
 pub use decode::decode;
+pub(crate) use decode::decode_advised;
 pub use graph_file::{
     GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
 };

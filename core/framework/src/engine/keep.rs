@@ -7,6 +7,7 @@ use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
 use super::estimate::Estimate;
 use super::state::{NodeState, SlotState};
 use super::{Engine, EngineState, RestoreError, Running};
+use crate::compile::PlannedRole;
 use crate::node::Restored;
 
 impl Engine {
@@ -66,7 +67,8 @@ impl Engine {
         })
     }
 
-    /// Lets outputs pass over from what another engine put out last; `from` says which of its outputs each follows.
+    /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
+    /// each follows, and what is frozen on command stays so.
     pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
         for ((_, blending), from) in self.blending.iter_mut().zip(from) {
             if let Some((_, last)) = from.and_then(|from| before.blending.get(from)) {
@@ -74,6 +76,8 @@ impl Engine {
             }
         }
         self.refused = before.refused;
+        // Whoever made this engine ready may have missed the command.
+        self.frozen = before.frozen;
     }
 
     /// All that the engine knows, by name.
@@ -233,6 +237,18 @@ impl Engine {
         self.before_break = state.before_break;
         self.refused = state.refused;
         self.frozen = state.frozen;
+        // A segment may end before the next tick, and what freezes learning then decides what is learned of it.
+        for node in &self.plan.nodes {
+            if let PlannedRole::Estimator {
+                learning: Some(learning),
+                ..
+            } = &node.role
+                && let Some(freeze) = learning.freeze
+            {
+                let gather = &self.plan.gathers[freeze];
+                self.gathered[freeze].read(gather, &self.slots, &self.histories, self.last);
+            }
+        }
     }
 }
 

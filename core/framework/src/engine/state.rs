@@ -33,7 +33,6 @@ pub struct EngineState {
     pub(crate) nodes: BTreeMap<String, NodeState>,
     pub(crate) blending: BTreeMap<String, Blending>,
     /// Whether learning has been frozen on command.
-    #[serde(default)]
     pub(crate) frozen: bool,
 }
 

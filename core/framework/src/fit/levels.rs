@@ -198,18 +198,11 @@ impl<'a> Fitting<'a> {
     }
 
     fn note(&mut self, engine: &Engine, passed: Passed) {
-        let sources = &self.plan.sources;
         self.report.ticks = passed.ticks;
         self.report.segments = passed.segments;
         self.report.period = passed.period;
         self.report.refused = engine.refused();
-        let counted = sources
-            .iter()
-            .zip(engine.rejected())
-            .filter(|&(_, &count)| count > 0);
-        self.report.rejected = counted
-            .map(|(source, &count)| (source.name.clone(), count))
-            .collect();
+        self.report.rejected = engine.rejected_channels();
     }
 }
 

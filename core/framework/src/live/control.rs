@@ -86,7 +86,7 @@ pub enum Notice {
     },
     /// The engine thread sent a graph back because it came too late; it can be committed again.
     SentBack,
-    /// Ticks or segment breaks were missed: states can no longer be carried, until a graph warmed by the retained past
+    /// Ticks, segment breaks or commands were missed: states can no longer be carried, until a graph warmed by the retained past
     /// takes over.
     Missed {
         /// How many.

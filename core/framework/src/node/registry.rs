@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::sync::OnceLock;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::{Combiner, Estimator, Feature, InputPort, Read};
 use crate::diagnostic::Diagnostics;
-use crate::document::{Value, decode};
+use crate::document::{Value, decode_advised};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -96,9 +97,7 @@ impl Kind {
     /// The first sentence of the documentation.
     #[must_use]
     pub fn summary(&self) -> String {
-        let documentation = self.documentation();
-        let paragraph = documentation.split("\n\n").next().unwrap_or_default();
-        paragraph.replace('\n', " ")
+        first_paragraph(&self.documentation())
     }
 
     /// The documentation of the parameters' struct.
@@ -116,11 +115,23 @@ inventory::collect!(Kind);
 
 /// Reads parameters of one concrete type; [`register!`](crate::register) makes use of it.
 #[doc(hidden)]
-pub fn read<T: NodeSpec + DeserializeOwned + 'static>(
+pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     value: &Value,
     diagnostics: &mut Diagnostics,
 ) -> Option<Box<dyn NodeSpec>> {
-    decode::<T>(value, "the node", diagnostics).map(|spec| Box::new(spec) as Box<dyn NodeSpec>)
+    let advice = |key: &str| {
+        let schema = serde_json::Value::from(schemars::schema_for!(T));
+        let description = schema["properties"][key]["description"].as_str()?;
+        Some(format!("add `{key}`: {}", first_paragraph(description)))
+    };
+    decode_advised::<T>(value, "the node", &advice, diagnostics)
+        .map(|spec| Box::new(spec) as Box<dyn NodeSpec>)
+}
+
+/// The first paragraph of a documentation, on one line.
+fn first_paragraph(documentation: &str) -> String {
+    let paragraph = documentation.split("\n\n").next().unwrap_or_default();
+    paragraph.replace('\n', " ")
 }
 
 /// All kinds linked into this program, by name; where two crates brought the same name, both.

@@ -1,8 +1,8 @@
-use athermal_core::testkit::{Bench, Case};
+use athermal_core::testkit::Bench;
 
 struct Difference {}
 
-athermal_core::conformance!(Difference, Case::new(""));
+athermal_core::conformance!(Difference, athermal_core::testkit::Case::new(""));
 
 fn main() {
     Bench::of(&Difference {});

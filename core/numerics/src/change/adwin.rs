@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::MeanChange;
 use crate::NumericsError;
+use crate::checks::check_parameter;
 
 /// How many buckets of a size there are before two of them are put together.
 const BUCKETS: usize = 5;
@@ -100,21 +101,11 @@ impl Adwin {
     /// # Errors
     /// [`NumericsError::Parameter`] for options out of range.
     pub fn new(options: AdwinOptions) -> Result<Self, NumericsError> {
-        if !(options.confidence > 0.0 && options.confidence < 1.0) {
-            return Err(NumericsError::Parameter {
-                name: "confidence",
-                value: options.confidence,
-                allowed: "between 0 and 1",
-            });
-        }
+        let confidence = options.confidence;
+        let fine = confidence > 0.0 && confidence < 1.0;
+        check_parameter("confidence", confidence, fine, "between 0 and 1")?;
         for (name, value) in [("clock", options.clock), ("shortest", options.shortest)] {
-            if value == 0 {
-                return Err(NumericsError::Parameter {
-                    name,
-                    value: 0.0,
-                    allowed: "1 or more",
-                });
-            }
+            check_parameter(name, value as f64, value >= 1, "1 or more")?;
         }
         Ok(Self {
             options,
@@ -235,18 +226,14 @@ impl Adwin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle;
+    use crate::change::tests::{alarms, ignores_what_is_not_finite};
 
     #[test]
     fn alarms_are_those_of_the_oracle() {
-        let Some(input) = oracle::table("online_river/drift_input.csv") else {
+        let mut window = Adwin::new(AdwinOptions::default()).unwrap();
+        let Some(alarms) = alarms(|value| window.push(value)) else {
             return;
         };
-        let mut window = Adwin::new(AdwinOptions::default()).unwrap();
-        let rows = input.numbers();
-        let alarms: Vec<_> = (0..rows.len())
-            .filter_map(|row| Some((row, window.push(rows[row][0])?)))
-            .collect();
         // `adwin_default` of drift_expected.json; the mean goes up at 800 and down at 1500.
         assert_eq!(alarms, [(831, MeanChange::Up), (1535, MeanChange::Down)]);
         assert_eq!(window.count(), 2000 - 1536);
@@ -276,14 +263,8 @@ mod tests {
 
     #[test]
     fn a_value_that_is_not_finite_changes_nothing_and_options_are_checked() {
-        let mut window = Adwin::new(AdwinOptions::default()).unwrap();
-        window.push(1.0);
-        let before = window.clone();
-        assert_eq!(
-            (window.push(f64::NAN), window.push(f64::INFINITY)),
-            (None, None)
-        );
-        assert_eq!(window, before);
+        let window = Adwin::new(AdwinOptions::default()).unwrap();
+        ignores_what_is_not_finite(window, Adwin::push);
         let with = |confidence, clock, shortest| {
             Adwin::new(AdwinOptions {
                 confidence,

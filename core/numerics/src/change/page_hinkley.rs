@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::MeanChange;
 use crate::NumericsError;
+use crate::checks::check_parameter;
 
 /// How sensitive the test is, in the unit of the series.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,20 +57,12 @@ impl PageHinkley {
             factor,
             ..
         } = options;
-        let parameter = |name, value, allowed| NumericsError::Parameter {
-            name,
-            value,
-            allowed,
-        };
-        if !(tolerance >= 0.0 && tolerance.is_finite()) {
-            return Err(parameter("tolerance", tolerance, "0 or more"));
-        }
-        if !(threshold > 0.0 && threshold.is_finite()) {
-            return Err(parameter("threshold", threshold, "above 0"));
-        }
-        if !(factor > 0.0 && factor <= 1.0) {
-            return Err(parameter("factor", factor, "above 0 and at most 1"));
-        }
+        let fine = tolerance >= 0.0 && tolerance.is_finite();
+        check_parameter("tolerance", tolerance, fine, "0 or more")?;
+        let fine = threshold > 0.0 && threshold.is_finite();
+        check_parameter("threshold", threshold, fine, "above 0")?;
+        let fine = factor > 0.0 && factor <= 1.0;
+        check_parameter("factor", factor, fine, "above 0 and at most 1")?;
         Ok(Self::begin(options))
     }
 
@@ -136,32 +129,22 @@ impl PageHinkley {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle;
+    use crate::change::tests::{alarms, ignores_what_is_not_finite};
 
     #[test]
     fn alarms_are_those_of_the_oracle() {
-        let Some(input) = oracle::table("online_river/drift_input.csv") else {
+        let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
+        let Some(alarms) = alarms(|value| test.push(value)) else {
             return;
         };
-        let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
-        let rows = input.numbers();
-        let alarms: Vec<_> = (0..rows.len())
-            .filter_map(|row| Some((row, test.push(rows[row][0])?)))
-            .collect();
         // `page_hinkley_default` of drift_expected.json; the mean goes up at 800 and down at 1500.
         assert_eq!(alarms, [(833, MeanChange::Up), (1505, MeanChange::Down)]);
     }
 
     #[test]
     fn a_value_that_is_not_finite_changes_nothing_and_options_are_checked() {
-        let mut test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
-        test.push(1.0);
-        let before = test.clone();
-        assert_eq!(
-            (test.push(f64::NAN), test.push(f64::INFINITY)),
-            (None, None)
-        );
-        assert_eq!(test, before);
+        let test = PageHinkley::new(PageHinkleyOptions::default()).unwrap();
+        ignores_what_is_not_finite(test, PageHinkley::push);
         let with = |tolerance, threshold, factor| {
             PageHinkley::new(PageHinkleyOptions {
                 tolerance,

@@ -3,7 +3,7 @@
 
 use super::fold_state::FoldState;
 use super::{CandidateScore, Candidates, Change, Selection, SelectionScore, SelectionStep, Start};
-use crate::checks::{check_penalty, check_splits};
+use crate::checks::{check_parameter, check_penalty, check_splits};
 use crate::{Folds, GramBlocks, NumericsError, Split};
 use std::borrow::Cow;
 
@@ -127,13 +127,8 @@ impl Search {
         candidates: &Candidates,
     ) -> Result<(), NumericsError> {
         check_penalty(self.alpha)?;
-        if let Some(tolerance) = self.tolerance.filter(|t| t.is_nan()) {
-            return Err(NumericsError::Parameter {
-                name: "tolerance",
-                value: tolerance,
-                allowed: "a number",
-            });
-        }
+        let tolerance = self.tolerance.unwrap_or(0.0);
+        check_parameter("tolerance", tolerance, !tolerance.is_nan(), "a number")?;
         if candidates.width() != scales.len() {
             return Err(NumericsError::Width {
                 expected: scales.len(),
@@ -209,7 +204,7 @@ impl State<'_> {
                 let Some(step) = self.best(&old, Change::Removed) else {
                     break;
                 };
-                let record = &mut records[self.units.iter().filter(|there| **there).count() - 1];
+                let record = &mut records[self.size() - 1];
                 if step.mean.is_nan() || step.mean <= *record {
                     break;
                 }

@@ -26,7 +26,7 @@ use rows::Rows;
 use sums::{Quad, quads};
 
 /// Samples of this size or above count as absent, like infinities: their squares would overflow.
-const LIMIT: f64 = 1e100;
+pub(crate) const LIMIT: f64 = 1e100;
 
 /// What a window must hold before it has a value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

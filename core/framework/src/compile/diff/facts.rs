@@ -225,20 +225,24 @@ pub(super) fn nodes(plan: &Plan) -> IndexMap<String, Facts> {
 
 /// The parameters of each kind that have units or quantities anywhere in them.
 fn measured_parameters(kind: &'static Kind) -> &'static [String] {
-    static KNOWN: OnceLock<HashMap<(&str, &str), Vec<String>>> = OnceLock::new();
+    // By name alone, since no plan has a kind of a name that two crates brought.
+    static KNOWN: OnceLock<HashMap<&str, OnceLock<Vec<String>>>> = OnceLock::new();
     let known = KNOWN.get_or_init(|| {
-        let of = |kind: &&'static Kind| {
-            let schema = Value::from((kind.schema)());
-            let parameters = schema["properties"].as_object().into_iter().flatten();
-            let measured = parameters.filter(|(_, schema)| is_measured(schema));
-            let measured = measured.map(|(name, _)| name.clone()).collect();
-            ((kind.package, kind.name), measured)
-        };
-        kinds().values().flatten().map(of).collect()
+        let names = kinds().keys();
+        names.map(|&name| (name, OnceLock::new())).collect()
     });
-    known
-        .get(&(kind.package, kind.name))
-        .map_or(&[], Vec::as_slice)
+    let Some(measured) = known.get(kind.name) else {
+        return &[];
+    };
+    // A schema takes long to make: only those of the kinds that a graph has are.
+    measured.get_or_init(|| {
+        let schema = Value::from((kind.schema)());
+        let parameters = schema["properties"].as_object().into_iter().flatten();
+        let definitions = &schema["$defs"];
+        let measured =
+            parameters.filter(|(_, schema)| is_measured(schema, definitions, &mut Vec::new()));
+        measured.map(|(name, _)| name.clone()).collect()
+    })
 }
 
 fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
@@ -265,9 +269,9 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
         facts.plain("learn.margin", learning.margin.to_string());
     }
     if let Value::Object(parameters) = node.spec.parameters() {
+        let measured = measured_parameters(node.kind);
         for (key, value) in parameters {
-            let measured = measured_parameters(node.kind).contains(&key);
-            facts.parameters(&key, value, measured);
+            facts.parameters(&key, value, measured.contains(&key));
         }
     }
     inputs(plan, node, &mut facts);
@@ -280,12 +284,23 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     facts
 }
 
-/// Whether a parameter has units or quantities anywhere in it.
-fn is_measured(schema: &Value) -> bool {
+/// Whether a parameter has units or quantities anywhere in it, be it by way of the definitions that it names.
+fn is_measured<'a>(schema: &'a Value, definitions: &'a Value, followed: &mut Vec<&'a str>) -> bool {
     match schema {
-        Value::String(text) => text == "#/$defs/Unit" || text == "#/$defs/Quantity",
-        Value::Array(parts) => parts.iter().any(is_measured),
-        Value::Object(parts) => parts.values().any(is_measured),
+        Value::String(text) => match text.strip_prefix("#/$defs/") {
+            Some("Unit" | "Quantity") => true,
+            Some(name) if !followed.contains(&name) => {
+                followed.push(name);
+                is_measured(&definitions[name], definitions, followed)
+            }
+            _ => false,
+        },
+        Value::Array(parts) => parts
+            .iter()
+            .any(|part| is_measured(part, definitions, followed)),
+        Value::Object(parts) => parts
+            .values()
+            .any(|part| is_measured(part, definitions, followed)),
         _ => false,
     }
 }

@@ -40,6 +40,16 @@ impl Mistake {
         }
     }
 
+    /// The same, with what to write where a key of the whole table is missing.
+    pub(super) fn advised(mut self, of: &dyn Fn(&str) -> Option<String>) -> Self {
+        if self.path.is_empty()
+            && let DocumentProblem::MissingKey { key, advice, .. } = &mut self.problem
+        {
+            *advice = of(key);
+        }
+        self
+    }
+
     /// Reports it, its table called by the keys that lead there and `what` holds them all.
     pub(super) fn report(mut self, what: &str, diagnostics: &mut Diagnostics) {
         let steps = match self.problem {

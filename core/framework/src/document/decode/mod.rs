@@ -26,6 +26,16 @@ pub fn decode<T: DeserializeOwned>(
     what: &str,
     diagnostics: &mut Diagnostics,
 ) -> Option<T> {
+    decode_advised(value, what, &|_| None, diagnostics)
+}
+
+/// As [`decode`], with what to write where a key of the table itself is missing.
+pub(crate) fn decode_advised<T: DeserializeOwned>(
+    value: &Value,
+    what: &str,
+    advice: &dyn Fn(&str) -> Option<String>,
+    diagnostics: &mut Diagnostics,
+) -> Option<T> {
     let mut repair: Option<Repair> = None;
     let mut clean = true;
     // Each turn takes at least one value out of the tree; the limit only bounds the time that a hopeless file takes.
@@ -46,7 +56,7 @@ pub fn decode<T: DeserializeOwned>(
         clean = false;
         let repair = repair.get_or_insert_with(|| Repair::of(value));
         if !repair.explains(&mistake) {
-            mistake.clone().report(what, diagnostics);
+            mistake.clone().advised(advice).report(what, diagnostics);
         }
         let goes_on = match mistake.missing_key() {
             Some(key) => {
