@@ -9,6 +9,7 @@
 //! purpose: they never see a truth before its time, because it is not theirs to read.
 
 mod combiner;
+mod encoder;
 mod estimator;
 mod feature;
 mod learner;
@@ -18,9 +19,11 @@ mod registry;
 mod state;
 
 pub use combiner::{Combine, Combiner, Votes};
+pub use encoder::Encoder;
+pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup, TruthLags,
+    CandidateScore, Estimator, OrderTable, Predictor, Regressor, Regressors, SelectionStep,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use learner::{Learner, Learns, TrainedRange};
