@@ -48,6 +48,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("resample", "athermal-features"),
         ("rls", "athermal-estimators"),
         ("safe_state", "athermal-control"),
+        ("sample_at", "athermal-features"),
         ("scale", "athermal-features"),
         ("settled", "athermal-control"),
         ("slope", "athermal-features"),

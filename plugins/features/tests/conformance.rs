@@ -3,7 +3,8 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
 use athermal_features::{
-    Delay, Difference, FirstOrder, Hampel, Lag, Moving, Pick, Product, Resample, Scale, Slope, Sum,
+    Delay, Difference, FirstOrder, Hampel, Lag, Moving, Pick, Product, Resample, SampleAt, Scale,
+    Slope, Sum,
 };
 
 conformance!(
@@ -143,6 +144,13 @@ conformance!(
         "#
     )
     .input("signal", 2, "Cel"),
+);
+
+conformance!(
+    SampleAt,
+    Case::new("")
+        .input("signal", 2, "Cel")
+        .input("instants", 1, "nm"),
 );
 
 #[test]

@@ -267,3 +267,28 @@ fn oracle_of_a_regular_clock() {
         assert!(compared > 40, "{compared}");
     }
 }
+
+#[test]
+fn oracle_of_samples_at_the_instants_of_another_channel() {
+    let mut bench = Bench::new(
+        "type = \"sample_at\"\ninputs.instants = \"s.z\"\n",
+        &["signal"],
+    );
+    let expected = table("sampled.csv");
+    let (mut compared, mut too_old) = (0, 0);
+    for (row, samples) in input().iter().enumerate() {
+        bench.tick(samples);
+        let line = expected.iter().find(|line| line[0] == row.to_string());
+        for (channel, column) in [("y", 1), ("z", 2)] {
+            let found = bench.output(&format!("signal.{channel}"));
+            let expected = line.map_or(f64::NAN, |line| number(&line[column]));
+            assert!(
+                found == expected || (found.is_nan() && expected.is_nan()),
+                "{channel} in row {row}: {found} for {expected}"
+            );
+            compared += usize::from(!expected.is_nan());
+            too_old += usize::from(line.is_some() && expected.is_nan());
+        }
+    }
+    assert!(compared > 400 && too_old > 0, "{compared}, {too_old}");
+}
