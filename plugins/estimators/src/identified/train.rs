@@ -263,7 +263,7 @@ impl Asked {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
-        report.orders = Some(table);
+        report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
     }
 }
