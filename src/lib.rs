@@ -58,4 +58,6 @@ mod guide {
     struct Combiner;
     #[doc = include_str!("../docs/src/source.md")]
     struct Source;
+    #[doc = include_str!("../docs/src/machine.md")]
+    struct Machine;
 }

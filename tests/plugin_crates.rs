@@ -23,9 +23,50 @@ fn with_core(scratch: &Scratch, name: &str, core: &str) -> String {
     format!("path:{}", folder.display())
 }
 
+/// Each role, the files that it has beside those that all have, and what the author is told to type.
+const ROLES: [(&str, &[&str], &str); 6] = [
+    ("feature", &["tests/conformance.rs"], "build --with path:."),
+    (
+        "estimator",
+        &["tests/conformance.rs"],
+        "build --with path:.",
+    ),
+    ("combiner", &["tests/conformance.rs"], "build --with path:."),
+    (
+        "source",
+        &["tests/live.rs", "examples/run.rs"],
+        "--example run",
+    ),
+    (
+        "sink",
+        &["tests/live.rs", "examples/run.rs"],
+        "--example run",
+    ),
+    ("machine", &[], "build --with path:."),
+];
+
+/// Every file under a folder, as paths from there.
+fn files_in(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let inside = path.strip_prefix(folder).unwrap();
+                found.push(inside.to_str().unwrap().replace('\\', "/"));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
 #[test]
-fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names() {
-    for role in ["feature", "estimator", "combiner"] {
+fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names_and_nothing_else() {
+    for (role, own, told) in ROLES {
         let scratch = Scratch::new(&format!("new-{role}"));
         let folder = scratch.path("room-lag");
         let wrote = athermal(&[
@@ -37,21 +78,27 @@ fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names() {
             &"-o",
             &folder,
         ]);
-        wrote
-            .ended(0)
-            .tells(&["wrote", "`room_lag`", "build --with path:."]);
-        for file in [
-            "Cargo.toml",
+        wrote.ended(0).tells(&["wrote", "cargo test", told]);
+        let shared = [
+            ".gitignore",
             "Cargo.lock",
+            "Cargo.toml",
             "README.md",
+            "graphs/room-lag.toml",
             "src/lib.rs",
-            "tests/conformance.rs",
-        ] {
-            assert!(folder.join(file).is_file(), "{file}");
-        }
+        ];
+        let mut expected: Vec<&str> = shared.iter().chain(own).copied().collect();
+        expected.sort_unstable();
+        assert_eq!(files_in(&folder), expected, "{role}");
         let read = |file: &str| std::fs::read_to_string(folder.join(file)).unwrap();
-        assert!(read("src/lib.rs").contains("pub struct RoomLag {"));
-        assert!(read("graphs/room-lag.toml").contains("type = \"room_lag\""));
+        assert!(read("src/lib.rs").contains("pub struct RoomLag"), "{role}");
+        assert!(read("graphs/room-lag.toml").contains("[[tests]]"), "{role}");
+        for file in expected.iter().filter(|file| **file != "Cargo.lock") {
+            let text = read(file);
+            for left in ["my-node", "my_node", "MyNode", "CORE", "ATHERMAL"] {
+                assert!(!text.contains(left), "{left} in {file} of a {role}");
+            }
+        }
         let core = Path::new(ROOT)
             .canonicalize()
             .unwrap()
@@ -61,14 +108,51 @@ fn a_new_plugin_has_all_that_a_crate_needs_under_its_own_names() {
 }
 
 #[test]
+fn what_was_written_is_told_to_programs_too() {
+    let scratch = Scratch::new("new-json");
+    for (role, kind) in [("feature", "\"room_lag\""), ("machine", "null")] {
+        let folder = scratch.path(role);
+        let wrote = athermal(&[
+            &"--format",
+            &"json",
+            &"new",
+            &"plugin",
+            &"room-lag",
+            &"--role",
+            &role,
+            &"-o",
+            &folder,
+        ]);
+        let wrote = wrote.ended(0);
+        let told: serde_json::Value = serde_json::from_str(&wrote.out).unwrap();
+        assert_eq!(told["role"], role);
+        assert_eq!(told["kind"].to_string(), kind);
+        assert_eq!(
+            told["files"].as_array().unwrap().len(),
+            files_in(&folder).len()
+        );
+    }
+}
+
+#[test]
 fn a_name_that_is_none_or_taken_is_refused_with_a_reason() {
-    for (name, reason) in [
-        ("Room Lag", "begin with a small letter"),
-        ("slope", "from athermal-features"),
-        ("votes", "means something else already"),
-        ("async", "means something else already"),
+    for (name, role, reason) in [
+        ("Room Lag", "feature", "begin with a small letter"),
+        (
+            "slope",
+            "feature",
+            "a node type `slope` already, from athermal-features",
+        ),
+        (
+            "linear-axis",
+            "machine",
+            "a machine `linear-axis` already, from athermal-simulation",
+        ),
+        ("votes", "feature", "means something else already"),
+        ("frame", "sink", "means something else already"),
+        ("async", "source", "means something else already"),
     ] {
-        athermal(&[&"new", &"plugin", &name])
+        athermal(&[&"new", &"plugin", &name, &"--role", &role])
             .ended(2)
             .tells(&[reason]);
     }
@@ -77,6 +161,12 @@ fn a_name_that_is_none_or_taken_is_refused_with_a_reason() {
     athermal(&[&"new", &"plugin", &"room-lag", &"-o", &scratch.path("")])
         .ended(2)
         .tells(&["not empty"]);
+    // What is no node has no name in graphs that could be taken.
+    let folder = scratch.path("slope");
+    athermal(&[
+        &"new", &"plugin", &"slope", &"--role", &"source", &"-o", &folder,
+    ])
+    .ended(0);
 }
 
 #[test]

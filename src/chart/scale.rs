@@ -45,11 +45,10 @@ pub(super) fn ticks(low: f64, high: f64, about: usize) -> Vec<f64> {
 
 /// The same for a number of decimals that the step needs.
 pub(super) fn label(value: f64, step: f64) -> String {
-    let decimals = if step >= 1.0 {
-        0
-    } else {
-        (-step.log10()).ceil().min(6.0) as usize
-    };
+    let decimals = (-step.log10()).ceil().max(0.0) as usize;
+    if decimals > 6 {
+        return format!("{value:.1e}");
+    }
     format!("{value:.decimals$}")
 }
 

@@ -1,7 +1,7 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
 use athermal::core::diagnostic::nearest;
-use athermal::core::node::{FREEZE, Kind, Read, kind, kinds};
+use athermal::core::node::{FREEZE, Kind, Read, RoleName, kind, kinds};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -95,8 +95,12 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
     let schema = Value::from((kind.schema)());
     println!("\nParameters:");
-    if kind.role == athermal::core::node::RoleName::Estimator {
-        println!("  ahead (duration) – how far ahead of now the truth is predicted; required");
+    if kind.framework_keys().contains(&"ahead") {
+        let truth = match kind.role {
+            RoleName::Feature => "that it is fitted on is measured",
+            RoleName::Estimator | RoleName::Combiner => "is predicted",
+        };
+        println!("  ahead (duration) – how far ahead of now the truth {truth}; required");
         println!(
             "  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on"
         );
@@ -109,7 +113,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
     let explained = parameters::explain(&schema);
     print!("{explained}");
-    if explained.is_empty() && kind.role != athermal::core::node::RoleName::Estimator {
+    if explained.is_empty() && kind.framework_keys().is_empty() {
         println!("  none");
     }
 }

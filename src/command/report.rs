@@ -7,7 +7,7 @@ use athermal::core::fit::FitError;
 use athermal::report::{WANTED, gather, page, plots, text};
 use clap::Args;
 
-use super::data::Data;
+use super::data::{self, Data};
 use super::evaluate::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
@@ -54,7 +54,14 @@ impl Report {
             let of_a_pass = error.downcast::<FitError>();
             of_a_pass.map_or_else(outside, |error| Failure::from(*error))
         })?;
-        if facts.course.axes.is_empty() {
+        let course = &facts.course;
+        data::tell(
+            terminal,
+            &dataset.reports(),
+            course.refused,
+            &course.rejected,
+        );
+        if course.axes.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is little to report",
             );

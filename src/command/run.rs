@@ -158,11 +158,7 @@ impl Run {
 
     fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader) {
         let reports = [(self.input.display().to_string(), reader.report().clone())];
-        let counted = engine.plan().sources.iter().zip(engine.rejected());
-        let rejected: Vec<_> = counted
-            .filter(|&(_, &count)| count > 0)
-            .map(|(source, &count)| (source.name.clone(), count))
-            .collect();
+        let rejected = engine.rejected_channels();
         data::tell(terminal, &reports, engine.refused(), &rejected);
     }
 }

@@ -128,7 +128,7 @@ fn widths(segments: &[Measured], own_s: f64, factor: f64) -> Vec<Width> {
 }
 
 /// The slot that a truth is the slope of.
-fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
+pub(crate) fn measured_by(plan: &Plan, truth: usize) -> Option<usize> {
     let node = &plan.nodes[plan.channels[truth].node?];
     let PlannedRole::Feature { gathers, .. } = &node.role else {
         return None;

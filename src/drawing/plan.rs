@@ -190,8 +190,8 @@ fn run(plan: &Plan, node: &PlannedNode, expand: bool) -> String {
         } => ", at every tick",
         _ => "",
     };
-    let ahead = match &node.role {
-        PlannedRole::Estimator { truth, .. } => {
+    let ahead = match node.role.learns_from() {
+        Some((truth, _)) => {
             format!(
                 ", {} {} ahead",
                 plan.channels[truth.slot]
@@ -202,7 +202,7 @@ fn run(plan: &Plan, node: &PlannedNode, expand: bool) -> String {
                 truth.ahead
             )
         }
-        _ => String::new(),
+        None => String::new(),
     };
     format!(
         "run {} ({}){ahead}{every}{slots}",

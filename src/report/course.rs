@@ -27,6 +27,10 @@ const TRANSIENT: f64 = 80.0;
 pub struct Course {
     /// Ticks stepped.
     pub ticks: u64,
+    /// Rows refused because their time was not after the one before.
+    pub refused: u64,
+    /// Samples rejected as infinite or out of range, by measured channel.
+    pub rejected: Vec<(String, u64)>,
     /// First and last instant in s; segments follow each other an hour apart.
     pub period_s: Option<(f64, f64)>,
     /// Every predicted truth.
@@ -160,6 +164,8 @@ pub(super) fn follow(
         begins = false;
     }
     course.sensors.iter_mut().for_each(SensorFacts::finish);
+    course.refused = engine.refused();
+    course.rejected = engine.rejected_channels();
     Ok((course, found.map(|(_, track)| track)))
 }
 

@@ -5,6 +5,8 @@ use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal_core::engine::Engine;
 use athermal_core::time::{Duration, Instant};
 
+use crate::diagnosis::window::measured_by;
+
 /// The number in the port `why` of a correction without a valid prediction.
 const INVALID: f64 = 1.0;
 
@@ -77,8 +79,7 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
         for (nth, correction) in node.ports.first()?.1.clone().enumerate() {
             let rate = first_input(plan, node, 0, nth)?;
             let truth = plan.channels[rate].predicts?;
-            let slope = &plan.nodes[plan.channels[truth].node?];
-            let position = first_input(plan, slope, 0, truth - slope.slots.start)?;
+            let position = measured_by(plan, truth)?;
             let unit = &plan.channels[position].channel.unit;
             places.factor = plan.channels[correction].channel.unit.factor_to(unit)?;
             places.positions.push(position);

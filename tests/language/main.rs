@@ -11,6 +11,7 @@ mod ages;
 mod combiners;
 mod delays;
 mod embargo;
+mod encoders;
 mod fitting;
 mod kinds;
 mod lags;

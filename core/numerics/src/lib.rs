@@ -23,6 +23,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod active_set;
 mod blocks;
 mod change;
 mod checks;
@@ -31,6 +32,7 @@ mod correlation;
 mod elastic_net;
 mod error;
 mod folds;
+mod forward_regression;
 mod gram;
 mod huber;
 mod kalman;
@@ -46,6 +48,7 @@ mod scaler;
 mod score;
 mod selection;
 mod sgd;
+mod state_space;
 
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
 pub use change::{Adwin, AdwinOptions, MeanChange, PageHinkley, PageHinkleyOptions};
@@ -57,10 +60,12 @@ pub use correlation::{
 pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;
 pub use folds::{FoldRows, Folds, Split};
+pub use forward_regression::{ErrorReduction, ForwardModel, ForwardRegression};
 pub use gram::Gram;
 pub use huber::{Huber, HuberFit};
 pub use kalman::{
-    Followed, Forecast, Innovation, Kalman, Passage, Series, Structural, follow, most_likely,
+    Followed, Forecast, Innovation, Kalman, Movement, Passage, Series, Structural, follow,
+    most_likely,
 };
 pub use least_squares::{
     DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
@@ -80,6 +85,9 @@ pub use selection::{
     SelectionStep, Smallest, Start, Stepwise, StepwiseSelection, StepwiseStep,
 };
 pub use sgd::{LearningRate, Sgd, SgdOptions};
+pub use state_space::{
+    DifferenceEquation, Identification, Record, StateOrder, StateSpace, Subspace, Weighting,
+};
 
 #[cfg(test)]
 mod oracle;

@@ -14,8 +14,8 @@ use crate::mean::mean;
 /// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
 /// and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by `gain · (1 − coverage − miss)`, `miss` being
 /// 1 where the truth lay outside of the interval that was given for it and 0 where not (Gibbs and Candès 2021, equation 2).
-/// So the share of truths within comes to `coverage` whatever the errors are like, and when a machine changes; it is a share
-/// over time, not at each instant. Only truths that the embargo lets through count.
+/// So the share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep outgrowing
+/// all that are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
 ///
 /// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends. They
 /// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths, and where more is asked for than any

@@ -214,6 +214,7 @@ impl Combine for Hedging {
         if let (Some(half_life), Some(last)) = (self.parameters.half_life, self.losses.last) {
             let left = Fading { half_life }.left(arrived - last);
             self.losses.gap *= left;
+            self.losses.widest *= left;
             self.losses.sums.iter_mut().for_each(|sum| *sum *= left);
         }
         self.losses.last = Some(arrived);

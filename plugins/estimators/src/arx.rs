@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::lag_order::LagOrder;
-use crate::lags::lag_mistakes;
+use crate::lags::{lag_mistakes, now};
 use crate::order::Order;
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
@@ -37,10 +37,6 @@ pub struct Arx {
     /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6", nb = "1..3" }`; without it all are.
     #[serde(default)]
     pub order: Option<Order>,
-}
-
-fn now() -> Vec<Duration> {
-    vec![Duration::ZERO]
 }
 
 impl Arx {

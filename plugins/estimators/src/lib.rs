@@ -1,6 +1,6 @@
 //! Estimator nodes of athermal: linear, AR and ARX regression, sparse, robust and polynomial ones, recursive least squares,
-//! structural models followed by a Kalman filter, transfer functions identified by the prediction error, and the baselines `zero`
-//! and `persistence`.
+//! structural models followed by a Kalman filter, transfer functions identified by the prediction error, state spaces, and the
+//! baselines `zero` and `persistence`.
 
 mod ar;
 mod arimax;
@@ -17,6 +17,7 @@ mod lag_order;
 mod lags;
 mod lasso;
 mod linear;
+mod narx;
 mod oe;
 mod online;
 mod order;
@@ -28,6 +29,7 @@ mod rls;
 mod selection;
 mod solver;
 mod stack;
+mod state_space;
 mod zero;
 
 pub use ar::Ar;
@@ -43,6 +45,7 @@ pub use identified::PerInput;
 pub use kalman::{Kalman, Noises};
 pub use lasso::Lasso;
 pub use linear::Linear;
+pub use narx::{Narx, NarxPredictor};
 pub use oe::Oe;
 pub use online::OnlinePredictor;
 pub use order::{Figure, Order, OrderRange};
@@ -54,4 +57,5 @@ pub use rls::{Forgetting, Rls};
 pub use selection::{By, CrossValidated, Selection};
 pub use solver::Solver;
 pub use stack::Stack;
+pub use state_space::{StateSpace, States, Weighting};
 pub use zero::Zero;

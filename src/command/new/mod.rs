@@ -16,7 +16,7 @@ pub struct New {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Write a crate with a node type of your own
+    /// Write a crate with a node type, a source, a sink or a machine of your own
     Plugin(plugin::Plugin),
 }
 

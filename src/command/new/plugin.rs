@@ -1,29 +1,32 @@
-//! `athermal new plugin`: a crate with a node type.
+//! `athermal new plugin`: a crate with a node type, a source, a sink or a machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use athermal::core::machine::machines;
 use athermal::core::node::kinds;
 use clap::Args;
 use serde_json::json;
 
-use super::template::{Names, Role, files};
+use super::template::{Athermal, Names, Role, files};
 use crate::checkout::{Checkout, VERSION, in_toml};
 use crate::invocation::{command, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
-/// Write a crate with a node type of your own
+/// Write a crate with a node type, a source, a sink or a machine of your own
 ///
-/// The crate builds as it is: a node that does something small, its tests, the tests of the rules that every node keeps, and a
-/// graph with a test. Change the node into yours and see what the tests say.
+/// The crate builds as it is: something small that works, its tests, a graph with a test, and a README that says what to do
+/// next. A node comes with the tests of the rules that every node keeps, a source or a sink with a live program of its own.
+/// Change it into yours and see what the tests say.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal new plugin room-lag
-  athermal new plugin my-regression --role estimator")]
+  athermal new plugin my-regression --role estimator
+  athermal new plugin our-controller --role source")]
 pub struct Plugin {
-    /// The name of crate and node type: small letters, digits, `-`
+    /// The name of the crate and of what it brings: small letters, digits, `-`
     name: String,
-    /// What the node is
+    /// What the crate brings
     #[arg(long, value_enum, default_value = "feature")]
     role: Role,
     /// The folder that the crate goes into; by default one of its name, here
@@ -53,9 +56,13 @@ impl Plugin {
                 folder.display()
             )));
         }
-        let core = in_toml(&checkout.core());
+        let athermal = Athermal {
+            folder: in_toml(checkout.folder()),
+            core: in_toml(&checkout.core()),
+            version: VERSION,
+        };
         let mut written = Vec::new();
-        for (path, text) in files(&names, self.role, &core, VERSION) {
+        for (path, text) in files(&names, self.role, &athermal) {
             let path = folder.join(path);
             write(&path, &text)?;
             written.push(path);
@@ -69,10 +76,15 @@ impl Plugin {
         if terminal.format == Format::Json {
             println!(
                 "{:#}",
-                json!({ "folder": folder, "kind": names.kind, "files": written })
+                json!({
+                    "folder": folder,
+                    "role": self.role.word(),
+                    "kind": self.role.is_node().then_some(names.kind),
+                    "files": written,
+                })
             );
         } else {
-            terminal.note(next(&folder, &names));
+            terminal.note(next(&folder, &names, self.role));
         }
         Ok(Answer::Fine)
     }
@@ -85,21 +97,36 @@ impl Plugin {
                  digits and single `-`"
             ))
         })?;
-        if let Some(kind) = kinds()
-            .get(names.kind.as_str())
-            .and_then(|same| same.first())
-        {
-            return Err(Failure::Request(format!(
-                "there is a node type `{}` already, from {} {}; a second one of the name could not be used beside it",
-                kind.name, kind.package, kind.version
-            )));
-        }
+        self.free(&names)?;
         if names.clash() {
             return Err(Failure::Request(format!(
-                "`{name}` means something else already, to Rust or to the traits of nodes; take a name such as `my-{name}`"
+                "`{name}` means something else already, to Rust or to athermal; take a name such as `my-{name}`"
             )));
         }
         Ok(names)
+    }
+
+    /// Refuses the name of what this program has already, and could not tell from the new one.
+    fn free(&self, names: &Names) -> Result<(), Failure> {
+        let kind = kinds().get(names.kind.as_str()).and_then(|all| all.first());
+        let machine = machines()
+            .get(self.name.as_str())
+            .and_then(|all| all.first());
+        let (what, name, package, version) = match (self.role, kind, machine) {
+            (Role::Machine, _, Some(known)) => (
+                "machine",
+                known.machine.name(),
+                known.package,
+                known.version,
+            ),
+            (Role::Feature | Role::Estimator | Role::Combiner, Some(kind), _) => {
+                ("node type", kind.name, kind.package, kind.version)
+            }
+            _ => return Ok(()),
+        };
+        Err(Failure::Request(format!(
+            "there is a {what} `{name}` already, from {package} {version}; a second one of the name could not be used beside it"
+        )))
     }
 }
 
@@ -110,17 +137,45 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
 }
 
-fn next(folder: &Path, names: &Names) -> String {
-    let program = program();
-    let into = command(&["cd", &quoted(&folder.display().to_string())]);
-    let build = command(&[&program, "build --with path:. -o target/athermal"]);
-    let test = command(&[
-        "target/athermal test",
-        &format!("graphs/{}.toml", names.package),
-    ]);
+/// What was written, and what to type next.
+fn next(folder: &Path, names: &Names, role: Role) -> String {
+    let Names { package, kind, .. } = names;
+    let (brings, then) = match role {
+        Role::Feature | Role::Estimator | Role::Combiner => (
+            format!("the node type `{kind}`"),
+            "build a binary that has it, and use it in a graph",
+        ),
+        Role::Machine => (
+            format!("the machine `{package}`"),
+            "build a binary that has it, and try a graph on it",
+        ),
+        Role::Source | Role::Sink => (
+            format!("a {}", role.word()),
+            "run a graph with it (README.md says more)",
+        ),
+    };
+    let graph = format!("graphs/{package}.toml");
+    let mut lines = vec![
+        command(&["cd", &quoted(&folder.display().to_string())]),
+        "  cargo test".to_owned(),
+    ];
+    match role {
+        Role::Source => {
+            let line = "echo '0 plate=21.5' |";
+            lines.push(command(&[line, "cargo run --example run --", &graph]));
+        }
+        Role::Sink => {
+            lines.push(command(&["cargo run --example run --", &graph, "log.csv"]));
+        }
+        _ => {
+            let build = "build --with path:. -o target/athermal";
+            lines.push(command(&[&program(), build]));
+            lines.push(command(&["target/athermal test", &graph]));
+        }
+    }
     format!(
-        "wrote {}, with the node type `{}`; test it, build a binary that has it, and use it in a graph:\n{into}\n  cargo test\n{build}\n{test}",
+        "wrote {}, with {brings}; test it, {then}:\n{}",
         folder.display(),
-        names.kind
+        lines.join("\n")
     )
 }

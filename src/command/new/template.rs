@@ -1,9 +1,9 @@
 //! Decides what a new plugin crate consists of; the texts are files beside this one, in which `my-node`, `my_node` and
-//! `MyNode` stand for the name.
+//! `MyNode` stand for the name, `CORE`, `ATHERMAL` and `VERSION` for the athermal that it builds on.
 
 use clap::ValueEnum;
 
-/// What a new node is.
+/// What a new crate brings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Role {
     /// Channels from channels: filters, monitors, corrections
@@ -12,9 +12,36 @@ pub enum Role {
     Estimator,
     /// One prediction of several
     Combiner,
+    /// Where samples come from: a bus, a controller
+    Source,
+    /// Where outputs go: a controller, a screen
+    Sink,
+    /// A machine to simulate
+    Machine,
 }
 
-/// The names by which a crate calls its node.
+impl Role {
+    /// Whether it is a node, with a type in graph files.
+    #[must_use]
+    pub fn is_node(self) -> bool {
+        matches!(self, Self::Feature | Self::Estimator | Self::Combiner)
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Feature => "feature",
+            Self::Estimator => "estimator",
+            Self::Combiner => "combiner",
+            Self::Source => "source",
+            Self::Sink => "sink",
+            Self::Machine => "machine",
+        }
+    }
+}
+
+/// The names by which a crate calls what it brings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Names {
     /// The crate: `my-node`.
@@ -32,11 +59,11 @@ impl Names {
         let mut letters = name.chars();
         let begins = letters.next().is_some_and(|c| c.is_ascii_lowercase());
         let goes_on = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
-        if !begins || !letters.all(goes_on) || name.ends_with(['-', '_']) {
+        let kind = name.replace('-', "_");
+        let words = kind.split('_');
+        if !begins || !letters.all(goes_on) || words.clone().any(str::is_empty) {
             return None;
         }
-        let kind = name.replace('-', "_");
-        let words = kind.split('_').filter(|word| !word.is_empty());
         let capital = |word: &str| word[..1].to_ascii_uppercase() + &word[1..];
         Some(Self {
             package: name.to_owned(),
@@ -48,12 +75,13 @@ impl Names {
     /// Whether the templates, or Rust, use one of the names for something else.
     #[must_use]
     pub fn clash(&self) -> bool {
-        let texts = ROLES.map(library);
+        let texts = ROLES.map(texts).concat();
         let taken = |word: &str| {
             let is = |c: char| c.is_alphanumeric() || c == '_';
             texts
                 .iter()
-                .any(|text| text.split(|c| !is(c)).any(|known| known == word))
+                .filter(|(path, _)| path.ends_with(".rs"))
+                .any(|(_, text)| text.split(|c| !is(c)).any(|known| known == word))
         };
         taken(&self.spec)
             || taken(&format!("{}Fitted", self.spec))
@@ -68,7 +96,14 @@ impl Names {
     }
 }
 
-const ROLES: [Role; 3] = [Role::Feature, Role::Estimator, Role::Combiner];
+const ROLES: [Role; 6] = [
+    Role::Feature,
+    Role::Estimator,
+    Role::Combiner,
+    Role::Source,
+    Role::Sink,
+    Role::Machine,
+];
 
 /// The words that Rust keeps for itself.
 const KEYWORDS: [&str; 51] = [
@@ -79,12 +114,13 @@ const KEYWORDS: [&str; 51] = [
     "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
 ];
 
-/// The crates that a new one cannot be called, because it uses them.
-const CRATES: [&str; 9] = [
+/// The crates and modules that a new one cannot be called, because it uses them.
+const CRATES: [&str; 10] = [
     "athermal",
     "athermal_core",
     "alloc",
     "core",
+    "live",
     "schemars",
     "serde",
     "std",
@@ -92,58 +128,126 @@ const CRATES: [&str; 9] = [
     "typetag",
 ];
 
-/// The files of a crate: paths in it and what they say. `core` is the folder of the core as it stands in a manifest.
-#[must_use]
-pub fn files(names: &Names, role: Role, core: &str, version: &str) -> Vec<(String, String)> {
-    let cases = match role {
-        Role::Feature => {
-            r#"Case::new("samples = 5"),
-    Case::new("samples = 1").input("signal", 3, "Cel"),"#
-        }
-        Role::Estimator => {
-            r#"Case::new("ahead = '1min'"),
-    Case::new("ahead = '0s'\nshrinkage = 0.5").input("features", 1, "Cel"),"#
-        }
-        Role::Combiner => {
-            r#"Case::new(""),
-    Case::new("pace = 1.0").input("voters", 5, "nm"),"#
-        }
-    };
-    // What is put in last is not looked through again: a folder may be called anything.
-    let manifest = names
-        .put_into(include_str!("template/Cargo.toml.txt"))
-        .replace("VERSION", version)
-        .replace("CORE", core);
-    let conformance = include_str!("template/conformance.rs.txt").replace(
-        "conformance!(MyNode, CASES);",
-        &format!("conformance!(\n    MyNode,\n    {cases}\n);"),
-    );
-    let graph = match role {
-        Role::Feature => include_str!("template/feature/graph.toml"),
-        Role::Estimator => include_str!("template/estimator/graph.toml"),
-        Role::Combiner => include_str!("template/combiner/graph.toml"),
-    };
-    let mut files = vec![("Cargo.toml".to_owned(), manifest)];
-    let others = [
-        (
-            "README.md".to_owned(),
-            include_str!("template/README.md.txt"),
-        ),
-        (".gitignore".to_owned(), "/target\n"),
-        ("src/lib.rs".to_owned(), library(role)),
-        ("tests/conformance.rs".to_owned(), conformance.as_str()),
-        (format!("graphs/{}.toml", names.package), graph),
-    ];
-    files.extend(others.map(|(path, text)| (path, names.put_into(text))));
-    files
+/// The athermal that a crate is written for, as it stands in a manifest.
+#[derive(Debug, Clone)]
+pub struct Athermal<'a> {
+    /// The folder of its sources.
+    pub folder: String,
+    /// The folder of its core.
+    pub core: String,
+    /// Its version.
+    pub version: &'a str,
 }
 
-fn library(role: Role) -> &'static str {
-    match role {
-        Role::Feature => include_str!("template/feature/lib.rs"),
-        Role::Estimator => include_str!("template/estimator/lib.rs"),
-        Role::Combiner => include_str!("template/combiner/lib.rs"),
-    }
+/// The files of a crate: paths in it and what they say.
+#[must_use]
+pub fn files(names: &Names, role: Role, athermal: &Athermal<'_>) -> Vec<(String, String)> {
+    let texts = texts(role).into_iter().map(|(path, text)| {
+        let (path, text) = (names.put_into(path), names.put_into(text));
+        if path != "Cargo.toml" {
+            return (path, text);
+        }
+        let words = [
+            ("VERSION", athermal.version),
+            ("CORE", &athermal.core),
+            ("ATHERMAL", &athermal.folder),
+        ];
+        (path, put(&text, &words))
+    });
+    texts.collect()
+}
+
+/// Puts what they stand for in the place of words. What is put in is not looked through again: a folder may be called anything.
+fn put(text: &str, words: &[(&str, &str)]) -> String {
+    let Some(((word, meaning), others)) = words.split_first() else {
+        return text.to_owned();
+    };
+    let parts: Vec<String> = text.split(word).map(|part| put(part, others)).collect();
+    parts.join(meaning)
+}
+
+const LIBRARY: &str = "src/lib.rs";
+const CONFORMANCE: &str = "tests/conformance.rs";
+const LIVE: &str = "tests/live.rs";
+const PROGRAM: &str = "examples/run.rs";
+const GRAPH: &str = "graphs/my-node.toml";
+const MANIFEST: &str = "Cargo.toml";
+const README: &str = "README.md";
+
+/// The text of a file of the template.
+macro_rules! text {
+    ($path:literal) => {
+        include_str!(concat!("template/", $path))
+    };
+}
+
+/// The files of a role: paths and texts, with what stands for the names still in them.
+fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
+    let node = [
+        (MANIFEST, text!("node/Cargo.toml.txt")),
+        (README, text!("node/README.md.txt")),
+    ];
+    let live = [
+        (MANIFEST, text!("live/Cargo.toml.txt")),
+        (GRAPH, text!("live/graph.toml")),
+    ];
+    let machine = [
+        (MANIFEST, text!("machine/Cargo.toml.txt")),
+        (README, text!("machine/README.md.txt")),
+    ];
+    let (shared, own) = match role {
+        Role::Feature => (
+            node,
+            vec![
+                (LIBRARY, text!("feature/lib.rs")),
+                (CONFORMANCE, text!("feature/conformance.rs")),
+                (GRAPH, text!("feature/graph.toml")),
+            ],
+        ),
+        Role::Estimator => (
+            node,
+            vec![
+                (LIBRARY, text!("estimator/lib.rs")),
+                (CONFORMANCE, text!("estimator/conformance.rs")),
+                (GRAPH, text!("estimator/graph.toml")),
+            ],
+        ),
+        Role::Combiner => (
+            node,
+            vec![
+                (LIBRARY, text!("combiner/lib.rs")),
+                (CONFORMANCE, text!("combiner/conformance.rs")),
+                (GRAPH, text!("combiner/graph.toml")),
+            ],
+        ),
+        Role::Source => (
+            live,
+            vec![
+                (LIBRARY, text!("source/lib.rs")),
+                (LIVE, text!("source/live.rs")),
+                (PROGRAM, text!("source/run.rs")),
+                (README, text!("source/README.md.txt")),
+            ],
+        ),
+        Role::Sink => (
+            live,
+            vec![
+                (LIBRARY, text!("sink/lib.rs")),
+                (LIVE, text!("sink/live.rs")),
+                (PROGRAM, text!("sink/run.rs")),
+                (README, text!("sink/README.md.txt")),
+            ],
+        ),
+        Role::Machine => (
+            machine,
+            vec![
+                (LIBRARY, text!("machine/lib.rs")),
+                (GRAPH, text!("machine/graph.toml")),
+            ],
+        ),
+    };
+    let ignored = (".gitignore", "/target\n");
+    shared.into_iter().chain(own).chain([ignored]).collect()
 }
 
 #[cfg(test)]
@@ -164,7 +268,16 @@ mod tests {
 
     #[test]
     fn names_that_mean_something_else_already_are_known() {
-        for taken in ["feature", "votes", "instant", "type", "errors", "vec-deque"] {
+        for taken in [
+            "feature",
+            "votes",
+            "instant",
+            "type",
+            "errors",
+            "vec-deque",
+            "frame",
+            "warming",
+        ] {
             assert!(Names::of(taken).unwrap().clash(), "{taken}");
         }
         assert!(!Names::of("room-lag").unwrap().clash());
@@ -173,19 +286,35 @@ mod tests {
     #[test]
     fn a_folder_may_be_called_like_what_is_replaced() {
         let names = Names::of("room-lag").unwrap();
-        let core = "\"/srv/my-node/CORE/VERSION\"";
-        let (path, text) = files(&names, Role::Feature, core, "1.2.3").swap_remove(0);
+        let athermal = Athermal {
+            folder: "\"/srv/my-node\"".to_owned(),
+            core: "\"/srv/my-node/ATHERMAL/CORE/VERSION\"".to_owned(),
+            version: "1.2.3",
+        };
+        let (path, text) = files(&names, Role::Source, &athermal).swap_remove(0);
         assert_eq!(path, "Cargo.toml");
-        let line = format!("athermal-core = {{ path = {core}, version = \"1.2.3\" }}\n");
-        assert!(text.contains(&line), "{text}");
+        for line in [
+            "athermal-core = { path = \"/srv/my-node/ATHERMAL/CORE/VERSION\", version = \"1.2.3\" }\n",
+            "athermal = { path = \"/srv/my-node\", version = \"1.2.3\", default-features = false }\n",
+        ] {
+            assert!(text.contains(line), "{text}");
+        }
     }
 
     #[test]
     fn nothing_of_the_template_is_left_over() {
         let names = Names::of("room-lag").unwrap();
+        let athermal = Athermal {
+            folder: "\"/sources\"".to_owned(),
+            core: "\"/sources/core\"".to_owned(),
+            version: "1.2.3",
+        };
         for role in ROLES {
-            for (path, text) in files(&names, role, "\"/sources\"", "1.2.3") {
-                for left in ["my_node", "my-node", "MyNode", "CORE", "VERSION", "CASES"] {
+            for (path, text) in files(&names, role, &athermal) {
+                for left in [
+                    "my_node", "my-node", "MyNode", "CORE", "VERSION", "ATHERMAL",
+                ] {
+                    assert!(!path.contains(left), "{left} in {path}");
                     assert!(!text.contains(left), "{left} in {path}:\n{text}");
                 }
             }

@@ -1,10 +1,11 @@
 //! Decides what a feature of a graph is given and what it gives.
 
 use super::instance::Instance;
-use super::plan::PlannedRole;
+use super::leak::Suspect;
+use super::plan::{PlannedFit, PlannedRole};
 use super::provenance::Provenance;
 use super::resolver::Resolver;
-use crate::node::{Feature, Read};
+use crate::node::{Feature, InputPort, Read};
 use crate::time::Duration;
 
 impl Resolver<'_> {
@@ -15,6 +16,8 @@ impl Resolver<'_> {
         feature: &dyn Feature,
         closes: bool,
     ) -> Option<()> {
+        let encoder = feature.encoder();
+        let lags = encoder.map_or_else(|| vec![Duration::ZERO], |encoder| encoder.lags());
         let mut ports = Vec::new();
         let mut gathers = Vec::new();
         let mut whole = true;
@@ -29,7 +32,7 @@ impl Resolver<'_> {
             };
             if port.read != Read::Truth {
                 let unit = Self::port_unit(port);
-                match self.gather(instance, port, &slots, &[Duration::ZERO], unit.as_ref()) {
+                match self.gather(instance, port, &slots, &lags, unit.as_ref()) {
                     Some(gather) => gathers.push(gather),
                     None => whole = false,
                 }
@@ -39,6 +42,14 @@ impl Resolver<'_> {
         if !whole {
             return None;
         }
+        let truth = ports.iter().find(|(port, _)| port.read == Read::Truth);
+        let fit = match (encoder, truth) {
+            (Some(_), Some((port, slots))) => {
+                let truth = self.one_of(instance, port, slots)?;
+                Some(self.fit(instance, truth, &lags, &ports)?)
+            }
+            _ => None,
+        };
         let data = ports.iter().filter(|(port, _)| port.read != Read::Truth);
         let slots: Vec<Vec<usize>> = data.map(|(_, slots)| slots.clone()).collect();
         let inputs = self.inputs(instance, ports);
@@ -58,8 +69,47 @@ impl Resolver<'_> {
             wanted: vec![true; outputs.len()],
             every_tick: feature.every_tick(),
             closes_loops: feature.closes_loops(),
+            fit,
         };
         self.add(instance, outputs, role, behind, None)
+    }
+
+    /// The rows that a feature is fitted on; `None` when an error about them has been told.
+    fn fit(
+        &mut self,
+        instance: &Instance<'_>,
+        truth: usize,
+        lags: &[Duration],
+        ports: &[(InputPort, Vec<usize>)],
+    ) -> Option<PlannedFit> {
+        let ahead = self.horizon(instance)?;
+        let truth = self.link(instance, truth, ahead)?;
+        let training = self.limits(instance, &truth)?;
+        let mut regressors = Vec::new();
+        for (port, slots) in ports.iter().filter(|(port, _)| port.read != Read::Truth) {
+            let unit = Self::port_unit(port);
+            for &lag in lags {
+                for &slot in slots {
+                    let mut regressor = self.regressor(slot, lag, false);
+                    if let Some(unit) = &unit {
+                        regressor.unit = unit.to_string();
+                    }
+                    regressors.push(regressor);
+                }
+                self.suspects.push(Suspect {
+                    place: instance.input_place(port.name),
+                    context: instance.context(),
+                    features: slots.clone(),
+                    lag,
+                    link: truth,
+                });
+            }
+        }
+        Some(PlannedFit {
+            regressors,
+            truth,
+            training,
+        })
     }
 
     /// What is behind each channel of a feature's output ports, given the slots of each input port.

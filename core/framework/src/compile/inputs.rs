@@ -59,10 +59,20 @@ impl Resolver<'_> {
     /// The one slot of an input that takes a single channel.
     pub(crate) fn single(&mut self, instance: &Instance<'_>, port: &InputPort) -> Option<usize> {
         let slots = self.slots(instance, port)?;
+        self.one_of(instance, port, &slots)
+    }
+
+    /// The one of these slots; where there are several or none, that is told.
+    pub(super) fn one_of(
+        &mut self,
+        instance: &Instance<'_>,
+        port: &InputPort,
+        slots: &[usize],
+    ) -> Option<usize> {
         if let [slot] = slots[..] {
             return Some(slot);
         }
-        self.wrong_count(instance, port.name, &slots, "one channel");
+        self.wrong_count(instance, port.name, slots, "one channel");
         None
     }
 
@@ -210,6 +220,7 @@ impl Resolver<'_> {
                 .map(|(port, slots)| channels(port, slots))
                 .collect(),
             member: instance.decl.member.clone(),
+            fit: None,
         }
     }
 }

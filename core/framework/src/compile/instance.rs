@@ -9,7 +9,7 @@ use super::learning::Learn;
 use super::problem::CompileProblem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
-use crate::node::{Kind, Mistake, NodeSpec, Role, RoleName, kinds};
+use crate::node::{Kind, Mistake, NodeSpec, Role, kinds};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 /// A node whose kind and parameters have been read.
@@ -129,10 +129,12 @@ fn read_instance(
         place: parameters.place,
         data: Data::Table(Table::new()),
     };
-    if let (RoleName::Estimator, Data::Table(own), Data::Table(taken)) =
-        (kind.role, &mut parameters.data, &mut framework.data)
-    {
-        for key in ["ahead", "train", "learn"] {
+    if let (keys, Data::Table(own), Data::Table(taken)) = (
+        kind.framework_keys(),
+        &mut parameters.data,
+        &mut framework.data,
+    ) {
+        for &key in keys {
             if let Some(entry) = own.remove(key) {
                 taken.insert(key, entry);
             }

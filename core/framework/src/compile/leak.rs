@@ -106,11 +106,12 @@ impl Resolver<'_> {
         entries.map(|entry| (entry.slot, entry.lag)).collect()
     }
 
-    /// The slots that a node reads as data, port by port.
+    /// The slots that a feature reads as data, port by port.
     fn inputs_of(&self, node: &PlannedNode) -> Vec<Vec<usize>> {
         let slots = |gather: usize| {
             let entries = self.gathers[gather].entries.iter();
-            entries.map(|entry| entry.slot).collect()
+            let present = entries.filter(|entry| entry.lag.is_zero());
+            present.map(|entry| entry.slot).collect()
         };
         node.role.inputs().map(slots).collect()
     }

@@ -24,9 +24,10 @@ pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
 pub(crate) use instance::EstimatorKeys;
+pub(crate) use plan::Rows;
 pub use plan::{
-    Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedLearning, PlannedNode,
-    PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
+    Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
+    PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::channel::Channel;
 use crate::document::TimeBase;
-use crate::node::{Inputs, Kind, NodeSpec, Read, Regressor};
+use crate::node::{Inputs, Kind, NodeSpec, Predictor, Read, Regressor, Role};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -153,6 +153,8 @@ pub enum PlannedRole {
         every_tick: bool,
         /// Whether its inputs are taken after all outputs are there.
         closes_loops: bool,
+        /// What it is fitted on, where it is fitted.
+        fit: Option<PlannedFit>,
     },
     /// A prediction of a truth.
     Estimator {
@@ -210,9 +212,21 @@ impl PlannedRole {
     #[must_use]
     pub fn truth(&self) -> Option<&TruthLink> {
         match self {
-            Self::Feature { .. } => None,
+            Self::Feature { fit, .. } => fit.as_ref().map(|fit| &fit.truth),
             Self::Estimator { truth, .. } => Some(truth),
             Self::Combiner { truth, .. } => truth.as_ref(),
+        }
+    }
+
+    /// The truth that it is fitted on, and which of its values.
+    #[must_use]
+    pub fn learns_from(&self) -> Option<(&TruthLink, &TrainingLimits)> {
+        match self {
+            Self::Feature { fit, .. } => fit.as_ref().map(|fit| (&fit.truth, &fit.training)),
+            Self::Estimator {
+                truth, training, ..
+            } => Some((truth, training)),
+            Self::Combiner { .. } => None,
         }
     }
 
@@ -232,6 +246,87 @@ impl PlannedRole {
             Self::Feature { .. } => None,
             Self::Estimator { deviation, .. } => *deviation,
             Self::Combiner { beside, .. } => beside.deviation.map(|(slot, _)| slot),
+        }
+    }
+}
+
+/// What a feature is fitted on.
+#[derive(Debug, Clone)]
+pub struct PlannedFit {
+    /// What makes up a row, over all gathers.
+    pub regressors: Vec<Regressor>,
+    /// The truth that it learns from.
+    pub truth: TruthLink,
+    /// Which rows it is fitted on.
+    pub training: TrainingLimits,
+}
+
+/// The rows that a node is fitted on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rows<'a> {
+    /// What makes up a row, over all gathers.
+    pub(crate) regressors: &'a [Regressor],
+    /// The gathers of a row, one after the other.
+    pub(crate) gathers: &'a [usize],
+    /// The gathers of which one must be fresh for the node to run; none where it runs at every tick.
+    pub(crate) triggers: &'a [usize],
+    /// The truth that belongs to them.
+    pub(crate) truth: TruthLink,
+    /// Which of them it is fitted on.
+    pub(crate) training: TrainingLimits,
+}
+
+impl PlannedNode {
+    /// What an estimator that needs no fit predicts by.
+    pub(crate) fn fixed(&self) -> Option<Box<dyn Predictor>> {
+        let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
+            (&self.role, self.spec.role())
+        else {
+            return None;
+        };
+        let names = regressors.iter().map(|regressor| regressor.name.clone());
+        estimator.fixed(&names.collect::<Vec<_>>())
+    }
+
+    /// The rows that the node is fitted on; none where it needs no fit.
+    pub(crate) fn rows(&self) -> Option<Rows<'_>> {
+        match (&self.role, self.spec.role()) {
+            (
+                PlannedRole::Feature {
+                    gathers,
+                    every_tick,
+                    fit: Some(fit),
+                    ..
+                },
+                _,
+            ) => Some(Rows {
+                regressors: &fit.regressors,
+                gathers,
+                triggers: if *every_tick { &[] } else { gathers },
+                truth: fit.truth,
+                training: fit.training,
+            }),
+            (
+                PlannedRole::Estimator {
+                    regressors,
+                    gathers,
+                    every_tick,
+                    truth,
+                    training,
+                    ..
+                },
+                Role::Estimator(_),
+            ) => {
+                let first = gathers.len().min(1);
+                self.fixed().is_none().then_some(Rows {
+                    regressors,
+                    gathers,
+                    triggers: if *every_tick { &[] } else { &gathers[..first] },
+                    truth: *truth,
+                    training: *training,
+                })
+            }
+            _ => None,
         }
     }
 }

@@ -35,7 +35,7 @@ pub enum EngineError {
         /// The node.
         node: String,
     },
-    /// Something fitted for a node that is no estimator of this graph.
+    /// Something fitted for a node of this graph that needs no fit, or for none.
     NotAnEstimator {
         /// The node.
         node: String,
@@ -73,7 +73,7 @@ impl fmt::Display for EngineError {
             Self::NotAnEstimator { node } => {
                 write!(
                     f,
-                    "the model has a fit for `{node}`, which is no estimator of its graph: fit the graph again"
+                    "the model has a fit for `{node}`, which is no node of its graph that is fitted: fit the graph again"
                 )
             }
         }

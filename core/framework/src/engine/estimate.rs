@@ -8,8 +8,44 @@ use super::learning::Learning;
 use super::state::NodeState;
 use super::{EngineError, Mode};
 use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
-use crate::node::{Predictor, Restored};
+use crate::node::{FeatureFit, Predictor, Regressor, Restored};
 use crate::time::Instant;
+
+/// Where each of the regressors that a fit uses is among those of its node.
+///
+/// # Errors
+/// When the node has none of a name that the fit uses.
+fn places_of(
+    node: &PlannedNode,
+    regressors: &[Regressor],
+    fit: &dyn Predictor,
+) -> Result<Vec<usize>, EngineError> {
+    let names = || regressors.iter().map(|regressor| &regressor.name);
+    let place = |name: &String| {
+        let place = names().position(|known| known == name);
+        place.ok_or_else(|| EngineError::UnknownRegressor {
+            node: node.instance(),
+            regressor: name.clone(),
+            known: names().cloned().collect(),
+        })
+    };
+    fit.uses().iter().map(place).collect()
+}
+
+/// What a feature was fitted to, as what runs is built from it.
+///
+/// # Errors
+/// When the node has no regressor of a name that the fit uses.
+pub(super) fn fit_of(
+    node: &PlannedNode,
+    regressors: &[Regressor],
+    predictor: &Arc<dyn Predictor>,
+) -> Result<FeatureFit, EngineError> {
+    Ok(FeatureFit {
+        places: places_of(node, regressors, &**predictor)?,
+        predictor: Arc::clone(predictor),
+    })
+}
 
 /// A fitted estimator in a running plan.
 #[derive(Debug)]
@@ -22,7 +58,7 @@ pub(crate) struct Estimate {
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
     pub(super) learning: Option<Learning>,
     /// What is read in place of measured past truths, in an evaluation that says so.
-    feedback: Option<Feedback>,
+    feedback: Option<Box<Feedback>>,
 }
 
 impl Estimate {
@@ -52,25 +88,8 @@ impl Estimate {
             .iter()
             .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
             .collect();
-        let place = |name: &String| match regressors
-            .iter()
-            .position(|regressor| regressor.name == *name)
-        {
-            Some(index) => Ok(places[index]),
-            None => Err(EngineError::UnknownRegressor {
-                node: node.instance(),
-                regressor: name.clone(),
-                known: regressors
-                    .iter()
-                    .map(|regressor| regressor.name.clone())
-                    .collect(),
-            }),
-        };
-        let places = predictor
-            .uses()
-            .iter()
-            .map(place)
-            .collect::<Result<Vec<_>, _>>()?;
+        let used = places_of(node, regressors, &*predictor)?;
+        let places: Vec<_> = used.into_iter().map(|index| places[index]).collect();
         let learning = match learning {
             None => None,
             Some(planned) => {
@@ -94,7 +113,7 @@ impl Estimate {
     pub(crate) fn predict_in(&mut self, mode: Mode, link: &TruthLink, gathers: &[Gather]) {
         self.feedback = match mode {
             Mode::OneStep => None,
-            mode => Feedback::new(mode, link, &self.places, gathers),
+            mode => Feedback::new(mode, link, &self.places, gathers).map(Box::new),
         };
         if let Some(learning) = &mut self.learning {
             learning.predict_in(mode);
@@ -103,7 +122,7 @@ impl Estimate {
 
     /// What is read in place of measured past truths.
     pub(crate) fn feedback(&mut self) -> Option<&mut Feedback> {
-        self.feedback.as_mut()
+        self.feedback.as_deref_mut()
     }
 
     /// The prediction and its stamp, the oldest among the values used; none where one of them is missing that is needed.

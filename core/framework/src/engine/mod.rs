@@ -15,6 +15,7 @@ mod learning;
 mod mode;
 mod pairing;
 mod revision;
+mod running;
 mod slots;
 mod state;
 mod vote;
@@ -36,13 +37,13 @@ pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
 use crate::compile::{Plan, PlannedRole, Step};
-use crate::node::{Operator, Outputs, Predictor, Role, Tick};
+use crate::node::{Outputs, Predictor, Tick};
 use crate::time::{Duration, Instant};
 use blend::Blending;
 use estimate::Estimate;
-use vote::Vote;
+use running::{Running, running};
 
-/// The fitted estimators of a graph, by instance: `thermal.Z1`.
+/// What was fitted of a graph, estimators and features, by instance: `thermal.Z1`.
 pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
 
 /// A running plan.
@@ -76,104 +77,13 @@ pub struct Engine {
     blending: Vec<(Option<f64>, Blending)>,
 }
 
-enum Running {
-    Operator {
-        operator: Box<dyn Operator>,
-        gathers: Vec<usize>,
-        every_tick: bool,
-        closes_loops: bool,
-    },
-    Estimate {
-        estimate: Option<Estimate>,
-        trigger: Option<usize>,
-    },
-    Vote(Vote),
-}
-
-impl Running {
-    /// The slot of the truth that it is told.
-    fn truth(&self) -> Option<usize> {
-        match self {
-            Self::Operator { .. } => None,
-            Self::Estimate { estimate, .. } => Some(estimate.as_ref()?.learning.as_ref()?.truth()),
-            Self::Vote(vote) => vote.truth(),
-        }
-    }
-}
-
 impl Engine {
     /// A plan ready to run, cold, with what has been fitted. An estimator that needs a fit and has none gives nothing.
     ///
     /// # Errors
     /// When something fitted does not belong to the plan.
     pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
-        let widths: Vec<_> = plan
-            .gathers
-            .iter()
-            .map(|gather| gather.entries.len())
-            .collect();
-        let mut nodes = Vec::with_capacity(plan.nodes.len());
-        let mut used = 0;
-        for node in &plan.nodes {
-            nodes.push(match (&node.role, node.spec.role()) {
-                (
-                    PlannedRole::Feature {
-                        inputs,
-                        gathers,
-                        wanted,
-                        every_tick,
-                        closes_loops,
-                    },
-                    Role::Feature(spec),
-                ) => Running::Operator {
-                    operator: spec.build(inputs, wanted),
-                    gathers: gathers.clone(),
-                    every_tick: *every_tick,
-                    closes_loops: *closes_loops,
-                },
-                (
-                    PlannedRole::Estimator {
-                        regressors,
-                        gathers,
-                        every_tick,
-                        ..
-                    },
-                    Role::Estimator(spec),
-                ) => {
-                    let given = fitted.get(&node.instance());
-                    used += usize::from(given.is_some());
-                    let names: Vec<_> = regressors
-                        .iter()
-                        .map(|regressor| regressor.name.clone())
-                        .collect();
-                    let predictor = given.cloned().or_else(|| spec.fixed(&names).map(Arc::from));
-                    Running::Estimate {
-                        estimate: predictor
-                            .map(|p| Estimate::new(node, p, &widths))
-                            .transpose()?,
-                        trigger: if *every_tick {
-                            None
-                        } else {
-                            gathers.first().copied()
-                        },
-                    }
-                }
-                (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
-                    Running::Vote(Vote::new(spec, widths[*voters], *truth))
-                }
-                _ => unreachable!("a plan gives each node the role of its specification"),
-            });
-        }
-        if used < fitted.len() {
-            let known = |name: &&String| {
-                let is = |node: &crate::compile::PlannedNode| {
-                    matches!(node.role, PlannedRole::Estimator { .. }) && node.instance() == **name
-                };
-                !plan.nodes.iter().any(is)
-            };
-            let node = fitted.keys().find(known).cloned().unwrap_or_default();
-            return Err(EngineError::NotAnEstimator { node });
-        }
+        let nodes = running(&plan, fitted)?;
         let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
@@ -356,6 +266,16 @@ impl Engine {
     #[must_use]
     pub fn rejected(&self) -> &[u64] {
         &self.rejected
+    }
+
+    /// The measured channels of which samples were rejected, and how many.
+    #[must_use]
+    pub fn rejected_channels(&self) -> Vec<(String, u64)> {
+        let counted = self.plan.sources.iter().zip(&self.rejected);
+        counted
+            .filter(|&(_, &count)| count > 0)
+            .map(|(source, &count)| (source.name.clone(), count))
+            .collect()
     }
 
     /// How many ticks were refused because their time was not after the last one.

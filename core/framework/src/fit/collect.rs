@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::candidates::Validity;
 use super::report::Dropped;
-use crate::compile::{Plan, PlannedRole, TrainingLimits, TruthLink};
+use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
 use crate::engine::{Engine, Pairing};
 use crate::recording::Event;
 use crate::time::Instant;
@@ -33,8 +33,8 @@ impl Share {
 /// The runs of a gather, as several estimators may share them.
 struct Tap {
     gather: usize,
-    /// The gather whose freshness makes the node run; none where it runs at every tick.
-    trigger: Option<usize>,
+    /// The gathers of which one must be fresh for the node to run; none where it runs at every tick.
+    triggers: Vec<usize>,
     pairing: Pairing,
     width: usize,
     kept: Vec<f64>,
@@ -83,30 +83,23 @@ impl Collector {
         let mut known = BTreeMap::new();
         let mut trainees = Vec::new();
         for &node in nodes {
-            let PlannedRole::Estimator {
+            let Rows {
                 regressors,
                 gathers,
-                every_tick,
+                triggers,
                 truth,
                 training,
-                ..
-            } = &plan.nodes[node].role
-            else {
-                unreachable!("only estimators are trained")
-            };
-            let trigger = if *every_tick {
-                None
-            } else {
-                gathers.first().copied()
-            };
+            } = plan.nodes[node]
+                .rows()
+                .expect("only what needs a fit is trained");
             let shared = |&gather: &usize| {
-                let key = (gather, trigger, truth.ahead, truth.limit);
+                let key = (gather, triggers, truth.ahead, truth.limit);
                 *known.entry(key).or_insert_with(|| {
                     let width = plan.gathers[gather].entries.len();
-                    let pairing = Pairing::new(truth, width);
+                    let pairing = Pairing::new(&truth, width);
                     taps.push(Tap {
                         gather,
-                        trigger,
+                        triggers: triggers.to_vec(),
                         pairing,
                         width,
                         kept: Vec::new(),
@@ -117,8 +110,8 @@ impl Collector {
             };
             trainees.push(Trainee {
                 node,
-                link: *truth,
-                limits: *training,
+                link: truth,
+                limits: training,
                 taps: gathers.iter().map(shared).collect(),
                 validity: Validity::new(regressors.len()),
                 dropped: Dropped::default(),
@@ -157,7 +150,8 @@ impl Collector {
             return;
         };
         for tap in &mut self.taps {
-            if tap.trigger.is_none_or(|gather| engine.gathered(gather).1) {
+            let fresh = |&gather: &usize| engine.gathered(gather).1;
+            if tap.triggers.is_empty() || tap.triggers.iter().any(fresh) {
                 tap.pairing.run(now, [engine.gathered(tap.gather).0]);
             }
         }

@@ -1,4 +1,5 @@
-//! Decides the passes of a fit: estimators fed by estimators come after them, and learn from out-of-fold predictions.
+//! Decides the passes of a fit: what is fed by estimators and encoders comes after them. From estimators it learns out-of-fold
+//! predictions; encoders are fitted once, since the outputs of two fits mean different things.
 
 use std::sync::Arc;
 
@@ -8,7 +9,6 @@ use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
 use crate::engine::{Engine, Fitted};
-use crate::node::Role;
 use crate::recording::{Event, Recording};
 
 /// A fit under way.
@@ -17,13 +17,21 @@ pub(super) struct Fitting<'a> {
     recording: &'a dyn Recording,
     options: &'a FitOptions,
     progress: &'a mut dyn FnMut(u64),
-    /// The estimators to be fitted, by level: those of a level are fed by levels below only.
-    levels: Vec<Vec<usize>>,
+    /// What is to be fitted, by level: nodes of a level are fed by levels below only.
+    levels: Vec<Level>,
     stepped: u64,
     report: FitReport,
 }
 
-/// What one part of the rows of a level is made with: the estimators below, and the ticks whose truths count.
+/// Nodes that are fitted together.
+#[derive(Default)]
+struct Level {
+    nodes: Vec<usize>,
+    /// Whether an estimator feeds one of them.
+    of_predictions: bool,
+}
+
+/// What one part of the rows of a level is made with: the fits below, and the ticks whose truths count.
 struct Part {
     fitted: Fitted,
     share: Share,
@@ -56,24 +64,35 @@ impl<'a> Fitting<'a> {
             return Ok((Fitted::new(), self.report));
         }
         let top = self.levels.len() - 1;
-        let (fitted, made) = self.fit_up_to(top, &Share::all())?;
+        let (fitted, made) = self.fit_up_to(top, &Share::all(), &Fitted::new())?;
         let mut made: Vec<_> = made;
         made.sort_by_key(|(node, _)| *node);
         self.report.estimators = made.into_iter().map(|(_, fit)| fit).collect();
         Ok((fitted, self.report))
     }
 
-    /// Fits all levels up to one on a share of the ticks.
+    /// Fits all levels up to one on a share of the ticks, but for what is given.
     fn fit_up_to(
         &mut self,
         top: usize,
         share: &Share,
+        given: &Fitted,
     ) -> Result<(Fitted, Vec<(usize, super::EstimatorFit)>), FitError> {
-        let mut fitted = Fitted::new();
+        let mut fitted = given.clone();
         let mut reports = Vec::new();
         for level in 0..=top {
-            let parts = self.parts(level, share)?;
-            let nodes = self.levels[level].clone();
+            let plan = self.plan;
+            let open = |node: &&usize| !given.contains_key(&plan.nodes[**node].instance());
+            let nodes: Vec<_> = self.levels[level]
+                .nodes
+                .iter()
+                .filter(open)
+                .copied()
+                .collect();
+            if nodes.is_empty() {
+                continue;
+            }
+            let parts = self.parts(level, share, &fitted)?;
             let made = self.fit_level(&nodes, &parts)?;
             for (&node, (fit, predictor)) in nodes.iter().zip(made) {
                 if let Some(predictor) = predictor {
@@ -86,12 +105,25 @@ impl<'a> Fitting<'a> {
     }
 
     /// Estimators below are fitted without the part of the ticks that they predict for those of this level.
-    fn parts(&mut self, level: usize, share: &Share) -> Result<Vec<Part>, FitError> {
-        if level == 0 {
+    fn parts(
+        &mut self,
+        level: usize,
+        share: &Share,
+        below: &Fitted,
+    ) -> Result<Vec<Part>, FitError> {
+        if !self.levels[level].of_predictions {
             return Ok(vec![Part {
-                fitted: Fitted::new(),
+                fitted: below.clone(),
                 share: share.clone(),
             }]);
+        }
+        let mut encoders = Fitted::new();
+        for node in &self.plan.nodes {
+            if let (PlannedRole::Feature { .. }, Some(fit)) =
+                (&node.role, below.get(&node.instance()))
+            {
+                encoders.insert(node.instance(), Arc::clone(fit));
+            }
         }
         let ticks = self.report.ticks;
         let (first, end) = (share.within.start, share.within.end.min(ticks));
@@ -102,7 +134,7 @@ impl<'a> Fitting<'a> {
             let fold = edge(fold)..edge(fold + 1);
             let mut without = share.clone();
             without.without.push(fold.clone());
-            let (fitted, _) = self.fit_up_to(level - 1, &without)?;
+            let (fitted, _) = self.fit_up_to(level - 1, &without, &encoders)?;
             parts.push(Part {
                 fitted,
                 share: Share {
@@ -166,45 +198,38 @@ impl<'a> Fitting<'a> {
     }
 
     fn note(&mut self, engine: &Engine, passed: Passed) {
-        let sources = &self.plan.sources;
         self.report.ticks = passed.ticks;
         self.report.segments = passed.segments;
         self.report.period = passed.period;
         self.report.refused = engine.refused();
-        let counted = sources
-            .iter()
-            .zip(engine.rejected())
-            .filter(|&(_, &count)| count > 0);
-        self.report.rejected = counted
-            .map(|(source, &count)| (source.name.clone(), count))
-            .collect();
+        self.report.rejected = engine.rejected_channels();
     }
 }
 
-/// The estimators that need a fit, by how many others feed them, one through the other.
-fn levels(plan: &Plan) -> Vec<Vec<usize>> {
-    let mut of_slot = vec![0_usize; plan.channels.len()];
-    let mut levels: Vec<Vec<usize>> = Vec::new();
+/// The nodes that need a fit, by how many others feed them, one through the other.
+fn levels(plan: &Plan) -> Vec<Level> {
+    let mut levels: Vec<Level> = Vec::new();
+    // Of each slot the first level that may read it, and whether a fitted estimator is behind it.
+    let mut of_slot = vec![(0_usize, false); plan.channels.len()];
     for (index, node) in plan.nodes.iter().enumerate() {
         let gathers = node.role.inputs();
-        let slots = gathers.flat_map(|gather| &plan.gathers[gather].entries);
-        let mut level = slots.map(|entry| of_slot[entry.slot]).max().unwrap_or(0);
-        if let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
-            (&node.role, node.spec.role())
-        {
-            let names: Vec<_> = regressors
-                .iter()
-                .map(|regressor| regressor.name.clone())
-                .collect();
-            if estimator.fixed(&names).is_none() {
-                if levels.len() <= level {
-                    levels.resize_with(level + 1, Vec::new);
-                }
-                levels[level].push(index);
-                level += 1;
-            }
+        let entries = gathers.flat_map(|gather| &plan.gathers[gather].entries);
+        let mut after = (0, false);
+        for entry in entries {
+            let (level, predicted) = of_slot[entry.slot];
+            after = (after.0.max(level), after.1 | predicted);
         }
-        of_slot[node.slots.clone()].fill(level);
+        if node.rows().is_some() {
+            let (level, predicted) = after;
+            if levels.len() <= level {
+                levels.resize_with(level + 1, Level::default);
+            }
+            levels[level].nodes.push(index);
+            levels[level].of_predictions |= predicted;
+            let predicts = matches!(node.role, PlannedRole::Estimator { .. });
+            after = (level + 1, predicted | predicts);
+        }
+        of_slot[node.slots.clone()].fill(after);
     }
     levels
 }

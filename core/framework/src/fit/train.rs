@@ -47,16 +47,10 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 /// Starts the fit of one estimator, now that it is known which candidates have values.
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
     let node = &plan.nodes[trainee.node];
-    let (
-        PlannedRole::Estimator {
-            regressors,
-            learning,
-            ..
-        },
-        Role::Estimator(estimator),
-    ) = (&node.role, node.spec.role())
-    else {
-        unreachable!("only estimators are trained")
+    let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
+    let learns = match &node.role {
+        PlannedRole::Estimator { learning, .. } => learning.is_some(),
+        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => false,
     };
     let kept = trainee.validity.kept();
     let setup = TrainingSetup {
@@ -70,9 +64,16 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
         memory,
         ahead: trainee.link.ahead,
         span: trainee.link.span,
-        learns: learning.is_some(),
+        learns,
     };
-    let trainer = estimator.trainer(&setup);
+    let trainer = match node.spec.role() {
+        Role::Estimator(estimator) => estimator.trainer(&setup),
+        Role::Feature(feature) => feature
+            .encoder()
+            .expect("a feature with rows has an encoder")
+            .trainer(&setup),
+        Role::Combiner(_) => unreachable!("a combiner is not fitted"),
+    };
     Making {
         trainer,
         row: Vec::with_capacity(kept.len()),
@@ -87,9 +88,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
 pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
-    let PlannedRole::Estimator { regressors, .. } = &node.role else {
-        unreachable!("only estimators are trained")
-    };
+    let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
     let mut dropped = trainee.dropped;
     dropped.incomplete = making.incomplete;
     let dropped_candidates = (0..regressors.len())

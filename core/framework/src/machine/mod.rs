@@ -1,71 +1,23 @@
 //! Decides what a simulated machine is to those who run it, and how it becomes known; not any machine's physics.
 //!
 //! Whoever brings a machine implements [`Machine`] and [`Simulation`], and makes it known with
-//! [`register_machine!`](crate::register_machine). From then on it can be simulated by its name from the command line
-//! and from tests of graph files:
-//!
-//! ```
-//! use athermal_core::machine::{Channel, Machine, Row, SetPoint, Setup, SetupError, Simulation, rows_of};
-//!
-//! const SECOND_NS: i64 = 1_000_000_000;
-//!
-//! /// A plate that warms by 1 mK in each second.
-//! struct Plate;
-//!
-//! impl Machine for Plate {
-//!     fn name(&self) -> &'static str {
-//!         "plate"
-//!     }
-//!     fn summary(&self) -> &'static str {
-//!         "A plate that warms steadily."
-//!     }
-//!     fn channels(&self) -> &[Channel] {
-//!         const { &[Channel::temperature("plate")] }
-//!     }
-//!     fn set_points(&self) -> &[SetPoint] {
-//!         &[]
-//!     }
-//!     fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
-//!         let rows = rows_of(self.name(), self.set_points(), setup, SECOND_NS)?;
-//!         Ok(Box::new(Warming { row: 0, rows }))
-//!     }
-//! }
-//!
-//! struct Warming {
-//!     row: u64,
-//!     rows: u64,
-//! }
-//!
-//! impl Simulation for Warming {
-//!     fn next(&mut self, row: &mut Row) -> bool {
-//!         if self.row == self.rows {
-//!             return false;
-//!         }
-//!         row.time_ns = self.row as i64 * SECOND_NS;
-//!         row.values[0] = 20.0 + 0.001 * self.row as f64;
-//!         self.row += 1;
-//!         true
-//!     }
-//! }
-//!
-//! athermal_core::register_machine!(Plate);
-//! # fn main() {
-//! let plate = athermal_core::machine::machine("plate").expect("it has just been registered");
-//! assert_eq!(plate.machine.channels()[0].reference(), "temperature.plate");
-//! # }
-//! ```
+//! [`register_machine!`](crate::register_machine): the documentation of [`Machine`] has a whole one. From then on it can be
+//! simulated by its name from the command line and from the tests of graph files. [`Simulated`] is a recording of it,
+//! [`ClosedLoop`] the machine under the correction of a graph.
 
 mod closed_loop;
 mod faulty;
 mod recording;
 mod registry;
 pub mod schedule;
+mod simulation;
 
 pub use closed_loop::ClosedLoop;
 pub use faulty::Faulty;
 pub use recording::{MachineError, Simulated};
 pub use registry::{KnownMachine, UnknownMachine, machine, machines};
 pub use schedule::{Schedule, ScheduleError};
+pub use simulation::{Machine, Simulation};
 
 use std::fmt;
 
@@ -230,41 +182,6 @@ impl Row {
             values: vec![f64::NAN; channels.len()],
             true_drift: vec![f64::NAN; axes],
         }
-    }
-}
-
-/// A machine that can be simulated.
-pub trait Machine: Sync {
-    /// Its name on the command line and in graph files, for example `die-tester`.
-    fn name(&self) -> &'static str;
-
-    /// What it is, in one line.
-    fn summary(&self) -> &'static str;
-
-    /// What it measures, in the order of the columns of a recording.
-    fn channels(&self) -> &[Channel];
-
-    /// What a schedule can set.
-    fn set_points(&self) -> &[SetPoint];
-
-    /// A simulation at time 0, settled as if the machine had stood there for half a day.
-    ///
-    /// # Errors
-    /// [`SetupError`] if the length is not positive or the schedule is another machine's.
-    fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError>;
-}
-
-/// A running simulation, advanced row by row.
-pub trait Simulation: Send {
-    /// Advances to the next row and fills `row`, which must be as wide as the machine's channels ([`Row::empty`]). `false` at the end; `row` is then unchanged.
-    fn next(&mut self, row: &mut Row) -> bool;
-
-    /// Asks the axes for corrections in nm, in the order of the axes among the channels; NaN leaves an axis as it is.
-    ///
-    /// They act from now on, as far as the axes can; what is applied is written to `applied`. A machine whose axes cannot be
-    /// corrected applies nothing.
-    fn correct(&mut self, _asked: &[f64], applied: &mut [f64]) {
-        applied.fill(0.0);
     }
 }
 

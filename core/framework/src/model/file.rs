@@ -7,11 +7,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Card, ModelError};
-use crate::compile::{Change, Plan, PlannedRole, Wanted, compile, diff};
+use crate::compile::{Change, Plan, PlannedNode, Wanted, compile, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
 use crate::engine::{Engine, Fitted};
-use crate::node::{Predictor, Role};
+use crate::node::Predictor;
 
 /// The format that this version writes.
 pub(super) const FORMAT: u64 = 1;
@@ -43,7 +43,8 @@ struct Written<'a> {
 struct ReadBack {
     card: Option<Card>,
     graph: serde_json::Value,
-    fitted: BTreeMap<String, Box<dyn Predictor>>,
+    /// Read once the graph is: where a node type is not known, the graph is what says so.
+    fitted: BTreeMap<String, serde_json::Value>,
 }
 
 #[derive(Deserialize)]
@@ -122,11 +123,12 @@ impl Model {
                 sources: Box::new(sources),
             });
         };
-        let fitted = read
-            .fitted
-            .into_iter()
-            .map(|(node, predictor)| (node, Arc::from(predictor)))
-            .collect();
+        let mut fitted = Fitted::new();
+        for (node, written) in read.fitted {
+            let predictor: Box<dyn Predictor> =
+                serde_json::from_value(written).map_err(not_a_model)?;
+            fitted.insert(node, Arc::from(predictor));
+        }
         Ok(Self {
             graph,
             plan: Arc::new(plan),
@@ -156,24 +158,17 @@ impl Model {
         }
     }
 
-    /// The estimators that need a fit and have none.
+    /// The nodes that need a fit and have none.
     #[must_use]
     pub fn unfitted(&self) -> Vec<String> {
-        let needs = |node: &&crate::compile::PlannedNode| match (&node.role, node.spec.role()) {
-            (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) => {
-                let names: Vec<_> = regressors
-                    .iter()
-                    .map(|regressor| regressor.name.clone())
-                    .collect();
-                estimator.fixed(&names).is_none() && !self.fitted.contains_key(&node.instance())
-            }
-            _ => false,
+        let needs = |node: &&PlannedNode| {
+            node.rows().is_some() && !self.fitted.contains_key(&node.instance())
         };
         self.plan
             .nodes
             .iter()
             .filter(needs)
-            .map(crate::compile::PlannedNode::instance)
+            .map(PlannedNode::instance)
             .collect()
     }
 

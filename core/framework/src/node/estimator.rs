@@ -1,5 +1,6 @@
 //! Decides what the author of an estimator implements: learning from rows, and predicting from a row.
 
+use std::any::Any;
 use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
@@ -248,7 +249,7 @@ pub struct TrainingReport {
     pub refused: Option<SelectionStep>,
     /// The orders that were compared, where they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub orders: Option<OrderTable>,
+    pub orders: Option<Box<OrderTable>>,
     /// Condition number of the standardised design.
     #[serde(
         default,
@@ -340,9 +341,9 @@ pub struct CandidateScore {
     pub score: f64,
 }
 
-/// A fitted estimator. Predicting never changes what was learned.
+/// A fitted estimator, or what an [`Encoder`](super::Encoder) was fitted to. Predicting never changes what was learned.
 #[typetag::serde(tag = "type")]
-pub trait Predictor: Debug + Send + Sync {
+pub trait Predictor: Any + Debug + Send + Sync {
     /// The names of the regressors that [`predict`](Predictor::predict) takes, in order.
     fn uses(&self) -> &[String];
 

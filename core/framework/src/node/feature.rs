@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use super::{InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
+use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
 use crate::channel::ABSENT;
 use crate::engine::Gathered;
 use crate::time::{Duration, Instant};
@@ -93,6 +93,11 @@ pub trait Feature: Debug + Send + Sync {
     /// What runs. `wanted[i]` says whether anybody reads output port `i`.
     fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator>;
 
+    /// How it is fitted, for a kind that learns from a truth before it runs: see [`Encoder`].
+    fn encoder(&self) -> Option<&dyn Encoder> {
+        None
+    }
+
     /// Whether the answer changes with time alone, so that the node runs at every tick.
     fn every_tick(&self) -> bool {
         false
@@ -102,6 +107,11 @@ pub trait Feature: Debug + Send + Sync {
     /// time, says so here; otherwise an estimator may be denied a harmless channel because of another beside it.
     fn reach(&self, _port: &str) -> Reach {
         Reach::All
+    }
+
+    /// Whether a value depends on all of the past, however little, so that it has no span: nothing made of it can be a truth.
+    fn is_endless(&self) -> bool {
+        false
     }
 
     /// How far back the inputs reach that the outputs depend on; the engine keeps so much of the past for warming up.

@@ -1,5 +1,6 @@
 //! Decides how a node declares its ports and says what is wrong with its inputs; not which channels reach them.
 
+use super::FeatureFit;
 use crate::channel::Channel;
 
 /// How an input port reads its channels.
@@ -111,6 +112,7 @@ pub struct Inputs {
     pub ports: Vec<(InputPort, Vec<Channel>)>,
     /// The member of `each` that this instance stands for.
     pub member: Option<String>,
+    pub(crate) fit: Option<FeatureFit>,
 }
 
 impl Inputs {

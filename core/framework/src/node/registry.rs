@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Combiner, Estimator, Feature, InputPort};
+use super::{Combiner, Estimator, Feature, InputPort, Read};
 use crate::diagnostic::Diagnostics;
 use crate::document::{Value, decode_advised};
 
@@ -83,6 +83,17 @@ pub struct Kind {
 }
 
 impl Kind {
+    /// The keys of a node's table that the framework reads itself.
+    #[must_use]
+    pub fn framework_keys(&self) -> &'static [&'static str] {
+        let learns_from_truth = || (self.inputs)().iter().any(|port| port.read == Read::Truth);
+        match self.role {
+            RoleName::Estimator => &["ahead", "train", "learn"],
+            RoleName::Feature if learns_from_truth() => &["ahead", "train"],
+            RoleName::Feature | RoleName::Combiner => &[],
+        }
+    }
+
     /// The first sentence of the documentation.
     #[must_use]
     pub fn summary(&self) -> String {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use crate::compile::EstimatorKeys;
 use crate::document::TIME_UNITS;
-use crate::node::{Kind, Read, RoleName, kinds};
+use crate::node::{Kind, Read, kinds};
 use crate::trial::TestTable;
 
 /// The JSON Schema (draft 7, which editors understand) of graph files, as text.
@@ -279,10 +279,8 @@ fn node(kind: &Kind, framework: &Value, definitions: &mut Definitions) -> Value 
         }),
     );
     properties.insert("inputs".to_owned(), inputs(kind));
-    if kind.role == RoleName::Estimator
-        && let Some(keys) = framework["properties"].as_object()
-    {
-        properties.extend(keys.clone());
+    for &key in kind.framework_keys() {
+        properties.insert(key.to_owned(), framework["properties"][key].clone());
     }
     let own = parameters["properties"].take();
     if let Value::Object(own) = own {

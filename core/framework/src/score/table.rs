@@ -89,18 +89,11 @@ pub(super) fn table(
     ticks: u64,
     options: &ScoreOptions,
 ) -> Scores {
-    let rejected = plan
-        .sources
-        .iter()
-        .zip(engine.rejected())
-        .filter(|&(_, &count)| count > 0);
     Scores {
         period,
         ticks,
         refused: engine.refused(),
-        rejected: rejected
-            .map(|(source, &count)| (source.name.clone(), count))
-            .collect(),
+        rejected: engine.rejected_channels(),
         scores: watch
             .truths
             .iter()

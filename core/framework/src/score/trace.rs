@@ -104,14 +104,10 @@ pub fn trace(
             .map(|(ahead, persistence)| (ahead, persistence.values))
             .collect(),
     });
-    let sources = plan.sources.iter().zip(engine.rejected());
     Ok(Trace {
         truths: truths.collect(),
         ticks: passed.ticks,
         refused: engine.refused(),
-        rejected: sources
-            .filter(|&(_, &count)| count > 0)
-            .map(|(source, &count)| (source.name.clone(), count))
-            .collect(),
+        rejected: engine.rejected_channels(),
     })
 }

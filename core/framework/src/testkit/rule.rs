@@ -118,7 +118,7 @@ impl Rule {
             }
             Self::Fits => {
                 "in `Trainer::finish`, answer `TrainingError` where there are too few rows or no solution, and start random numbers \
-                 from a seed"
+                 from a seed; a feature that is fitted has an `Encoder`, a port `truth`, and nothing to say without a fit"
             }
             Self::Models => {
                 "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod combiner;
+mod encoder;
 mod estimator;
 mod feature;
 mod parameters;

@@ -4,6 +4,8 @@
 use std::ops::Range;
 
 use super::{Orders, Polynomials};
+use crate::Record;
+use crate::Standardizer;
 
 /// Evenly spaced samples of the inputs and of what they lead to, in segments.
 #[derive(Debug, Clone, Default)]
@@ -54,12 +56,38 @@ impl Samples {
         self.width
     }
 
+    /// The standard deviation of the values; 1 where they are all the same.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        let mut values = Standardizer::new(1);
+        self.values
+            .iter()
+            .for_each(|&value| values.partial_fit(&[value]));
+        values.standardization().scales[0]
+    }
+
+    /// The same with values that are so many times smaller.
+    #[must_use]
+    pub fn divided(&self, by: f64) -> Self {
+        let mut divided = self.clone();
+        divided.values.iter_mut().for_each(|value| *value /= by);
+        divided
+    }
+
     /// How many are left when the first of each segment are not counted.
     #[must_use]
     pub fn counted(&self, first: usize) -> usize {
         self.segments()
             .map(|segment| segment.len().saturating_sub(first))
             .sum()
+    }
+
+    /// The segments, as subspace identification takes them.
+    pub fn records(&self) -> impl Iterator<Item = Record<'_>> {
+        self.segments().map(|segment| Record {
+            inputs: &self.inputs[segment.start * self.width..segment.end * self.width],
+            outputs: &self.values[segment],
+        })
     }
 
     pub(super) fn segments(&self) -> impl Iterator<Item = Range<usize>> + '_ {

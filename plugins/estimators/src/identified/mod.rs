@@ -10,7 +10,7 @@ use athermal_numerics::{InputOrders, Orders};
 
 use crate::order::{LARGEST, Order};
 pub use per_input::PerInput;
-use train::IdentifiedTrainer;
+pub(crate) use train::{Found, IdentifiedTrainer, Identify};
 
 /// What a kind asks for, in the letters of Ljung (1999), chapter 4; those that it does not have are none.
 #[derive(Debug, Clone, Default)]
@@ -25,6 +25,9 @@ pub(crate) struct Asked {
     pub(crate) penalty: f64,
     pub(crate) every: Option<Duration>,
     pub(crate) order: Option<Order>,
+    /// Where the inputs stand among the features, of which there are so many: those without values are left out.
+    pub(crate) places: Vec<usize>,
+    pub(crate) features: usize,
 }
 
 impl Asked {
@@ -74,7 +77,12 @@ impl Asked {
     }
 
     pub(crate) fn trainer(self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(IdentifiedTrainer::new(setup, self))
+        let asked = Self {
+            places: setup.places.clone(),
+            features: setup.asked_for,
+            ..self
+        };
+        Box::new(IdentifiedTrainer::new(setup, asked))
     }
 
     /// The orders as they are given, those of the first input standing for all.
@@ -90,8 +98,8 @@ impl Asked {
         ]
     }
 
-    /// The orders of a model with inputs at these places among the features, the open ones as in `chosen`.
-    fn orders(&self, inputs: &[usize], chosen: &[usize; 6]) -> Orders {
+    /// The orders of a model, the open ones as in `chosen`.
+    fn orders(&self, chosen: &[usize; 6]) -> Orders {
         let open = self.order.as_ref().map_or([false; 6], Order::open);
         let of = |orders: &Option<PerInput>, letter: usize, nth: usize| match orders {
             Some(orders) if !open[letter] => orders.of(nth),
@@ -99,7 +107,8 @@ impl Asked {
         };
         Orders {
             na: chosen[0],
-            inputs: inputs
+            inputs: self
+                .places
                 .iter()
                 .map(|&nth| InputOrders {
                     nb: of(&self.nb, 1, nth),
@@ -113,13 +122,14 @@ impl Asked {
         }
     }
 
-    /// Lists of orders that are not as long as there are inputs.
-    fn misfit(&self, inputs: usize) -> Option<String> {
+    /// Lists of orders that are not as long as there are features.
+    fn misfit(&self) -> Option<String> {
         let lists = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
         lists.into_iter().find_map(|(name, orders)| match orders {
-            Some(PerInput::Each(list)) if list.len() != inputs => Some(format!(
-                "`{name}` has {} orders for {inputs} features; one number stands for all",
-                list.len()
+            Some(PerInput::Each(list)) if list.len() != self.features => Some(format!(
+                "`{name}` has {} orders for {} features; one number stands for all",
+                list.len(),
+                self.features
             )),
             _ => None,
         })

@@ -3,8 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    InformationCriteria, PredictionError, PredictionErrorFit, Samples, Standardization,
-    Standardizer, Stepper,
+    InformationCriteria, Polynomials, PredictionError, PredictionErrorFit, Samples,
+    Standardization, Standardizer, Stepper,
 };
 
 use super::Asked;
@@ -16,14 +16,43 @@ const MOST_SERIES: usize = 16;
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
 const STEPS_AHEAD: usize = 256;
 
-/// Keeps all rows, which the search goes through again and again.
+/// How a model is found from evenly spaced samples.
+pub(crate) trait Identify: std::fmt::Debug + Send {
+    /// How long a step is, where that is stated.
+    fn every(&self) -> Option<Duration>;
+
+    /// What does not fit so many inputs.
+    fn misfit(&self, _inputs: usize) -> Option<String> {
+        None
+    }
+
+    /// The model, from samples of so many interleaved series; what there is to tell goes into the report.
+    ///
+    /// # Errors
+    /// When the samples do not allow one.
+    fn identify(
+        &self,
+        samples: &Samples,
+        series: usize,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError>;
+}
+
+/// A model, and how far its one-step predictions were off.
 #[derive(Debug)]
-pub(super) struct IdentifiedTrainer {
-    asked: Asked,
+pub(crate) struct Found {
+    pub(crate) model: Polynomials,
+    pub(crate) residual_sum_of_squares: f64,
+    pub(crate) rows: usize,
+    /// The variance of an innovation.
+    pub(crate) variance: f64,
+}
+
+/// Keeps all rows, which are gone through again and again.
+#[derive(Debug)]
+pub(crate) struct IdentifiedTrainer<Kind> {
+    asked: Kind,
     names: Vec<String>,
-    /// Where each stands among the features, of which there are so many.
-    places: Vec<usize>,
-    features: usize,
     span: Duration,
     memory: usize,
     rows: Vec<Row>,
@@ -40,8 +69,8 @@ struct Row {
     begins: bool,
 }
 
-impl IdentifiedTrainer {
-    pub(super) fn new(setup: &TrainingSetup, asked: Asked) -> Self {
+impl<Kind: Identify> IdentifiedTrainer<Kind> {
+    pub(crate) fn new(setup: &TrainingSetup, asked: Kind) -> Self {
         let names = setup
             .regressors
             .iter()
@@ -49,8 +78,6 @@ impl IdentifiedTrainer {
         Self {
             asked,
             names: names.collect(),
-            places: setup.places.clone(),
-            features: setup.asked_for,
             span: setup.span,
             memory: setup.memory,
             rows: Vec::new(),
@@ -80,15 +107,10 @@ impl IdentifiedTrainer {
     }
 
     /// The rows as samples of several interleaved series, each as far apart as a step; where one is missing, a series ends and
-    /// another begins. Truths are in units of their spread, which is told too: the search must not depend on their unit.
-    fn samples(&self, pace: Pace, standard: &Standardization) -> (Samples, f64) {
+    /// another begins.
+    fn samples(&self, pace: Pace, standard: &Standardization) -> Samples {
         let width = self.names.len();
         let step = pace.step.secs();
-        let mut truths = Standardizer::new(1);
-        self.rows
-            .iter()
-            .for_each(|row| truths.partial_fit(&[row.truth]));
-        let spread = truths.standardization().scales[0];
         let mut samples = Samples::new(width);
         let mut from = 0;
         while from < self.rows.len() {
@@ -109,12 +131,12 @@ impl IdentifiedTrainer {
                     last = Some(at);
                     let mut inputs = self.regressors[nth * width..(nth + 1) * width].to_vec();
                     standard.apply(&mut inputs);
-                    samples.push(inputs, truth / spread);
+                    samples.push(inputs, truth);
                 }
             }
             from += length;
         }
-        (samples, spread)
+        samples
     }
 
     fn solve(&self, report: &mut TrainingReport) -> Result<Identified, TrainingError> {
@@ -126,14 +148,18 @@ impl IdentifiedTrainer {
                 (bytes / f64::from(1 << 20)).ceil() + 1.0
             )));
         }
-        if let Some(misfit) = self.asked.misfit(self.features) {
+        if let Some(misfit) = self.asked.misfit(self.names.len()) {
             return Err(unsolvable(misfit));
         }
         let too_few = TrainingError::TooFewRows {
             rows: self.rows.len(),
             needed: 3,
         };
-        let pace = Pace::of(self.asked.every, self.span, self.between().ok_or(too_few)?);
+        let pace = Pace::of(
+            self.asked.every(),
+            self.span,
+            self.between().ok_or(too_few)?,
+        );
         let mut standard = Standardizer::new(self.names.len());
         if !self.names.is_empty() {
             self.regressors
@@ -141,20 +167,12 @@ impl IdentifiedTrainer {
                 .for_each(|row| standard.partial_fit(row));
         }
         let standard = standard.standardization();
-        let (samples, spread) = self.samples(pace, &standard);
-        let mut fit = self.fit(&samples, spread, report)?;
-        fit.model.rescale(spread);
-        fit.residual_sum_of_squares *= spread * spread;
-        if !fit.converged {
-            report.notes.push(format!(
-                "the search had not ended after {} steps",
-                fit.steps
-            ));
-        }
+        let samples = self.samples(pace, &standard);
+        let found = self.asked.identify(&samples, pace.series, report)?;
         report.notes.push(pace.told());
-        report.in_sample_rmse = Some((fit.residual_sum_of_squares / fit.rows as f64).sqrt());
-        let variance = fit.variance();
-        let stepper = Stepper::new(fit.model);
+        report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
+        let variance = found.variance;
+        let stepper = Stepper::new(found.model);
         let variances = stepper.variances(STEPS_AHEAD);
         Ok(Identified {
             regressors: self.names.clone(),
@@ -171,7 +189,44 @@ impl IdentifiedTrainer {
             series: pace.series,
         })
     }
+}
 
+impl Identify for Asked {
+    fn every(&self) -> Option<Duration> {
+        self.every
+    }
+
+    fn misfit(&self, _inputs: usize) -> Option<String> {
+        Asked::misfit(self)
+    }
+
+    fn identify(
+        &self,
+        samples: &Samples,
+        _series: usize,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError> {
+        // In units of their spread, or the search would depend on the unit of the truth.
+        let spread = samples.spread();
+        let mut fit = self.fit(&samples.divided(spread), spread, report)?;
+        fit.model.rescale(spread);
+        fit.residual_sum_of_squares *= spread * spread;
+        if !fit.converged {
+            report.notes.push(format!(
+                "the search had not ended after {} steps",
+                fit.steps
+            ));
+        }
+        Ok(Found {
+            residual_sum_of_squares: fit.residual_sum_of_squares,
+            rows: fit.rows,
+            variance: fit.variance(),
+            model: fit.model,
+        })
+    }
+}
+
+impl Asked {
     fn fit(
         &self,
         samples: &Samples,
@@ -179,19 +234,15 @@ impl IdentifiedTrainer {
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
         let search = PredictionError {
-            penalty: self.asked.penalty,
+            penalty: self.penalty,
             ..PredictionError::default()
         };
-        let inputs = &self.places;
-        let Some(order) = self.asked.order else {
-            let orders = self.asked.orders(inputs, &self.asked.given());
+        let Some(order) = self.order else {
+            let orders = self.orders(&self.given());
             return search.fit(&orders, samples, 0).map_err(told);
         };
-        let candidates = order.combinations(self.asked.given());
-        let orders: Vec<_> = candidates
-            .iter()
-            .map(|one| self.asked.orders(inputs, one))
-            .collect();
+        let candidates = order.combinations(self.given());
+        let orders: Vec<_> = candidates.iter().map(|one| self.orders(one)).collect();
         let first = orders
             .iter()
             .map(athermal_numerics::Orders::first)
@@ -216,7 +267,7 @@ impl IdentifiedTrainer {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
-        report.orders = Some(table);
+        report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
     }
 }
@@ -251,7 +302,7 @@ impl Pace {
     }
 }
 
-impl Trainer for IdentifiedTrainer {
+impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
     fn row(&mut self, regressors: &[f64], truth: f64) {
         let second = Duration::from_ns(1_000_000_000);
         let last = self.rows.last().map(|row| row.at);

@@ -248,13 +248,7 @@ fn measured_parameters(kind: &'static Kind) -> &'static [String] {
 fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
     let mut facts = Facts::default();
     facts.plain("type", node.kind.name);
-    if let PlannedRole::Estimator {
-        truth,
-        training,
-        learning,
-        ..
-    } = &node.role
-    {
+    if let Some((truth, training)) = node.role.learns_from() {
         facts.plain("ahead", truth.ahead.to_string());
         let unit = &plan.channels[truth.slot].channel.unit;
         for (path, limit, none) in [
@@ -265,10 +259,14 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
                 facts.measured(path, format!("{limit} {unit}"));
             }
         }
-        if let Some(learning) = learning {
-            facts.plain("learn.outliers", learning.outliers.to_string());
-            facts.plain("learn.margin", learning.margin.to_string());
-        }
+    }
+    if let PlannedRole::Estimator {
+        learning: Some(learning),
+        ..
+    } = &node.role
+    {
+        facts.plain("learn.outliers", learning.outliers.to_string());
+        facts.plain("learn.margin", learning.margin.to_string());
     }
     if let Value::Object(parameters) = node.spec.parameters() {
         let measured = measured_parameters(node.kind);
@@ -322,9 +320,13 @@ fn inputs(plan: &Plan, node: &PlannedNode, facts: &mut Facts) {
         .filter(|port| port.read != Read::Truth && port.name != FREEZE);
     for (port, gather) in data.zip(gathers) {
         let gather = &plan.gathers[gather];
-        let slots: Vec<usize> = gather.entries.iter().map(|entry| entry.slot).collect();
+        // Lags are parameters.
+        let first = gather.entries.first().map(|entry| entry.lag);
+        let entries = gather.entries.iter();
+        let entries: Vec<_> = entries.filter(|entry| Some(entry.lag) == first).collect();
+        let slots: Vec<usize> = entries.iter().map(|entry| entry.slot).collect();
         let ages = (gather.read != Read::Fresh)
-            .then(|| gather.entries.iter().map(|entry| entry.max_age).collect());
+            .then(|| entries.iter().map(|entry| entry.max_age).collect());
         input(plan, port.name, &slots, ages, facts);
     }
     if let Some(gather) = freeze(&node.role) {

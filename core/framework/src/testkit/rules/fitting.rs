@@ -1,4 +1,4 @@
-//! Decides whether an estimator can be fitted, on good data and bad, and keeps what it learned in a model.
+//! Decides whether an estimator or encoder can be fitted, on good data and bad, and keeps what it learned in a model.
 
 use super::super::compared::course;
 use super::Subject;
@@ -6,9 +6,13 @@ use crate::channel::ABSENT;
 use crate::engine::Fitted;
 use crate::fit::{FitOptions, fit};
 use crate::model::Model;
+use crate::node::{Feature, Read, Role};
 use crate::recording::Table;
 
 pub(super) fn fits(subject: &Subject<'_>) -> Result<(), String> {
+    if let Role::Feature(feature) = subject.fixture.plan.nodes[0].spec.role() {
+        encodes(subject, feature)?;
+    }
     if !subject.is_fitted() {
         return Ok(());
     }
@@ -31,6 +35,34 @@ pub(super) fn fits(subject: &Subject<'_>) -> Result<(), String> {
     };
     survives(subject, &subject.table, &streamed)
         .map_err(|found| format!("fitted on rows that are streamed rather than kept, {found}"))
+}
+
+/// A feature is fitted where it has both an encoder and a truth to learn from, and has nothing to say before.
+fn encodes(subject: &Subject<'_>, feature: &dyn Feature) -> Result<(), String> {
+    let mut ports = (subject.kind.inputs)().iter();
+    let has_truth = ports.any(|port| port.read == Read::Truth);
+    match (feature.encoder().is_some(), has_truth) {
+        (true, false) => Err(
+            "it has an encoder, and no port made by `InputPort::truth` to learn from".to_owned(),
+        ),
+        (false, true) => {
+            Err("it has a port `truth`, and no encoder that learns from it".to_owned())
+        }
+        (false, false) => Ok(()),
+        (true, true) => {
+            let fixture = &subject.fixture;
+            let unfitted = course(
+                fixture,
+                &mut fixture.engine(&Fitted::new()),
+                subject.events(),
+            );
+            let mut slots = 0..fixture.slots().len();
+            if slots.any(|number| unfitted.values(number).any(f64::is_finite)) {
+                return Err("it gives values before it has been fitted".to_owned());
+            }
+            Ok(())
+        }
+    }
 }
 
 /// Data that allow no fit, or hardly one.

@@ -19,7 +19,6 @@ use super::compared::course;
 use super::fixture::Fixture;
 use super::samples::{Coming, samples};
 use super::{Case, Rule};
-use crate::compile::PlannedRole;
 use crate::engine::{Engine, Fitted};
 use crate::fit::{FitOptions, Outcome, fit};
 use crate::node::{Kind, Role};
@@ -123,10 +122,7 @@ impl<'a> Subject<'a> {
 
     /// Whether the node learns from a fit.
     pub(super) fn is_fitted(&self) -> bool {
-        matches!(
-            self.fixture.plan.nodes[0].role,
-            PlannedRole::Estimator { .. }
-        ) && !self.fitted.is_empty()
+        !self.fitted.is_empty()
     }
 
     /// Whether the port of a slot may have something to say of nothing.

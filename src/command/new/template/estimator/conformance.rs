@@ -4,7 +4,11 @@ use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use my_node::MyNode;
 
-conformance!(MyNode, CASES);
+conformance!(
+    MyNode,
+    Case::new("ahead = '1min'"),
+    Case::new("ahead = '0s'\nshrinkage = 0.5").input("features", 1, "Cel"),
+);
 
 #[test]
 fn every_kind_of_this_crate_conforms() {

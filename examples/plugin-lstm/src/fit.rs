@@ -1,0 +1,89 @@
+//! Decides what a fit gives: a network with the scales of what it reads and answers, and what it makes of a row.
+
+use serde::{Deserialize, Serialize};
+
+use crate::network::{MOST_UNITS, Memory, Network};
+
+/// A network with the scales of what it reads and answers, as a model file holds it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Fit {
+    /// The regressors that make up a sequence, the oldest step first.
+    pub(crate) uses: Vec<String>,
+    /// Mean and deviation of each channel.
+    pub(crate) inputs: Vec<Scale>,
+    /// Mean and deviation of the truth.
+    pub(crate) truth: Scale,
+    pub(crate) network: Network,
+}
+
+/// A mean, and a standard deviation that is 1 where there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Scale {
+    mean: f64,
+    pub(crate) deviation: f64,
+}
+
+impl Scale {
+    /// Of some values.
+    pub(crate) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+        let count = values.clone().count().max(1) as f64;
+        let mean = values.clone().sum::<f64>() / count;
+        let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+        let deviation = variance.sqrt();
+        // What wanders no more than its own rounding does not wander.
+        let wanders = deviation > 1e-12 * mean.abs();
+        Self {
+            mean,
+            deviation: if wanders { deviation } else { 1.0 },
+        }
+    }
+
+    /// The value on this scale.
+    pub(crate) fn scaled(self, value: f64) -> f64 {
+        (value - self.mean) / self.deviation
+    }
+}
+
+/// The most channels of a step.
+pub(crate) const MOST_CHANNELS: usize = 256;
+
+impl Fit {
+    /// What the network remembers of a row; none where the model file makes no sense.
+    fn remember(&self, row: &[f64]) -> Option<Memory> {
+        let channels = self.network.channels();
+        let sound = self.network.is_sound()
+            && (1..=MOST_CHANNELS).contains(&channels)
+            && self.inputs.len() == channels
+            && row.len() == self.uses.len()
+            && row.len().is_multiple_of(channels);
+        if !sound {
+            return None;
+        }
+        let mut memory = Memory::empty();
+        let mut scaled = [0.0; MOST_CHANNELS];
+        for step in row.chunks_exact(channels) {
+            for ((scaled, value), scale) in scaled.iter_mut().zip(step).zip(&self.inputs) {
+                *scaled = scale.scaled(*value);
+            }
+            self.network.step(&scaled[..channels], &mut memory);
+        }
+        Some(memory)
+    }
+
+    /// The answer of the network, in the unit of the truth.
+    pub(crate) fn predict(&self, row: &[f64]) -> f64 {
+        self.remember(row).map_or(f64::NAN, |memory| {
+            self.truth.mean + self.truth.deviation * self.network.read_out(&memory)
+        })
+    }
+
+    /// What each unit shows at the end of a row.
+    pub(crate) fn encode(&self, row: &[f64], code: &mut [f64; MOST_UNITS]) {
+        if let Some(memory) = self.remember(row) {
+            let units = self.network.units();
+            code[..units].copy_from_slice(memory.hidden(units));
+        }
+    }
+}
