@@ -92,6 +92,8 @@ mod tests {
             name: (*name).to_owned(),
             unit: "K".to_owned(),
             sensors: Vec::new(),
+            lag: athermal_core::time::Duration::ZERO,
+            of_truth: false,
         };
         names.iter().map(regressor).collect()
     }
