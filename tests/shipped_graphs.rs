@@ -37,6 +37,7 @@ fn every_built_in_kind_is_linked_and_comes_from_its_crate() {
         ("linear", "athermal-estimators"),
         ("mean", "athermal-combiners"),
         ("median", "athermal-combiners"),
+        ("minimum_difference", "athermal-features"),
         ("moving", "athermal-features"),
         ("narx", "athermal-estimators"),
         ("optical_loss", "athermal-control"),

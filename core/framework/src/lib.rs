@@ -77,6 +77,7 @@
 //! | to write | implement |
 //! |---|---|
 //! | channels from channels: a filter, a monitor, a correction | [`node::Feature`] |
+//! | the same, learned from a truth: an encoder | [`node::Feature`] with [`node::Encoder`] |
 //! | a prediction, fitted on history | [`node::Estimator`] |
 //! | one prediction of several | [`node::Combiner`] |
 //! | where samples come from | [`live::Source`] |

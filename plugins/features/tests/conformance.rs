@@ -3,8 +3,8 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
 use athermal_features::{
-    Delay, Difference, FirstOrder, Hampel, Lag, Moving, Pick, Product, Resample, SampleAt, Scale,
-    Slope, Sum,
+    Delay, Difference, FirstOrder, Hampel, Lag, MinimumDifference, Moving, Pick, Product, Resample,
+    SampleAt, Scale, Slope, Sum,
 };
 
 conformance!(
@@ -30,6 +30,12 @@ conformance!(
         r#"
         time_constants = { from = "1min", to = "1h", steps = 4 }
         output = "value"
+        "#
+    ),
+    Case::new(
+        r#"
+        time_constants = ["1min", "3min"]
+        span = "15min"
         "#
     ),
 );
@@ -108,6 +114,12 @@ conformance!(
         "#
     )
     .input("signal", 2, "um"),
+);
+
+conformance!(
+    MinimumDifference,
+    Case::new(r#"difference = "5 mK""#).input("signal", 2, "Cel"),
+    Case::new(r#"difference = "0.2 um""#).input("signal", 1, "nm"),
 );
 
 conformance!(

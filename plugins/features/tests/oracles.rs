@@ -292,3 +292,28 @@ fn oracle_of_samples_at_the_instants_of_another_channel() {
     }
     assert!(compared > 400 && too_old > 0, "{compared}, {too_old}");
 }
+
+#[test]
+fn a_change_below_the_minimum_difference_is_kept_back_and_a_slow_one_comes_in_steps() {
+    let node = "type = \"minimum_difference\"\ndifference = \"30 um\"";
+    let mut bench = Bench::new(node, &["signal"]);
+    let nan = f64::NAN;
+    // In mm, so that the difference is 0.03; the second channel drifts by 0.01 in each row.
+    let rows = [
+        (1.00, 1.00, 0.00, 0.00),
+        (1.02, 1.00, 0.01, 0.00),
+        (0.98, 1.00, 0.02, 0.00),
+        (1.50, 1.50, 0.035, 0.035),
+        (1.48, 1.50, 0.04, 0.035),
+        (nan, nan, 0.05, 0.035),
+        (1.44, 1.44, 0.07, 0.07),
+    ];
+    for (nth, (y, y_kept, z, z_kept)) in rows.into_iter().enumerate() {
+        bench.tick(&[nth as f64, y, z]);
+        if y.is_nan() {
+            continue;
+        }
+        assert_eq!(bench.output("signal.y"), y_kept, "row {nth}");
+        assert_eq!(bench.output("signal.z"), z_kept, "row {nth}");
+    }
+}

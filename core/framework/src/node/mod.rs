@@ -6,7 +6,8 @@
 //!
 //! A [`Feature`] with its [`Operator`] is the general form: any ports in, any ports out, a state of its own, at every tick if it
 //! asks for it. Monitors, filters, safe states and compensations are features. [`Estimator`] and [`Combiner`] are narrower on
-//! purpose: they never see a truth before its time, because it is not theirs to read.
+//! purpose: they never see a truth before its time, because it is not theirs to read. A feature that learns from a truth before
+//! it runs has an [`Encoder`], and stays as it was fitted.
 
 mod combiner;
 mod encoder;
