@@ -12,7 +12,8 @@
 //!                                                  samples from a recording, a live source or a simulated machine
 //! ```
 //!
-//! In a program that is three steps. The node here is a feature that doubles; the shipped ones come from plugin crates:
+//! In a program that is three steps: load, make an engine, step it. The node here is a feature that doubles; the shipped ones
+//! come from plugin crates:
 //!
 //! ```
 //! # use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
@@ -77,6 +78,7 @@
 //! | to write | implement |
 //! |---|---|
 //! | channels from channels: a filter, a monitor, a correction | [`node::Feature`] |
+//! | the same, learned from a truth: an encoder | [`node::Feature`] with [`node::Encoder`] |
 //! | a prediction, fitted on history | [`node::Estimator`] |
 //! | one prediction of several | [`node::Combiner`] |
 //! | where samples come from | [`live::Source`] |
