@@ -68,6 +68,7 @@ fn local_linear_trend(bencher: Bencher, regressors: usize) {
         observation: 1.0,
         level: 0.01,
         trend: Some(1e-4),
+        returning: 0.0,
         passage: Passage::Continuous,
     };
     let mut filter = Kalman::diffuse(model, regressors).expect("the variances are in range");

@@ -287,6 +287,7 @@ mod tests {
             rmse: Some(rmse),
             r2_zero: None,
             r2_mean: None,
+            fit: None,
             bias: None,
             max_abs: None,
             valid: None,

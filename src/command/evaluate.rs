@@ -1,13 +1,14 @@
 //! `athermal evaluate`: scores a model's predictions on recorded data.
 
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::model::ModelError;
 use athermal::core::quantity::Quantity;
-use athermal::core::score::{Score, ScoreOptions, Scores, score};
-use clap::Args;
+use athermal::core::score::{Mode, Score, ScoreOptions, Scores, score};
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::data::{self, Data};
@@ -20,14 +21,21 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
 ///
+/// Fit is the share of the truth's spread that is told, 1 − √(SSE / Σ (y − ȳ)²), as identification has it.
+///
 /// Where predictions have intervals (bounds, as of `conformal`, or a standard deviation, of which 1.645 to either side are
 /// to cover nine tenths), a second table tells which share of the truths they cover, how wide they are on average, and
 /// their interval score: the width plus 2/(1 − share to cover) times the mean distance of truths outside, small being good.
+///
+/// `--mode` tells how far the model reaches by itself: one step from measured past truths, several steps with its own
+/// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
+/// stay as they were measured, and so do the weights of votes.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \
                         athermal evaluate model.json --data test.csv --format json \\\n      \
-                        --abs-truth-below \"250 nm/min\""
+                        --abs-truth-below \"250 nm/min\"\n  \
+                        athermal evaluate model.json --data test.csv --mode free-run"
 )]
 pub struct Evaluate {
     /// The model, or a graph in which nothing needs fitting
@@ -43,6 +51,25 @@ pub struct Evaluate {
     /// Let nothing learn on the way; otherwise, what learns does so after each truth has been predicted
     #[arg(long)]
     frozen: bool,
+    /// From which past truths predictions are made; only what reads or follows past truths differs
+    #[arg(long, value_enum, default_value = "one-step")]
+    mode: Horizon,
+    /// How many steps ahead `--mode k-step` predicts
+    #[arg(long, value_name = "K", required_if_eq("mode", "k-step"))]
+    steps: Option<NonZeroU32>,
+}
+
+/// From which past truths predictions are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Horizon {
+    /// From those measured, as beside a machine: all that the horizon and the embargo allow
+    OneStep,
+    /// From those measured up to K steps before the predicted one; newer ones are replaced by predictions of them, and
+    /// nothing is learned from them. A step is the time from the newest truth that an estimator may read to the predicted one
+    KStep,
+    /// From its own predictions: a measured truth is read only where there is none yet, as at the beginning of a segment, and
+    /// nothing is learned from any
+    FreeRun,
 }
 
 impl Evaluate {
@@ -61,11 +88,13 @@ impl Evaluate {
         if let Some(limit) = &self.abs_truth_below {
             check_limit(limit, &model)?;
         }
+        let mode = self.mode()?;
         let dataset = self.data.dataset();
         let options = ScoreOptions {
             abs_truth_below: self.abs_truth_below.clone(),
             each_on_its_own: self.each_on_its_own,
             frozen: self.frozen,
+            mode,
         };
         let mut progress = terminal.progress("evaluating");
         let scores = score(
@@ -87,10 +116,10 @@ impl Evaluate {
             });
             println!(
                 "{:#}",
-                json!({ "data": files, "period": period, "scores": scores.scores })
+                json!({ "data": files, "mode": self.mode.name(), "steps": self.steps, "period": period, "scores": scores.scores })
             );
         } else {
-            print!("{}", describe(&scores));
+            print!("{}", describe(&scores, mode));
         }
         data::tell(
             terminal,
@@ -104,6 +133,31 @@ impl Evaluate {
             );
         }
         Ok(Answer::Fine)
+    }
+
+    fn mode(&self) -> Result<Mode, Failure> {
+        match (self.mode, self.steps) {
+            (Horizon::OneStep, None) => Ok(Mode::OneStep),
+            (Horizon::FreeRun, None) => Ok(Mode::FreeRun),
+            (Horizon::KStep, Some(steps)) => Ok(Mode::Steps(steps)),
+            (Horizon::KStep, None) => Err(Failure::Request(
+                "--mode k-step needs the number of steps: `--steps 3`".to_owned(),
+            )),
+            (other, Some(_)) => Err(Failure::Request(format!(
+                "--steps says how far `--mode k-step` predicts, and the mode is {}",
+                other.name()
+            ))),
+        }
+    }
+}
+
+impl Horizon {
+    fn name(self) -> &'static str {
+        match self {
+            Self::OneStep => "one-step",
+            Self::KStep => "k-step",
+            Self::FreeRun => "free-run",
+        }
     }
 }
 
@@ -146,9 +200,17 @@ pub fn load_fitted(path: &std::path::Path, wanted: Wanted) -> Result<Model, Fail
     Ok(model)
 }
 
-fn describe(scores: &Scores) -> String {
+fn describe(scores: &Scores, mode: Mode) -> String {
     use std::fmt::Write as _;
-    let mut text = String::new();
+    let mut text = match mode {
+        Mode::OneStep => String::new(),
+        Mode::Steps(steps) => format!(
+            "{steps} steps ahead: no truth newer than that is read, but what was predicted of it\n\n"
+        ),
+        Mode::FreeRun => {
+            "free run: no measured truth is read where there is a prediction of it\n\n".to_owned()
+        }
+    };
     let mut truths: Vec<&str> = scores
         .scores
         .iter()
@@ -183,6 +245,7 @@ fn describe(scores: &Scores) -> String {
             "RMSE",
             "R²",
             "R²mean",
+            "fit",
             "bias",
             "largest",
             "valid",
@@ -223,6 +286,9 @@ fn line(score: &Score) -> Vec<String> {
         or_dash(score.rmse),
         ratio(score.r2_zero),
         ratio(score.r2_mean),
+        score
+            .fit
+            .map_or_else(|| "-".to_owned(), |fit| format!("{fit:.1}%")),
         or_dash(score.bias),
         or_dash(score.max_abs),
         score

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
-use athermal::core::node::SelectionStep;
+use athermal::core::node::{OrderTable, SelectionStep};
 use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
 
 use super::data::{self, Data};
-use crate::figures::{count, number, paragraph};
+use crate::figures::{count, number, paragraph, table};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit a graph's estimators on recorded data
@@ -184,6 +184,31 @@ fn tell_step(
     }
 }
 
+/// What is told of orders that were compared.
+fn tell_orders(text: &mut String, orders: &OrderTable) {
+    let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
+    let cells = orders.tried.iter().enumerate().map(|(nth, tried)| {
+        let chosen = nth == orders.chosen;
+        let mut cells = vec![
+            format!("  {}", tried.order),
+            tried.coefficients.to_string(),
+            format!("{:.2}", tried.aic),
+            format!("{:.2}", tried.aicc),
+            format!("{:.2}", tried.bic),
+            number(tried.fpe),
+        ];
+        if chosen {
+            cells.push(format!(
+                "smallest {}, on {} rows",
+                orders.by,
+                count(orders.rows as u64)
+            ));
+        }
+        cells
+    });
+    text.push_str(&table(&header, &cells.collect::<Vec<_>>()));
+}
+
 /// How wide the longest name in a selection is.
 fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
     let tried = steps.iter().flat_map(|step| &step.candidates);
@@ -237,6 +262,9 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
             "not".to_owned()
         };
         tell_step(&mut text, &nth, step, (width, candidates));
+    }
+    if let Some(orders) = &report.orders {
+        tell_orders(&mut text, orders);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {

@@ -1,18 +1,14 @@
 //! Least squares with a penalty on absolute coefficients. Decides how such coefficients are found; does not decide how large
 //! the penalty is.
 
+use crate::active_set::ActiveSet;
 use crate::checks::{check_columns, check_parameter, check_penalty, check_scale, check_splits};
 use crate::normal_equations::Problem;
 use crate::penalty::TestMoments;
 use crate::{Gram, NumericsError, Split};
 
-/// A sweep that moves no coefficient by more than this share of the target's deviation ends the descent.
-const TOLERANCE: f64 = 1e-13;
-const MOST_SWEEPS: usize = 50_000;
-
 /// Minimises `1/(2n) Σ(y − b₀ − xᵀb)² + α (ρ t Σ|s_j b_j| + (1 − ρ)/2 Σ(s_j b_j)²)` with column scales `s` and a scale `t` of the
-/// target by cyclic coordinate descent on the Gram matrix (Friedman, Hastie and Tibshirani 2010, section 2.2). `ρ = 1` is the
-/// lasso. With the scale of the target, the same penalty means the same in all units.
+/// target, on the Gram matrix. `ρ = 1` is the lasso. With the scale of the target, the same penalty means the same in all units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElasticNet {
     /// The penalty `α`, on the *mean* of squares, unlike that of ridge.
@@ -32,7 +28,7 @@ pub struct SparseFit {
     pub intercept: f64,
     /// The sum of the squared residuals, without the penalty.
     pub residual_sum_of_squares: f64,
-    /// Whether the descent came to its end.
+    /// Whether the search came to its end.
     pub converged: bool,
 }
 
@@ -50,17 +46,17 @@ impl ElasticNet {
     ) -> Result<SparseFit, NumericsError> {
         self.check(gram, columns, scales)?;
         let problem = Problem::new(true, gram, columns, scales);
-        let mut descent = Descent::new(&problem, gram.weight());
-        let converged = descent.run(self, self.alpha);
+        let mut search = ActiveSet::new(&problem, gram.weight());
+        let converged = self.search(&mut search, self.alpha);
         let mut coefficients = vec![0.0; columns.len()];
-        for (&k, weight) in problem.active.iter().zip(&descent.weights) {
+        for (&k, weight) in problem.active.iter().zip(&search.weights) {
             coefficients[k] = weight / scales[columns[k]];
         }
         let means = gram.means();
         let terms = columns.iter().zip(&coefficients);
         Ok(SparseFit {
             intercept: terms.fold(means[gram.width()], |rest, (&j, b)| rest - b * means[j]),
-            residual_sum_of_squares: problem.residual_sum_of_squares(&descent.weights),
+            residual_sum_of_squares: problem.residual_sum_of_squares(&search.weights),
             coefficients,
             converged,
         })
@@ -103,15 +99,20 @@ impl ElasticNet {
             let problem = Problem::new(true, &split.train, columns, scales);
             let used: Vec<usize> = problem.active.iter().map(|&k| columns[k]).collect();
             let test = TestMoments::of(split, &used, scales);
-            let mut descent = Descent::new(&problem, split.train.weight());
+            let mut search = ActiveSet::new(&problem, split.train.weight());
             for &at in &order {
                 check_penalty(alphas[at])?;
-                descent.run(self, alphas[at]);
-                let errors = test.errors(&test.cross, &test.target, &descent.weights);
+                self.search(&mut search, alphas[at]);
+                let errors = test.errors(&test.cross, &test.target, &search.weights);
                 scores[at].push(test.r2(errors));
             }
         }
         Ok(scores)
+    }
+
+    fn search(&self, search: &mut ActiveSet<'_>, alpha: f64) -> bool {
+        let threshold = alpha * self.l1_ratio * self.target_scale;
+        search.run(threshold, alpha * (1.0 - self.l1_ratio))
     }
 
     fn check(&self, gram: &Gram, columns: &[usize], scales: &[f64]) -> Result<(), NumericsError> {
@@ -141,56 +142,6 @@ impl ElasticNet {
             });
         }
         Ok(())
-    }
-}
-
-/// Coordinate descent from where it stands.
-struct Descent<'a> {
-    problem: &'a Problem,
-    rows: f64,
-    weights: Vec<f64>,
-    /// The covariance of each column with the residuals.
-    slopes: Vec<f64>,
-    least_move: f64,
-}
-
-impl<'a> Descent<'a> {
-    fn new(problem: &'a Problem, rows: f64) -> Self {
-        Self {
-            weights: vec![0.0; problem.target.len()],
-            slopes: problem.target.iter().map(|t| t / rows).collect(),
-            least_move: TOLERANCE * (problem.spread / rows).sqrt(),
-            problem,
-            rows,
-        }
-    }
-
-    fn run(&mut self, how: &ElasticNet, alpha: f64) -> bool {
-        let threshold = alpha * how.l1_ratio * how.target_scale;
-        let damping = alpha * (1.0 - how.l1_ratio);
-        for _ in 0..MOST_SWEEPS {
-            let mut largest = 0.0_f64;
-            for j in 0..self.weights.len() {
-                let own = self.problem.gram[(j, j)] / self.rows;
-                let old = self.weights[j];
-                let slope = self.slopes[j] + own * old;
-                let shrunk = (slope.abs() - threshold).max(0.0) * slope.signum();
-                let new = shrunk / (own + damping);
-                if new == old {
-                    continue;
-                }
-                let change = (new - old) / self.rows;
-                for (k, slope) in self.slopes.iter_mut().enumerate() {
-                    *slope -= change * self.problem.gram[(k, j)];
-                }
-                self.weights[j] = new;
-                largest = largest.max((new - old).abs() * own.sqrt());
-            }
-            if largest <= self.least_move {
-                return true;
-            }
-        }
-        false
     }
 }
 
@@ -267,6 +218,36 @@ mod tests {
         }
         let largest = lasso.largest_alpha(&blocks.total(), &ALL, &scales).unwrap();
         assert!((largest / expected["largest_alpha"].as_f64().unwrap() - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn of_columns_that_are_combinations_of_others_the_cheapest_are_used() {
+        let mut blocks = GramBlocks::new(4);
+        for i in 0..600 {
+            let (a, b) = ((0.37 * f64::from(i)).sin(), (0.11 * f64::from(i)).cos());
+            blocks.push(&[a, b, a + b, a], 3.0 * (a + b));
+        }
+        let gram = blocks.total();
+        for alpha in [1e-6, 1e-3, 0.1] {
+            let lasso = ElasticNet {
+                alpha,
+                l1_ratio: 1.0,
+                target_scale: 1.0,
+            };
+            let fit = lasso.solve(&gram, &[0, 1, 2, 3], &[1.0; 4]).unwrap();
+            assert!(fit.converged);
+            let found = &fit.coefficients;
+            let others = [found[0], found[1], found[3]];
+            assert!(others.iter().all(|b| b.abs() < 1e-9), "{found:?}");
+            assert!(found[2] > 2.5 && found[2] < 3.0, "{found:?}");
+        }
+        let unpenalised = ElasticNet {
+            alpha: 0.0,
+            l1_ratio: 1.0,
+            target_scale: 1.0,
+        };
+        let fit = unpenalised.solve(&gram, &[0, 1, 2, 3], &[1.0; 4]).unwrap();
+        assert!(fit.converged && fit.residual_sum_of_squares < 1e-9);
     }
 
     #[test]

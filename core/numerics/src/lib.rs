@@ -1,5 +1,5 @@
 //! Least squares for drift models: Gram blocks, ridge, selection by cross-validation, recursions, correlations; the Kalman
-//! filter of structural models; changes of a mean.
+//! filter of structural models; transfer functions by the prediction error; changes of a mean.
 //!
 //! Decides how rows of regressors become statistics and how statistics become coefficients. Does not decide where rows
 //! come from, what a regressor is called or what its unit is. Everything runs on the calling thread, and the same rows
@@ -23,6 +23,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod active_set;
 mod blocks;
 mod change;
 mod checks;
@@ -31,6 +32,7 @@ mod correlation;
 mod elastic_net;
 mod error;
 mod folds;
+mod forward_regression;
 mod gram;
 mod huber;
 mod kalman;
@@ -39,12 +41,14 @@ mod non_negative;
 mod normal_equations;
 mod orthogonal;
 mod penalty;
+mod prediction_error;
 mod prediction_variance;
 mod rls;
 mod scaler;
 mod score;
 mod selection;
 mod sgd;
+mod state_space;
 
 pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
 pub use change::{Adwin, AdwinOptions, MeanChange, PageHinkley, PageHinkleyOptions};
@@ -56,16 +60,22 @@ pub use correlation::{
 pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;
 pub use folds::{FoldRows, Folds, Split};
+pub use forward_regression::{ErrorReduction, ForwardModel, ForwardRegression};
 pub use gram::Gram;
 pub use huber::{Huber, HuberFit};
 pub use kalman::{
-    Followed, Forecast, Innovation, Kalman, Passage, Series, Structural, follow, most_likely,
+    Followed, Forecast, Innovation, Kalman, Movement, Passage, Series, Structural, follow,
+    most_likely,
 };
 pub use least_squares::{
     DEFAULT_CONDITION_BOUND, DEFAULT_RCOND, LeastSquares, LinearFit, Method, SINGULAR_BOUND,
 };
 pub use non_negative::non_negative_least_squares;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
+pub use prediction_error::{
+    Criterion, InformationCriteria, InputOrders, Orders, Polynomials, PredictionError,
+    PredictionErrorFit, Samples, Stepper, Transfer,
+};
 pub use prediction_variance::PredictionVariance;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use scaler::{Standardization, Standardizer};
@@ -75,6 +85,9 @@ pub use selection::{
     SelectionStep, Smallest, Start, Stepwise, StepwiseSelection, StepwiseStep,
 };
 pub use sgd::{LearningRate, Sgd, SgdOptions};
+pub use state_space::{
+    DifferenceEquation, Identification, Record, StateOrder, StateSpace, Subspace, Weighting,
+};
 
 #[cfg(test)]
 mod oracle;

@@ -5,7 +5,8 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 
-use crate::network::{Network, sigmoid};
+use crate::activation::tanh;
+use crate::network::{Network, open};
 
 /// Sequences with the truths that belong to them, one after the other.
 #[derive(Debug, Clone, Copy)]
@@ -27,39 +28,68 @@ impl Batch<'_> {
     }
 }
 
-/// The room that a batch takes on its way through a network and back; columns are sequences.
+/// The room that a batch takes on its way through a network and back. Columns are sequences, the blocks of steps lie one after
+/// the other.
 #[derive(Debug)]
 pub(crate) struct Passage {
     steps: usize,
-    /// For each step `z = (x_t, h_(t−1), 1)`, and after the last its `h`.
-    entering: Vec<Vec<f64>>,
-    /// For each step `i`, `f`, `g` and `o`.
-    gates: Vec<Vec<f64>>,
-    /// For each step `c`, before the first too.
-    cells: Vec<Vec<f64>>,
-    /// For each step `tanh(c)`.
-    shown: Vec<Vec<f64>>,
-    /// The gradients of a step's gates, of what entered it, and of its cells.
+    /// Of each step `z = (x_t, h_(t−1), 1)`, and after the last its `h`.
+    entering: Vec<f64>,
+    /// Of each step `i`, `f`, `g` and `o`.
+    gates: Vec<f64>,
+    /// Of each step `c`, before the first too.
+    cells: Vec<f64>,
+    /// Of each step `tanh(c)`.
+    shown: Vec<f64>,
+    /// The gradients of all gates, and of what entered a step and its cells.
     of_gates: Vec<f64>,
     of_entering: Vec<f64>,
     of_cells: Vec<f64>,
     errors: Vec<f64>,
 }
 
+/// The numbers of a network and batch.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    channels: usize,
+    units: usize,
+    /// The gates of all units.
+    rows: usize,
+    /// What enters a step.
+    wide: usize,
+    /// The sequences.
+    count: usize,
+}
+
+impl Size {
+    fn of(network: &Network, count: usize) -> Self {
+        let (channels, units) = (network.channels(), network.units());
+        Self {
+            channels,
+            units,
+            rows: 4 * units,
+            wide: channels + units + 1,
+            count,
+        }
+    }
+}
+
 impl Passage {
     /// For batches of at most so many sequences of so many steps.
     pub(crate) fn new(network: &Network, steps: usize, batch: usize) -> Self {
-        let (units, entering) = (network.units(), network.channels() + network.units() + 1);
-        let room = |count: usize, rows: usize| vec![vec![0.0; rows * batch]; count];
+        let Size {
+            units, rows, wide, ..
+        } = Size::of(network, batch);
+        let room = |steps: usize, rows: usize| vec![0.0; steps * rows * batch];
         Self {
             steps,
-            entering: room(steps + 1, entering),
-            gates: room(steps, 4 * units),
+            entering: room(steps + 1, wide),
+            gates: room(steps, rows),
             cells: room(steps + 1, units),
             shown: room(steps, units),
-            of_gates: vec![0.0; 4 * units * batch],
-            of_entering: vec![0.0; entering * batch],
-            of_cells: vec![0.0; units * batch],
+            of_gates: room(steps, rows),
+            of_entering: room(1, wide),
+            of_cells: room(1, units),
             errors: vec![0.0; batch],
         }
     }
@@ -74,15 +104,22 @@ impl Passage {
     /// The gradient of half the mean squared error of a batch.
     pub(crate) fn gradient(&mut self, network: &Network, batch: Batch<'_>, gradient: &mut [f64]) {
         self.forward(network, batch);
-        let (units, channels, count) = (network.units(), network.channels(), batch.truths.len());
-        let (rows, wide) = (4 * units, channels + units + 1);
+        let size = Size::of(network, batch.truths.len());
+        let Size {
+            channels,
+            units,
+            rows,
+            wide,
+            count,
+        } = size;
         gradient.fill(0.0);
         let (of_weights, of_readout) = gradient.split_at_mut(network.gates());
-        let readout = &network.weights()[network.gates()..];
+        let (weights, readout) = network.weights().split_at(network.gates());
+        let weights = MatRef::from_column_major_slice(weights, rows, wide);
         let share = 1.0 / count as f64;
         self.of_cells[..units * count].fill(0.0);
         // What the readout hands back to the last hidden state.
-        let last = self.entering[self.steps].chunks_exact(wide);
+        let last = self.entering[self.steps * wide * count..].chunks_exact(wide);
         let handed = self.of_entering.chunks_exact_mut(wide);
         for ((hidden, handed), error) in last.zip(handed).zip(&self.errors[..count]) {
             let error = share * error;
@@ -93,34 +130,39 @@ impl Passage {
             of_readout[units] += error;
         }
         for step in (0..self.steps).rev() {
-            self.back_through_gates(units, channels, step, count);
-            let of_gates =
-                MatRef::from_column_major_slice(&self.of_gates[..rows * count], rows, count);
-            let entered = &self.entering[step][..wide * count];
-            let entered = MatRef::from_column_major_slice(entered, wide, count);
-            let to = MatMut::from_column_major_slice_mut(of_weights, rows, wide);
-            matmul(to, Accum::Add, of_gates, entered.transpose(), 1.0, Par::Seq);
-            let weights = &network.weights()[..network.gates()];
-            let weights = MatRef::from_column_major_slice(weights, rows, wide);
-            let to = &mut self.of_entering[..wide * count];
-            let to = MatMut::from_column_major_slice_mut(to, wide, count);
-            matmul(
-                to,
-                Accum::Replace,
-                weights.transpose(),
-                of_gates,
-                1.0,
-                Par::Seq,
-            );
+            self.back_through_gates(size, step);
+            if step > 0 {
+                let of_gates = &self.of_gates[step * rows * count..(step + 1) * rows * count];
+                let of_gates = MatRef::from_column_major_slice(of_gates, rows, count);
+                let to = &mut self.of_entering[..wide * count];
+                let to = MatMut::from_column_major_slice_mut(to, wide, count);
+                let weights = weights.transpose();
+                matmul(to, Accum::Replace, weights, of_gates, 1.0, Par::Seq);
+            }
         }
+        let columns = self.steps * count;
+        let of_gates = &self.of_gates[..rows * columns];
+        let of_gates = MatRef::from_column_major_slice(of_gates, rows, columns);
+        let entered = &self.entering[..wide * columns];
+        let entered = MatRef::from_column_major_slice(entered, wide, columns).transpose();
+        let to = MatMut::from_column_major_slice_mut(of_weights, rows, wide);
+        matmul(to, Accum::Replace, of_gates, entered, 1.0, Par::Seq);
     }
 
     fn forward(&mut self, network: &Network, batch: Batch<'_>) {
-        let (units, channels, count) = (network.units(), network.channels(), batch.truths.len());
-        let (rows, wide, steps) = (4 * units, channels + units + 1, self.steps);
+        let size = Size::of(network, batch.truths.len());
+        let Size {
+            channels,
+            units,
+            rows,
+            wide,
+            count,
+        } = size;
+        let steps = self.steps;
         for (sequence, values) in batch.sequences.chunks_exact(steps * channels).enumerate() {
             for (step, values) in values.chunks_exact(channels).enumerate() {
-                let entering = &mut self.entering[step][sequence * wide..(sequence + 1) * wide];
+                let column = (step * count + sequence) * wide;
+                let entering = &mut self.entering[column..column + wide];
                 entering[..channels].copy_from_slice(values);
                 entering[wide - 1] = 1.0;
                 if step == 0 {
@@ -128,40 +170,43 @@ impl Passage {
                 }
             }
         }
-        self.cells[0].fill(0.0);
-        let weights = &network.weights()[..network.gates()];
+        self.cells[..units * count].fill(0.0);
+        let (weights, readout) = network.weights().split_at(network.gates());
         let weights = MatRef::from_column_major_slice(weights, rows, wide);
         for step in 0..steps {
-            let (before, after) = self.entering.split_at_mut(step + 1);
-            let entering = &before[step][..wide * count];
+            let (before, after) = self.entering.split_at_mut((step + 1) * wide * count);
+            let entering = &before[step * wide * count..];
             let entering = MatRef::from_column_major_slice(entering, wide, count);
-            let gates = &mut self.gates[step][..rows * count];
+            let gates = &mut self.gates[step * rows * count..(step + 1) * rows * count];
             let to = MatMut::from_column_major_slice_mut(gates, rows, count);
             matmul(to, Accum::Replace, weights, entering, 1.0, Par::Seq);
-            let (known, new) = self.cells.split_at_mut(step + 1);
-            let cells = known[step]
-                .chunks_exact(units)
-                .zip(new[0].chunks_exact_mut(units));
-            let shown = self.shown[step].chunks_exact_mut(units);
-            let hidden = after[0].chunks_exact_mut(wide).zip(shown);
-            for ((gates, (known, new)), (hidden, shown)) in
-                gates.chunks_exact_mut(rows).zip(cells).zip(hidden)
+            let (known, new) = self.cells.split_at_mut((step + 1) * units * count);
+            let known = known[step * units * count..].chunks_exact(units);
+            let new = &mut new[..units * count];
+            for ((gates, known), new) in gates
+                .chunks_exact_mut(rows)
+                .zip(known)
+                .zip(new.chunks_exact_mut(units))
             {
+                open(gates, units);
                 for unit in 0..units {
-                    let [input, forget, candidate, output] =
-                        [0, 1, 2, 3].map(|gate| gate * units + unit);
-                    gates[input] = sigmoid(gates[input]);
-                    gates[forget] = sigmoid(gates[forget]);
-                    gates[candidate] = gates[candidate].tanh();
-                    gates[output] = sigmoid(gates[output]);
-                    new[unit] = gates[forget] * known[unit] + gates[input] * gates[candidate];
-                    shown[unit] = new[unit].tanh();
-                    hidden[channels + unit] = gates[output] * shown[unit];
+                    let [input, forget, candidate] =
+                        [0, 1, 2].map(|gate| gates[gate * units + unit]);
+                    new[unit] = forget * known[unit] + input * candidate;
+                }
+            }
+            let shown = &mut self.shown[step * units * count..(step + 1) * units * count];
+            shown.copy_from_slice(new);
+            tanh(shown);
+            let hidden = after.chunks_exact_mut(wide).zip(shown.chunks_exact(units));
+            for ((hidden, shown), gates) in hidden.zip(gates.chunks_exact(rows)) {
+                let hidden = hidden[channels..channels + units].iter_mut();
+                for ((hidden, shown), output) in hidden.zip(shown).zip(&gates[3 * units..]) {
+                    *hidden = output * shown;
                 }
             }
         }
-        let readout = &network.weights()[network.gates()..];
-        let hidden = self.entering[steps].chunks_exact(wide);
+        let hidden = self.entering[steps * wide * count..].chunks_exact(wide);
         for ((error, hidden), truth) in self.errors.iter_mut().zip(hidden).zip(batch.truths) {
             let shown = &hidden[channels..channels + units];
             let weighted = readout.iter().zip(shown).map(|(v, h)| v * h);
@@ -170,15 +215,22 @@ impl Passage {
     }
 
     /// From the gradients of a step's hidden state and cells to those of its gates, and of the cells before it.
-    fn back_through_gates(&mut self, units: usize, channels: usize, step: usize, count: usize) {
-        let (rows, wide) = (4 * units, channels + units + 1);
-        let gates = self.gates[step].chunks_exact(rows);
-        let cells = self.cells[step].chunks_exact(units);
-        let cells = cells.zip(self.shown[step].chunks_exact(units));
+    fn back_through_gates(&mut self, size: Size, step: usize) {
+        let Size {
+            channels,
+            units,
+            rows,
+            wide,
+            count,
+        } = size;
+        let block = |rows: usize| step * rows * count..(step + 1) * rows * count;
+        let gates = self.gates[block(rows)].chunks_exact(rows);
+        let cells = self.cells[block(units)].chunks_exact(units);
+        let cells = cells.zip(self.shown[block(units)].chunks_exact(units));
         let of_cells = self.of_cells.chunks_exact_mut(units);
-        let of_gates = self.of_gates.chunks_exact_mut(rows);
+        let of_gates = self.of_gates[block(rows)].chunks_exact_mut(rows);
         let of_hidden = self.of_entering.chunks_exact(wide);
-        let gradients = of_cells.zip(of_gates).zip(of_hidden).take(count);
+        let gradients = of_cells.zip(of_gates).zip(of_hidden);
         for ((gates, (before, shown)), ((of_cells, of_gates), of_hidden)) in
             gates.zip(cells).zip(gradients)
         {

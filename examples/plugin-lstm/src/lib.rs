@@ -6,6 +6,7 @@
 //! | `sequence` | which regressors of a row make up the sequence, in which order |
 //! | `network` | what a network is, and what it makes of one sequence |
 //! | `gradient` | the error of a batch and its gradient, by back-propagation through time |
+//! | `activation` | how gates are opened |
 //! | `adam` | how weights follow the gradient |
 //! | `training` | what a graph may say of training |
 //! | `learning` | what is trained on, when training stops, which weights are kept |
@@ -14,6 +15,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod activation;
 mod adam;
 mod encoder;
 mod estimator;

@@ -3,6 +3,8 @@
 use athermal_core::prng::Prng;
 use serde::{Deserialize, Serialize};
 
+use crate::activation::{sigmoid, tanh};
+
 /// The most units of a network.
 pub(crate) const MOST_UNITS: usize = 64;
 
@@ -95,14 +97,17 @@ impl Network {
                 *gate += weight * input;
             }
         }
+        open(gates, units);
         for unit in 0..units {
-            let input = sigmoid(gates[unit]);
-            let forget = sigmoid(gates[units + unit]);
-            let new = gates[2 * units + unit].tanh();
-            let output = sigmoid(gates[3 * units + unit]);
-            let cell = forget * memory.cell[unit] + input * new;
-            memory.cell[unit] = cell;
-            memory.hidden[unit] = output * cell.tanh();
+            let [input, forget, new, output] = [0, 1, 2, 3].map(|gate| gates[gate * units + unit]);
+            memory.cell[unit] = forget * memory.cell[unit] + input * new;
+            memory.hidden[unit] = memory.cell[unit];
+            gates[unit] = output;
+        }
+        let hidden = &mut memory.hidden[..units];
+        tanh(hidden);
+        for (hidden, output) in hidden.iter_mut().zip(gates) {
+            *hidden *= *output;
         }
     }
 }
@@ -122,9 +127,11 @@ impl Memory {
     }
 }
 
-/// `σ(x) = 1 / (1 + e^(−x))`.
-pub(crate) fn sigmoid(x: f64) -> f64 {
-    1.0 / (1.0 + (-x).exp())
+/// Makes of `W z` the gates `i`, `f`, `g` and `o`.
+pub(crate) fn open(gates: &mut [f64], units: usize) {
+    sigmoid(&mut gates[..2 * units]);
+    tanh(&mut gates[2 * units..3 * units]);
+    sigmoid(&mut gates[3 * units..]);
 }
 
 #[cfg(test)]

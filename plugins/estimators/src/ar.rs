@@ -7,7 +7,9 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::lag_order::LagOrder;
 use crate::lags::lag_mistakes;
+use crate::order::Order;
 use crate::regression::LinearTrainer;
 use crate::solver::Solver;
 
@@ -26,6 +28,16 @@ pub struct Ar {
     /// How coefficients are found.
     #[serde(default)]
     pub solver: Solver,
+    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6" }`; without it all are.
+    #[serde(default)]
+    pub order: Option<Order>,
+}
+
+impl Ar {
+    fn lag_order(&self) -> Option<LagOrder> {
+        self.order
+            .map(|order| LagOrder::new(order, &self.lags, &[]))
+    }
 }
 
 impl Estimator for Ar {
@@ -49,6 +61,11 @@ impl Estimator for Ar {
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(lag_mistakes("lags", &self.lags));
+        mistakes.extend(
+            self.lag_order()
+                .iter()
+                .flat_map(|order| order.mistakes(false)),
+        );
         mistakes
     }
 
@@ -61,7 +78,7 @@ impl Estimator for Ar {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(LinearTrainer::new(setup, self.solver, None))
+        Box::new(LinearTrainer::new(setup, self.solver, None).with_order(self.lag_order()))
     }
 }
 

@@ -7,7 +7,9 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::lags::lag_mistakes;
+use crate::lag_order::LagOrder;
+use crate::lags::{lag_mistakes, now};
+use crate::order::Order;
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
 use crate::solver::Solver;
@@ -32,10 +34,16 @@ pub struct Arx {
     /// How features and lags are chosen; without it, all are used.
     #[serde(default)]
     pub selection: Option<Selection>,
+    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6", nb = "1..3" }`; without it all are.
+    #[serde(default)]
+    pub order: Option<Order>,
 }
 
-fn now() -> Vec<Duration> {
-    vec![Duration::ZERO]
+impl Arx {
+    fn lag_order(&self) -> Option<LagOrder> {
+        self.order
+            .map(|order| LagOrder::new(order, &self.lags, &self.feature_lags))
+    }
 }
 
 impl Estimator for Arx {
@@ -62,6 +70,12 @@ impl Estimator for Arx {
         mistakes.extend(self.selection.iter().flat_map(Selection::mistakes));
         mistakes.extend(lag_mistakes("lags", &self.lags));
         mistakes.extend(lag_mistakes("feature_lags", &self.feature_lags));
+        let selects = self.selection.is_some();
+        mistakes.extend(
+            self.lag_order()
+                .iter()
+                .flat_map(|order| order.mistakes(selects)),
+        );
         mistakes
     }
 
@@ -74,7 +88,8 @@ impl Estimator for Arx {
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(LinearTrainer::new(setup, self.solver, self.selection))
+        let trainer = LinearTrainer::new(setup, self.solver, self.selection);
+        Box::new(trainer.with_order(self.lag_order()))
     }
 }
 

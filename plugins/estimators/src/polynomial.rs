@@ -5,6 +5,7 @@ use athermal_core::node::{
     Estimator, InputPort, Mistake, Predictor, Regressor, Regressors, Trained, Trainer,
     TrainingError, TrainingReport, TrainingSetup,
 };
+use athermal_core::time::Duration;
 use athermal_numerics::Standardizer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -166,6 +167,8 @@ impl PolynomialTrainer {
             name: term.name(features),
             unit: String::new(),
             sensors: term.sensors(features),
+            lag: Duration::ZERO,
+            of_truth: false,
         });
         let setup = TrainingSetup {
             regressors: regressors.collect(),

@@ -11,6 +11,7 @@ use athermal_numerics::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::lag_order::LagOrder;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
 use crate::solver::Solver;
@@ -21,6 +22,7 @@ pub(crate) struct LinearTrainer {
     regressors: Vec<Regressor>,
     solver: Solver,
     selection: Option<Selection>,
+    order: Option<LagOrder>,
     blocks: GramBlocks,
     /// The range of the regressors, for an estimator that goes on learning.
     range: Option<TrainedRange>,
@@ -43,11 +45,17 @@ impl LinearTrainer {
             regressors: setup.regressors.clone(),
             solver,
             selection,
+            order: None,
             blocks,
             range: setup
                 .learns
                 .then(|| TrainedRange::new(setup.regressors.len())),
         }
+    }
+
+    /// The same with the number of lags left open.
+    pub(crate) fn with_order(self, order: Option<LagOrder>) -> Self {
+        Self { order, ..self }
     }
 
     /// The columns that are used, and the penalty with which they are.
@@ -60,9 +68,16 @@ impl LinearTrainer {
         let penalty = self.solver.penalty();
         let mut settled = penalty.settle(&self.blocks, &all, scales)?;
         let mut columns = all;
-        if let Some(selection) = &self.selection {
-            let alpha = settled.alpha;
-            columns = selection.run(&self.regressors, &self.blocks, scales, alpha, report)?;
+        let alpha = settled.alpha;
+        let chosen = match (&self.selection, &self.order) {
+            (Some(by), _) => Some(by.run(&self.regressors, &self.blocks, scales, alpha, report)?),
+            (None, Some(by)) => {
+                Some(by.run(&self.regressors, &self.blocks, scales, alpha, report)?)
+            }
+            (None, None) => None,
+        };
+        if let Some(chosen) = chosen {
+            columns = chosen;
             // What was best for all candidates need not be so for those chosen.
             settled = penalty.settle(&self.blocks, &columns, scales)?;
         }

@@ -206,6 +206,8 @@ mod tests {
             name: format!("voter{i}"),
             unit: "nm/min".to_owned(),
             sensors: Vec::new(),
+            lag: Duration::ZERO,
+            of_truth: false,
         };
         let setup = TrainingSetup {
             regressors: (0..rows[0].0.len()).map(regressor).collect(),

@@ -3,7 +3,8 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use athermal_estimators::{
-    Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Persistence, Polynomial, Rls, Stack, Zero,
+    Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Narx, Persistence, Polynomial, Rls, Stack,
+    StateSpace, Zero,
 };
 
 conformance!(
@@ -154,6 +155,27 @@ conformance!(
 );
 
 conformance!(
+    Narx,
+    Case::new(
+        r#"
+        ahead = "1min"
+        lags = ["0s", "30s"]
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        lags = ["30s"]
+        feature_lags = ["0s", "30s"]
+        degree = 3
+        tolerance = 0.0
+        most = 7
+        "#
+    )
+    .input("features", 1, "Cel"),
+);
+
+conformance!(
     Kalman,
     Case::new(r#"ahead = "1min""#).speaks_without_input(&["prediction", "deviation"]),
     Case::new(
@@ -170,6 +192,13 @@ conformance!(
         ahead = "30s"
         learn = false
         noises = { observation = "4 nm", level = "10 nm", per = "1h" }
+        "#
+    )
+    .input("features", 1, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        noises = { observation = "4 nm", level = "10 nm", per = "1h", returns = "10min" }
         "#
     )
     .input("features", 1, "K"),
@@ -197,6 +226,37 @@ conformance!(
         "#
     )
     .input("features", 3, "Cel"),
+);
+
+conformance!(
+    StateSpace,
+    Case::new(
+        r#"
+        ahead = "1min"
+        horizon = 3
+        "#
+    )
+    .speaks_without_input(&["prediction", "deviation"]),
+    Case::new(
+        r#"
+        ahead = "0s"
+        states = 2
+        horizon = 4
+        weighting = "n4sid"
+        "#
+    )
+    .input("features", 1, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        states = { by = "gap" }
+        horizon = 3
+        weighting = "moesp"
+        every = "1min"
+        learn = false
+        "#
+    )
+    .input("features", 2, "K"),
 );
 
 conformance!(

@@ -32,6 +32,10 @@ pub struct Product {
 }
 
 /// Each channel times a factor plus an offset: `y = factor · x + offset`.
+///
+/// Where `unit` measures the same as the input, `x` is first converted to it: a factor of 1 makes micrometres of nanometres. To
+/// and from temperature scales points are converted: 20 Cel are 68 \[degF\] and 293.15 K. A unit that measures something else is
+/// that of the result, and `x` a plain number in its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scale {
@@ -190,6 +194,22 @@ impl Scale {
     }
 }
 
+impl Scale {
+    /// The slope and offset of a channel's line, in the unit of the result.
+    fn line(&self, from: &Channel) -> (f64, f64) {
+        let unit = self.unit_of(from);
+        let shift = from.unit.convert(0.0, &unit);
+        let gain = from.unit.factor_to(&unit);
+        let (gain, shift) = gain.zip(shift).unwrap_or((1.0, 0.0));
+        let offset = self.offset.as_ref();
+        let offset = offset.and_then(|offset| offset.in_unit(&unit.difference()));
+        (
+            self.factor * gain,
+            self.factor * shift + offset.unwrap_or(0.0),
+        )
+    }
+}
+
 impl Feature for Scale {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is scaled")] }
@@ -228,31 +248,24 @@ impl Feature for Scale {
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
-        let offset = |channel: &Channel| {
-            let unit = self.unit_of(channel).difference();
-            self.offset
-                .as_ref()
-                .and_then(|offset| offset.in_unit(&unit))
-                .unwrap_or(0.0)
-        };
+        let lines = inputs.port("signal").iter();
         Box::new(Scaling {
-            factor: self.factor,
-            offsets: inputs.port("signal").iter().map(offset).collect(),
+            lines: lines.map(|channel| self.line(channel)).collect(),
         })
     }
 }
 
 struct Scaling {
-    factor: f64,
-    offsets: Vec<f64>,
+    /// The slope and offset of each channel's line.
+    lines: Vec<(f64, f64)>,
 }
 
 impl Operator for Scaling {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
-        let inputs = tick.port(0).iter().zip(tick.stamps(0)).zip(&self.offsets);
-        for (i, ((&value, &stamp), offset)) in inputs.enumerate() {
+        let inputs = tick.port(0).iter().zip(tick.stamps(0)).zip(&self.lines);
+        for (i, ((&value, &stamp), (gain, offset))) in inputs.enumerate() {
             if !value.is_nan() {
-                outputs.set_stamped(i, self.factor * value + offset, stamp);
+                outputs.set_stamped(i, gain * value + offset, stamp);
             }
         }
     }
@@ -263,3 +276,49 @@ impl Operator for Scaling {
 athermal_core::register!(Sum, Feature, "sum");
 athermal_core::register!(Product, Feature, "product");
 athermal_core::register!(Scale, Feature, "scale");
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn line(text: &str, from: &str) -> (f64, f64) {
+        let scale: Scale = serde_json::from_str(text).unwrap();
+        let channel = Channel {
+            name: "x".to_owned(),
+            unit: from.parse().unwrap(),
+            span: Default::default(),
+            ahead: Default::default(),
+            max_age: None,
+        };
+        scale.line(&channel)
+    }
+
+    fn near(found: (f64, f64), expected: (f64, f64)) {
+        let within = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs().max(1.0);
+        assert!(
+            within(found.0, expected.0) && within(found.1, expected.1),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_unit_of_the_same_kind_is_converted_to() {
+        near(line(r#"{ "unit": "um" }"#, "nm"), (1e-3, 0.0));
+        near(
+            line(r#"{ "unit": "um", "factor": 2, "offset": "5 nm" }"#, "nm"),
+            (2e-3, 5e-3),
+        );
+        near(line(r#"{ "unit": "[degF]" }"#, "Cel"), (1.8, 32.0));
+        near(line(r#"{ "unit": "K" }"#, "Cel"), (1.0, 273.15));
+    }
+
+    #[test]
+    fn a_unit_of_another_kind_is_that_of_the_result() {
+        near(line(r#"{ "unit": "um", "factor": 3 }"#, "V"), (3.0, 0.0));
+        near(
+            line(r#"{ "factor": 3, "offset": "1 mV" }"#, "V"),
+            (3.0, 1e-3),
+        );
+    }
+}

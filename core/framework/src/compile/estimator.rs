@@ -1,5 +1,7 @@
 //! Decides what an estimator's rows are made of, and that none of it sees the future.
 
+use std::collections::BTreeSet;
+
 use super::instance::{Instance, Limits};
 use super::leak::Suspect;
 use super::learning;
@@ -9,7 +11,7 @@ use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
 use super::resolver::Resolver;
 use crate::channel::Channel;
 use crate::diagnostic::Place;
-use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
+use crate::node::{Estimator, FREEZE, OutputPort, Regressor, Role, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -213,6 +215,13 @@ impl Resolver<'_> {
             return None;
         }
         let span = channel.span;
+        if let Some(node) = self.endless(truth) {
+            let channel = self.channels[truth].name.clone();
+            let problem = CompileProblem::EndlessTruth { channel, node };
+            self.diagnostics
+                .report(instance.input_place("truth"), problem);
+            return None;
+        }
         let limit = if span > Duration::ZERO {
             Some(span)
         } else {
@@ -224,6 +233,31 @@ impl Resolver<'_> {
             span,
             limit: limit?,
         })
+    }
+
+    /// A node behind a slot whose values depend on all of the past.
+    fn endless(&self, slot: usize) -> Option<String> {
+        let mut ahead = vec![slot];
+        let mut seen = BTreeSet::new();
+        while let Some(slot) = ahead.pop() {
+            let Some(node) = self.channels[slot].node.filter(|&node| seen.insert(node)) else {
+                continue;
+            };
+            let node = &self.nodes[node];
+            let (PlannedRole::Feature { gathers, .. }, Role::Feature(feature)) =
+                (&node.role, node.spec.role())
+            else {
+                continue;
+            };
+            if feature.is_endless() {
+                return Some(node.name.clone());
+            }
+            let entries = gathers
+                .iter()
+                .flat_map(|&gather| &self.gathers[gather].entries);
+            ahead.extend(entries.map(|entry| entry.slot));
+        }
+        None
     }
 
     pub(super) fn regressor(&self, slot: usize, lag: Duration, of_truth: bool) -> Regressor {
@@ -239,6 +273,8 @@ impl Resolver<'_> {
             name,
             unit: from.channel.unit.to_string(),
             sensors: Vec::new(),
+            lag,
+            of_truth,
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::channel::Channel;
 use crate::document::TimeBase;
-use crate::node::{Inputs, Kind, NodeSpec, Read, Regressor, Role};
+use crate::node::{Inputs, Kind, NodeSpec, Predictor, Read, Regressor, Role};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -277,6 +277,17 @@ pub(crate) struct Rows<'a> {
 }
 
 impl PlannedNode {
+    /// What an estimator that needs no fit predicts by.
+    pub(crate) fn fixed(&self) -> Option<Box<dyn Predictor>> {
+        let (PlannedRole::Estimator { regressors, .. }, Role::Estimator(estimator)) =
+            (&self.role, self.spec.role())
+        else {
+            return None;
+        };
+        let names = regressors.iter().map(|regressor| regressor.name.clone());
+        estimator.fixed(&names.collect::<Vec<_>>())
+    }
+
     /// The rows that the node is fitted on; none where it needs no fit.
     pub(crate) fn rows(&self) -> Option<Rows<'_>> {
         match (&self.role, self.spec.role()) {
@@ -304,12 +315,10 @@ impl PlannedNode {
                     training,
                     ..
                 },
-                Role::Estimator(estimator),
+                Role::Estimator(_),
             ) => {
-                let names = regressors.iter().map(|regressor| regressor.name.clone());
-                let fixed = estimator.fixed(&names.collect::<Vec<_>>()).is_some();
                 let first = gathers.len().min(1);
-                (!fixed).then_some(Rows {
+                self.fixed().is_none().then_some(Rows {
                     regressors,
                     gathers,
                     triggers: if *every_tick { &[] } else { &gathers[..first] },

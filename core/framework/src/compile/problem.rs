@@ -114,6 +114,8 @@ pub enum CompileProblem {
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
     PredictedTruth { channel: String },
+    /// A truth made of values that depend on all of the past.
+    EndlessTruth { channel: String, node: String },
     /// A limit of a unit that is not the truth's.
     LimitUnit { found: Unit, expected: Unit },
     /// Two channels or columns of the same name.
@@ -193,6 +195,7 @@ impl Problem for CompileProblem {
             Self::NoRows { .. } => "A064",
             Self::Doubt { .. } => "A065",
             Self::NeverLearns { .. } => "A110",
+            Self::EndlessTruth { .. } => "A160",
         }
     }
 
@@ -278,6 +281,9 @@ impl Problem for CompileProblem {
             Self::PredictedTruth { channel } => {
                 format!("`{channel}` is a prediction and cannot be the truth")
             }
+            Self::EndlessTruth { channel, node } => {
+                format!("`{channel}` cannot be the truth, since `{node}` remembers all of the past")
+            }
             Self::LimitUnit { found, expected } => {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
@@ -329,6 +335,7 @@ impl Problem for CompileProblem {
             Self::NoHorizon { .. } => "`ahead` is missing",
             Self::NeverLearns { .. } => "stays as it was fitted",
             Self::PredictedTruth { .. } => "not measured",
+            Self::EndlessTruth { .. } => "of no span",
             Self::LimitUnit { .. } => "another unit",
             Self::DuplicateName { .. } => "the name is taken",
             Self::UnusedNode { .. } | Self::UnusedSignal { .. } => "not used",
@@ -402,6 +409,9 @@ impl Problem for CompileProblem {
             Self::PredictedTruth { .. } => {
                 "refer to something measured, such as the slope of a position".to_owned()
             }
+            Self::EndlessTruth { node, .. } => format!(
+                "say how much of the past counts, such as `span = \"10min\"` on `{node}`, or use a window, such as `slope`"
+            ),
             Self::LimitUnit { expected, .. } => format!("write the limit in {expected}"),
             Self::DuplicateName { .. } => {
                 "give one of them another name, or refer to fewer channels".to_owned()

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::EngineError;
+use super::feedback::Feedback;
 use super::gather::Gathered;
 use super::learning::Learning;
 use super::state::NodeState;
-use crate::compile::{PlannedNode, PlannedRole};
+use super::{EngineError, Mode};
+use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
 use crate::node::{FeatureFit, Predictor, Regressor, Restored};
 use crate::time::Instant;
 
@@ -56,6 +57,8 @@ pub(crate) struct Estimate {
     takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
     pub(super) learning: Option<Learning>,
+    /// What is read in place of measured past truths, in an evaluation that says so.
+    feedback: Option<Box<Feedback>>,
 }
 
 impl Estimate {
@@ -102,7 +105,24 @@ impl Estimate {
             predictor,
             places,
             learning,
+            feedback: None,
         })
+    }
+
+    /// Predicts from past truths as a mode allows.
+    pub(crate) fn predict_in(&mut self, mode: Mode, link: &TruthLink, gathers: &[Gather]) {
+        self.feedback = match mode {
+            Mode::OneStep => None,
+            mode => Feedback::new(mode, link, &self.places, gathers).map(Box::new),
+        };
+        if let Some(learning) = &mut self.learning {
+            learning.predict_in(mode);
+        }
+    }
+
+    /// What is read in place of measured past truths.
+    pub(crate) fn feedback(&mut self) -> Option<&mut Feedback> {
+        self.feedback.as_deref_mut()
     }
 
     /// The prediction and its stamp, the oldest among the values used; none where one of them is missing that is needed.
@@ -119,17 +139,22 @@ impl Estimate {
         } else {
             Instant::MAX
         };
-        let mut whole = true;
         for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
             let from = &gathered[gather];
             *value = from.values[place];
             if !value.is_nan() {
                 oldest = oldest.min(from.stamps[place]);
-            } else if !self.takes_absent {
-                whole = false;
-                break;
             }
         }
+        if let Some(feedback) = &mut self.feedback {
+            let (learning, predictor) = (&self.learning, &self.predictor);
+            feedback.replace(&mut self.row, now, |row, at| match learning {
+                Some(learning) => learning.predict(row, at),
+                None => predictor.predict(row),
+            });
+            oldest = oldest.min(now);
+        }
+        let mut whole = self.takes_absent || self.row.iter().all(|value| !value.is_nan());
         // Where none of several regressors is there, none had a stamp.
         whole &= oldest < Instant::MAX;
         if let Some(learning) = &mut self.learning {
@@ -139,13 +164,14 @@ impl Estimate {
             }
             learning.run(&self.row, now, gathered, on);
         }
-        if !whole {
-            return None;
-        }
         let prediction = match &self.learning {
+            _ if !whole => f64::NAN,
             Some(learning) => learning.predict(&self.row, now),
             None => self.predictor.predict(&self.row),
         };
+        if let Some(feedback) = &mut self.feedback {
+            feedback.ran(&self.row, prediction, now);
+        }
         prediction.is_finite().then_some((prediction, oldest))
     }
 

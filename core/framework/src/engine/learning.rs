@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::Mode;
 use super::gather::Gathered;
+use super::mode::Step;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
@@ -18,6 +20,8 @@ pub(crate) struct Learning {
     withheld: Withheld,
     gate: Gate,
     freeze: Option<usize>,
+    mode: Mode,
+    step: Step,
 }
 
 /// What became of a truth that the embargo let through, as the port `learning` tells it.
@@ -60,7 +64,20 @@ impl Learning {
                 training,
                 recent: RecentError::default(),
             },
+            mode: Mode::OneStep,
+            step: Step::new(truth.ahead.max(truth.span)),
         })
+    }
+
+    /// Learns as late as a mode says.
+    pub(crate) fn predict_in(&mut self, mode: Mode) {
+        self.mode = mode;
+    }
+
+    /// The newest arrival that a prediction made at `now` may know of; none where it may know of no truth.
+    fn newest(&self, now: Instant) -> Option<Instant> {
+        let earlier = self.mode.earlier(self.step.length())?;
+        Some(self.withheld.newest(now) - earlier)
     }
 
     pub(crate) fn predict(&self, row: &[f64], now: Instant) -> f64 {
@@ -81,11 +98,15 @@ impl Learning {
     pub(crate) fn run(&mut self, row: &[f64], now: Instant, gathered: &[Gathered], on: bool) {
         let frozen = [self.frozen(gathered, on)];
         self.withheld.run(now, [row, &frozen]);
+        let (of, newest) = (now + self.withheld.link().ahead, self.withheld.newest(now));
+        self.learner
+            .run(row, of, self.newest(now).unwrap_or(newest));
     }
 
     /// Takes a truth that has just been measured.
     pub(crate) fn observe(&mut self, truth: f64, now: Instant, gathered: &[Gathered], on: bool) {
         let frozen = self.frozen(gathered, on);
+        self.step.truth(now);
         if let Some(of_row) = self.withheld.observe(truth, now)
             && frozen > *of_row
         {
@@ -101,7 +122,7 @@ impl Learning {
         on: bool,
     ) -> Option<(Became, Instant)> {
         let frozen = self.frozen(gathered, on);
-        let newest = self.withheld.newest(now);
+        let newest = self.newest(now)?;
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
         let mut news = None;
         self.withheld.release(newest, |released| {
@@ -114,9 +135,13 @@ impl Learning {
     pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
         let frozen = self.frozen(gathered, on);
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
+        let tell = self.mode != Mode::FreeRun;
         self.withheld.end_segment(last, |released| {
-            gate.offer(learner, released, frozen);
+            if tell {
+                gate.offer(learner, released, frozen);
+            }
         });
+        self.step.segment();
     }
 
     /// Moves what is remembered to the clock of the segment that begins.
@@ -152,7 +177,7 @@ impl Learning {
             .freeze
             .iter()
             .flat_map(|&freeze| &gathered[freeze].values);
-        let became = if !on {
+        let became = if !on && !self.learner.follows() {
             Became::FrozenOnCommand
         } else if channels.any(|&value| value != 0.0) {
             // NaN too: where nobody says that learning may go on, it does not.

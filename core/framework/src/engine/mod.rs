@@ -5,14 +5,17 @@ mod blend;
 mod carry;
 mod error;
 mod estimate;
+mod feedback;
 mod gather;
 mod history;
 #[cfg(feature = "testkit")]
 mod idle;
 mod keep;
 mod learning;
+mod mode;
 mod pairing;
 mod revision;
+mod running;
 mod slots;
 mod state;
 mod vote;
@@ -23,6 +26,7 @@ use std::sync::{Arc, OnceLock};
 
 pub use carry::{Carry, NodeCarry};
 pub use error::EngineError;
+pub use mode::Mode;
 pub use pairing::{Paired, Pairing};
 pub use revision::{fnv_1a, revision};
 pub use state::{EngineState, RestoreError};
@@ -33,11 +37,11 @@ pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
 use crate::compile::{Plan, PlannedRole, Step};
-use crate::node::{Inputs, Operator, Outputs, Predictor, Role, Tick};
+use crate::node::{Outputs, Predictor, Tick};
 use crate::time::{Duration, Instant};
 use blend::Blending;
 use estimate::Estimate;
-use vote::Vote;
+use running::{Running, running};
 
 /// What was fitted of a graph, estimators and features, by instance: `thermal.Z1`.
 pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
@@ -64,36 +68,13 @@ pub struct Engine {
     before_break: Option<Instant>,
     rejected: Vec<u64>,
     refused: u64,
+    /// Estimators whose predictions are fed back, and the slots of their truths.
+    fed_back: Vec<(usize, usize)>,
     /// Whether learning has been frozen on command.
     frozen: bool,
     outputs: Vec<f64>,
     /// For each output its rate of passing over, in its unit per second, and how far it has.
     blending: Vec<(Option<f64>, Blending)>,
-}
-
-enum Running {
-    Operator {
-        operator: Box<dyn Operator>,
-        gathers: Vec<usize>,
-        every_tick: bool,
-        closes_loops: bool,
-    },
-    Estimate {
-        estimate: Option<Estimate>,
-        trigger: Option<usize>,
-    },
-    Vote(Vote),
-}
-
-impl Running {
-    /// The slot of the truth that it is told.
-    fn truth(&self) -> Option<usize> {
-        match self {
-            Self::Operator { .. } => None,
-            Self::Estimate { estimate, .. } => Some(estimate.as_ref()?.learning.as_ref()?.truth()),
-            Self::Vote(vote) => vote.truth(),
-        }
-    }
 }
 
 impl Engine {
@@ -102,89 +83,7 @@ impl Engine {
     /// # Errors
     /// When something fitted does not belong to the plan.
     pub fn new(plan: Arc<Plan>, fitted: &Fitted) -> Result<Self, EngineError> {
-        let widths: Vec<_> = plan
-            .gathers
-            .iter()
-            .map(|gather| gather.entries.len())
-            .collect();
-        let mut nodes = Vec::with_capacity(plan.nodes.len());
-        let mut used = 0;
-        for node in &plan.nodes {
-            nodes.push(match (&node.role, node.spec.role()) {
-                (
-                    PlannedRole::Feature {
-                        inputs,
-                        gathers,
-                        wanted,
-                        every_tick,
-                        closes_loops,
-                        fit,
-                    },
-                    Role::Feature(spec),
-                ) => {
-                    let given = fitted.get(&node.instance());
-                    let operator = match (fit, given) {
-                        (Some(fit), Some(given)) => {
-                            used += 1;
-                            let fit = estimate::fit_of(node, &fit.regressors, given)?;
-                            let inputs = Inputs {
-                                fit: Some(fit),
-                                ..inputs.clone()
-                            };
-                            spec.build(&inputs, wanted)
-                        }
-                        _ => spec.build(inputs, wanted),
-                    };
-                    Running::Operator {
-                        operator,
-                        gathers: gathers.clone(),
-                        every_tick: *every_tick,
-                        closes_loops: *closes_loops,
-                    }
-                }
-                (
-                    PlannedRole::Estimator {
-                        regressors,
-                        gathers,
-                        every_tick,
-                        ..
-                    },
-                    Role::Estimator(spec),
-                ) => {
-                    let given = fitted.get(&node.instance());
-                    used += usize::from(given.is_some());
-                    let names: Vec<_> = regressors
-                        .iter()
-                        .map(|regressor| regressor.name.clone())
-                        .collect();
-                    let predictor = given.cloned().or_else(|| spec.fixed(&names).map(Arc::from));
-                    Running::Estimate {
-                        estimate: predictor
-                            .map(|p| Estimate::new(node, p, &widths))
-                            .transpose()?,
-                        trigger: if *every_tick {
-                            None
-                        } else {
-                            gathers.first().copied()
-                        },
-                    }
-                }
-                (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
-                    Running::Vote(Vote::new(spec, widths[*voters], *truth))
-                }
-                _ => unreachable!("a plan gives each node the role of its specification"),
-            });
-        }
-        if used < fitted.len() {
-            let known = |name: &&String| {
-                let is = |node: &crate::compile::PlannedNode| {
-                    node.role.learns_from().is_some() && node.instance() == **name
-                };
-                !plan.nodes.iter().any(is)
-            };
-            let node = fitted.keys().find(known).cloned().unwrap_or_default();
-            return Err(EngineError::NotAnEstimator { node });
-        }
+        let nodes = running(&plan, fitted)?;
         let with_history = |&slot: &usize| plan.channels[slot].history.is_some();
         Ok(Self {
             recorded: (0..plan.channels.len()).filter(with_history).collect(),
@@ -205,6 +104,7 @@ impl Engine {
             before_break: None,
             rejected: vec![0; plan.sources.len()],
             refused: 0,
+            fed_back: Vec::new(),
             frozen: false,
             outputs: vec![f64::NAN; plan.outputs.len()],
             blending: plan
@@ -294,6 +194,29 @@ impl Engine {
         self.frozen = frozen;
     }
 
+    /// Lets estimators predict from such past truths as a mode allows; for evaluations, before the first tick.
+    ///
+    /// Predictions that are fed back are kept in memory that grows as it must.
+    pub fn predict_in(&mut self, mode: Mode) {
+        let Self {
+            plan,
+            nodes,
+            fed_back,
+            ..
+        } = self;
+        fed_back.clear();
+        for (index, (node, running)) in plan.nodes.iter().zip(nodes).enumerate() {
+            if let (Running::Estimate { estimate, .. }, Some(link)) = (running, node.role.truth())
+                && let Some(estimate) = estimate
+            {
+                estimate.predict_in(mode, link, &plan.gathers);
+                if estimate.feedback().is_some() {
+                    fed_back.push((index, link.slot));
+                }
+            }
+        }
+    }
+
     /// Whether learning has been frozen on command.
     #[must_use]
     pub fn frozen(&self) -> bool {
@@ -324,6 +247,9 @@ impl Engine {
                 Running::Estimate { estimate, .. } => {
                     if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
                         learning.segment(self.last, &self.gathered, !self.frozen);
+                    }
+                    if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
+                        feedback.segment();
                     }
                 }
                 Running::Vote(vote) => vote.segment(self.last),
@@ -469,6 +395,9 @@ impl Engine {
                 if trigger.is_some_and(|gather| !self.gathered[gather].fresh) {
                     return;
                 }
+                if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
+                    feedback.before_run(&self.slots, now);
+                }
                 let prediction = estimate
                     .as_mut()
                     .and_then(|estimate| estimate.run(&self.gathered, now, on));
@@ -553,6 +482,14 @@ impl Engine {
                 && self.slots.ran(slot)
             {
                 history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
+            }
+        }
+        for &(node, slot) in &self.fed_back {
+            if let Running::Estimate { estimate, .. } = &mut self.nodes[node]
+                && let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback)
+                && self.slots.ran(slot)
+            {
+                feedback.observe(self.slots.values[slot], self.slots.stamps[slot], now);
             }
         }
         for &(node, slot) in &self.told {

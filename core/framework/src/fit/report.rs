@@ -54,7 +54,7 @@ pub struct FitReport {
     pub refused: u64,
     /// Samples rejected as infinite or out of range, by measured channel.
     pub rejected: Vec<(String, u64)>,
-    /// How the fit of each estimator went, in the order of the plan.
+    /// How the fit of each estimator, and of each feature that is fitted, went; in the order of the plan.
     pub estimators: Vec<EstimatorFit>,
 }
 

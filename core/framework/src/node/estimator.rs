@@ -153,6 +153,12 @@ pub struct Regressor {
     /// The measured channels that it is made from, in the order of the plan: `temperature.room`.
     #[serde(default)]
     pub sensors: Vec<String>,
+    /// How far back it is read.
+    #[serde(default)]
+    pub lag: Duration,
+    /// Whether it is a past value of the truth, read as such.
+    #[serde(default)]
+    pub of_truth: bool,
 }
 
 /// What a trainer knows before the first row.
@@ -237,6 +243,9 @@ pub struct TrainingReport {
     /// The step at which selection stopped, since it was not worth it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refused: Option<SelectionStep>,
+    /// The orders that were compared, where they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orders: Option<Box<OrderTable>>,
     /// Condition number of the standardised design.
     #[serde(
         default,
@@ -254,6 +263,40 @@ pub struct TrainingReport {
     /// What the user should know, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+}
+
+/// Orders of a model, compared on the same rows.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct OrderTable {
+    /// The figure that chose: `AICc`.
+    pub by: String,
+    /// The rows on which each was fitted.
+    pub rows: usize,
+    /// Which one was chosen.
+    pub chosen: usize,
+    /// All of them.
+    pub tried: Vec<TriedOrder>,
+}
+
+/// An order of a model, and what it is worth: small is good.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TriedOrder {
+    /// Its letters: `na 2, nb 1`.
+    pub order: String,
+    /// How many coefficients it has.
+    pub coefficients: usize,
+    /// Akaike's information criterion.
+    #[serde(with = "crate::model::number")]
+    pub aic: f64,
+    /// The same, corrected for few rows.
+    #[serde(with = "crate::model::number")]
+    pub aicc: f64,
+    /// The Bayesian information criterion.
+    #[serde(with = "crate::model::number")]
+    pub bic: f64,
+    /// The final prediction error, in the square of the truth's unit.
+    #[serde(with = "crate::model::number")]
+    pub fpe: f64,
 }
 
 /// A regressor, or a sensor with all its regressors, chosen or taken out again by selection.

@@ -109,6 +109,11 @@ pub trait Feature: Debug + Send + Sync {
         Reach::All
     }
 
+    /// Whether a value depends on all of the past, however little, so that it has no span: nothing made of it can be a truth.
+    fn is_endless(&self) -> bool {
+        false
+    }
+
     /// How far back the inputs reach that the outputs depend on; the engine keeps so much of the past for warming up.
     fn memory(&self) -> Duration {
         Duration::ZERO

@@ -96,6 +96,17 @@ pub trait Learner: Debug + Send {
         f64::NAN
     }
 
+    /// Takes the regressors of a run, NaN where one is absent, which predicts the truth that will be measured at `of`; every
+    /// truth that arrived up to `told` has been handed over, if it was to be. For learners whose state goes on without a
+    /// truth; `of` never goes back, and nothing is allocated here once the number of runs within the horizon is known.
+    fn run(&mut self, _regressors: &[f64], _of: Instant, _told: Instant) {}
+
+    /// Whether truths only move a state, and nothing of the model: they are then handed over while learning is frozen on
+    /// command too.
+    fn follows(&self) -> bool {
+        false
+    }
+
     /// A truth, measured at `at`, and the regressors of the run that it belongs to. Instants never go back.
     ///
     /// Nothing is allocated here.

@@ -6,7 +6,8 @@
 //!
 //! A [`Feature`] with its [`Operator`] is the general form: any ports in, any ports out, a state of its own, at every tick if it
 //! asks for it. Monitors, filters, safe states and compensations are features. [`Estimator`] and [`Combiner`] are narrower on
-//! purpose: they never see a truth before its time, because it is not theirs to read.
+//! purpose: they never see a truth before its time, because it is not theirs to read. A feature that learns from a truth before
+//! it runs has an [`Encoder`], and stays as it was fitted.
 
 mod combiner;
 mod encoder;
@@ -22,8 +23,8 @@ pub use combiner::{Combine, Combiner, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, Predictor, Regressor, Regressors, SelectionStep, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup, TruthLags,
+    CandidateScore, Estimator, OrderTable, Predictor, Regressor, Regressors, SelectionStep,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use learner::{Learner, Learns, TrainedRange};

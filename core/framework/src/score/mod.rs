@@ -7,6 +7,7 @@ mod watch;
 
 use std::sync::Arc;
 
+pub use crate::engine::Mode;
 pub use interval::IntervalScore;
 pub use table::{RESTRICTS, Score, Scores};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
@@ -27,6 +28,8 @@ pub struct ScoreOptions {
     pub each_on_its_own: bool,
     /// Nothing is learned on the way.
     pub frozen: bool,
+    /// From which past truths predictions are made.
+    pub mode: Mode,
 }
 
 /// Steps a plan over a recording, cold, and scores every prediction in it.
@@ -46,6 +49,7 @@ pub fn score(
 ) -> Result<Scores, FitError> {
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
     engine.freeze(options.frozen);
+    engine.predict_in(options.mode);
     let mut watch = Watch::new(plan);
     let mut stepped = 0;
     let passed = drive(&mut engine, recording, |engine, event| {

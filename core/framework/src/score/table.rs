@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::watch::{Truth, Watch};
-use super::{IntervalScore, ScoreOptions};
+use super::{IntervalScore, Mode, ScoreOptions};
 use crate::compile::Plan;
 use crate::engine::Engine;
 use crate::time::Instant;
@@ -52,6 +52,8 @@ pub struct Score {
     pub r2_zero: Option<f64>,
     /// 1 − SSE / Σ (y − ȳ)².
     pub r2_mean: Option<f64>,
+    /// How much of the truth's spread is told, in percent: 100 (1 − √(SSE / Σ (y − ȳ)²)) (Ljung 1999, section 16.4).
+    pub fit: Option<f64>,
     /// Mean error.
     pub bias: Option<f64>,
     /// Largest absolute error.
@@ -60,7 +62,8 @@ pub struct Score {
     pub valid: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of predicting zero.
     pub baseline_zero: Option<f64>,
-    /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, on the same instants.
+    /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, on the same instants; none
+    /// where predictions may not read as new a truth.
     pub baseline_persistence: Option<f64>,
     /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines.
     pub truth_noise: Option<f64>,
@@ -169,6 +172,9 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                 rmse: root_mean_square(errors()),
                 r2_zero: share(about_zero),
                 r2_mean: about_mean.and_then(share),
+                fit: about_mean
+                    .filter(|&of| of > 0.0)
+                    .map(|of| 100.0 * (1.0 - (squared / of).sqrt())),
                 bias: self::mean(errors()),
                 max_abs: errors().map(f64::abs).reduce(f64::max),
                 valid: (!counted.is_empty()).then_some(valid[nth]),
@@ -178,7 +184,8 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                         .iter()
                         .map(|&i| persistence[i] - truth.values[i])
                         .filter(|e| !e.is_nan()),
-                ),
+                )
+                .filter(|_| options.mode == Mode::OneStep),
                 truth_noise: root_mean_square(
                     instants
                         .iter()

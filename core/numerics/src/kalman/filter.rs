@@ -147,6 +147,13 @@ impl Kalman {
             self.covariance[1] += gained.both;
             self.covariance[order] += gained.both;
             self.covariance[order + 1] += gained.trend;
+        } else if self.model.returning > 0.0 {
+            let kept = self.model.kept(time);
+            self.state[0] *= kept;
+            shrink(&mut self.covariance, order, kept);
+            if self.unknown > 0 {
+                shrink(&mut self.diffuse, order, kept);
+            }
         }
         self.covariance[0] += gained.level;
     }
@@ -158,6 +165,16 @@ impl Kalman {
     /// When `x` has not one value per coefficient.
     #[inline]
     pub fn observe(&mut self, x: &[f64], y: f64) -> Option<Innovation> {
+        self.observe_share(x, y, 1.0)
+    }
+
+    /// The same for an observation that says only a share, above 0 up to 1, of what another would, since it says the rest
+    /// together with others: its variance is divided by that.
+    ///
+    /// # Panics
+    /// When `x` has not one value per coefficient.
+    #[inline]
+    pub fn observe_share(&mut self, x: &[f64], y: f64, share: f64) -> Option<Innovation> {
         let order = self.state.len();
         assert_eq!(
             self.model.moving() + x.len(),
@@ -169,13 +186,13 @@ impl Kalman {
             return None;
         }
         if self.unknown > 0
-            && let Some(innovation) = self.learn_of_the_unknown(x, error)
+            && let Some(innovation) = self.learn_of_the_unknown(x, error, share)
         {
             return Some(innovation);
         }
         let (shared, _) = self.room.split_at_mut(order);
         let explained = product(&self.covariance, &self.model, x, shared);
-        let variance = explained + self.model.observation;
+        let variance = explained + self.model.observation / share;
         if !(variance > 0.0 && variance.is_finite()) {
             return None;
         }
@@ -219,7 +236,7 @@ impl Kalman {
         let order = self.state.len();
         let weight = |i: usize| match i.checked_sub(self.model.moving()) {
             Some(regressor) => x(regressor),
-            None if i == 0 => 1.0,
+            None if i == 0 => self.model.kept(time),
             None => time,
         };
         let spread = |matrix: &[f64]| -> f64 {
@@ -314,7 +331,7 @@ impl Kalman {
     #[inline]
     pub fn expected(&self, time: f64, x: impl Fn(usize) -> f64) -> f64 {
         let moving = self.model.moving();
-        let mut mean = self.state[0];
+        let mut mean = self.state[0] * self.model.kept(time);
         if moving > 1 {
             mean += time * self.state[1];
         }
@@ -323,7 +340,7 @@ impl Kalman {
     }
 
     /// Takes an observation of something that nothing is known of; none where all that it tells of is known.
-    fn learn_of_the_unknown(&mut self, x: &[f64], error: f64) -> Option<Innovation> {
+    fn learn_of_the_unknown(&mut self, x: &[f64], error: f64, share: f64) -> Option<Innovation> {
         let order = self.state.len();
         let (of_diffuse, shared) = self.room.split_at_mut(order);
         let variance = product(&self.diffuse, &self.model, x, of_diffuse);
@@ -331,7 +348,8 @@ impl Kalman {
         if variance.is_nan() || variance <= NOTHING_NEW * most {
             return None;
         }
-        let finite = product(&self.covariance, &self.model, x, shared) + self.model.observation;
+        let own = self.model.observation / share;
+        let finite = product(&self.covariance, &self.model, x, shared) + own;
         for (state, gain) in self.state.iter_mut().zip(&*of_diffuse) {
             *state += gain / variance * error;
         }
@@ -370,6 +388,15 @@ fn carry(matrix: &mut [f64], order: usize, time: f64) {
     }
     for i in 0..order {
         matrix[i * order] += time * matrix[i * order + 1];
+    }
+}
+
+/// Multiplies the row and column of the level by what is kept of it.
+#[inline]
+fn shrink(matrix: &mut [f64], order: usize, kept: f64) {
+    for j in 0..order {
+        matrix[j] *= kept;
+        matrix[j * order] *= kept;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::filter::diagonal;
 use super::simplex::minimum;
-use super::{Kalman, Passage, Structural};
+use super::{Kalman, Movement, Passage, Structural};
 use crate::NumericsError;
 use crate::checks::check_parameter;
 
@@ -11,6 +11,9 @@ const TRIED: [f64; 7] = [-14.0, -9.0, -6.0, -3.5, -1.5, 1.0, 5.0];
 const BOUNDS: (f64, f64) = (-25.0, 25.0);
 /// A variance that adds less than this to the logarithm of the likelihood is none.
 const WORTH: f64 = 1e-6;
+
+/// After so many rounds variances and coefficients agree well enough.
+const MOST_ROUNDS: usize = 5;
 
 /// Observations in order.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +28,9 @@ pub struct Series<'a> {
     /// the model's variances over a typical step. Infinite where nothing is. For a level that stays, `1 / α` is what ridge
     /// with a penalty of `α` says.
     pub prior: f64,
+    /// The time within which observations share their noise, 0 where none do: one that comes sooner after the one before
+    /// counts for its share of that time.
+    pub shared: f64,
 }
 
 /// A series as a model follows it.
@@ -62,6 +68,8 @@ impl Series<'_> {
             }
         }
         check_parameter("prior", self.prior, self.prior > 0.0, "positive")?;
+        let fine = self.shared >= 0.0 && self.shared.is_finite();
+        check_parameter("shared", self.shared, fine, "finite and not negative")?;
         let infinite = |values: &[f64]| values.iter().any(|value| value.is_infinite());
         let negative = self.times.iter().any(|time| *time < 0.0);
         let unknown = self.regressors.iter().any(|x| x.is_nan());
@@ -79,6 +87,34 @@ impl Series<'_> {
             .filter(|time| !time.is_nan())
             .fold((0.0, 0.0), |(sum, count), time| (sum + time, count + 1.0));
         if sum > 0.0 { sum / count } else { 1.0 }
+    }
+
+    /// For how much of one an observation counts, this time after the one before.
+    fn share(&self, since: f64) -> f64 {
+        if since > 0.0 && since < self.shared {
+            since / self.shared
+        } else {
+            1.0
+        }
+    }
+
+    /// The times and observations, less what these coefficients explain of them, that share no noise.
+    fn apart(&self, coefficients: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let width = self.width();
+        let (mut times, mut left) = (Vec::new(), Vec::new());
+        let mut since = f64::NAN;
+        for (nth, (&time, &y)) in self.times.iter().zip(self.observations).enumerate() {
+            since = if time.is_nan() { time } else { since + time };
+            if y.is_nan() || since < self.shared {
+                continue;
+            }
+            let x = &self.regressors[nth * width..(nth + 1) * width];
+            let explained = x.iter().zip(coefficients).map(|(x, b)| x * b);
+            times.push(since);
+            left.push(y - explained.sum::<f64>());
+            since = 0.0;
+        }
+        (times, left)
     }
 }
 
@@ -102,7 +138,8 @@ impl Passed {
         let moving = model.moving();
         let typical = series.typical();
         let of_trend = model.trend.unwrap_or(0.0) * typical.powi(3);
-        let total = model.observation + model.level * typical + of_trend;
+        let of_one = model.observation / series.share(typical);
+        let total = of_one + model.level * typical + of_trend;
         let mut variances = vec![f64::INFINITY; moving];
         variances.resize(moving + series.width(), series.prior * total);
         let start = vec![0.0; variances.len()];
@@ -118,14 +155,23 @@ impl Passed {
         };
         let width = series.width();
         let rows = series.times.iter().zip(series.observations).enumerate();
+        let mut since = 0.0;
         for (nth, (&time, &y)) in rows {
             if !time.is_nan() {
                 passed.filter.advance(time);
-            } else if nth > 0 {
-                passed.filter.forget_level();
+                since += time;
+            } else {
+                since = 0.0;
+                if nth > 0 {
+                    passed.filter.forget_level();
+                }
             }
             let x = &series.regressors[nth * width..(nth + 1) * width];
-            match passed.filter.observe(x, y) {
+            let brought = passed.filter.observe_share(x, y, series.share(since));
+            if brought.is_some() {
+                since = 0.0;
+            }
+            match brought {
                 None => {}
                 Some(known) if known.diffuse => {
                     passed.unknown += 1.0;
@@ -201,34 +247,50 @@ pub fn follow(model: Structural, series: &Series<'_>) -> Result<Followed, Numeri
     Ok(passed.followed(1.0))
 }
 
-/// Finds the variances that make a series most likely, of a local level or, with `trend`, a local linear trend.
+/// Finds the variances that make a series most likely, and the rate at which a level that returns does.
 ///
 /// The scale of all variances is found in closed form; their ratios are looked for on a coarse grid of logarithms, and
-/// from the best place there by a simplex. A variance that adds nothing is exactly 0.
+/// from the best place there by a simplex. A variance or rate that adds nothing is exactly 0.
+///
+/// Where observations share noise, the coefficients are those of all, each counted for its share, and the variances those of
+/// observations so far apart that they share none, less what the coefficients explain of them; each goes by the other until
+/// they agree. The likelihood and the errors told are of those far apart.
 ///
 /// # Errors
 /// [`NumericsError::TooFewRows`] when fewer observations can be predicted than there are variances;
 /// [`NumericsError::NoConvergence`] where all observations are predicted exactly; and as [`follow`].
 pub fn most_likely(
-    trend: bool,
+    movement: Movement,
     passage: Passage,
     series: &Series<'_>,
 ) -> Result<Followed, NumericsError> {
     series.check()?;
+    if series.shared > 0.0 {
+        return most_likely_apart(movement, passage, series);
+    }
     let typical = series.typical();
-    let model = |level: f64, slope: f64| {
+    let trend = movement == Movement::Trend;
+    // The second is the trend's, or the rate.
+    let model = |level: f64, second: f64| {
+        let slope = if trend { second } else { 0.0 };
         // The trend's variance is per step of its own effect on the level, so that both logarithms have one meaning.
         let total = 1.0 + level + slope;
         Structural {
             observation: 1.0 / total,
             level: level / total / typical,
             trend: trend.then(|| slope / total / typical.powi(3)),
+            returning: if movement == Movement::Returns {
+                second / typical
+            } else {
+                0.0
+            },
             passage,
         }
     };
-    let pass = |level: f64, slope: f64| Passed::over(model(level, slope), series);
-    let needed = 3 + u64::from(trend);
-    let first = pass(1.0, if trend { 1.0 } else { 0.0 })?;
+    let pass = |level: f64, second: f64| Passed::over(model(level, second), series);
+    let both = movement != Movement::Wanders;
+    let needed = 3 + u64::from(both);
+    let first = pass(1.0, if both { 1.0 } else { 0.0 })?;
     if first.predicted < needed as f64 {
         return Err(NumericsError::TooFewRows {
             needed: needed + first.unknown as u64,
@@ -236,13 +298,13 @@ pub fn most_likely(
         });
     }
     let loss = |at: &[f64]| {
-        let slope = at.get(1).map_or(0.0, |slope| slope.exp());
-        pass(at[0].exp(), slope).map_or(f64::INFINITY, |passed| -passed.concentrated().1)
+        let second = at.get(1).map_or(0.0, |second| second.exp());
+        pass(at[0].exp(), second).map_or(f64::INFINITY, |passed| -passed.concentrated().1)
     };
     let mut best = (Vec::new(), f64::INFINITY);
     for level in TRIED {
-        let places: Vec<Vec<f64>> = if trend {
-            TRIED.iter().map(|&slope| vec![level, slope]).collect()
+        let places: Vec<Vec<f64>> = if both {
+            TRIED.iter().map(|&second| vec![level, second]).collect()
         } else {
             vec![vec![level]]
         };
@@ -257,7 +319,7 @@ pub fn most_likely(
         return Err(NumericsError::NoConvergence);
     }
     let (at, _) = minimum(loss, &best.0, 1.0, BOUNDS);
-    let mut ratios = [at[0].exp(), at.get(1).map_or(0.0, |slope| slope.exp())];
+    let mut ratios = [at[0].exp(), at.get(1).map_or(0.0, |second| second.exp())];
     let mut passed = pass(ratios[0], ratios[1])?;
     for which in 0..at.len() {
         let mut without = ratios;
@@ -276,7 +338,45 @@ pub fn most_likely(
         observation: scale * relative.observation,
         level: scale * relative.level,
         trend: relative.trend.map(|trend| scale * trend),
-        passage,
+        ..relative
     };
     follow(model, series)
+}
+
+/// The same where observations share noise.
+fn most_likely_apart(
+    movement: Movement,
+    passage: Passage,
+    series: &Series<'_>,
+) -> Result<Followed, NumericsError> {
+    let mut model = Structural {
+        observation: 1.0,
+        level: 0.0,
+        trend: (movement == Movement::Trend).then_some(0.0),
+        returning: 0.0,
+        passage,
+    };
+    let mut rounds = 0;
+    loop {
+        let passed = Passed::over(model, series)?;
+        let coefficients = &passed.filter.state()[model.moving()..];
+        let (times, left) = series.apart(coefficients);
+        let apart = Series {
+            times: &times,
+            observations: &left,
+            regressors: &[],
+            prior: f64::INFINITY,
+            shared: 0.0,
+        };
+        let found = most_likely(movement, passage, &apart)?;
+        rounds += 1;
+        if rounds == MOST_ROUNDS || series.width() == 0 || found.model.is_near(&model) {
+            let passed = Passed::over(found.model, series)?;
+            return Ok(Followed {
+                filter: passed.filter,
+                ..found
+            });
+        }
+        model = found.model;
+    }
 }

@@ -12,4 +12,4 @@ mod tests;
 
 pub use filter::{Forecast, Innovation, Kalman};
 pub use likelihood::{Followed, Series, follow, most_likely};
-pub use model::{Passage, Structural};
+pub use model::{Movement, Passage, Structural};

@@ -1,6 +1,6 @@
 //! The filter against statsmodels: the shared oracle, and series with regressors, gaps and irregular times of its own.
 
-use super::{Kalman, Passage, Series, Structural, follow, most_likely};
+use super::{Kalman, Movement, Passage, Series, Structural, follow, most_likely};
 use crate::NumericsError;
 use crate::oracle::{own_table, own_text, table, text};
 
@@ -8,6 +8,7 @@ const OWN: Structural = Structural {
     observation: 0.09,
     level: 0.01,
     trend: Some(0.0001),
+    returning: 0.0,
     passage: Passage::Steps,
 };
 
@@ -56,6 +57,7 @@ fn a_local_linear_trend_equals_the_oracle() {
         observation: 0.04,
         level: 0.0025,
         trend: Some(0.0001),
+        returning: 0.0,
         passage: Passage::Steps,
     };
     let mut filter = Kalman::starting_at(model, vec![20.0, 0.0], &[1.0, 0.0, 0.0, 0.01]).unwrap();
@@ -157,6 +159,7 @@ fn the_diffuse_likelihood_equals_the_oracle() {
             observations: &observations,
             regressors: &regressors,
             prior: f64::INFINITY,
+            shared: 0.0,
         };
         let found = follow(Structural { passage, ..OWN }, &series).unwrap();
         near(found.log_likelihood, number(&scalars, &[name]), 1e-8);
@@ -173,9 +176,13 @@ fn the_most_likely_variances_equal_the_oracle() {
         observations: &observations,
         regressors: &regressors,
         prior: f64::INFINITY,
+        shared: 0.0,
     };
-    for (trend, name) in [(false, "most_likely_level"), (true, "most_likely_trend")] {
-        let found = most_likely(trend, Passage::Steps, &series).unwrap();
+    for (movement, name) in [
+        (Movement::Wanders, "most_likely_level"),
+        (Movement::Trend, "most_likely_trend"),
+    ] {
+        let found = most_likely(movement, Passage::Steps, &series).unwrap();
         near(found.log_likelihood, number(&scalars, &[name, "llf"]), 1e-6);
         let model = found.model;
         let variances = [Some(model.observation), Some(model.level), model.trend];
@@ -202,8 +209,9 @@ fn the_search_is_no_worse_than_the_oracle_of_the_shared_series() {
         observations: &observations,
         regressors: &[],
         prior: f64::INFINITY,
+        shared: 0.0,
     };
-    let found = most_likely(true, Passage::Steps, &series).unwrap();
+    let found = most_likely(Movement::Trend, Passage::Steps, &series).unwrap();
     let variances: Vec<f64> = scalars["mle_params_default_init"]
         .as_array()
         .unwrap()
@@ -214,6 +222,7 @@ fn the_search_is_no_worse_than_the_oracle_of_the_shared_series() {
         observation: variances[0],
         level: variances[1],
         trend: Some(variances[2]),
+        returning: 0.0,
         passage: Passage::Steps,
     };
     let of_theirs = follow(of_theirs, &series).unwrap().log_likelihood;
@@ -226,8 +235,20 @@ fn the_search_is_no_worse_than_the_oracle_of_the_shared_series() {
 
 #[test]
 fn time_may_be_let_pass_at_once_or_in_parts() {
-    for passage in [Passage::Steps, Passage::Continuous] {
-        let mut at_once = Kalman::diffuse(Structural { passage, ..OWN }, 0).unwrap();
+    let returning = Structural {
+        trend: None,
+        returning: 0.3,
+        ..OWN
+    };
+    for model in [
+        OWN,
+        Structural {
+            passage: Passage::Continuous,
+            ..OWN
+        },
+        returning,
+    ] {
+        let mut at_once = Kalman::diffuse(model, 0).unwrap();
         for y in [1.0, 2.0, 2.5] {
             at_once.observe(&[], y);
             at_once.advance(1.0);
@@ -255,6 +276,7 @@ fn a_level_that_stays_makes_ridge_of_the_regressors() {
         observation: 0.3,
         level: 0.0,
         trend: None,
+        returning: 0.0,
         passage: Passage::Steps,
     };
     let alpha = 4.0;
@@ -284,6 +306,98 @@ fn a_level_that_stays_makes_ridge_of_the_regressors() {
     near(filter.state()[0], fit.intercept, 1e-10);
     near(filter.state()[1], fit.coefficients[0], 1e-10);
     near(filter.state()[2], fit.coefficients[1], 1e-10);
+}
+
+#[test]
+fn coefficients_are_those_of_all_observations_even_where_they_share_noise() {
+    use crate::{GramBlocks, LeastSquares};
+    let (_, regressors, mut observations) = own_series();
+    for y in &mut observations {
+        *y = if y.is_nan() { 0.0 } else { *y };
+    }
+    let times = in_steps(observations.len());
+    let series = Series {
+        times: &times,
+        observations: &observations,
+        regressors: &regressors,
+        prior: 0.25,
+        shared: 4.0,
+    };
+    let model = Structural {
+        observation: 0.3,
+        level: 0.0,
+        trend: None,
+        returning: 0.0,
+        passage: Passage::Steps,
+    };
+    let found = follow(model, &series).unwrap();
+    let mut blocks = GramBlocks::new(2);
+    for (x, &y) in regressors.chunks_exact(2).zip(&observations) {
+        blocks.push(x, y);
+    }
+    let ridge = LeastSquares::ridge(4.0);
+    let fit = ridge
+        .solve(&blocks.total(), &[0, 1], &[1.0, 1.0], None)
+        .unwrap();
+    for (nth, coefficient) in fit.coefficients.iter().enumerate() {
+        near(
+            found.filter.state()[1 + nth],
+            *coefficient,
+            2e-2 * coefficient.abs(),
+        );
+    }
+    // Four that share their noise are as sure as one.
+    let alone = Series {
+        shared: 0.0,
+        ..series
+    };
+    let alone = follow(model, &alone).unwrap();
+    let ratio = found.filter.covariance()[4] / alone.filter.covariance()[4];
+    near(ratio, 4.0, 0.3);
+}
+
+#[test]
+fn a_level_that_returns_is_found_as_an_autoregression() {
+    let mut state = 7_u64;
+    let mut normal = || {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum - 6.0
+    };
+    let kept: f64 = 0.8;
+    let mut level = 0.0;
+    let observations: Vec<f64> = (0..4000)
+        .map(|_| {
+            level = kept * level + normal();
+            level + 0.5 * normal()
+        })
+        .collect();
+    let times = in_steps(observations.len());
+    let series = Series {
+        times: &times,
+        observations: &observations,
+        regressors: &[],
+        prior: f64::INFINITY,
+        shared: 0.0,
+    };
+    let found = most_likely(Movement::Returns, Passage::Continuous, &series).unwrap();
+    near((-found.model.returning).exp(), kept, 0.05);
+    near(found.model.observation, 0.25, 0.15);
+    let stays = most_likely(Movement::Wanders, Passage::Continuous, &series).unwrap();
+    assert!(found.log_likelihood > stays.log_likelihood + 10.0);
+    assert!(found.innovation_rms < stays.innovation_rms);
+    let (now, later) = (
+        found.filter.forecast(0.0, &[]),
+        found.filter.forecast(9.0, &[]),
+    );
+    let (now, later) = (now.unwrap(), later.unwrap());
+    near(later.mean, now.mean * found.model.kept(9.0), 1e-12);
+    assert!(later.variance < 1.2 / (1.0 - kept * kept));
 }
 
 #[test]
@@ -380,9 +494,10 @@ fn what_cannot_be_followed_is_refused() {
         observations,
         regressors: &[],
         prior: f64::INFINITY,
+        shared: 0.0,
     };
     let few = most_likely(
-        false,
+        Movement::Wanders,
         Passage::Steps,
         &series(&[1.0, 2.0], &[f64::NAN, 1.0]),
     );
@@ -393,6 +508,10 @@ fn what_cannot_be_followed_is_refused() {
             found: 2
         })
     ));
-    let same = most_likely(false, Passage::Steps, &series(&[1.0; 6], &[1.0; 6]));
+    let same = most_likely(
+        Movement::Wanders,
+        Passage::Steps,
+        &series(&[1.0; 6], &[1.0; 6]),
+    );
     assert_eq!(same, Err(NumericsError::NoConvergence));
 }

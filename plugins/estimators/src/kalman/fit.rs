@@ -5,7 +5,8 @@ use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use athermal_numerics::{
-    Followed, NumericsError, Passage, Series, Standardizer, Structural, follow, most_likely,
+    Followed, Movement, NumericsError, Passage, Series, Standardizer, Structural, follow,
+    most_likely,
 };
 
 use super::{Kalman, KalmanPredictor, Noises, Scaling};
@@ -13,7 +14,7 @@ use super::{Kalman, KalmanPredictor, Noises, Scaling};
 /// The most rows that the search for variances goes through, again and again.
 const MOST_ROWS: usize = 20_000;
 
-/// Takes rows that lie far enough apart, and fewer of them the more there are.
+/// Takes rows, fewer of them the more there are.
 #[derive(Debug)]
 pub(super) struct KalmanTrainer {
     parameters: Kalman,
@@ -21,9 +22,9 @@ pub(super) struct KalmanTrainer {
     unit: String,
     every: Duration,
     most: usize,
-    /// Of the rows that are far enough apart, one in so many is kept.
+    /// Of the rows, one in so many is kept.
     stride: usize,
-    far_enough: usize,
+    rows: usize,
     last: Option<Instant>,
     segment_pending: bool,
     kept: Vec<Kept>,
@@ -53,7 +54,7 @@ impl KalmanTrainer {
             most: (setup.memory / bytes).clamp(16, MOST_ROWS),
             names,
             stride: 1,
-            far_enough: 0,
+            rows: 0,
             last: None,
             segment_pending: true,
             kept: Vec::new(),
@@ -103,16 +104,24 @@ impl KalmanTrainer {
                 _ => f64::NAN,
             })
             .collect();
-        let truths: Vec<f64> = self.kept.iter().map(|row| row.truth).collect();
+        let sum: f64 = self.kept.iter().map(|row| row.truth).sum();
+        let mean = sum / self.kept.len() as f64;
+        let truths: Vec<f64> = self.kept.iter().map(|row| row.truth - mean).collect();
         let series = Series {
             times: &times,
             observations: &truths,
             regressors: &scaled,
             prior: 1.0 / self.parameters.penalty,
+            shared: self.every.secs(),
+        };
+        let movement = if self.parameters.trend {
+            Movement::Trend
+        } else {
+            Movement::Returns
         };
         let followed = match &self.parameters.noises {
             Some(noises) => follow(noises.model(&self.unit)?, &series),
-            None => most_likely(self.parameters.trend, Passage::Continuous, &series),
+            None => most_likely(movement, Passage::Continuous, &series),
         };
         let followed = followed.map_err(|error| match error {
             NumericsError::TooFewRows { needed, found } => TrainingError::TooFewRows {
@@ -137,6 +146,7 @@ impl KalmanTrainer {
             scaling: Scaling {
                 means: standard.means,
                 scales: standard.scales,
+                truth: mean,
             },
             filter,
             at_large: followed.at_large,
@@ -172,12 +182,9 @@ impl Trainer for KalmanTrainer {
     }
 
     fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
-        if self.last.is_some_and(|last| at < last + self.every) {
-            return;
-        }
         self.last = Some(at);
-        self.far_enough += 1;
-        if !(self.far_enough - 1).is_multiple_of(self.stride) {
+        self.rows += 1;
+        if !(self.rows - 1).is_multiple_of(self.stride) {
             return;
         }
         if self.kept.len() == self.most {
@@ -228,6 +235,7 @@ impl Noises {
             observation: in_unit(&self.observation)?.powi(2),
             level: level * level / per,
             trend: trend.map(|trend| (trend / per).powi(2) / per),
+            returning: self.returns.map_or(0.0, |returns| 1.0 / returns.secs()),
             passage: Passage::Continuous,
         })
     }
@@ -248,7 +256,13 @@ impl std::fmt::Display for Told<'_> {
             let trend = significant((trend * per).sqrt() * per);
             write!(f, "trend = \"{trend} {unit}\", ")?;
         }
-        write!(f, "per = \"1h\" }}")
+        write!(f, "per = \"1h\"")?;
+        if model.returning > 0.0
+            && let Some(returns) = Duration::from_secs_f64(significant(1.0 / model.returning))
+        {
+            write!(f, ", returns = \"{returns}\"")?;
+        }
+        write!(f, " }}")
     }
 }
 

@@ -1,6 +1,6 @@
 //! The estimator that follows a level and a trend while truths come in.
 
-use athermal_core::model::numbers;
+use athermal_core::model::{number, numbers};
 use athermal_core::node::{
     Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored, State,
     Trainer, TrainingSetup,
@@ -18,18 +18,20 @@ use fit::KalmanTrainer;
 
 /// Kalman filter of a structural model: a level that wanders, maybe with a trend, and linear regression on features.
 ///
-/// `y = μ + Σ b_j x_j + ε`; the level `μ` is a random walk (local level) or has a slope that is one (local linear trend), in
-/// continuous time, so that truths may come at any instants and be missing (Harvey 1989, sections 2.3 and 9.2; Durbin and
-/// Koopman 2012, chapters 2 to 4). The fit finds the coefficients, which stay, and unless `noises` gives them the variances
-/// that make its rows most likely. Running, the filter takes each truth that the embargo lets through and predicts
-/// `ahead` of now from the newest one; with `learn = false` it stays where the fit ended, which is regression on the
-/// features. Without features it is a forecast from the past of the truth alone, which expects the level to stay: what
-/// returns to zero by itself, as drift does, is better forecast by `ar`.
+/// `y = ȳ + μ + Σ b_j x_j + ε` with the mean truth `ȳ` of the fit; the level `μ` wanders and returns to 0 at a rate of its own
+/// (an autoregressive component, which with a rate of 0 is the random walk of the local level), or has a slope that is a
+/// random walk (local linear trend). Both are in continuous time, so that truths may come at any instants and be missing
+/// (Harvey 1989, sections 2.3, 9.1 and 9.2; Durbin and Koopman 2012, chapters 2 to 4). The fit finds the coefficients, which
+/// stay, and unless `noises` gives them the variances and the rate that make its rows most likely. Running, the filter takes
+/// each truth that the embargo lets through and predicts `ahead` of now from the newest one; with `learn = false` it stays
+/// where the fit ended, which is regression on the features. Without features it is a forecast from the past of the truth
+/// alone.
 ///
-/// Truths whose windows overlap share their noise, which the model would take for a level that moves; so only one truth per
-/// `every` is taken. In a new segment level and trend start from what the fit knew of them at large. The port `deviation` is
-/// the standard deviation of the truth about its prediction; it grows while no truth comes. The answer changes with time
-/// alone, so the node runs at every tick.
+/// Truths whose windows overlap share their noise, which the model would take for a level that moves; so a truth that comes
+/// sooner than `every` after the one before counts for its share of that time, its variance being multiplied by the inverse.
+/// The coefficients are so those of all rows; the variances are found from rows `every` apart. In a new segment level and
+/// trend start from what the fit knew of them at large. The port `deviation` is the standard deviation of the truth about its
+/// prediction; it grows while no truth comes. The answer changes with time alone, so the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kalman {
@@ -44,7 +46,7 @@ pub struct Kalman {
     #[serde(default = "one")]
     #[schemars(range(min = 0.0))]
     pub penalty: f64,
-    /// The shortest time between truths that are taken; without it the span of the truth.
+    /// The time within which truths share their noise; without it the span of the truth.
     #[serde(default)]
     pub every: Option<Duration>,
 }
@@ -62,6 +64,9 @@ pub struct Noises {
     pub trend: Option<Quantity>,
     /// The time in which they do, such as "1h".
     pub per: Duration,
+    /// The time in which a level without a trend returns to its mean, but for 1/e of the way; without it, it does not.
+    #[serde(default)]
+    pub returns: Option<Duration>,
 }
 
 fn one() -> f64 {
@@ -174,6 +179,19 @@ impl Noises {
             let message = format!("`per` is {} and must be longer than nothing", self.per);
             mistakes.push(Mistake::at("noises.per", message));
         }
+        if let Some(returns) = self.returns {
+            if returns <= Duration::ZERO {
+                let message = format!("`returns` is {returns} and must be longer than nothing");
+                mistakes.push(Mistake::at("noises.returns", message));
+            }
+            if trend {
+                let message = "a level with a trend does not return to a mean";
+                mistakes.push(
+                    Mistake::at("noises.returns", message)
+                        .help("leave `returns` out, or say `trend = false`"),
+                );
+            }
+        }
         match (&self.trend, trend) {
             (None, true) => mistakes.push(
                 Mistake::at(
@@ -199,6 +217,9 @@ struct Scaling {
     means: Vec<f64>,
     #[serde(with = "numbers")]
     scales: Vec<f64>,
+    /// The mean of the truth.
+    #[serde(default, with = "number")]
+    truth: f64,
 }
 
 impl Scaling {
@@ -228,7 +249,7 @@ impl Predictor for KalmanPredictor {
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
-        self.filter.expected(0.0, self.scaling.of(regressors))
+        self.scaling.truth + self.filter.expected(0.0, self.scaling.of(regressors))
     }
 
     fn deviation(&self, regressors: &[f64]) -> f64 {
@@ -268,7 +289,7 @@ struct Following {
 /// What is known of level, trend and coefficients.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Known {
-    /// As of the last truth taken.
+    /// As of the last truth.
     filter: Filter,
     scaling: Scaling,
     /// When that was.
@@ -276,7 +297,7 @@ struct Known {
 }
 
 impl Known {
-    /// The time in seconds from the last truth taken.
+    /// The time in seconds from the last truth.
     fn since(&self, of: Instant) -> f64 {
         self.last.map_or(0.0, |last| (of - last).secs().max(0.0))
     }
@@ -287,7 +308,7 @@ impl Learner for Following {
         let Known {
             filter, scaling, ..
         } = &self.known;
-        filter.expected(self.known.since(of), scaling.of(regressors))
+        scaling.truth + filter.expected(self.known.since(of), scaling.of(regressors))
     }
 
     fn deviation(&self, regressors: &[f64], of: Instant) -> f64 {
@@ -298,9 +319,6 @@ impl Learner for Following {
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
-        if self.known.last.is_some_and(|last| at < last + self.every) {
-            return;
-        }
         let since = self.known.since(at);
         let Known {
             filter,
@@ -311,8 +329,12 @@ impl Learner for Following {
         for (nth, value) in self.row.iter_mut().enumerate() {
             *value = scaled(nth);
         }
+        let share = match *last {
+            Some(_) if since > 0.0 && since < self.every.secs() => since / self.every.secs(),
+            _ => 1.0,
+        };
         filter.advance(since);
-        filter.observe(&self.row, truth);
+        filter.observe_share(&self.row, truth - scaling.truth, share);
         *last = Some(at);
     }
 

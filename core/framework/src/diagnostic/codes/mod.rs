@@ -373,6 +373,11 @@ pub const CODES: &[Code] = &[
         "`learn` lets an estimator go on learning while it runs. Not every kind can, and some only with certain parameters."
     ),
     code!(
+        "A160",
+        "a truth without a span",
+        "What may be known of a truth, and when, follows from its span: the length of past time that one value summarises. A first-order lag depends on all of the past, so it has none unless `span` says how much of it counts."
+    ),
+    code!(
         "A170",
         "schedule of a machine",
         "`schedule` names a file of set points over time, the same as `athermal simulate --schedule` takes; every mistake in it is told where it stands."

@@ -1,0 +1,374 @@
+//! Decides where the search for a model starts: with least squares on long regressions, which need no start.
+
+use super::residuals::{Past, Samples, residuals, sum_of_squares, through};
+use super::{Orders, Polynomials, Transfer};
+use crate::{GramBlocks, LeastSquares, NumericsError, Standardization};
+
+/// How often the filters of Steiglitz and McBride are renewed.
+const RENEWALS: usize = 20;
+
+/// Models to start from; the best of them is taken.
+pub(super) fn starts(
+    orders: &Orders,
+    samples: &Samples,
+    penalty: f64,
+) -> Result<Vec<Polynomials>, NumericsError> {
+    let mut differenced = samples.clone();
+    for _ in 0..orders.differences {
+        differenced = differenced.differenced();
+    }
+    let whole = |model: Polynomials| Polynomials {
+        differences: orders.differences,
+        ..model.stabilised()
+    };
+    let direct = Orders {
+        differences: 0,
+        ..orders.clone()
+    };
+    let filtered = orders.inputs.iter().any(|input| input.nf > 0);
+    let plants = if filtered {
+        vec![steiglitz_mcbride(&direct, &differenced, penalty)?]
+    } else {
+        vec![regression(&direct, &differenced, penalty, 0)?]
+    };
+    let mut starts = Vec::new();
+    for plant in plants {
+        starts.push(whole(with_noise(&direct, &plant, &differenced)?));
+        if !filtered && orders.nc > 0 {
+            starts.push(whole(hannan_rissanen(&direct, &differenced, penalty)?));
+        }
+        starts.push(whole(plant));
+    }
+    Ok(starts)
+}
+
+/// Least squares of `y` on its own past and that of the inputs, and with `longer` of it on as many more of both.
+fn regression(
+    orders: &Orders,
+    samples: &Samples,
+    penalty: f64,
+    longer: usize,
+) -> Result<Polynomials, NumericsError> {
+    let (na, nb) = (orders.na + longer, |nb: usize| nb + longer);
+    let mut model = Polynomials::zero(orders);
+    model.a = vec![0.0; na];
+    for (transfer, input) in model.inputs.iter_mut().zip(&orders.inputs) {
+        *transfer = Transfer {
+            delay: input.nk,
+            b: vec![0.0; nb(input.nb)],
+            f: Vec::new(),
+        };
+    }
+    let columns = na
+        + model
+            .inputs
+            .iter()
+            .map(|input| input.b.len())
+            .sum::<usize>();
+    let mut rows = Rows::new(columns);
+    for segment in samples.segments() {
+        let values = samples.values(segment.clone());
+        let inputs: Vec<Vec<f64>> = (0..samples.width())
+            .map(|nth| samples.input(segment.clone(), nth))
+            .collect();
+        for sample in na..values.len() {
+            let past = (1..=na).map(|lag| -values[sample - lag]);
+            let of_inputs = model.inputs.iter().zip(&inputs).flat_map(|(of, values)| {
+                let before = values[0];
+                (0..of.b.len()).map(move |j| Past { values, before }.at(sample, of.delay + j))
+            });
+            rows.push(past.chain(of_inputs), values[sample]);
+        }
+    }
+    let (found, intercept) = rows.solve(penalty)?;
+    let (a, mut b) = found.split_at(na);
+    model.a.copy_from_slice(a);
+    for input in &mut model.inputs {
+        let (own, rest) = b.split_at(input.b.len());
+        input.b.copy_from_slice(own);
+        b = rest;
+    }
+    model.level = level(intercept, &model.a);
+    for (transfer, input) in model.inputs.iter_mut().zip(&orders.inputs) {
+        if longer == 0 {
+            transfer.f = vec![0.0; input.nf];
+        }
+    }
+    if longer == 0 {
+        // The noise is white, to begin with.
+        model.c = vec![0.0; orders.nc];
+        model.d = vec![0.0; orders.nd];
+    } else {
+        (model.c, model.d) = (Vec::new(), Vec::new());
+    }
+    Ok(model)
+}
+
+/// The level about which a model lies whose regression has this intercept.
+fn level(intercept: f64, a: &[f64]) -> f64 {
+    let gain = 1.0 + a.iter().sum::<f64>();
+    if gain.abs() > 1e-3 {
+        intercept / gain
+    } else {
+        0.0
+    }
+}
+
+/// The residuals of a long regression stand in for the innovations, on which the short one is then done too (Hannan and
+/// Rissanen 1982).
+fn hannan_rissanen(
+    orders: &Orders,
+    samples: &Samples,
+    penalty: f64,
+) -> Result<Polynomials, NumericsError> {
+    let count = samples.count() as f64;
+    let longer = (count.ln().powf(1.5).ceil() as usize).clamp(orders.nc + 1, 40);
+    let most = samples.count() / (8 * (1 + samples.width()));
+    let longer = longer.min(most).max(1);
+    let long = regression(orders, samples, penalty, longer)?;
+    let innovations = residuals_of(&long, samples);
+    let mut rows = Rows::new(0);
+    let mut model = Polynomials::zero(orders);
+    let reach = orders.na.max(orders.nc);
+    for (segment, innovations) in samples.segments().zip(&innovations) {
+        let values = samples.values(segment.clone());
+        let inputs: Vec<Vec<f64>> = (0..samples.width())
+            .map(|nth| samples.input(segment.clone(), nth))
+            .collect();
+        for sample in reach..values.len() {
+            let past = (1..=orders.na).map(|lag| -values[sample - lag]);
+            let of_inputs = orders.inputs.iter().zip(&inputs).flat_map(|(of, values)| {
+                let before = values[0];
+                (0..of.nb).map(move |j| Past { values, before }.at(sample, of.nk + j))
+            });
+            let noise = (1..=orders.nc).map(|lag| innovations[sample - lag]);
+            let row = past.chain(of_inputs).chain(noise);
+            if innovations[sample - orders.nc..=sample]
+                .iter()
+                .all(|e| !e.is_nan())
+            {
+                rows.push(row, values[sample]);
+            }
+        }
+    }
+    let (found, intercept) = rows.solve(penalty)?;
+    let mut found = found.into_iter();
+    let mut next = |place: &mut f64| *place = found.next().unwrap_or(0.0);
+    model.a.iter_mut().for_each(&mut next);
+    for input in &mut model.inputs {
+        input.b.iter_mut().for_each(&mut next);
+    }
+    model.c.iter_mut().for_each(&mut next);
+    model.level = level(intercept, &model.a);
+    Ok(model)
+}
+
+/// The residuals by segment; NaN where there is none.
+fn residuals_of(model: &Polynomials, samples: &Samples) -> Vec<Vec<f64>> {
+    let mut all = Vec::new();
+    for segment in samples.segments() {
+        let mut alone = Samples::new(samples.width());
+        let inputs: Vec<Vec<f64>> = (0..samples.width())
+            .map(|nth| samples.input(segment.clone(), nth))
+            .collect();
+        for (sample, value) in samples.values(segment.clone()).iter().enumerate() {
+            alone.push(inputs.iter().map(|input| input[sample]), *value);
+        }
+        let mut found = Vec::with_capacity(segment.len());
+        residuals(model, &alone, 0, |residual, _| found.push(residual));
+        let mut own = vec![f64::NAN; segment.len() - found.len()];
+        own.extend(found);
+        all.push(own);
+    }
+    all
+}
+
+/// `C` and `D` of what the plant leaves over.
+fn with_noise(
+    orders: &Orders,
+    plant: &Polynomials,
+    samples: &Samples,
+) -> Result<Polynomials, NumericsError> {
+    let mut model = plant.clone();
+    if orders.nc + orders.nd == 0 {
+        return Ok(model);
+    }
+    let white = Polynomials {
+        c: Vec::new(),
+        d: Vec::new(),
+        ..plant.clone()
+    };
+    let mut left = Samples::new(0);
+    for noise in residuals_of(&white, samples) {
+        left.segment();
+        let known = noise.iter().filter(|value| !value.is_nan());
+        known.for_each(|&value| left.push([], value));
+    }
+    let of_noise = Orders {
+        na: orders.nd,
+        nc: orders.nc,
+        ..Orders::default()
+    };
+    let noise = if orders.nc == 0 {
+        regression(&of_noise, &left, 0.0, 0)?
+    } else {
+        hannan_rissanen(&of_noise, &left, 0.0)?
+    };
+    (model.c, model.d) = (noise.c, noise.a);
+    Ok(model)
+}
+
+/// Least squares of `F y = Σ B u`, with inputs and outputs filtered by the last `1/F`, until that stays (Steiglitz and McBride
+/// 1965); all inputs share one `F`, of which those of lower order get what comes nearest.
+fn steiglitz_mcbride(
+    orders: &Orders,
+    samples: &Samples,
+    penalty: f64,
+) -> Result<Polynomials, NumericsError> {
+    let nf = orders
+        .inputs
+        .iter()
+        .map(|input| input.nf)
+        .max()
+        .unwrap_or(0);
+    let mut shared = vec![0.0; nf];
+    let mut best: Option<(f64, Polynomials)> = None;
+    for _ in 0..RENEWALS {
+        let mut filtered = Samples::new(samples.width());
+        for segment in samples.segments().filter(|segment| !segment.is_empty()) {
+            filtered.segment();
+            let through = |x: &[f64]| through(&shared, x, x[0]).0;
+            let values = through(samples.values(segment.clone()));
+            let inputs: Vec<Vec<f64>> = (0..samples.width())
+                .map(|nth| through(&samples.input(segment.clone(), nth)))
+                .collect();
+            for (sample, value) in values.iter().enumerate() {
+                filtered.push(inputs.iter().map(|input| input[sample]), *value);
+            }
+        }
+        let as_regression = Orders {
+            na: nf,
+            inputs: orders.inputs.clone(),
+            ..Orders::default()
+        };
+        let found = regression(&as_regression, &filtered, penalty, 0)?.stabilised();
+        let before = std::mem::replace(&mut shared, found.a.clone());
+        let mut model = Polynomials::zero(orders);
+        for ((transfer, found), input) in model
+            .inputs
+            .iter_mut()
+            .zip(&found.inputs)
+            .zip(&orders.inputs)
+        {
+            *transfer = if input.nf == nf {
+                Transfer {
+                    f: shared.clone(),
+                    ..found.clone()
+                }
+            } else {
+                nearest(
+                    &Transfer {
+                        f: shared.clone(),
+                        ..found.clone()
+                    },
+                    input.nf,
+                )
+            };
+        }
+        model.level = mean_left(&model, samples);
+        let sum = sum_of_squares(&model, samples, 0);
+        if best.as_ref().is_none_or(|(least, _)| sum < *least) {
+            best = Some((sum, model));
+        }
+        let moved = before.iter().zip(&shared).map(|(a, b)| (a - b).abs());
+        if moved.fold(0.0, f64::max) < 1e-9 {
+            break;
+        }
+    }
+    best.map(|(_, model)| model).ok_or(NumericsError::NotFinite)
+}
+
+/// What a model without a level leaves over on average.
+fn mean_left(model: &Polynomials, samples: &Samples) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    residuals(model, samples, 0, |residual, _| {
+        sum += residual;
+        count += 1.0;
+    });
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// The transfer function with fewer coefficients in `F` whose answer to an impulse is nearest, as Steiglitz and McBride find it.
+fn nearest(transfer: &Transfer, nf: usize) -> Transfer {
+    let own = Orders {
+        inputs: vec![super::InputOrders {
+            nb: transfer.b.len(),
+            nk: transfer.delay,
+            nf,
+        }],
+        ..Orders::default()
+    };
+    let mut impulse = vec![0.0; 1 + 20 * transfer.f.len().max(5)];
+    impulse[1] = 1.0;
+    let (answer, _) = through(&transfer.f, &impulse, 0.0);
+    let past = Past {
+        values: &answer,
+        before: 0.0,
+    };
+    let mut samples = Samples::new(1);
+    for (sample, &input) in impulse.iter().enumerate() {
+        let b = transfer.b.iter().enumerate();
+        let value = b
+            .map(|(j, b)| b * past.at(sample, transfer.delay + j))
+            .sum();
+        samples.push([input], value);
+    }
+    let found = if nf == 0 {
+        regression(&own, &samples, 0.0, 0)
+    } else {
+        steiglitz_mcbride(&own, &samples, 0.0)
+    };
+    let found = found.ok().and_then(|model| model.inputs.into_iter().next());
+    found.unwrap_or_else(|| Transfer {
+        f: vec![0.0; nf],
+        ..transfer.clone()
+    })
+}
+
+/// Rows of a regression.
+struct Rows {
+    blocks: Option<GramBlocks>,
+    row: Vec<f64>,
+}
+
+impl Rows {
+    fn new(columns: usize) -> Self {
+        Self {
+            blocks: None,
+            row: Vec::with_capacity(columns),
+        }
+    }
+
+    fn push(&mut self, row: impl Iterator<Item = f64>, value: f64) {
+        self.row.clear();
+        self.row.extend(row);
+        let width = self.row.len();
+        let blocks = self
+            .blocks
+            .get_or_insert_with(|| GramBlocks::with_row_memory(width, 0));
+        blocks.push(&self.row, value);
+    }
+
+    /// The coefficients and the intercept.
+    fn solve(self, penalty: f64) -> Result<(Vec<f64>, f64), NumericsError> {
+        let blocks = self.blocks.ok_or(NumericsError::TooFewRows {
+            needed: 2,
+            found: 0,
+        })?;
+        let gram = blocks.total();
+        let columns: Vec<usize> = (0..gram.width()).collect();
+        let scales = Standardization::of(&gram).scales;
+        let fit = LeastSquares::ridge(penalty).solve(&gram, &columns, &scales, None)?;
+        Ok((fit.coefficients, fit.intercept))
+    }
+}

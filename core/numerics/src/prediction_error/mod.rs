@@ -1,0 +1,20 @@
+//! Transfer functions of inputs and noise, and the search for those whose one-step predictions err least. Decides how such a
+//! model predicts and how it is found; not which orders it has, nor at which instants its samples are taken.
+//!
+//! All kinds are cases of one model (Ljung 1999, eq. 4.33): `A(q) (y − μ) = Σ B_i(q)/F_i(q) u_i + C(q)/(D(q) (1 − q⁻¹)^d) e`.
+
+mod criteria;
+mod initial;
+mod polynomials;
+mod residuals;
+mod roots;
+mod search;
+mod stepper;
+#[cfg(test)]
+mod tests;
+
+pub use criteria::{Criterion, InformationCriteria};
+pub use polynomials::{InputOrders, Orders, Polynomials, Transfer};
+pub use residuals::Samples;
+pub use search::{PredictionError, PredictionErrorFit};
+pub use stepper::Stepper;

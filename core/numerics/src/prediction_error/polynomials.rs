@@ -1,0 +1,196 @@
+//! Decides what a model of transfer functions consists of.
+
+use serde::{Deserialize, Serialize};
+
+use super::roots::{is_stable, reflected};
+
+/// How many coefficients each polynomial has, in the letters of Ljung (1999), chapter 4.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Orders {
+    /// Of `A`: past values of what is predicted.
+    pub na: usize,
+    /// Of each input.
+    pub inputs: Vec<InputOrders>,
+    /// Of `C`: past innovations.
+    pub nc: usize,
+    /// Of `D`: past values of the noise.
+    pub nd: usize,
+    /// How often the noise is integrated.
+    pub differences: usize,
+}
+
+/// The orders of one input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InputOrders {
+    /// Of `B`: how many values of the input count.
+    pub nb: usize,
+    /// How many samples the newest of them lies back.
+    pub nk: usize,
+    /// Of `F`: past values of what the input brings about.
+    pub nf: usize,
+}
+
+impl Orders {
+    /// The number of coefficients, with the level where there is one.
+    #[must_use]
+    pub fn coefficients(&self) -> usize {
+        let of_inputs: usize = self.inputs.iter().map(|input| input.nb + input.nf).sum();
+        usize::from(self.has_level()) + self.na + of_inputs + self.nc + self.nd
+    }
+
+    /// Whether the level is determined: not where the noise is integrated, which has none.
+    #[must_use]
+    pub fn has_level(&self) -> bool {
+        self.differences == 0
+    }
+
+    /// The first sample of a segment whose residual has all that it needs.
+    #[must_use]
+    pub fn first(&self) -> usize {
+        // Where an input goes through a filter, that is taken to have been at rest.
+        let direct = self
+            .inputs
+            .iter()
+            .filter(|input| input.nf == 0 && input.nb > 0);
+        let reach = direct.map(|input| input.nk + input.nb - 1).max();
+        self.na.max(reach.unwrap_or(0)) + self.nd + self.differences
+    }
+}
+
+/// `q^−nk B(q)/F(q)` of one input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Transfer {
+    /// How many samples the newest value that counts lies back.
+    pub delay: usize,
+    /// `b₀, b₁, …`.
+    pub b: Vec<f64>,
+    /// `f₁, f₂, …`, after a leading 1.
+    pub f: Vec<f64>,
+}
+
+impl Transfer {
+    /// What an input that stays as it is leads to, per unit.
+    #[must_use]
+    pub fn gain(&self) -> f64 {
+        self.b.iter().sum::<f64>() / (1.0 + self.f.iter().sum::<f64>())
+    }
+}
+
+/// A model: see [the module](self) for the equation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Polynomials {
+    /// `a₁, a₂, …`, after a leading 1.
+    pub a: Vec<f64>,
+    /// Those of each input.
+    pub inputs: Vec<Transfer>,
+    /// `c₁, c₂, …`, after a leading 1.
+    pub c: Vec<f64>,
+    /// `d₁, d₂, …`, after a leading 1.
+    pub d: Vec<f64>,
+    /// How often the noise is integrated.
+    pub differences: usize,
+    /// What the model is about when all inputs are 0.
+    pub level: f64,
+}
+
+impl Polynomials {
+    /// The model of these orders whose coefficients are all 0.
+    #[must_use]
+    pub fn zero(orders: &Orders) -> Self {
+        let inputs = orders.inputs.iter().map(|input| Transfer {
+            delay: input.nk,
+            b: vec![0.0; input.nb],
+            f: vec![0.0; input.nf],
+        });
+        Self {
+            a: vec![0.0; orders.na],
+            inputs: inputs.collect(),
+            c: vec![0.0; orders.nc],
+            d: vec![0.0; orders.nd],
+            differences: orders.differences,
+            level: 0.0,
+        }
+    }
+
+    /// What the model is about while its inputs stay as they are.
+    #[must_use]
+    pub fn at_rest(&self, input: impl Fn(usize) -> f64) -> f64 {
+        let transfers = self.inputs.iter().enumerate();
+        let sum: f64 = transfers.map(|(nth, of)| of.gain() * input(nth)).sum();
+        self.level + sum / (1.0 + self.a.iter().sum::<f64>())
+    }
+
+    /// `D(q) (1 − q⁻¹)^d`, without its leading 1.
+    pub(super) fn whitening(&self) -> Vec<f64> {
+        let mut product: Vec<f64> = std::iter::once(1.0).chain(self.d.iter().copied()).collect();
+        let undifferenced = product.len();
+        product.resize(undifferenced + self.differences, 0.0);
+        for last in undifferenced..product.len() {
+            for j in (1..=last).rev() {
+                product[j] -= product[j - 1];
+            }
+        }
+        product.split_off(1)
+    }
+
+    /// Whether every prediction forgets where it started.
+    pub(super) fn is_stable(&self) -> bool {
+        let filters = self.inputs.iter().map(|input| &input.f);
+        filters
+            .chain([&self.a, &self.c, &self.d])
+            .all(|p| is_stable(p))
+    }
+
+    /// The same with roots outside of the unit circle reflected into it.
+    pub(super) fn stabilised(mut self) -> Self {
+        for input in &mut self.inputs {
+            input.f = reflected(&input.f);
+        }
+        for p in [&mut self.a, &mut self.c, &mut self.d] {
+            *p = reflected(p);
+        }
+        self
+    }
+
+    /// All coefficients one after the other: level, `A`, `B` and `F` of each input, `C`, `D`.
+    pub(super) fn flat(&self) -> Vec<f64> {
+        let level = (self.differences == 0).then_some(self.level);
+        let inputs = self.inputs.iter().flat_map(|of| of.b.iter().chain(&of.f));
+        let all = self.a.iter().chain(inputs).chain(&self.c).chain(&self.d);
+        level.into_iter().chain(all.copied()).collect()
+    }
+
+    /// The same model with other coefficients, in the order of [`flat`](Self::flat).
+    pub(super) fn with(&self, flat: &[f64]) -> Self {
+        let mut model = self.clone();
+        let mut flat = flat.iter().copied();
+        let mut next = |place: &mut f64| {
+            if let Some(value) = flat.next() {
+                *place = value;
+            }
+        };
+        if model.differences == 0 {
+            next(&mut model.level);
+        }
+        model.a.iter_mut().for_each(&mut next);
+        for input in &mut model.inputs {
+            input.b.iter_mut().chain(&mut input.f).for_each(&mut next);
+        }
+        model.c.iter_mut().chain(&mut model.d).for_each(&mut next);
+        model
+    }
+
+    /// Which of the coefficients, in the order of [`flat`](Self::flat), are of a `B`.
+    pub(super) fn penalised(&self) -> Vec<bool> {
+        let level = usize::from(self.differences == 0) + self.a.len();
+        let mut of_b = vec![false; level];
+        for input in &self.inputs {
+            of_b.extend(input.b.iter().map(|_| true));
+            of_b.extend(input.f.iter().map(|_| false));
+        }
+        of_b.extend(self.c.iter().chain(&self.d).map(|_| false));
+        of_b
+    }
+}

@@ -1,0 +1,359 @@
+//! Decides how far a model's one-step predictions are off, sample by sample, and how that changes with each coefficient; not
+//! which coefficients are best.
+
+use std::ops::Range;
+
+use super::{Orders, Polynomials};
+use crate::Record;
+
+/// Evenly spaced samples of the inputs and of what they lead to, in segments.
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    width: usize,
+    values: Vec<f64>,
+    /// One input after the other for each sample.
+    inputs: Vec<f64>,
+    starts: Vec<usize>,
+}
+
+impl Samples {
+    /// None yet, with so many inputs.
+    #[must_use]
+    pub fn new(width: usize) -> Self {
+        Self {
+            width,
+            ..Self::default()
+        }
+    }
+
+    /// The next sample begins a segment.
+    pub fn segment(&mut self) {
+        if self.starts.last() != Some(&self.values.len()) {
+            self.starts.push(self.values.len());
+        }
+    }
+
+    /// Takes a sample, of as many inputs as there are.
+    pub fn push(&mut self, inputs: impl IntoIterator<Item = f64>, value: f64) {
+        if self.starts.is_empty() {
+            self.starts.push(0);
+        }
+        self.values.push(value);
+        self.inputs.extend(inputs);
+        self.inputs.resize(self.values.len() * self.width, 0.0);
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.values.len()
+    }
+
+    /// How many inputs.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// How many are left when the first of each segment are not counted.
+    #[must_use]
+    pub fn counted(&self, first: usize) -> usize {
+        self.segments()
+            .map(|segment| segment.len().saturating_sub(first))
+            .sum()
+    }
+
+    /// The segments, as subspace identification takes them.
+    pub fn records(&self) -> impl Iterator<Item = Record<'_>> {
+        self.segments().map(|segment| Record {
+            inputs: &self.inputs[segment.start * self.width..segment.end * self.width],
+            outputs: &self.values[segment],
+        })
+    }
+
+    pub(super) fn segments(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let ends = self
+            .starts
+            .iter()
+            .skip(1)
+            .copied()
+            .chain([self.values.len()]);
+        self.starts.iter().zip(ends).map(|(&start, end)| start..end)
+    }
+
+    pub(super) fn values(&self, segment: Range<usize>) -> &[f64] {
+        &self.values[segment]
+    }
+
+    pub(super) fn input(&self, segment: Range<usize>, nth: usize) -> Vec<f64> {
+        segment
+            .map(|sample| self.inputs[sample * self.width + nth])
+            .collect()
+    }
+
+    /// The differences from one sample to the next, which are one fewer in each segment.
+    pub(super) fn differenced(&self) -> Self {
+        let mut differenced = Self::new(self.width);
+        for segment in self.segments() {
+            differenced.segment();
+            for sample in segment.skip(1) {
+                let row = |sample: usize| &self.inputs[sample * self.width..][..self.width];
+                let inputs = row(sample)
+                    .iter()
+                    .zip(row(sample - 1))
+                    .map(|(now, before)| now - before);
+                differenced.push(inputs, self.values[sample] - self.values[sample - 1]);
+            }
+        }
+        differenced
+    }
+}
+
+/// A signal that has always been what it was first, before its first sample.
+pub(super) struct Past<'a> {
+    pub(super) values: &'a [f64],
+    pub(super) before: f64,
+}
+
+impl Past<'_> {
+    pub(super) fn at(&self, sample: usize, lag: usize) -> f64 {
+        match sample.checked_sub(lag) {
+            Some(sample) => self.values[sample],
+            None => self.before,
+        }
+    }
+}
+
+/// `x/F(q)`, where `x` has always been `before` until its first sample.
+pub(super) fn through(f: &[f64], x: &[f64], before: f64) -> (Vec<f64>, f64) {
+    let rest = before / (1.0 + f.iter().sum::<f64>());
+    let mut filtered: Vec<f64> = Vec::with_capacity(x.len());
+    for (sample, value) in x.iter().enumerate() {
+        let past = Past {
+            values: &filtered,
+            before: rest,
+        };
+        let sum: f64 = f
+            .iter()
+            .enumerate()
+            .map(|(j, f)| f * past.at(sample, j + 1))
+            .sum();
+        filtered.push(value - sum);
+    }
+    (filtered, rest)
+}
+
+/// An input of a segment on its way through the model.
+struct Brought {
+    delay: usize,
+    nb: usize,
+    nf: usize,
+    /// `u/F`, what `b` is multiplied with.
+    of_b: (Vec<f64>, f64),
+    /// `w/F`, what `f` is.
+    of_f: (Vec<f64>, f64),
+    /// `w = B/F u`.
+    whole: Vec<f64>,
+}
+
+impl Brought {
+    fn new(transfer: &super::Transfer, input: &[f64]) -> Self {
+        let first = input.first().copied().unwrap_or(0.0);
+        let of_b = through(&transfer.f, input, first);
+        let past = Past {
+            values: &of_b.0,
+            before: of_b.1,
+        };
+        let whole = |sample| {
+            let b = transfer.b.iter().enumerate();
+            b.map(|(j, b)| b * past.at(sample, transfer.delay + j))
+                .sum()
+        };
+        let whole: Vec<f64> = (0..input.len()).map(whole).collect();
+        let rest = transfer.b.iter().sum::<f64>() * of_b.1;
+        Self {
+            delay: transfer.delay,
+            nb: transfer.b.len(),
+            nf: transfer.f.len(),
+            of_f: through(&transfer.f, &whole, rest),
+            of_b,
+            whole,
+        }
+    }
+}
+
+/// Goes through the residuals of a model, each with its derivatives in the order of [`Polynomials::flat`] (Ljung 1999, section
+/// 10.3). The first `first` of each segment are left out.
+pub(super) fn residuals(
+    model: &Polynomials,
+    samples: &Samples,
+    first: usize,
+    mut take: impl FnMut(f64, &[f64]),
+) {
+    let count = model.flat().len();
+    let has_level = model.differences == 0;
+    let whitening = model.whitening();
+    let integrating = Polynomials {
+        d: Vec::new(),
+        ..model.clone()
+    }
+    .whitening();
+    let of_level = -(1.0 + model.a.iter().sum::<f64>());
+    for segment in samples.segments() {
+        let values: Vec<f64> = samples
+            .values(segment.clone())
+            .iter()
+            .map(|y| y - model.level)
+            .collect();
+        let brought: Vec<Brought> = model
+            .inputs
+            .iter()
+            .enumerate()
+            .map(|(nth, transfer)| Brought::new(transfer, &samples.input(segment.clone(), nth)))
+            .collect();
+        // Before this sample something that `A` or a direct input needs is missing.
+        let begin = first_of(model);
+        let mut ring = Ring::new(count, whitening.len(), model.c.len(), integrating.len());
+        for sample in begin..values.len() {
+            let row = ring.next();
+            let a = model.a.iter().enumerate();
+            let brought_now: f64 = brought.iter().map(|of| of.whole[sample]).sum();
+            row.noise = values[sample] + a.map(|(j, a)| a * values[sample - 1 - j]).sum::<f64>()
+                - brought_now;
+            let mut at = 0;
+            let mut put = |value: f64| {
+                row.raw[at] = value;
+                at += 1;
+            };
+            if has_level {
+                put(of_level);
+            }
+            (1..=model.a.len()).for_each(|j| put(values[sample - j]));
+            for of in &brought {
+                let past = |of: &(Vec<f64>, f64), lag| {
+                    let (values, before) = (&of.0, of.1);
+                    Past { values, before }.at(sample, lag)
+                };
+                (0..of.nb).for_each(|j| put(-past(&of.of_b, of.delay + j)));
+                (1..=of.nf).for_each(|j| put(past(&of.of_f, j)));
+            }
+            if sample < begin + whitening.len() {
+                continue;
+            }
+            ring.whiten(&whitening, &model.c, &integrating, model.d.len(), at);
+            if sample >= first {
+                take(ring.residual(), ring.derivatives());
+            }
+        }
+    }
+}
+
+fn first_of(model: &Polynomials) -> usize {
+    let direct = model
+        .inputs
+        .iter()
+        .filter(|of| of.f.is_empty() && !of.b.is_empty());
+    let reach = direct.map(|of| of.delay + of.b.len() - 1).max();
+    model.a.len().max(reach.unwrap_or(0))
+}
+
+/// The last samples, as far back as the noise model reaches.
+struct Ring {
+    rows: Vec<Row>,
+    now: usize,
+}
+
+#[derive(Clone)]
+struct Row {
+    /// `A y − Σ w`, before the noise model.
+    noise: f64,
+    /// Its derivatives.
+    raw: Vec<f64>,
+    residual: f64,
+    derivatives: Vec<f64>,
+}
+
+impl Ring {
+    fn new(count: usize, whitening: usize, nc: usize, integrating: usize) -> Self {
+        let row = Row {
+            noise: 0.0,
+            raw: vec![0.0; count],
+            residual: 0.0,
+            derivatives: vec![0.0; count],
+        };
+        Self {
+            rows: vec![row; 1 + whitening.max(nc).max(integrating) + integrating],
+            now: 0,
+        }
+    }
+
+    /// The row of the next sample, whose residual is 0 until it has been worked out.
+    fn next(&mut self) -> &mut Row {
+        self.now = (self.now + 1) % self.rows.len();
+        let row = &mut self.rows[self.now];
+        row.residual = 0.0;
+        row.derivatives.fill(0.0);
+        row
+    }
+
+    fn back(&self, lag: usize) -> usize {
+        (self.now + self.rows.len() - lag) % self.rows.len()
+    }
+
+    /// `ε = D (1 − q⁻¹)^d/C` of the noise, and the same of its derivatives; then those by `C` and `D` themselves.
+    fn whiten(&mut self, whitening: &[f64], c: &[f64], integrating: &[f64], nd: usize, at: usize) {
+        let mut new = std::mem::take(&mut self.rows[self.now].derivatives);
+        new[..at].copy_from_slice(&self.rows[self.now].raw[..at]);
+        let mut residual = self.rows[self.now].noise;
+        for (j, d) in whitening.iter().enumerate() {
+            let row = &self.rows[self.back(j + 1)];
+            residual += d * row.noise;
+            for (to, from) in new[..at].iter_mut().zip(&row.raw) {
+                *to += d * from;
+            }
+        }
+        for j in 0..c.len() {
+            new[at + j] = -self.rows[self.back(j + 1)].residual;
+        }
+        for j in 0..nd {
+            // The noise, integrated back, `j + 1` samples ago.
+            let mut noise = self.rows[self.back(j + 1)].noise;
+            for (i, d) in integrating.iter().enumerate() {
+                noise += d * self.rows[self.back(j + 2 + i)].noise;
+            }
+            new[at + c.len() + j] = noise;
+        }
+        for (j, c) in c.iter().enumerate() {
+            let row = &self.rows[self.back(j + 1)];
+            residual -= c * row.residual;
+            for (to, from) in new.iter_mut().zip(&row.derivatives) {
+                *to -= c * from;
+            }
+        }
+        let row = &mut self.rows[self.now];
+        row.residual = residual;
+        row.derivatives = new;
+    }
+
+    fn residual(&self) -> f64 {
+        self.rows[self.now].residual
+    }
+
+    fn derivatives(&self) -> &[f64] {
+        &self.rows[self.now].derivatives
+    }
+}
+
+/// The sum of the squared residuals; infinite where it is not a number.
+pub(super) fn sum_of_squares(model: &Polynomials, samples: &Samples, first: usize) -> f64 {
+    let mut sum = 0.0;
+    residuals(model, samples, first, |residual, _| {
+        sum += residual * residual
+    });
+    if sum.is_finite() { sum } else { f64::INFINITY }
+}
+
+/// Whether the orders leave residuals to be counted from `first` on.
+pub(super) fn counted_from(orders: &Orders, first: usize) -> usize {
+    first.max(orders.first())
+}

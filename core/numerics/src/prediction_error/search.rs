@@ -1,0 +1,206 @@
+//! Decides which coefficients make the one-step predictions of a model err least; not where the search starts.
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+
+use super::initial::starts;
+use super::residuals::{counted_from, residuals, sum_of_squares};
+use super::{InformationCriteria, Orders, Polynomials, Samples};
+use crate::NumericsError;
+use crate::checks::check_penalty;
+
+/// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
+const TOLERANCE: f64 = 1e-10;
+const MOST_DAMPING: f64 = 1e12;
+
+/// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B`, by damped Gauss–Newton
+/// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PredictionError {
+    /// What is added to the sum: so many times the squares of the coefficients of `B`.
+    pub penalty: f64,
+    /// The most steps.
+    pub most_steps: usize,
+}
+
+impl Default for PredictionError {
+    fn default() -> Self {
+        Self {
+            penalty: 0.0,
+            most_steps: 100,
+        }
+    }
+}
+
+/// A model and how well it predicts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictionErrorFit {
+    /// The model.
+    pub model: Polynomials,
+    /// Without the penalty.
+    pub residual_sum_of_squares: f64,
+    /// Residuals that were counted.
+    pub rows: usize,
+    /// Steps of the search.
+    pub steps: usize,
+    /// Whether the search ended since no step was worth it.
+    pub converged: bool,
+}
+
+impl PredictionErrorFit {
+    /// The variance of the innovations, for as many coefficients as there are.
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        let left = self.rows.saturating_sub(self.model.flat().len()).max(1);
+        self.residual_sum_of_squares / left as f64
+    }
+
+    /// What it is worth beside others on the same rows.
+    #[must_use]
+    pub fn criteria(&self) -> InformationCriteria {
+        let coefficients = self.model.flat().len();
+        InformationCriteria::of(self.rows, coefficients, self.residual_sum_of_squares)
+    }
+}
+
+impl PredictionError {
+    /// Fits a model of these orders. The first `first` samples of each segment are not counted, or those before which the
+    /// model lacks something, whichever are more: models of several orders that are to be compared need the same.
+    ///
+    /// # Errors
+    /// [`NumericsError::Parameter`], [`NumericsError::Width`] where the inputs are not those of the samples,
+    /// [`NumericsError::TooFewRows`], [`NumericsError::NotFinite`].
+    pub fn fit(
+        &self,
+        orders: &Orders,
+        samples: &Samples,
+        first: usize,
+    ) -> Result<PredictionErrorFit, NumericsError> {
+        check_penalty(self.penalty)?;
+        if orders.inputs.len() != samples.width() {
+            return Err(NumericsError::Width {
+                expected: orders.inputs.len(),
+                found: samples.width(),
+            });
+        }
+        let first = counted_from(orders, first);
+        let rows = samples.counted(first);
+        let needed = orders.coefficients() + 2;
+        if rows < needed {
+            return Err(NumericsError::TooFewRows {
+                needed: needed as u64,
+                found: rows as u64,
+            });
+        }
+        let mut best: Option<(f64, Polynomials)> = None;
+        for start in starts(orders, samples, self.penalty)? {
+            let found = self.objective(&start, samples, first);
+            if best.as_ref().is_none_or(|(least, _)| found < *least) {
+                best = Some((found, start));
+            }
+        }
+        let start = best
+            .filter(|(found, _)| found.is_finite())
+            .map(|(_, start)| start);
+        let start = start.ok_or(NumericsError::NotFinite)?;
+        let (model, steps, converged) = self.search(start, samples, first);
+        Ok(PredictionErrorFit {
+            residual_sum_of_squares: sum_of_squares(&model, samples, first),
+            model,
+            rows,
+            steps,
+            converged,
+        })
+    }
+
+    fn objective(&self, model: &Polynomials, samples: &Samples, first: usize) -> f64 {
+        let b = model.flat().into_iter().zip(model.penalised());
+        let squares: f64 = b.filter(|(_, of_b)| *of_b).map(|(b, _)| b * b).sum();
+        sum_of_squares(model, samples, first) + self.penalty * squares
+    }
+
+    fn search(
+        &self,
+        start: Polynomials,
+        samples: &Samples,
+        first: usize,
+    ) -> (Polynomials, usize, bool) {
+        let mut model = start;
+        let mut least = self.objective(&model, samples, first);
+        let mut damping = 1e-3;
+        for step in 0..self.most_steps {
+            let (hessian, gradient) = self.normal_equations(&model, samples, first);
+            let flat = model.flat();
+            loop {
+                let tried = descend(&hessian, &gradient, damping).map(|change| {
+                    let moved: Vec<f64> =
+                        flat.iter().zip(&change).map(|(at, by)| at - by).collect();
+                    model.with(&moved)
+                });
+                let tried = tried.filter(Polynomials::is_stable);
+                let found = tried.map(|tried| (self.objective(&tried, samples, first), tried));
+                if let Some((sum, tried)) = found.filter(|(sum, _)| *sum <= least) {
+                    let gained = least - sum;
+                    (model, damping) = (tried, (damping / 10.0).max(1e-12));
+                    least = sum;
+                    if gained <= TOLERANCE * least {
+                        return (model, step + 1, true);
+                    }
+                    break;
+                }
+                damping *= 10.0;
+                if damping > MOST_DAMPING {
+                    return (model, step, true);
+                }
+            }
+        }
+        (model, self.most_steps, false)
+    }
+
+    /// `JᵀJ` and `Jᵀε`, with the penalty.
+    fn normal_equations(
+        &self,
+        model: &Polynomials,
+        samples: &Samples,
+        first: usize,
+    ) -> (Mat<f64>, Vec<f64>) {
+        let flat = model.flat();
+        let count = flat.len();
+        let mut squares = vec![0.0; count * count];
+        let mut gradient = vec![0.0; count];
+        residuals(model, samples, first, |residual, derivatives| {
+            for (i, &of) in derivatives.iter().enumerate() {
+                gradient[i] += of * residual;
+                let row = &mut squares[i * count..i * count + i + 1];
+                for (to, other) in row.iter_mut().zip(derivatives) {
+                    *to += of * other;
+                }
+            }
+        });
+        let of_b = model.penalised();
+        let mut hessian = Mat::from_fn(count, count, |i, j| squares[i.max(j) * count + i.min(j)]);
+        for i in (0..count).filter(|&i| of_b[i]) {
+            hessian[(i, i)] += self.penalty;
+            gradient[i] += self.penalty * flat[i];
+        }
+        (hessian, gradient)
+    }
+}
+
+/// The step that `(H + λ diag H) δ = g` asks for; none where that has no solution.
+fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: f64) -> Option<Vec<f64>> {
+    let count = gradient.len();
+    let scales: Vec<f64> = (0..count).map(|i| hessian[(i, i)].sqrt()).collect();
+    let scales: Vec<f64> = scales
+        .iter()
+        .map(|&s| if s > 0.0 { s } else { 1.0 })
+        .collect();
+    let scaled = Mat::from_fn(count, count, |i, j| {
+        let damped = if i == j { damping } else { 0.0 };
+        hessian[(i, j)] / (scales[i] * scales[j]) + damped
+    });
+    let right = Mat::from_fn(count, 1, |i, _| gradient[i] / scales[i]);
+    let solved = scaled.llt(Side::Lower).ok()?.solve(&right);
+    let step: Vec<f64> = (0..count).map(|i| solved[(i, 0)] / scales[i]).collect();
+    step.iter().all(|by| by.is_finite()).then_some(step)
+}

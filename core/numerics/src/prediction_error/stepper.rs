@@ -1,0 +1,165 @@
+//! Decides what a model predicts from sample to sample, and what it makes of samples that are missing.
+
+use serde::{Deserialize, Serialize};
+
+use super::Polynomials;
+
+/// A model, followed sample by sample. Nothing is allocated once it is built.
+///
+/// Of a sample that is missing it takes what it had predicted for it, so that predictions several samples ahead are steps
+/// without one (Ljung 1999, section 3.2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stepper {
+    model: Polynomials,
+    whitening: Vec<f64>,
+    /// The newest first.
+    past: Vec<f64>,
+    noise: Vec<f64>,
+    innovations: Vec<f64>,
+    inputs: Vec<PastInput>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PastInput {
+    /// Of the input itself.
+    values: Vec<f64>,
+    /// Of what it brings about.
+    filtered: Vec<f64>,
+}
+
+impl Stepper {
+    /// A model at rest with all inputs 0.
+    #[must_use]
+    pub fn new(model: Polynomials) -> Self {
+        let whitening = model.whitening();
+        let inputs = model.inputs.iter().map(|of| PastInput {
+            values: vec![0.0; of.delay + of.b.len()],
+            filtered: vec![0.0; of.f.len()],
+        });
+        Self {
+            past: vec![0.0; model.a.len()],
+            noise: vec![0.0; whitening.len()],
+            innovations: vec![0.0; model.c.len()],
+            inputs: inputs.collect(),
+            whitening,
+            model,
+        }
+    }
+
+    /// The model that is followed.
+    #[must_use]
+    pub fn model(&self) -> &Polynomials {
+        &self.model
+    }
+
+    /// Forgets what was: the inputs have always been like this.
+    pub fn rest(&mut self, input: impl Fn(usize) -> f64) {
+        let level = self.model.at_rest(&input) - self.model.level;
+        for (nth, (past, transfer)) in self.inputs.iter_mut().zip(&self.model.inputs).enumerate() {
+            past.values.fill(input(nth));
+            past.filtered.fill(transfer.gain() * input(nth));
+        }
+        self.past.fill(level);
+        self.noise.fill(0.0);
+        self.innovations.fill(0.0);
+    }
+
+    /// Where it is has been measured: what the inputs do not explain of it has always been there.
+    pub fn settle_on(&mut self, value: f64) {
+        let value = value - self.model.level;
+        let brought: f64 = self
+            .inputs
+            .iter()
+            .zip(&self.model.inputs)
+            .map(|(past, of)| match past.filtered.first() {
+                Some(&filtered) => filtered,
+                None => of.gain() * past.values.first().copied().unwrap_or(0.0),
+            })
+            .sum();
+        self.past.fill(value);
+        let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - brought;
+        self.noise.fill(noise);
+        self.innovations.fill(0.0);
+    }
+
+    /// Goes on by one sample, and gives what was predicted of it.
+    pub fn step(&mut self, input: impl Fn(usize) -> f64, value: Option<f64>) -> f64 {
+        let mut brought = 0.0;
+        for (nth, (past, of)) in self.inputs.iter_mut().zip(&self.model.inputs).enumerate() {
+            push(&mut past.values, input(nth));
+            let from = past.values.get(of.delay..).unwrap_or_default();
+            let filtered = product(&of.b, from) - product(&of.f, &past.filtered);
+            push(&mut past.filtered, filtered);
+            brought += filtered;
+        }
+        let noise =
+            product(&self.model.c, &self.innovations) - product(&self.whitening, &self.noise);
+        let expected = brought + noise - product(&self.model.a, &self.past);
+        let innovation = value.map_or(0.0, |value| value - self.model.level - expected);
+        push(&mut self.past, expected + innovation);
+        push(&mut self.noise, noise + innovation);
+        push(&mut self.innovations, innovation);
+        self.model.level + expected
+    }
+
+    /// The variance of predictions one sample ahead, two samples and so on, in that of an innovation: sums of the squares of
+    /// what an innovation leads to (Ljung 1999, section 3.2).
+    #[must_use]
+    pub fn variances(&self, most: usize) -> Vec<f64> {
+        let mut alone = Self::new(self.model.clone());
+        let mut sum = 0.0;
+        (0..most)
+            .map(|nth| {
+                let before = if nth == 0 {
+                    Some(self.model.level + 1.0)
+                } else {
+                    None
+                };
+                let expected = alone.step(|_| 0.0, before) - self.model.level;
+                let brought = if nth == 0 { 1.0 } else { expected };
+                sum += brought * brought;
+                sum
+            })
+            .collect()
+    }
+
+    /// Takes over where another stepper is, unless it has other orders.
+    pub fn resume(&mut self, other: &Self) -> bool {
+        let shape = |of: &Self| {
+            let inputs = of.inputs.iter();
+            let inputs: Vec<_> = inputs.map(|p| (p.values.len(), p.filtered.len())).collect();
+            (of.past.len(), of.noise.len(), of.innovations.len(), inputs)
+        };
+        let alike = shape(self) == shape(other);
+        if alike {
+            self.take(other);
+        }
+        alike
+    }
+
+    /// Takes over where another of the same orders is, without making room.
+    pub fn take(&mut self, other: &Self) {
+        self.past.copy_from_slice(&other.past);
+        self.noise.copy_from_slice(&other.noise);
+        self.innovations.copy_from_slice(&other.innovations);
+        for (to, from) in self.inputs.iter_mut().zip(&other.inputs) {
+            to.values.copy_from_slice(&from.values);
+            to.filtered.copy_from_slice(&from.filtered);
+        }
+    }
+}
+
+/// `Σ p_j x_j` over the first of both.
+fn product(polynomial: &[f64], past: &[f64]) -> f64 {
+    polynomial.iter().zip(past).map(|(p, x)| p * x).sum()
+}
+
+/// Puts a value before those of the past, and forgets the oldest.
+fn push(past: &mut [f64], value: f64) {
+    if let Some(last) = past.len().checked_sub(1) {
+        past.copy_within(..last, 1);
+        past[0] = value;
+    }
+}

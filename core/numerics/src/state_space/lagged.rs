@@ -1,0 +1,148 @@
+//! Decides what past and future of a record are, and sums their products; not what is made of them.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par, Side};
+
+use super::Record;
+use crate::NumericsError;
+
+/// Windows are summed so many at a time.
+const AT_ONCE: usize = 256;
+/// Directions in which a matrix is below this share of its largest have rounding in them and nothing else.
+const ROUNDING: f64 = 1e-13;
+
+/// The mean products of past inputs and outputs, future inputs and future outputs, in this order, over all windows.
+pub(super) struct Lagged {
+    products: Mat<f64>,
+    pub(super) horizon: usize,
+    pub(super) width: usize,
+    pub(super) windows: usize,
+}
+
+impl Lagged {
+    /// Over windows of twice the horizon.
+    pub(super) fn of(records: &[Record<'_>], width: usize, horizon: usize) -> Self {
+        let order = 2 * horizon * (width + 1);
+        let mut sum = Mat::<f64>::zeros(order, order);
+        let mut rows: Vec<f64> = Vec::with_capacity(AT_ONCE * order);
+        let mut windows = 0;
+        let mut add = |rows: &mut Vec<f64>| {
+            let block = MatRef::from_column_major_slice(rows, order, rows.len() / order);
+            matmul(
+                sum.as_mut(),
+                Accum::Add,
+                block,
+                block.transpose(),
+                1.0,
+                Par::Seq,
+            );
+            rows.clear();
+        };
+        for record in records {
+            for begin in 0..(record.len() + 1).saturating_sub(2 * horizon) {
+                for half in [begin, begin + horizon] {
+                    for at in half..half + horizon {
+                        rows.extend_from_slice(record.input(at));
+                    }
+                    rows.extend_from_slice(&record.outputs[half..half + horizon]);
+                }
+                windows += 1;
+                if rows.len() == AT_ONCE * order {
+                    add(&mut rows);
+                }
+            }
+        }
+        if !rows.is_empty() {
+            add(&mut rows);
+        }
+        let count = windows.max(1) as f64;
+        Self {
+            products: Mat::from_fn(order, order, |i, j| sum[(i, j)] / count),
+            horizon,
+            width,
+            windows,
+        }
+    }
+
+    fn past(&self) -> usize {
+        self.horizon * (self.width + 1)
+    }
+
+    fn part(&self, rows: (usize, usize), columns: (usize, usize)) -> Mat<f64> {
+        self.products
+            .submatrix(rows.0, columns.0, rows.1, columns.1)
+            .to_owned()
+    }
+
+    /// What the past tells of the future outputs beside the future inputs, and products of what is left of past and future
+    /// outputs when the future inputs are taken out of them.
+    pub(super) fn projected(&self) -> Result<Projected, NumericsError> {
+        let past = (0, self.past());
+        let inputs = (self.past(), self.horizon * self.width);
+        let outputs = (inputs.0 + inputs.1, self.horizon);
+        let inverse = pseudo_inverse(&self.part(inputs, inputs))?;
+        let left = |rows, columns| {
+            let explained = self.part(rows, inputs) * &inverse * self.part(inputs, columns);
+            self.part(rows, columns) - explained
+        };
+        let past_left = left(past, past);
+        Ok(Projected {
+            from_past: left(outputs, past) * pseudo_inverse(&past_left)?,
+            past: self.part(past, past),
+            past_left,
+            outputs_left: left(outputs, outputs),
+        })
+    }
+}
+
+pub(super) struct Projected {
+    /// Future outputs from the past.
+    pub(super) from_past: Mat<f64>,
+    pub(super) past: Mat<f64>,
+    pub(super) past_left: Mat<f64>,
+    pub(super) outputs_left: Mat<f64>,
+}
+
+/// Eigenvalues in falling order, none below 0, and the vectors that belong to them.
+pub(super) fn spectrum(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), NumericsError> {
+    let order = matrix.nrows();
+    if order == 0 {
+        return Ok((Vec::new(), Mat::zeros(0, 0)));
+    }
+    let eigen = matrix
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|_| NumericsError::NoConvergence)?;
+    let values = eigen.S().column_vector();
+    let falling: Vec<f64> = (0..order).rev().map(|i| values[i].max(0.0)).collect();
+    let vectors = eigen.U();
+    let turned = Mat::from_fn(order, order, |i, j| vectors[(i, order - 1 - j)]);
+    Ok((falling, turned))
+}
+
+/// A power of a symmetric matrix, directions of rounding left out.
+pub(super) fn power(matrix: &Mat<f64>, exponent: f64) -> Result<Mat<f64>, NumericsError> {
+    let (values, vectors) = spectrum(matrix)?;
+    let least = ROUNDING * values.first().copied().unwrap_or(0.0);
+    let order = values.len();
+    let scaled = Mat::from_fn(order, order, |i, j| {
+        if values[j] > least {
+            vectors[(i, j)] * values[j].powf(exponent)
+        } else {
+            0.0
+        }
+    });
+    Ok(scaled * vectors.transpose())
+}
+
+/// The pseudo-inverse of a symmetric matrix, its rows and columns on one scale.
+pub(super) fn pseudo_inverse(matrix: &Mat<f64>) -> Result<Mat<f64>, NumericsError> {
+    let order = matrix.nrows();
+    let inverse = |i: usize| {
+        let own = matrix[(i, i)];
+        if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 }
+    };
+    let roots: Vec<f64> = (0..order).map(inverse).collect();
+    let scale =
+        |matrix: &Mat<f64>| Mat::from_fn(order, order, |i, j| matrix[(i, j)] * roots[i] * roots[j]);
+    Ok(scale(&power(&scale(matrix), -1.0)?))
+}

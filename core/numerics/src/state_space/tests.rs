@@ -1,0 +1,282 @@
+//! The identification against `sippy_unipi`, and models that are known.
+
+use super::{Record, StateOrder, Subspace, Weighting};
+use crate::NumericsError;
+use crate::oracle;
+
+const PLAIN: Subspace = Subspace {
+    horizon: 8,
+    weighting: Weighting::N4sid,
+    order: StateOrder::Given(3),
+    alike: 1,
+    feedthrough: true,
+    refined: false,
+};
+
+/// The columns of a table on a scale of 1: inputs sample by sample and the output, and the scales.
+fn scaled() -> (Vec<f64>, Vec<f64>, [f64; 3]) {
+    let rows = oracle::own_table("state_space/record.csv").numbers();
+    let count = rows.len() as f64;
+    let scales = [0, 1, 2].map(|j| {
+        let mean = rows.iter().map(|row| row[j]).sum::<f64>() / count;
+        let squares: f64 = rows.iter().map(|row| (row[j] - mean).powi(2)).sum();
+        (squares / count).sqrt()
+    });
+    let inputs = rows
+        .iter()
+        .flat_map(|row| [row[0] / scales[0], row[1] / scales[1]])
+        .collect();
+    (
+        inputs,
+        rows.iter().map(|row| row[2] / scales[2]).collect(),
+        scales,
+    )
+}
+
+fn numbers(value: &serde_json::Value) -> Vec<f64> {
+    let values = value.as_array().unwrap().iter();
+    values.map(|value| value.as_f64().unwrap()).collect()
+}
+
+#[track_caller]
+fn near(found: f64, expected: f64, within: f64) {
+    assert!(
+        (found - expected).abs() <= within,
+        "{found} instead of {expected}"
+    );
+}
+
+#[test]
+fn responses_gains_and_singular_values_are_those_of_the_own_oracle() {
+    let (inputs, outputs, scales) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let text = oracle::own_text("state_space/expected.json");
+    let expected: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for (weighting, name) in [
+        (Weighting::N4sid, "N4SID"),
+        (Weighting::Moesp, "MOESP"),
+        (Weighting::Cva, "CVA"),
+    ] {
+        let expected = &expected["by"][name];
+        let how = Subspace { weighting, ..PLAIN };
+        let found = how.identify(&[record], 2).unwrap();
+        assert!(!found.stabilised);
+        for (value, theirs) in found
+            .singular_values
+            .iter()
+            .zip(numbers(&expected["singular"]))
+        {
+            near(*value, theirs, 1e-7);
+        }
+        for (input, direct) in numbers(&expected["direct"]).into_iter().enumerate() {
+            let response = found.model.impulse_response(Some(input), 12);
+            let scale = scales[2] / scales[input];
+            near(response[0] * scale, direct, 1e-7);
+            let theirs = numbers(&expected["response"][input.to_string()]);
+            for (value, theirs) in response[1..].iter().zip(theirs) {
+                near(value * scale, theirs, 1e-7);
+            }
+        }
+        let response = found.model.impulse_response(None, 12);
+        let theirs = numbers(&expected["response"]["noise"]);
+        for (value, theirs) in response[1..].iter().zip(theirs) {
+            near(*value, theirs, 1e-6);
+        }
+    }
+}
+
+#[test]
+fn the_difference_equation_forecasts_what_the_states_do() {
+    let (inputs, outputs, _) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let how = Subspace {
+        weighting: Weighting::Cva,
+        refined: true,
+        ..PLAIN
+    };
+    let model = how.identify(&[record], 2).unwrap().model;
+    let by_states = model.one_step(&record);
+    let equation = model.difference_equation();
+    assert_eq!(
+        (equation.a.len(), equation.b.len(), equation.c.len()),
+        (3, 2, 3)
+    );
+    let mut innovations = vec![0.0; outputs.len()];
+    let mut largest = 0.0_f64;
+    for t in 0..outputs.len() {
+        let mut expected = 0.0;
+        for i in 0..3 {
+            if let Some(before) = t.checked_sub(i + 1) {
+                expected += equation.c[i] * innovations[before] - equation.a[i] * outputs[before];
+            }
+        }
+        for (j, b) in equation.b.iter().enumerate() {
+            for (i, b) in b.iter().enumerate().take(t + 1) {
+                expected += b * inputs[(t - i) * 2 + j];
+            }
+        }
+        innovations[t] = outputs[t] - expected;
+        largest = largest.max((expected - by_states[t]).abs());
+    }
+    assert!(largest < 1e-9, "{largest}");
+}
+
+#[test]
+fn found_anew_the_inputs_tell_more_of_one_step() {
+    let (inputs, outputs, _) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let plain = PLAIN.identify(&[record], 2).unwrap();
+    let refined = Subspace {
+        refined: true,
+        ..PLAIN
+    };
+    let refined = refined.identify(&[record], 2).unwrap();
+    assert!(
+        refined.errors.0 < plain.errors.0,
+        "{:?} {:?}",
+        refined.errors,
+        plain.errors
+    );
+    assert_eq!(refined.errors.1, outputs.len() - 8);
+}
+
+#[test]
+fn three_states_are_told_by_a_threshold_and_none_is_more_than_is_there() {
+    let (inputs, outputs, _) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let order = |order| {
+        let how = Subspace {
+            weighting: Weighting::Cva,
+            order,
+            ..PLAIN
+        };
+        how.identify(&[record], 2).unwrap().model.order()
+    };
+    assert!((2..=3).contains(&order(StateOrder::Threshold(0.3))));
+    assert!((1..=4).contains(&order(StateOrder::LargestGap)));
+    assert_eq!(order(StateOrder::Threshold(0.999)), 1);
+}
+
+#[test]
+fn of_little_that_is_independent_one_state_is_told() {
+    let (inputs, outputs, _) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let order = |alike| {
+        let how = Subspace {
+            weighting: Weighting::Cva,
+            order: StateOrder::Threshold(0.01),
+            alike,
+            ..PLAIN
+        };
+        how.identify(&[record], 2).unwrap().model.order()
+    };
+    assert!((2..=3).contains(&order(1)), "{}", order(1));
+    assert_eq!(order(40), 1);
+}
+
+#[test]
+fn records_are_not_joined_where_one_ends() {
+    let (inputs, outputs, _) = scaled();
+    let half = outputs.len() / 2;
+    let parts = [
+        Record {
+            inputs: &inputs[..2 * half],
+            outputs: &outputs[..half],
+        },
+        Record {
+            inputs: &inputs[2 * half..],
+            outputs: &outputs[half..],
+        },
+    ];
+    let refined = Subspace {
+        refined: true,
+        ..PLAIN
+    };
+    let forth = refined
+        .identify(&parts, 2)
+        .unwrap()
+        .model
+        .impulse_response(Some(0), 5);
+    let back = refined.identify(&[parts[1], parts[0]], 2).unwrap().model;
+    for (a, b) in forth.iter().zip(back.impulse_response(Some(0), 5)) {
+        near(*a, b, 1e-9);
+    }
+}
+
+#[test]
+fn without_inputs_the_output_is_told_from_itself() {
+    let (_, outputs, _) = scaled();
+    let record = Record {
+        inputs: &[],
+        outputs: &outputs,
+    };
+    let how = Subspace {
+        refined: true,
+        order: StateOrder::Given(1),
+        ..PLAIN
+    };
+    let found = how.identify(&[record], 0).unwrap();
+    let mean_square = found.errors.0 / found.errors.1 as f64;
+    assert!(mean_square < 0.95, "{mean_square}");
+}
+
+#[test]
+fn wrong_requests_are_refused() {
+    let (inputs, outputs, _) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let short = Record {
+        inputs: &inputs[..40],
+        outputs: &outputs[..20],
+    };
+    assert!(matches!(
+        PLAIN.identify(&[short], 2),
+        Err(NumericsError::TooFewRows { .. })
+    ));
+    for how in [
+        Subspace {
+            horizon: 1,
+            ..PLAIN
+        },
+        Subspace {
+            order: StateOrder::Given(9),
+            ..PLAIN
+        },
+        Subspace {
+            order: StateOrder::Given(0),
+            ..PLAIN
+        },
+        Subspace {
+            order: StateOrder::Threshold(f64::NAN),
+            ..PLAIN
+        },
+    ] {
+        assert!(matches!(
+            how.identify(&[record], 2),
+            Err(NumericsError::Parameter { .. })
+        ));
+    }
+    let still = vec![0.0; outputs.len()];
+    let still = Record {
+        inputs: &inputs,
+        outputs: &still,
+    };
+    assert!(PLAIN.identify(&[still], 2).is_err());
+}

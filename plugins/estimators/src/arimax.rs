@@ -1,0 +1,130 @@
+//! The estimator whose noise has no level to return to.
+
+use athermal_core::node::{
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
+};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::identified::{Asked, PerInput};
+use crate::order::Order;
+
+/// ARMAX whose noise is integrated: it has no level to return to, so that an offset that comes to stay is followed.
+///
+/// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999, section 4.2). Without
+/// features it is ARIMA. The sum of squared one-step prediction errors is made least by damped Gauss–Newton steps with exact
+/// derivatives, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C` stay inside the unit circle.
+///
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span of
+/// the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a series of its
+/// own, which are fitted together and followed side by side. The time between two truths of a series counts as so many steps,
+/// rounded; for those that are missing it takes what it had predicted. Running, it is told each truth that the embargo lets
+/// through and predicts as many steps ahead of the newest as there are. Where truths or rows are missing in the fit, the filters
+/// start again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays
+/// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time
+/// alone, the node runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Arimax {
+    /// How many past values of the truth, 0 to 100.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 100))]
+    pub na: usize,
+    /// How many values of each feature, 1 to 100: a number for all, or a list with one for each.
+    #[serde(default = "one_each")]
+    pub nb: PerInput,
+    /// How many past innovations, 0 to 100.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 100))]
+    pub nc: usize,
+    /// How many steps the newest value of each feature that counts lies before the run, 0 to 100: a number for all, or a list
+    /// with one for each.
+    #[serde(default = "none_each")]
+    pub nk: PerInput,
+    /// How often the noise is integrated, 0 to 2.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 2))]
+    pub differences: usize,
+    /// The penalty on the coefficients of standardised features, at least 0, as in ridge.
+    #[serde(default = "penalty")]
+    #[schemars(range(min = 0.0))]
+    pub penalty: f64,
+    /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
+    #[serde(default)]
+    pub every: Option<Duration>,
+    /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
+    #[serde(default)]
+    pub order: Option<Order>,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn one_each() -> PerInput {
+    PerInput::All(1)
+}
+
+fn none_each() -> PerInput {
+    PerInput::All(0)
+}
+
+fn penalty() -> f64 {
+    1.0
+}
+
+impl Arimax {
+    fn asked(&self) -> Asked {
+        Asked {
+            na: Some(self.na),
+            nb: Some(self.nb.clone()),
+            nc: Some(self.nc),
+            nk: Some(self.nk.clone()),
+            differences: self.differences,
+            penalty: self.penalty,
+            every: self.every,
+            order: self.order,
+            ..Asked::default()
+        }
+    }
+}
+
+impl Estimator for Arimax {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("features", "what the prediction is made of beside the past")
+                    .or_none(),
+                InputPort::truth("what is predicted, and followed"),
+                InputPort::freeze(),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            every_tick: true,
+            ..Regressors::default()
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        self.asked().mistakes()
+    }
+
+    fn learns(&self) -> Learns {
+        Learns::UnlessTold
+    }
+
+    fn deviates(&self) -> bool {
+        true
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        self.asked().trainer(setup)
+    }
+}
+
+athermal_core::register!(Arimax, Estimator, "arimax");

@@ -1,0 +1,95 @@
+//! The estimator that tells the truth from its own past and from what was not foreseen of it.
+
+use athermal_core::node::{
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
+};
+use athermal_core::time::Duration;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::identified::Asked;
+use crate::order::Order;
+
+/// Autoregressive moving average: what the truth does by itself, and what was not foreseen of it.
+///
+/// `A(q) (y − μ) = C(q) e`, with `A(q) = 1 + a₁q⁻¹ + …` and `C(q) = 1 + c₁q⁻¹ + …` (Box and Jenkins 1970; Ljung 1999,
+/// section 4.2). The sum of squared one-step prediction errors is made least by damped Gauss–Newton steps with exact derivatives,
+/// starting where Hannan and Rissanen (1982) end; roots of `A` and `C` stay inside the unit circle.
+///
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span of
+/// the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a series of its
+/// own, which are fitted together and followed side by side. The time between two truths of a series counts as so many steps,
+/// rounded; for those that are missing it takes what it had predicted. Running, it is told each truth that the embargo lets
+/// through and predicts as many steps ahead of the newest as there are. Where truths or rows are missing in the fit, the filters
+/// start again. A segment begins at the level of the fit, where it stays with `learn = false`. The port `deviation` is the
+/// standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Arma {
+    /// How many past values of the truth, 0 to 100.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 100))]
+    pub na: usize,
+    /// How many past innovations, 0 to 100.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 100))]
+    pub nc: usize,
+    /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
+    #[serde(default)]
+    pub every: Option<Duration>,
+    /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
+    #[serde(default)]
+    pub order: Option<Order>,
+}
+
+fn one() -> usize {
+    1
+}
+
+impl Arma {
+    fn asked(&self) -> Asked {
+        Asked {
+            na: Some(self.na),
+            nc: Some(self.nc),
+            every: self.every,
+            order: self.order,
+            ..Asked::default()
+        }
+    }
+}
+
+impl Estimator for Arma {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::truth("what is predicted, and followed"),
+                InputPort::freeze(),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            every_tick: true,
+            ..Regressors::default()
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        self.asked().mistakes()
+    }
+
+    fn learns(&self) -> Learns {
+        Learns::UnlessTold
+    }
+
+    fn deviates(&self) -> bool {
+        true
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        self.asked().trainer(setup)
+    }
+}
+
+athermal_core::register!(Arma, Estimator, "arma");

@@ -1,0 +1,344 @@
+//! Decides how an identified model is followed while it runs: when it goes on by a step, from which inputs, and what it makes of
+//! truths.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
+use athermal_core::model::numbers;
+use athermal_core::node::{Learner, Predictor, Restored, State};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{Polynomials, Stepper};
+use serde::{Deserialize, Serialize};
+
+/// How many runs within a step are kept.
+const RUNS_PER_STEP: i64 = 16;
+
+/// How inputs are brought to a common scale.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Scaling {
+    #[serde(with = "numbers")]
+    pub(super) means: Vec<f64>,
+    #[serde(with = "numbers")]
+    pub(super) scales: Vec<f64>,
+}
+
+impl Scaling {
+    fn of<'a>(&'a self, row: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
+        |nth| (row[nth] - self.means[nth]) / self.scales[nth]
+    }
+}
+
+/// A model as it was identified.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Identified {
+    pub(super) regressors: Vec<String>,
+    pub(super) scaling: Scaling,
+    /// On scaled inputs, in the unit of the truth.
+    pub(super) model: Polynomials,
+    pub(super) step: Duration,
+    /// How many truths come within a step.
+    pub(super) series: usize,
+    /// The standard deviation of a prediction one step after the newest truth, two steps and so on.
+    #[serde(with = "numbers")]
+    pub(super) deviations: Vec<f64>,
+}
+
+#[typetag::serde(name = "identified")]
+impl Predictor for Identified {
+    fn uses(&self) -> &[String] {
+        &self.regressors
+    }
+
+    fn predict(&self, regressors: &[f64]) -> f64 {
+        self.model.at_rest(self.scaling.of(regressors))
+    }
+
+    fn deviation(&self, _regressors: &[f64]) -> f64 {
+        self.deviations.last().copied().unwrap_or(f64::NAN)
+    }
+
+    fn learner(&self) -> Option<Box<dyn Learner>> {
+        Some(Box::new(Following::new(self)))
+    }
+}
+
+/// One of the interleaved series that a model is followed in.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Followed {
+    stepper: Stepper,
+    /// The instant of its last sample.
+    at: Instant,
+    /// Whether a truth has been told since the segment began.
+    measured: bool,
+}
+
+/// What is known since the segment began.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Known {
+    regressors: Vec<String>,
+    scaling: Scaling,
+    step: Duration,
+    series: Vec<Followed>,
+    /// Whether there has been a run.
+    begun: bool,
+    /// What each run predicts, and its inputs, since the oldest sample of the series.
+    runs: VecDeque<Instant>,
+    inputs: VecDeque<f64>,
+}
+
+athermal_core::state!(Known, "identified/1");
+
+/// Follows a model.
+#[derive(Debug)]
+struct Following {
+    known: Known,
+    deviations: Vec<f64>,
+    /// For predictions, which leave no trace.
+    scratch: RefCell<Stepper>,
+}
+
+impl Following {
+    fn new(of: &Identified) -> Self {
+        let stepper = Stepper::new(of.model.clone());
+        let followed = Followed {
+            stepper: stepper.clone(),
+            at: Instant::MIN,
+            measured: false,
+        };
+        Self {
+            known: Known {
+                regressors: of.regressors.clone(),
+                scaling: of.scaling.clone(),
+                step: of.step,
+                series: vec![followed; of.series.max(1)],
+                begun: false,
+                runs: VecDeque::new(),
+                inputs: VecDeque::new(),
+            },
+            deviations: of.deviations.clone(),
+            scratch: RefCell::new(stepper),
+        }
+    }
+}
+
+impl Known {
+    /// Begins at rest, a step before what the first run predicts.
+    fn begin(&mut self, row: &[f64], of: Instant) {
+        let Self {
+            scaling,
+            series,
+            step,
+            ..
+        } = self;
+        let count = series.len() as i64;
+        for (nth, followed) in series.iter_mut().enumerate() {
+            followed.stepper.rest(scaling.of(row));
+            followed.at = of - *step + part(*step, nth as i64, count);
+            followed.measured = false;
+        }
+        self.begun = true;
+    }
+
+    /// Goes on to `of` in so many steps, the last one with the inputs of `row` and maybe a truth. Tells what was predicted.
+    fn advance(
+        &self,
+        stepper: &mut Stepper,
+        from: Instant,
+        of: Instant,
+        row: &[f64],
+        truth: Option<f64>,
+    ) -> f64 {
+        let steps = self.steps(from, of);
+        for nth in 1..steps {
+            let at = from + part(of - from, nth, steps);
+            self.pass(stepper, at, row);
+        }
+        stepper.step(self.scaling.of(row), truth)
+    }
+
+    /// A step without a truth, with the inputs of the last run that predicted this instant or one before; with those of `row`
+    /// where there was none.
+    fn pass(&self, stepper: &mut Stepper, at: Instant, row: &[f64]) {
+        let count = self.runs.partition_point(|&of| of <= at);
+        let width = self.scaling.means.len();
+        let Scaling { means, scales } = &self.scaling;
+        match count.checked_sub(1) {
+            Some(run) => stepper.step(
+                |nth| (self.inputs[run * width + nth] - means[nth]) / scales[nth],
+                None,
+            ),
+            None => stepper.step(self.scaling.of(row), None),
+        };
+    }
+
+    /// How many steps lie between two instants.
+    fn steps(&self, from: Instant, to: Instant) -> i64 {
+        let steps = ((to - from).secs() / self.step.secs()).round();
+        // More than that are forgotten anyway.
+        (steps as i64).clamp(1, 10_000)
+    }
+
+    /// The series whose newest sample is the newest that lies a step before an instant.
+    fn nearest(&self, of: Instant) -> &Followed {
+        let before = of - part(self.step, 1, 2);
+        let key = |followed: &&Followed| (followed.at <= before, followed.measured, followed.at);
+        self.series
+            .iter()
+            .max_by_key(key)
+            .expect("there is a series at least")
+    }
+}
+
+/// So many parts of a duration.
+fn part(of: Duration, count: i64, parts: i64) -> Duration {
+    let ns = i128::from(of.as_ns()) * i128::from(count) / i128::from(parts.max(1));
+    Duration::from_ns(i64::try_from(ns).unwrap_or(i64::MAX))
+}
+
+impl Learner for Following {
+    fn follows(&self) -> bool {
+        true
+    }
+
+    fn run(&mut self, regressors: &[f64], of: Instant, told: Instant) {
+        let known = &mut self.known;
+        if regressors.iter().any(|value| value.is_nan()) {
+            return;
+        }
+        if !known.begun {
+            known.begin(regressors, of);
+        }
+        // A truth that has not been told by now never will be.
+        for nth in 0..known.series.len() {
+            let Followed { at, .. } = known.series[nth];
+            let mut next = at + known.step;
+            let overdue = told - part(known.step, 1, 2);
+            if next > overdue {
+                continue;
+            }
+            let scratch = self.scratch.get_mut();
+            scratch.take(&known.series[nth].stepper);
+            let steps = ((overdue - at).secs() / known.step.secs()) as i64;
+            if steps > 10_000 {
+                next = next + part(known.step, steps - 10_000, 1);
+            }
+            let mut last = at;
+            while next <= overdue {
+                known.pass(scratch, next, regressors);
+                last = next;
+                next = next + known.step;
+            }
+            known.series[nth].stepper.take(scratch);
+            known.series[nth].at = last;
+        }
+        let width = known.scaling.means.len();
+        let oldest = known.series.iter().map(|followed| followed.at).min();
+        while known.runs.get(1).is_some_and(|&next| Some(next) <= oldest) {
+            known.runs.pop_front();
+            known.inputs.drain(..width);
+        }
+        let apart = part(known.step, 1, RUNS_PER_STEP);
+        if known.runs.back().is_none_or(|&last| of - last >= apart) {
+            known.runs.push_back(of);
+            known.inputs.extend(regressors);
+        }
+    }
+
+    fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
+        if !self.known.begun {
+            let scratch = self.scratch.borrow();
+            return scratch.model().at_rest(self.known.scaling.of(regressors));
+        }
+        let followed = self.known.nearest(of);
+        let mut scratch = self.scratch.borrow_mut();
+        scratch.take(&followed.stepper);
+        self.known
+            .advance(&mut scratch, followed.at, of, regressors, None)
+    }
+
+    fn deviation(&self, _regressors: &[f64], of: Instant) -> f64 {
+        let followed = self.known.nearest(of);
+        let steps = if followed.measured {
+            self.known.steps(followed.at, of)
+        } else {
+            i64::MAX
+        };
+        let last = self.deviations.len().saturating_sub(1);
+        let nth = usize::try_from(steps - 1).unwrap_or(usize::MAX).min(last);
+        self.deviations.get(nth).copied().unwrap_or(f64::NAN)
+    }
+
+    fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
+        if !self.known.begun {
+            self.known.begin(regressors, at);
+        }
+        let oldest = self
+            .known
+            .series
+            .iter()
+            .enumerate()
+            .min_by_key(|(_, of)| of.at);
+        let Some((nth, followed)) = oldest else {
+            return;
+        };
+        let soonest = followed.at + part(self.known.step, 1, 2);
+        if at < soonest {
+            return;
+        }
+        let scratch = self.scratch.get_mut();
+        scratch.take(&followed.stepper);
+        self.known
+            .advance(scratch, followed.at, at, regressors, Some(truth));
+        if !followed.measured {
+            scratch.settle_on(truth);
+        }
+        let followed = &mut self.known.series[nth];
+        followed.stepper.take(scratch);
+        followed.at = at;
+        followed.measured = true;
+    }
+
+    fn segment(&mut self, _shift: Duration) {
+        self.known.begun = false;
+        self.known.runs.clear();
+        self.known.inputs.clear();
+    }
+
+    fn snapshot(&self) -> Box<dyn State> {
+        Box::new(self.known.clone())
+    }
+
+    fn restore(&mut self, state: Box<dyn State>) -> Restored {
+        let known = match state.known::<Known>() {
+            Ok(known) => known,
+            Err(cold) => return cold,
+        };
+        if known.regressors != self.known.regressors {
+            return Restored::cold("it was followed with other inputs");
+        }
+        if known.scaling != self.known.scaling {
+            return Restored::cold("its inputs were on another scale");
+        }
+        if known.step != self.known.step || known.series.len() != self.known.series.len() {
+            return Restored::cold("it was followed in other steps");
+        }
+        let mut series = self.known.series.clone();
+        for (own, other) in series.iter_mut().zip(&known.series) {
+            if !own.stepper.resume(&other.stepper) {
+                return Restored::cold("it was followed with other orders");
+            }
+            (own.at, own.measured) = (other.at, other.measured);
+        }
+        self.known.series = series;
+        self.known.begun = known.begun;
+        self.known.runs = known.runs;
+        self.known.inputs = known.inputs;
+        // The engine thread must not have to make room.
+        let Known { runs, inputs, .. } = &mut self.known;
+        runs.reserve(runs.len().max(16));
+        inputs.reserve(inputs.len().max(16));
+        Restored::Accepted
+    }
+}

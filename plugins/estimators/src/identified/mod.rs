@@ -1,0 +1,130 @@
+//! What the kinds share that are identified by the prediction error: their orders, and how they are told of mistakes.
+
+mod follow;
+mod per_input;
+mod train;
+
+use athermal_core::node::{Mistake, Trainer, TrainingSetup};
+use athermal_core::time::Duration;
+use athermal_numerics::{InputOrders, Orders};
+
+use crate::order::{LARGEST, Order};
+pub use per_input::PerInput;
+pub(crate) use train::{Found, IdentifiedTrainer, Identify};
+
+/// What a kind asks for, in the letters of Ljung (1999), chapter 4; those that it does not have are none.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Asked {
+    pub(crate) na: Option<usize>,
+    pub(crate) nb: Option<PerInput>,
+    pub(crate) nc: Option<usize>,
+    pub(crate) nd: Option<usize>,
+    pub(crate) nf: Option<PerInput>,
+    pub(crate) nk: Option<PerInput>,
+    pub(crate) differences: usize,
+    pub(crate) penalty: f64,
+    pub(crate) every: Option<Duration>,
+    pub(crate) order: Option<Order>,
+}
+
+impl Asked {
+    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        let has = [
+            self.na.is_some(),
+            self.nb.is_some(),
+            self.nc.is_some(),
+            self.nd.is_some(),
+            self.nf.is_some(),
+            self.nk.is_some(),
+        ];
+        let of_all = [("na", self.na), ("nc", self.nc), ("nd", self.nd)];
+        let of_inputs = [
+            ("nb", &self.nb, 1),
+            ("nf", &self.nf, 0),
+            ("nk", &self.nk, 0),
+        ];
+        let mut check = |name: &str, order: usize, least: usize| {
+            if !(least..=LARGEST).contains(&order) {
+                let message = format!("`{name}` is {order} and must be {least} to {LARGEST}");
+                mistakes.push(Mistake::at(name, message));
+            }
+        };
+        for (name, order) in of_all {
+            order.into_iter().for_each(|order| check(name, order, 0));
+        }
+        for (name, orders, least) in of_inputs {
+            let orders = orders.iter().flat_map(PerInput::each);
+            orders.for_each(|order| check(name, order, least));
+        }
+        if self.differences > 2 {
+            let message = format!("`differences` is {} and must be 0 to 2", self.differences);
+            mistakes.push(Mistake::at("differences", message));
+        }
+        if !(self.penalty >= 0.0 && self.penalty.is_finite()) {
+            let message = format!("`penalty` is {} and must be 0 or more", self.penalty);
+            mistakes.push(Mistake::at("penalty", message));
+        }
+        if let Some(every) = self.every
+            && every <= Duration::ZERO
+        {
+            let message = format!("`every` is {every} and must be longer than nothing");
+            mistakes.push(Mistake::at("every", message));
+        }
+        if let Some(order) = &self.order {
+            mistakes.extend(order.mistakes(has.map(|has| has.then_some(LARGEST))));
+        }
+        mistakes
+    }
+
+    pub(crate) fn trainer(self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(IdentifiedTrainer::new(setup, self))
+    }
+
+    /// The orders as they are given, those of the first input standing for all.
+    fn given(&self) -> [usize; 6] {
+        let first = |orders: &Option<PerInput>| orders.as_ref().map_or(0, |orders| orders.of(0));
+        [
+            self.na.unwrap_or(0),
+            first(&self.nb),
+            self.nc.unwrap_or(0),
+            self.nd.unwrap_or(0),
+            first(&self.nf),
+            first(&self.nk),
+        ]
+    }
+
+    /// The orders of a model with so many inputs, the open ones as in `chosen`.
+    fn orders(&self, inputs: usize, chosen: &[usize; 6]) -> Orders {
+        let open = self.order.as_ref().map_or([false; 6], Order::open);
+        let of = |orders: &Option<PerInput>, letter: usize, nth: usize| match orders {
+            Some(orders) if !open[letter] => orders.of(nth),
+            _ => chosen[letter],
+        };
+        Orders {
+            na: chosen[0],
+            inputs: (0..inputs)
+                .map(|nth| InputOrders {
+                    nb: of(&self.nb, 1, nth),
+                    nf: of(&self.nf, 4, nth),
+                    nk: of(&self.nk, 5, nth),
+                })
+                .collect(),
+            nc: chosen[2],
+            nd: chosen[3],
+            differences: self.differences,
+        }
+    }
+
+    /// Lists of orders that are not as long as there are inputs.
+    fn misfit(&self, inputs: usize) -> Option<String> {
+        let lists = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
+        lists.into_iter().find_map(|(name, orders)| match orders {
+            Some(PerInput::Each(list)) if list.len() != inputs => Some(format!(
+                "`{name}` has {} orders for {inputs} features; one number stands for all",
+                list.len()
+            )),
+            _ => None,
+        })
+    }
+}

@@ -1,0 +1,335 @@
+//! Decides how rows become the evenly spaced samples that a model is identified from, and which of its orders is taken.
+
+use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{
+    Polynomials, PredictionError, PredictionErrorFit, Samples, Standardization, Standardizer,
+    Stepper,
+};
+
+use super::Asked;
+use super::follow::{Identified, Scaling};
+use crate::regression::told;
+
+/// The most interleaved series.
+const MOST_SERIES: usize = 16;
+/// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
+const STEPS_AHEAD: usize = 256;
+
+/// How a model is found from evenly spaced samples.
+pub(crate) trait Identify: std::fmt::Debug + Send {
+    /// How long a step is, where that is stated.
+    fn every(&self) -> Option<Duration>;
+
+    /// What does not fit so many inputs.
+    fn misfit(&self, _inputs: usize) -> Option<String> {
+        None
+    }
+
+    /// The model, from samples of so many interleaved series; what there is to tell goes into the report.
+    ///
+    /// # Errors
+    /// When the samples do not allow one.
+    fn identify(
+        &self,
+        samples: &Samples,
+        series: usize,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError>;
+}
+
+/// A model, and how far its one-step predictions were off.
+#[derive(Debug)]
+pub(crate) struct Found {
+    pub(crate) model: Polynomials,
+    pub(crate) residual_sum_of_squares: f64,
+    pub(crate) rows: usize,
+    /// The variance of an innovation.
+    pub(crate) variance: f64,
+}
+
+/// Keeps all rows, which are gone through again and again.
+#[derive(Debug)]
+pub(crate) struct IdentifiedTrainer<Kind> {
+    asked: Kind,
+    names: Vec<String>,
+    span: Duration,
+    memory: usize,
+    rows: Vec<Row>,
+    regressors: Vec<f64>,
+    begins: bool,
+    count: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    at: Instant,
+    truth: f64,
+    /// Whether a segment begins with it.
+    begins: bool,
+}
+
+impl<Kind: Identify> IdentifiedTrainer<Kind> {
+    pub(crate) fn new(setup: &TrainingSetup, asked: Kind) -> Self {
+        let names = setup
+            .regressors
+            .iter()
+            .map(|regressor| regressor.name.clone());
+        Self {
+            asked,
+            names: names.collect(),
+            span: setup.span,
+            memory: setup.memory,
+            rows: Vec::new(),
+            regressors: Vec::new(),
+            begins: true,
+            count: 0,
+        }
+    }
+
+    fn bytes_per_row(&self) -> usize {
+        size_of::<Row>() + self.names.len() * size_of::<f64>()
+    }
+
+    fn fits(&self) -> bool {
+        self.count * self.bytes_per_row() <= self.memory
+    }
+
+    /// The typical time from one truth to the next.
+    fn between(&self) -> Option<Duration> {
+        let pairs = self.rows.windows(2).filter(|pair| !pair[1].begins);
+        let mut between: Vec<Duration> = pairs.map(|pair| pair[1].at - pair[0].at).collect();
+        between.sort_unstable();
+        between
+            .get(between.len() / 2)
+            .copied()
+            .filter(|&between| between > Duration::ZERO)
+    }
+
+    /// The rows as samples of several interleaved series, each as far apart as a step; where one is missing, a series ends and
+    /// another begins.
+    fn samples(&self, pace: Pace, standard: &Standardization) -> Samples {
+        let width = self.names.len();
+        let step = pace.step.secs();
+        let mut samples = Samples::new(width);
+        let mut from = 0;
+        while from < self.rows.len() {
+            let rest = &self.rows[from + 1..];
+            let length = 1 + rest.iter().position(|row| row.begins).unwrap_or(rest.len());
+            for series in 0..pace.series {
+                samples.segment();
+                let mut last: Option<Instant> = None;
+                for nth in (from + series..from + length).step_by(pace.series) {
+                    let Row { at, truth, .. } = self.rows[nth];
+                    let steps = last.map_or(1.0, |last| (at - last).secs() / step);
+                    if steps < 0.5 {
+                        continue;
+                    }
+                    if steps >= 1.5 {
+                        samples.segment();
+                    }
+                    last = Some(at);
+                    let mut inputs = self.regressors[nth * width..(nth + 1) * width].to_vec();
+                    standard.apply(&mut inputs);
+                    samples.push(inputs, truth);
+                }
+            }
+            from += length;
+        }
+        samples
+    }
+
+    fn solve(&self, report: &mut TrainingReport) -> Result<Identified, TrainingError> {
+        let unsolvable = |reason: String| TrainingError::Unsolvable { reason };
+        if !self.fits() {
+            let bytes = (self.count * self.bytes_per_row()) as f64;
+            return Err(unsolvable(format!(
+                "it goes over its rows several times, and they did not fit in memory; `--memory {:.0}` would hold them",
+                (bytes / f64::from(1 << 20)).ceil() + 1.0
+            )));
+        }
+        if let Some(misfit) = self.asked.misfit(self.names.len()) {
+            return Err(unsolvable(misfit));
+        }
+        let too_few = TrainingError::TooFewRows {
+            rows: self.rows.len(),
+            needed: 3,
+        };
+        let pace = Pace::of(
+            self.asked.every(),
+            self.span,
+            self.between().ok_or(too_few)?,
+        );
+        let mut standard = Standardizer::new(self.names.len());
+        if !self.names.is_empty() {
+            self.regressors
+                .chunks_exact(self.names.len())
+                .for_each(|row| standard.partial_fit(row));
+        }
+        let standard = standard.standardization();
+        let samples = self.samples(pace, &standard);
+        let found = self.asked.identify(&samples, pace.series, report)?;
+        report.notes.push(pace.told());
+        report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
+        let variance = found.variance;
+        let stepper = Stepper::new(found.model);
+        let variances = stepper.variances(STEPS_AHEAD);
+        Ok(Identified {
+            regressors: self.names.clone(),
+            scaling: Scaling {
+                means: standard.means,
+                scales: standard.scales,
+            },
+            deviations: variances
+                .iter()
+                .map(|sum| (variance * sum).sqrt())
+                .collect(),
+            model: stepper.model().clone(),
+            step: pace.step,
+            series: pace.series,
+        })
+    }
+}
+
+impl Identify for Asked {
+    fn every(&self) -> Option<Duration> {
+        self.every
+    }
+
+    fn misfit(&self, inputs: usize) -> Option<String> {
+        Asked::misfit(self, inputs)
+    }
+
+    fn identify(
+        &self,
+        samples: &Samples,
+        _series: usize,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError> {
+        let fit = self.fit(samples, report)?;
+        if !fit.converged {
+            report.notes.push(format!(
+                "the search had not ended after {} steps",
+                fit.steps
+            ));
+        }
+        Ok(Found {
+            residual_sum_of_squares: fit.residual_sum_of_squares,
+            rows: fit.rows,
+            variance: fit.variance(),
+            model: fit.model,
+        })
+    }
+}
+
+impl Asked {
+    fn fit(
+        &self,
+        samples: &Samples,
+        report: &mut TrainingReport,
+    ) -> Result<PredictionErrorFit, TrainingError> {
+        let search = PredictionError {
+            penalty: self.penalty,
+            ..PredictionError::default()
+        };
+        let width = samples.width();
+        let Some(order) = self.order else {
+            let orders = self.orders(width, &self.given());
+            return search.fit(&orders, samples, 0).map_err(told);
+        };
+        let candidates = order.combinations(self.given());
+        let orders: Vec<_> = candidates
+            .iter()
+            .map(|one| self.orders(width, one))
+            .collect();
+        let first = orders
+            .iter()
+            .map(athermal_numerics::Orders::first)
+            .max()
+            .unwrap_or(0);
+        let mut tried = Vec::new();
+        let mut fits = Vec::new();
+        let mut failed = None;
+        for (candidate, orders) in candidates.iter().zip(&orders) {
+            match search.fit(orders, samples, first) {
+                Ok(fit) => {
+                    tried.push((*candidate, orders.coefficients(), fit.criteria()));
+                    fits.push(fit);
+                }
+                Err(error) => failed = Some(error),
+            }
+        }
+        let Some((best, table)) = order.best(samples.counted(first), &tried) else {
+            let reason = "no order could be fitted".to_owned();
+            return Err(failed.map_or(unsolved(reason), told));
+        };
+        report.orders = Some(Box::new(table));
+        Ok(fits.swap_remove(best))
+    }
+}
+
+fn unsolved(reason: String) -> TrainingError {
+    TrainingError::Unsolvable { reason }
+}
+
+/// How samples follow each other.
+#[derive(Debug, Clone, Copy)]
+struct Pace {
+    step: Duration,
+    /// How many truths come within a step: each begins a series of its own.
+    series: usize,
+}
+
+impl Pace {
+    fn of(every: Option<Duration>, span: Duration, between: Duration) -> Self {
+        let step = every.unwrap_or_else(|| span.max(between));
+        let series = (step.secs() / between.secs()).round();
+        Self {
+            step,
+            series: (series as usize).clamp(1, MOST_SERIES),
+        }
+    }
+
+    fn told(self) -> String {
+        match self.series {
+            1 => format!("a step is {}", self.step),
+            series => format!("a step is {}, in {series} interleaved series", self.step),
+        }
+    }
+}
+
+impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
+    fn row(&mut self, regressors: &[f64], truth: f64) {
+        let second = Duration::from_ns(1_000_000_000);
+        let last = self.rows.last().map(|row| row.at);
+        self.row_at(
+            last.map_or(Instant::from_ns(0), |last| last + second),
+            regressors,
+            truth,
+        );
+    }
+
+    fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
+        self.count += 1;
+        if !self.fits() {
+            (self.rows, self.regressors) = (Vec::new(), Vec::new());
+            return;
+        }
+        let begins = std::mem::take(&mut self.begins);
+        self.rows.push(Row { at, truth, begins });
+        self.regressors.extend_from_slice(regressors);
+    }
+
+    fn segment(&mut self) {
+        self.begins = true;
+    }
+
+    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        let mut report = TrainingReport::default();
+        let predictor = self.solve(&mut report)?;
+        Ok(Trained {
+            predictor: Box::new(predictor),
+            report,
+        })
+    }
+}

@@ -1,0 +1,87 @@
+//! Decides how many of the lags of a linear model are used, where their number is left open.
+
+use athermal_core::node::{Mistake, Regressor, TrainingReport};
+use athermal_core::time::Duration;
+use athermal_numerics::{GramBlocks, InformationCriteria, LeastSquares, NumericsError};
+
+use crate::order::Order;
+
+/// How many of the first lags are compared.
+#[derive(Debug, Clone)]
+pub(crate) struct LagOrder {
+    order: Order,
+    lags: Vec<Duration>,
+    feature_lags: Vec<Duration>,
+}
+
+impl LagOrder {
+    /// For a model with lags of the truth, and maybe of features.
+    pub(crate) fn new(order: Order, lags: &[Duration], feature_lags: &[Duration]) -> Self {
+        Self {
+            order,
+            lags: lags.to_vec(),
+            feature_lags: feature_lags.to_vec(),
+        }
+    }
+
+    pub(crate) fn mistakes(&self, selects: bool) -> Vec<Mistake> {
+        let of_features = (!self.feature_lags.is_empty()).then_some(self.feature_lags.len());
+        let most = [Some(self.lags.len()), of_features, None, None, None, None];
+        let mut mistakes = self.order.mistakes(most);
+        if selects {
+            let message = "either `order` or `selection` says which lags are used";
+            mistakes.push(Mistake::at("order", message).help("leave one of them out"));
+        }
+        mistakes
+    }
+
+    /// The columns of the best order with this penalty; all that were compared go into the report.
+    pub(crate) fn run(
+        &self,
+        regressors: &[Regressor],
+        blocks: &GramBlocks,
+        scales: &[f64],
+        alpha: f64,
+        report: &mut TrainingReport,
+    ) -> Result<Vec<usize>, NumericsError> {
+        let gram = blocks.total();
+        let rows = usize::try_from(gram.count()).unwrap_or(usize::MAX);
+        let given = [self.lags.len(), self.feature_lags.len(), 0, 0, 0, 0];
+        let mut tried = Vec::new();
+        let mut all = Vec::new();
+        for orders in self.order.combinations(given) {
+            let columns = self.columns(regressors, orders[0], orders[1]);
+            if columns.is_empty() {
+                continue;
+            }
+            let fit = LeastSquares::ridge(alpha).solve(&gram, &columns, scales, blocks.rows())?;
+            let coefficients = columns.len() - fit.constant.len() + 1;
+            let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
+            tried.push((orders, coefficients, figures));
+            all.push(columns);
+        }
+        let (best, table) = self
+            .order
+            .best(rows, &tried)
+            .ok_or(NumericsError::TooFewRows {
+                needed: 4,
+                found: gram.count(),
+            })?;
+        report.orders = Some(Box::new(table));
+        Ok(all.swap_remove(best))
+    }
+
+    /// The columns of the first lags of the truth and of the features.
+    fn columns(&self, regressors: &[Regressor], na: usize, nb: usize) -> Vec<usize> {
+        let (lags, feature_lags) = (&self.lags[..na], &self.feature_lags[..nb]);
+        let used = regressors.iter().enumerate().filter(|(_, regressor)| {
+            let first = if regressor.of_truth {
+                lags
+            } else {
+                feature_lags
+            };
+            first.contains(&regressor.lag)
+        });
+        used.map(|(column, _)| column).collect()
+    }
+}

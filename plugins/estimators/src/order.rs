@@ -1,0 +1,236 @@
+//! Decides how a user asks for orders to be compared, and how the comparison is told; not how a model of an order is fitted.
+
+use std::fmt;
+
+use athermal_core::node::{Mistake, OrderTable, TriedOrder};
+use athermal_numerics::{Criterion, InformationCriteria};
+use schemars::JsonSchema;
+use serde::de::Visitor;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// The most orders that are compared.
+const MOST: usize = 500;
+/// The largest order.
+pub(crate) const LARGEST: usize = 100;
+
+/// Orders from one to another, both included: `"1..6"`, or a number for one alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema)]
+#[schemars(with = "String", extend("pattern" = r"^\d+\.\.\d+$"))]
+pub struct OrderRange {
+    /// The smallest.
+    pub from: usize,
+    /// The largest.
+    pub to: usize,
+}
+
+impl Serialize for OrderRange {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{}..{}", self.from, self.to))
+    }
+}
+
+impl<'de> Deserialize<'de> for OrderRange {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Text;
+        impl Visitor<'_> for Text {
+            type Value = OrderRange;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the smallest and the largest order, such as \"1..6\"")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<OrderRange, E> {
+                let ends = text.split_once("..");
+                let ends = ends.and_then(|(from, to)| {
+                    Some((from.trim().parse().ok()?, to.trim().parse().ok()?))
+                });
+                let (from, to) =
+                    ends.ok_or_else(|| E::invalid_value(serde::de::Unexpected::Str(text), &self))?;
+                Ok(OrderRange { from, to })
+            }
+        }
+        deserializer.deserialize_str(Text)
+    }
+}
+
+/// Which figure chooses the order; the smallest is the best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Figure {
+    /// Akaike's information criterion.
+    Aic,
+    /// The same, corrected for few rows.
+    #[default]
+    Aicc,
+    /// The Bayesian information criterion, which takes the fewest coefficients.
+    Bic,
+    /// The final prediction error.
+    Fpe,
+}
+
+impl Figure {
+    fn criterion(self) -> Criterion {
+        match self {
+            Self::Aic => Criterion::Aic,
+            Self::Aicc => Criterion::Aicc,
+            Self::Bic => Criterion::Bic,
+            Self::Fpe => Criterion::Fpe,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Aic => "AIC",
+            Self::Aicc => "AICc",
+            Self::Bic => "BIC",
+            Self::Fpe => "FPE",
+        }
+    }
+}
+
+/// Which orders are compared, and by what. All are fitted on the same rows.
+///
+/// With `N` rows, `V` the mean square of the residuals, `p` coefficients and `k = p + 1`: AIC `N ln V + 2k`, AICc
+/// `AIC + 2k(k + 1)/(N − k − 1)`, BIC `N ln V + k ln N`, FPE `V (N + p)/(N − p)` (Ljung 1999, section 16.4; Hurvich and Tsai
+/// 1989). They take rows for independent; those of a drift whose windows overlap are not, and the order then comes out large.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Order {
+    /// The figure that chooses: `aic`, `aicc`, `bic` or `fpe`.
+    #[serde(default)]
+    pub by: Figure,
+    /// How many past values of the truth, such as `"1..6"`; for `ar` and `arx`, how many of the first `lags`.
+    #[serde(default)]
+    pub na: Option<OrderRange>,
+    /// How many values of each input; for `arx`, how many of the first `feature_lags`.
+    #[serde(default)]
+    pub nb: Option<OrderRange>,
+    /// How many past innovations.
+    #[serde(default)]
+    pub nc: Option<OrderRange>,
+    /// How many past values of the noise.
+    #[serde(default)]
+    pub nd: Option<OrderRange>,
+    /// How many past values of what each input brings about.
+    #[serde(default)]
+    pub nf: Option<OrderRange>,
+    /// How many samples the newest value of each input that counts lies back.
+    #[serde(default)]
+    pub nk: Option<OrderRange>,
+}
+
+/// An order that may be compared: its letter.
+pub(crate) const LETTERS: [&str; 6] = ["na", "nb", "nc", "nd", "nf", "nk"];
+
+impl Order {
+    fn ranges(&self) -> [Option<OrderRange>; 6] {
+        [self.na, self.nb, self.nc, self.nd, self.nf, self.nk]
+    }
+
+    /// Ranges that are none, and letters that the kind does not have; `most` is the largest order of each that it has.
+    pub(crate) fn mistakes(&self, most: [Option<usize>; 6]) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        let mut count = 1_usize;
+        let has: Vec<&str> = LETTERS
+            .iter()
+            .zip(most)
+            .filter(|(_, most)| most.is_some())
+            .map(|(letter, _)| *letter)
+            .collect();
+        for ((letter, range), most) in LETTERS.iter().zip(self.ranges()).zip(most) {
+            let Some(range) = range else { continue };
+            let place = format!("order.{letter}");
+            let Some(most) = most else {
+                let message = format!("this kind has no `{letter}`");
+                mistakes
+                    .push(Mistake::at(place, message).help(format!("it has {}", has.join(", "))));
+                continue;
+            };
+            if range.from > range.to || range.to > most {
+                let message = format!(
+                    "`{letter}` is {}..{} and must rise to {most} at most",
+                    range.from, range.to
+                );
+                mistakes.push(Mistake::at(place, message));
+                continue;
+            }
+            count = count.saturating_mul(range.to - range.from + 1);
+        }
+        if count > MOST {
+            let message = format!("these are {count} orders, and at most {MOST} are compared");
+            mistakes.push(
+                Mistake::at("order", message).help("compare fewer, or one letter after the other"),
+            );
+        }
+        if self.ranges().iter().all(Option::is_none) {
+            let message = "no order is left open";
+            mistakes.push(
+                Mistake::at("order", message)
+                    .help(format!("say which, such as `{} = \"1..6\"`", has[0])),
+            );
+        }
+        mistakes
+    }
+
+    /// Every combination, the letters left out as they are in `given`, the first letter slowest.
+    pub(crate) fn combinations(&self, given: [usize; 6]) -> Vec<[usize; 6]> {
+        let mut all = vec![given];
+        for (nth, range) in self.ranges().into_iter().enumerate() {
+            let Some(range) = range else { continue };
+            let longer = all.iter().flat_map(|one| {
+                (range.from..=range.to).map(move |order| {
+                    let mut one = *one;
+                    one[nth] = order;
+                    one
+                })
+            });
+            all = longer.collect();
+        }
+        all
+    }
+
+    /// Which orders are open.
+    pub(crate) fn open(&self) -> [bool; 6] {
+        self.ranges().map(|range| range.is_some())
+    }
+
+    /// The orders as a report tells them.
+    pub(crate) fn name(&self, orders: &[usize; 6]) -> String {
+        let open = LETTERS.iter().zip(orders).zip(self.open());
+        let open = open.filter(|(_, open)| *open);
+        let named: Vec<String> = open
+            .map(|((letter, order), _)| format!("{letter} {order}"))
+            .collect();
+        named.join(", ")
+    }
+
+    /// The best of what was tried, and the table of all: each with its orders, its coefficients and the figures.
+    pub(crate) fn best(
+        &self,
+        rows: usize,
+        tried: &[([usize; 6], usize, InformationCriteria)],
+    ) -> Option<(usize, OrderTable)> {
+        let by = |figures: &InformationCriteria| figures.by(self.by.criterion());
+        let worth = tried.iter().map(|(_, _, figures)| by(figures)).enumerate();
+        let (best, _) = worth
+            .filter(|(_, worth)| worth.is_finite())
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let told = tried
+            .iter()
+            .map(|(orders, coefficients, figures)| TriedOrder {
+                order: self.name(orders),
+                coefficients: *coefficients,
+                aic: figures.aic,
+                aicc: figures.aicc,
+                bic: figures.bic,
+                fpe: figures.fpe,
+            });
+        let table = OrderTable {
+            by: self.by.name().to_owned(),
+            rows,
+            chosen: best,
+            tried: told.collect(),
+        };
+        Some((best, table))
+    }
+}

@@ -1,0 +1,317 @@
+//! The estimator whose states are told from the past.
+
+use std::fmt;
+
+use athermal_core::node::{
+    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingError, TrainingReport,
+    TrainingSetup,
+};
+use athermal_core::time::Duration;
+use athermal_numerics::{Polynomials, Record, Samples, StateOrder, Subspace, Transfer};
+use schemars::JsonSchema;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::identified::{Found, IdentifiedTrainer, Identify};
+use crate::regression::told;
+
+/// The longest horizon, in steps.
+const LONGEST: usize = 100;
+/// The most states.
+const MOST_STATES: usize = 20;
+/// Values of a past: more would take the memory of many rows.
+const LARGEST_PAST: usize = 1000;
+
+/// A state-space model by subspace identification: states that sum up what the past tells of the future.
+///
+/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter 4; Ljung 1999,
+/// section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the features meanwhile, is
+/// decomposed by singular values: as many as count, and chance does not explain (Wachter 1980), are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how
+/// those go on. `B` and `D` are then found such that one-step errors are least. The singular values are printed and kept. A mode
+/// that would grow is brought back to one that barely fades. No search is made and no start needed, so that a fit takes little
+/// more than one pass over the rows; `oe` or `armax` may come closer from there.
+///
+/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed as a
+/// filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default
+/// the span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
+/// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts as so
+/// many steps, rounded. Running, it is told each truth that the embargo lets through, takes for one that is missing what it had
+/// predicted, and for features that are missing the last ones. Where truths or rows are missing in the fit, windows end and begin
+/// again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays there.
+/// The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the
+/// node runs at every tick.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StateSpace {
+    /// How many states, 1 to 20 and not more than `horizon`; or how that is told from the singular values, such as
+    /// `{ by = "threshold", share = 0.25 }`.
+    #[serde(default)]
+    pub states: States,
+    /// How many steps past and future have each, 2 to 100.
+    #[serde(default = "ten")]
+    #[schemars(range(min = 2, max = 100))]
+    pub horizon: usize,
+    /// How future truths are weighed before their singular values are told.
+    #[serde(default)]
+    pub weighting: Weighting,
+    /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
+    #[serde(default)]
+    pub every: Option<Duration>,
+}
+
+/// How many states a model has.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum States {
+    /// So many.
+    Given(#[schemars(range(min = 1, max = 20))] usize),
+    /// As many as the singular values tell.
+    Told(By),
+}
+
+/// How the number of states is told from the singular values.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
+pub enum By {
+    /// Those before the one that falls most, in proportion to the one before it; half the horizon at most.
+    Gap {},
+    /// Those of at least a share of the largest.
+    Threshold {
+        /// The share, above 0 and below 1.
+        #[serde(default = "quarter")]
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        share: f64,
+    },
+}
+
+/// How future truths are weighed before their singular values are told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Weighting {
+    /// Not at all (Van Overschee and De Moor 1994).
+    N4sid,
+    /// Without what future features tell of the past (Verhaegen 1994).
+    Moesp,
+    /// The same, and in units of what is left: singular values are then canonical correlations (Larimore 1990).
+    #[default]
+    Cva,
+}
+
+fn ten() -> usize {
+    10
+}
+
+fn quarter() -> f64 {
+    0.25
+}
+
+impl Default for States {
+    fn default() -> Self {
+        Self::Told(By::Threshold { share: quarter() })
+    }
+}
+
+// Not derived, since an untagged enum forgets what was wrong with either form.
+impl<'de> Deserialize<'de> for States {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = States;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a whole number or a table such as `{ by = \"gap\" }`")
+            }
+
+            fn visit_u64<E>(self, states: u64) -> Result<States, E> {
+                Ok(States::Given(usize::try_from(states).unwrap_or(usize::MAX)))
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, states: i64) -> Result<States, E> {
+                usize::try_from(states)
+                    .map(States::Given)
+                    .map_err(|_| E::invalid_value(serde::de::Unexpected::Signed(states), &self))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, told: A) -> Result<States, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(told)).map(States::Told)
+            }
+        }
+        deserializer.deserialize_any(Form)
+    }
+}
+
+impl Estimator for StateSpace {
+    fn inputs() -> &'static [InputPort] {
+        const {
+            &[
+                InputPort::held("features", "what the prediction is made of").or_none(),
+                InputPort::truth("what is predicted"),
+                InputPort::freeze(),
+            ]
+        }
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: vec![Duration::ZERO],
+            every_tick: true,
+            ..Regressors::default()
+        }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if !(2..=LONGEST).contains(&self.horizon) {
+            let message = format!("`horizon` is {} and must be 2 to {LONGEST}", self.horizon);
+            mistakes.push(Mistake::at("horizon", message));
+        }
+        match self.states {
+            States::Given(states) if !(1..=MOST_STATES).contains(&states) => {
+                let message = format!("`states` is {states} and must be 1 to {MOST_STATES}");
+                mistakes.push(Mistake::at("states", message));
+            }
+            States::Given(states) if states > self.horizon => {
+                let message = format!(
+                    "`states` is {states} and `horizon` {}, which tells of no more",
+                    self.horizon
+                );
+                mistakes.push(Mistake::at("states", message).help("give a longer `horizon`"));
+            }
+            States::Told(By::Threshold { share }) if !(share > 0.0 && share < 1.0) => {
+                let message = format!("`share` is {share} and must be above 0 and below 1");
+                mistakes.push(Mistake::at("states.share", message));
+            }
+            States::Given(_) | States::Told(_) => {}
+        }
+        if let Some(every) = self.every
+            && every <= Duration::ZERO
+        {
+            let message = format!("`every` is {every} and must be longer than nothing");
+            mistakes.push(Mistake::at("every", message));
+        }
+        mistakes
+    }
+
+    fn learns(&self) -> Learns {
+        Learns::UnlessTold
+    }
+
+    fn deviates(&self) -> bool {
+        true
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        Box::new(IdentifiedTrainer::new(setup, self.clone()))
+    }
+}
+
+athermal_core::register!(StateSpace, Estimator, "state_space");
+
+impl StateSpace {
+    fn subspace(&self, series: usize) -> Subspace {
+        Subspace {
+            horizon: self.horizon,
+            weighting: match self.weighting {
+                Weighting::N4sid => athermal_numerics::Weighting::N4sid,
+                Weighting::Moesp => athermal_numerics::Weighting::Moesp,
+                Weighting::Cva => athermal_numerics::Weighting::Cva,
+            },
+            order: match self.states {
+                States::Given(states) => StateOrder::Given(states),
+                States::Told(By::Gap {}) => StateOrder::LargestGap,
+                States::Told(By::Threshold { share }) => StateOrder::Threshold(share),
+            },
+            alike: series,
+            feedthrough: true,
+            refined: true,
+        }
+    }
+}
+
+impl Identify for StateSpace {
+    fn every(&self) -> Option<Duration> {
+        self.every
+    }
+
+    fn misfit(&self, inputs: usize) -> Option<String> {
+        let past = self.horizon * (inputs + 1);
+        (past > LARGEST_PAST).then(|| {
+            format!(
+                "{inputs} features over a `horizon` of {} steps make a past of {past} values, and at most {LARGEST_PAST} are \
+                 fitted: name fewer features, or give a shorter horizon",
+                self.horizon
+            )
+        })
+    }
+
+    fn identify(
+        &self,
+        samples: &Samples,
+        series: usize,
+        report: &mut TrainingReport,
+    ) -> Result<Found, TrainingError> {
+        let outputs = || samples.records().flat_map(|record| record.outputs);
+        let count = samples.count().max(1) as f64;
+        let mean = outputs().sum::<f64>() / count;
+        let squares: f64 = outputs().map(|y| (y - mean).powi(2)).sum();
+        let scale = (squares / count).sqrt();
+        // Where the truth does not vary, the identification says so.
+        let scale = if scale > 0.0 { scale } else { 1.0 };
+        let scaled: Vec<Vec<f64>> = samples
+            .records()
+            .map(|record| record.outputs.iter().map(|y| (y - mean) / scale).collect())
+            .collect();
+        let records: Vec<Record<'_>> = samples
+            .records()
+            .zip(&scaled)
+            .map(|(record, outputs)| Record {
+                inputs: record.inputs,
+                outputs,
+            })
+            .collect();
+        let found = self.subspace(series).identify(&records, samples.width());
+        let found = found.map_err(told)?;
+        report.notes.push(note(&found));
+        let (squares, rows) = found.errors;
+        let equation = found.model.difference_equation();
+        let inputs = equation.b.iter().map(|b| Transfer {
+            delay: 0,
+            b: b.iter().map(|b| b * scale).collect(),
+            f: Vec::new(),
+        });
+        let rows = rows.max(1);
+        Ok(Found {
+            residual_sum_of_squares: squares * scale * scale,
+            rows,
+            variance: squares * scale * scale / rows as f64,
+            model: Polynomials {
+                a: equation.a,
+                inputs: inputs.collect(),
+                c: equation.c,
+                d: Vec::new(),
+                differences: 0,
+                level: mean,
+            },
+        })
+    }
+}
+
+fn note(found: &athermal_numerics::Identification) -> String {
+    let values: Vec<String> = found
+        .singular_values
+        .iter()
+        .map(|value| format!("{value:.4}"))
+        .collect();
+    let states = found.model.order();
+    let plural = if states == 1 { "" } else { "s" };
+    let stabilised = if found.stabilised {
+        "; a mode that grew was brought back"
+    } else {
+        ""
+    };
+    format!(
+        "{states} state{plural}, from the singular values {}{stabilised}",
+        values.join(", ")
+    )
+}

@@ -1,0 +1,234 @@
+//! What `evaluate --mode` makes of past truths: measured ones, those of some steps before, or none but predictions.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::path::Path;
+
+use workbench::{Scratch, athermal, data, graph};
+
+const GRAPH: &str = r#"
+schema = 1
+[time]
+column = "time_s"
+[signals.input]
+unit = "V"
+channels = ["a"]
+column = "{channel}"
+max_age = "10s"
+[signals.output]
+unit = "V"
+channels = ["y"]
+column = "{channel}"
+max_age = "10s"
+[nodes.lasting]
+type = "persistence"
+inputs.truth = "output.y"
+ahead = "10s"
+[nodes.features]
+type = "linear"
+inputs = { features = "input.a", truth = "output.y" }
+ahead = "10s"
+[nodes.level]
+type = "kalman"
+inputs.truth = "output.y"
+ahead = "10s"
+LEARN
+[outputs]
+lasting = "lasting"
+features = "features"
+level = "level"
+"#;
+
+/// Numbers without a pattern that a model of these could learn by heart.
+fn series(length: usize) -> Vec<[f64; 2]> {
+    let mut state = 12_345_u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) as f64 / f64::from(1 << 30) - 1.0
+    };
+    let mut y = 0.0;
+    (0..length)
+        .map(|_| {
+            let a = random();
+            y = 0.9 * y + 0.3 * a + random();
+            [a, y]
+        })
+        .collect()
+}
+
+fn csv(rows: &[[f64; 2]]) -> String {
+    let lines = rows.iter().enumerate();
+    let lines = lines.map(|(nth, [a, y])| format!("{},{a},{y}\n", 10 * nth));
+    format!("time_s,a,y\n{}", lines.collect::<String>())
+}
+
+fn fitted(scratch: &Scratch, name: &str, graph: &Path, data: &Path) -> std::path::PathBuf {
+    let model = scratch.path(name);
+    athermal(&[&"fit", &graph, &"--data", &data, &"--output", &model]).ended(0);
+    model
+}
+
+fn scores(model: &Path, data: &Path, mode: &[&str]) -> Vec<serde_json::Value> {
+    let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+        vec![&"evaluate", &model, &"--data", &data, &"--format", &"json"];
+    arguments.extend(mode.iter().map(|part| part as &dyn AsRef<std::ffi::OsStr>));
+    let told = athermal(&arguments).ended(0).json();
+    told["scores"].as_array().unwrap().clone()
+}
+
+fn figure(scores: &[serde_json::Value], node: &str, figure: &str) -> f64 {
+    let of = scores.iter().find(|score| score["node"] == node).unwrap();
+    of[figure].as_f64().unwrap()
+}
+
+fn root_mean_square(errors: impl Iterator<Item = f64>) -> f64 {
+    let squares: Vec<f64> = errors.map(|error| error * error).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[track_caller]
+fn near(found: f64, expected: f64) {
+    assert!(
+        (found - expected).abs() < 1e-9 * expected.abs(),
+        "{found} is not {expected}"
+    );
+}
+
+#[test]
+fn the_last_truth_is_repeated_from_as_far_back_as_the_mode_says() {
+    let scratch = Scratch::new("modes");
+    let rows = series(200);
+    let data = scratch.file("data.csv", csv(&rows));
+    let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
+    let model = fitted(&scratch, "model.json", &graph, &data);
+    let y: Vec<f64> = rows.iter().map(|row| row[1]).collect();
+
+    let one = scores(&model, &data, &["--each-on-its-own"]);
+    near(
+        figure(&one, "lasting", "rmse"),
+        root_mean_square((1..200).map(|t| y[t - 1] - y[t])),
+    );
+    let three = ["--mode", "k-step", "--steps", "3", "--each-on-its-own"];
+    let three = scores(&model, &data, &three);
+    near(
+        figure(&three, "lasting", "rmse"),
+        root_mean_square((3..200).map(|t| y[t - 3] - y[t])),
+    );
+    let free = scores(&model, &data, &["--mode", "free-run", "--each-on-its-own"]);
+    near(
+        figure(&free, "lasting", "rmse"),
+        root_mean_square((1..200).map(|t| y[0] - y[t])),
+    );
+    for mode in [&three, &free] {
+        assert_eq!(
+            figure(mode, "features", "rmse"),
+            figure(&one, "features", "rmse"),
+            "what reads no past truth differs"
+        );
+        assert!(figure(mode, "level", "rmse") > figure(&one, "level", "rmse"));
+    }
+    let spread = {
+        let mean = y[1..].iter().sum::<f64>() / 199.0;
+        root_mean_square(y[1..].iter().map(|y| y - mean))
+    };
+    near(
+        figure(&one, "lasting", "fit"),
+        100.0 * (1.0 - figure(&one, "lasting", "rmse") / spread),
+    );
+}
+
+#[test]
+fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
+    let scratch = Scratch::new("modes-learning");
+    let data = scratch.file("data.csv", csv(&series(200)));
+    let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
+    let still = scratch.file("still.toml", GRAPH.replace("LEARN", "learn = false"));
+    let model = fitted(&scratch, "model.json", &graph, &data);
+    let still = fitted(&scratch, "still.json", &still, &data);
+    let free = scores(&model, &data, &["--mode", "free-run"]);
+    assert_eq!(
+        figure(&free, "level", "rmse"),
+        figure(&scores(&still, &data, &[]), "level", "rmse")
+    );
+    assert_eq!(
+        scores(&model, &data, &["--mode", "k-step", "--steps", "1"])[0]["rmse"],
+        scores(&model, &data, &[])[0]["rmse"]
+    );
+}
+
+#[test]
+fn steps_are_asked_for_and_refused_where_they_mean_nothing() {
+    let scratch = Scratch::new("modes-steps");
+    let data = scratch.file("data.csv", csv(&series(20)));
+    let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
+    let model = fitted(&scratch, "model.json", &graph, &data);
+    let evaluate = |mode: &[&str]| {
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"evaluate", &model, &"--data", &data];
+        arguments.extend(mode.iter().map(|part| part as &dyn AsRef<std::ffi::OsStr>));
+        athermal(&arguments).ended(2)
+    };
+    evaluate(&["--mode", "k-step"]).tells(&["--steps <K>"]);
+    evaluate(&["--mode", "free-run", "--steps", "3"]).tells(&["--mode k-step", "free-run"]);
+    evaluate(&["--mode", "k-step", "--steps", "0"]).tells(&["--steps"]);
+}
+
+/// The rows of a file from one to another as a file of their own.
+fn part(
+    scratch: &Scratch,
+    name: &str,
+    from: &Path,
+    rows: std::ops::Range<usize>,
+) -> std::path::PathBuf {
+    let text = std::fs::read_to_string(from).unwrap();
+    let mut lines = text.lines();
+    let header = lines.next().unwrap();
+    let kept: Vec<&str> = lines.skip(rows.start).take(rows.len()).collect();
+    scratch.file(name, format!("{header}\n{}\n", kept.join("\n")))
+}
+
+/// The free run of a shipped graph, fitted on the first rows of a file, over the rest.
+fn free_run(name: &str, file: &str, rows: usize, first: usize) -> Option<Vec<serde_json::Value>> {
+    let file = data()?.join(file);
+    let scratch = Scratch::new(&format!("modes-{name}"));
+    let train = part(&scratch, "train.csv", &file, 0..first);
+    let test = part(&scratch, "test.csv", &file, first..rows);
+    let model = fitted(&scratch, "model.json", &graph(name), &train);
+    let mode = ["--mode", "free-run", "--each-on-its-own"];
+    Some(scores(&model, &test, &mode))
+}
+
+#[test]
+fn arx_runs_free_on_the_hairdryer_as_the_textbook_has_it() {
+    let Some(free) = free_run("hairdryer", "hairdryer/hairdryer.csv", 1000, 500) else {
+        return;
+    };
+    // Least squares of numpy on the same rows: 85.51 %.
+    let fit = figure(&free, "arx", "fit");
+    assert!(fit >= 85.0, "{fit}");
+    assert!((fit - 85.508).abs() < 0.01, "{fit}");
+}
+
+#[test]
+fn arx_runs_free_on_a_wall_and_on_a_plate() {
+    // Least squares of numpy on the same rows: 0.97149 and 0.72358.
+    for (name, file, rows, expected) in [
+        ("wall-heatflow", "wall-heatflow/wall.csv", 1680, 0.971_49),
+        (
+            "heating-system",
+            "heating-system/heating.csv",
+            801,
+            0.723_58,
+        ),
+    ] {
+        let Some(free) = free_run(name, file, rows, rows * 7 / 10) else {
+            return;
+        };
+        let found = figure(&free, "arx", "r2_mean");
+        assert!((found - expected).abs() < 1e-4, "{name}: {found}");
+    }
+}
