@@ -12,7 +12,8 @@
 //!                                                  samples from a recording, a live source or a simulated machine
 //! ```
 //!
-//! In a program that is three steps. The node here is a feature that doubles; the shipped ones come from plugin crates:
+//! In a program that is three steps: load, make an engine, step it. The node here is a feature that doubles; the shipped ones
+//! come from plugin crates:
 //!
 //! ```
 //! # use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
