@@ -16,8 +16,16 @@ use workbench::{Scratch, data, graph};
 /// Baselines themselves, and what predicts from predictions.
 const LEFT_OUT: [&str; 3] = ["persistence", "stack", "zero"];
 
-/// Kinds that take products of features: each sensor with the window in the middle alone.
-const OF_FEW: [&str; 3] = ["narx", "polynomial", "state_space"];
+/// Kinds that take products of features or several of their past values: each sensor with the window in the middle alone.
+const OF_FEW: [&str; 7] = [
+    "arimax",
+    "armax",
+    "bj",
+    "narx",
+    "oe",
+    "polynomial",
+    "state_space",
+];
 
 struct Machine {
     /// A graph of this project that has `drift` and `gradients`; its other nodes are left out.
@@ -70,8 +78,10 @@ fn text(machine: &Machine, kinds: &[&Kind]) -> String {
         }
     }
     text += "[outputs]\n";
-    for kind in kinds {
-        text += &format!("{0} = \"{0}\"\n", kind.name);
+    for (nth, kind) in kinds.iter().enumerate() {
+        // The output that every graph has is taken over.
+        let output = if nth == 0 { "predicted" } else { kind.name };
+        text += &format!("{output} = \"{}\"\n", kind.name);
     }
     text
 }
@@ -87,10 +97,10 @@ fn estimators() -> Vec<&'static Kind> {
 
 /// Each output that is worse than no model on data that it was not fitted on, and how much.
 fn worse(machine: &Machine, folder: &Path) -> Vec<String> {
-    let scratch = Scratch::new("defaults");
+    let scratch = Scratch::new(&format!("defaults-{}-{}", machine.graph, machine.ahead));
     let kinds = estimators();
-    let path = scratch.file("defaults.toml", &text(machine, &kinds));
-    let model = Model::load(path).unwrap();
+    let path = scratch.file("defaults.toml", text(machine, &kinds));
+    let model = Model::load(path).unwrap_or_else(|error| panic!("{error}"));
     let recording = |file: &str| Dataset::new(vec![folder.join(file)], Options::default());
     let options = FitOptions::default();
     let train = recording(machine.train);

@@ -203,6 +203,19 @@ fn a_kind_that_keeps_channels_apart_denies_none_for_another() {
 }
 
 #[test]
+fn the_instants_of_a_truth_give_nothing_away_and_its_values_do() {
+    let sampled = |signal: &str, instants: &str| {
+        format!(
+            "[nodes.sampled]\ntype = \"sample_at\"\ninputs.signal = \"{signal}\"\ninputs.instants = \"{instants}\"\n{}",
+            estimator("sampled", "0s")
+        )
+    };
+    assert_eq!(told(&sampled("position.Y", "position.X")), []);
+    let leak = told(&sampled("position.X", "position.Y"));
+    assert!(leak[0].1.contains("from `position.X`"), "{}", leak[0].1);
+}
+
+#[test]
 fn looking_back_over_a_window_delays_nothing() {
     let nodes = [
         "type = \"moving\"\nwindows = [\"1h\"]",

@@ -151,6 +151,56 @@ fn reference_of_the_linear_axis_as_virtual_sensor() {
     compare("linear-axis", "linear-axis-sensor", "Virtual sensor", 3);
 }
 
+/// What 12 nm of noise at mostly four positions in a window leave in the drift, in nm/min, as the page says.
+const NOISE: f64 = 3.85;
+
+/// What a model adds to the noise of the truth.
+fn excess(rmse: f64) -> f64 {
+    (rmse * rmse - NOISE * NOISE).sqrt()
+}
+
+/// The excess of the virtual sensor of a machine over that of the best single model of the page for each axis, as a geometric
+/// mean over the axes; none where there are no shared data.
+fn sensor_to_best(machine: &str, axes: &[&str]) -> Option<f64> {
+    let data = data()?;
+    let page = std::fs::read_to_string(data.join("README.md")).unwrap();
+    let table = table(&page, machine, "Virtual sensor");
+    let folder = data.join(machine);
+    let scores = scored(
+        &format!("{machine}-virtual-sensor"),
+        &folder.join("train.csv"),
+        &folder.join("test.csv"),
+        Some("250 nm/min"),
+    );
+    let logs = axes.iter().map(|axis| {
+        let models = ["linear", "AR", "ARX"].map(|model| (model.to_owned(), (*axis).to_owned()));
+        let best = models.iter().map(|model| table[model]).reduce(f64::min);
+        let output = format!("sensor.{axis}");
+        let score = scores.iter().find(|score| score.output == output).unwrap();
+        assert!(score.valid.unwrap() >= 0.98, "{score:?}");
+        (excess(score.rmse.unwrap()) / excess(best.unwrap())).ln()
+    });
+    Some((logs.sum::<f64>() / axes.len() as f64).exp())
+}
+
+#[test]
+fn the_virtual_sensor_of_the_linear_axis_leaves_four_fifths_of_the_best_reference() {
+    let Some(ratio) = sensor_to_best("linear-axis", &["X", "Y", "Z"]) else {
+        return;
+    };
+    assert!(ratio <= 0.8, "{ratio}");
+}
+
+/// What is left here is creep that starts anew about once an hour, and nothing tells which way. Simulated with the amplitudes of
+/// the training file, the best filter of such creep leaves 5 % less than regression on past residuals does.
+#[test]
+fn the_virtual_sensor_of_the_die_tester_leaves_less_than_the_best_reference() {
+    let Some(ratio) = sensor_to_best("die-tester", &["X1", "Y1", "Z1", "X2", "Y2", "Z2"]) else {
+        return;
+    };
+    assert!(ratio <= 0.88, "{ratio}");
+}
+
 #[test]
 fn reference_of_the_measured_probe_holds_on_its_covered_run() {
     let Some(data) = data() else { return };

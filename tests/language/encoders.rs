@@ -113,11 +113,17 @@ impl Trainer for Collecting {
     }
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
-        let mean = |of: &dyn Fn(&(Instant, Vec<f64>, f64)) -> f64| {
-            self.rows.iter().map(of).sum::<f64>() / self.rows.len() as f64
+        let rows = || {
+            self.rows
+                .iter()
+                .map(|(_, regressors, truth)| (regressors, truth))
         };
-        let truth = mean(&|row| row.2);
-        let covariance = |i: usize| mean(&|row| row.1[i] * (row.2 - truth));
+        let count = self.rows.len() as f64;
+        let mean = rows().map(|(_, truth)| truth).sum::<f64>() / count;
+        let covariance = |i: usize| {
+            let products = rows().map(|(regressors, truth)| regressors[i] * (truth - mean));
+            products.sum::<f64>() / count
+        };
         let fit = Covariances {
             weights: (0..self.uses.len()).map(covariance).collect(),
             uses: self.uses,

@@ -27,7 +27,7 @@ const LARGEST_PAST: usize = 1000;
 ///
 /// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter 4; Ljung 1999,
 /// section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the features meanwhile, is
-/// decomposed by singular values: as many as count are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how
+/// decomposed by singular values: as many as count, and chance does not explain (Wachter 1980), are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how
 /// those go on. `B` and `D` are then found such that one-step errors are least. The singular values are printed and kept. A mode
 /// that would grow is brought back to one that barely fades. No search is made and no start needed, so that a fit takes little
 /// more than one pass over the rows; `oe` or `armax` may come closer from there.
@@ -209,7 +209,7 @@ impl Estimator for StateSpace {
 athermal_core::register!(StateSpace, Estimator, "state_space");
 
 impl StateSpace {
-    fn subspace(&self) -> Subspace {
+    fn subspace(&self, series: usize) -> Subspace {
         Subspace {
             horizon: self.horizon,
             weighting: match self.weighting {
@@ -222,6 +222,7 @@ impl StateSpace {
                 States::Told(By::Gap {}) => StateOrder::LargestGap,
                 States::Told(By::Threshold { share }) => StateOrder::Threshold(share),
             },
+            alike: series,
             feedthrough: true,
             refined: true,
         }
@@ -247,6 +248,7 @@ impl Identify for StateSpace {
     fn identify(
         &self,
         samples: &Samples,
+        series: usize,
         report: &mut TrainingReport,
     ) -> Result<Found, TrainingError> {
         let outputs = || samples.records().flat_map(|record| record.outputs);
@@ -268,7 +270,7 @@ impl Identify for StateSpace {
                 outputs,
             })
             .collect();
-        let found = self.subspace().identify(&records, samples.width());
+        let found = self.subspace(series).identify(&records, samples.width());
         let found = found.map_err(told)?;
         report.notes.push(note(&found));
         let (squares, rows) = found.errors;

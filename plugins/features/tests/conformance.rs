@@ -3,7 +3,8 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
 use athermal_features::{
-    Delay, Difference, FirstOrder, Hampel, Lag, Moving, Pick, Product, Resample, Scale, Slope, Sum,
+    Delay, Difference, FirstOrder, Hampel, Lag, MinimumDifference, Moving, Pick, Product, Resample,
+    SampleAt, Scale, Slope, Sum,
 };
 
 conformance!(
@@ -29,6 +30,12 @@ conformance!(
         r#"
         time_constants = { from = "1min", to = "1h", steps = 4 }
         output = "value"
+        "#
+    ),
+    Case::new(
+        r#"
+        time_constants = ["1min", "3min"]
+        span = "15min"
         "#
     ),
 );
@@ -110,6 +117,12 @@ conformance!(
 );
 
 conformance!(
+    MinimumDifference,
+    Case::new(r#"difference = "5 mK""#).input("signal", 2, "Cel"),
+    Case::new(r#"difference = "0.2 um""#).input("signal", 1, "nm"),
+);
+
+conformance!(
     Lag,
     Case::new(r#"lags = ["1min"]"#),
     Case::new(
@@ -143,6 +156,13 @@ conformance!(
         "#
     )
     .input("signal", 2, "Cel"),
+);
+
+conformance!(
+    SampleAt,
+    Case::new("")
+        .input("signal", 2, "Cel")
+        .input("instants", 1, "nm"),
 );
 
 #[test]

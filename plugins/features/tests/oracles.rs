@@ -267,3 +267,53 @@ fn oracle_of_a_regular_clock() {
         assert!(compared > 40, "{compared}");
     }
 }
+
+#[test]
+fn oracle_of_samples_at_the_instants_of_another_channel() {
+    let mut bench = Bench::new(
+        "type = \"sample_at\"\ninputs.instants = \"s.z\"\n",
+        &["signal"],
+    );
+    let expected = table("sampled.csv");
+    let (mut compared, mut too_old) = (0, 0);
+    for (row, samples) in input().iter().enumerate() {
+        bench.tick(samples);
+        let line = expected.iter().find(|line| line[0] == row.to_string());
+        for (channel, column) in [("y", 1), ("z", 2)] {
+            let found = bench.output(&format!("signal.{channel}"));
+            let expected = line.map_or(f64::NAN, |line| number(&line[column]));
+            assert!(
+                found == expected || (found.is_nan() && expected.is_nan()),
+                "{channel} in row {row}: {found} for {expected}"
+            );
+            compared += usize::from(!expected.is_nan());
+            too_old += usize::from(line.is_some() && expected.is_nan());
+        }
+    }
+    assert!(compared > 400 && too_old > 0, "{compared}, {too_old}");
+}
+
+#[test]
+fn a_change_below_the_minimum_difference_is_kept_back_and_a_slow_one_comes_in_steps() {
+    let node = "type = \"minimum_difference\"\ndifference = \"30 um\"";
+    let mut bench = Bench::new(node, &["signal"]);
+    let nan = f64::NAN;
+    // In mm, so that the difference is 0.03; the second channel drifts by 0.01 in each row.
+    let rows = [
+        (1.00, 1.00, 0.00, 0.00),
+        (1.02, 1.00, 0.01, 0.00),
+        (0.98, 1.00, 0.02, 0.00),
+        (1.50, 1.50, 0.035, 0.035),
+        (1.48, 1.50, 0.04, 0.035),
+        (nan, nan, 0.05, 0.035),
+        (1.44, 1.44, 0.07, 0.07),
+    ];
+    for (nth, (y, y_kept, z, z_kept)) in rows.into_iter().enumerate() {
+        bench.tick(&[nth as f64, y, z]);
+        if y.is_nan() {
+            continue;
+        }
+        assert_eq!(bench.output("signal.y"), y_kept, "row {nth}");
+        assert_eq!(bench.output("signal.z"), z_kept, "row {nth}");
+    }
+}

@@ -77,9 +77,15 @@ for name in ["y", "z"]:
         bins = series.resample(f"{every}s", closed="right", label="right", origin="epoch")
         for end, mean, last, count in zip(bins.mean().index, bins.mean(), bins.last(), bins.count()):
             regular.append([name, every, int(end.timestamp()), float(mean), float(last), int(count)])
+held = [pd.DataFrame({"at": at, name: table[name]}).dropna() for name in ["y", "z"]]
+asked = held[1].rename(columns={"z": "measured"})
+for column in held:
+    asked = pd.merge_asof(asked, column, on="at", tolerance=pd.Timedelta(seconds=10))
+sampled = [[int(row), float(y), float(z)] for row, y, z in zip(np.flatnonzero(table["z"].notna()), asked["y"], asked["z"])]
 write("moving.csv", moving, ["channel", "window", "row", "mean", "std", "min", "max", "median", "count"])
 write("lines.csv", lines, ["channel", "window", "row", "slope", "stderr", "value", "r2"])
 write("hampel.csv", filtered, ["channel", "window", "threshold", "floor", "row", "median", "outlier"])
 write("lag.csv", lagged, ["channel", "lag", "max_age", "row", "value"])
 write("difference.csv", differences, ["channel", "over", "max_age", "row", "value"])
 write("resample.csv", regular, ["channel", "every", "end", "mean", "last", "count"])
+write("sampled.csv", sampled, ["row", "y", "z"])

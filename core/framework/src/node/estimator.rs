@@ -245,7 +245,7 @@ pub struct TrainingReport {
     pub refused: Option<SelectionStep>,
     /// The orders that were compared, where they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub orders: Option<OrderTable>,
+    pub orders: Option<Box<OrderTable>>,
     /// Condition number of the standardised design.
     #[serde(
         default,

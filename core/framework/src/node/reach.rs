@@ -15,6 +15,9 @@ pub enum Reach {
     /// first input port, in that order; of another input port with as many channels it reads its own there too, and of any
     /// other all.
     Own,
+    /// Each is made of its own channel of the first input port as with [`Own`](Reach::Own). The values of other ports reach
+    /// none: only that they come says when.
+    First,
     /// Each is made of its own input channel as with [`Own`](Reach::Own), and there is one for each of these delays.
     Delayed(Vec<Duration>),
 }
@@ -35,9 +38,14 @@ impl Reach {
         }
         let delay = match self {
             Self::Delayed(delays) => delays.get(nth % each).copied().unwrap_or_default(),
-            Self::All | Self::Own => Duration::ZERO,
+            Self::All | Self::Own | Self::First => Duration::ZERO,
         };
-        let own = inputs.iter().flat_map(|port| {
+        let ports = if *self == Self::First {
+            1
+        } else {
+            inputs.len()
+        };
+        let own = inputs.iter().take(ports).flat_map(|port| {
             if port.len() == owners {
                 &port[nth / each..=nth / each]
             } else {
@@ -68,6 +76,12 @@ mod tests {
         let inputs = [vec![3, 4], vec![7, 8], vec![9]];
         assert_eq!(slots(&Reach::Own, &inputs, 1, 4), [3, 7, 9]);
         assert_eq!(slots(&Reach::Own, &inputs, 2, 4), [4, 8, 9]);
+    }
+
+    #[test]
+    fn a_port_that_says_only_when_reaches_nothing() {
+        let inputs = [vec![3, 4], vec![7, 8]];
+        assert_eq!(slots(&Reach::First, &inputs, 1, 2), [4]);
     }
 
     #[test]

@@ -125,9 +125,10 @@ impl Polynomials {
     /// `D(q) (1 − q⁻¹)^d`, without its leading 1.
     pub(super) fn whitening(&self) -> Vec<f64> {
         let mut product: Vec<f64> = std::iter::once(1.0).chain(self.d.iter().copied()).collect();
-        for _ in 0..self.differences {
-            product.push(0.0);
-            for j in (1..product.len()).rev() {
+        let undifferenced = product.len();
+        product.resize(undifferenced + self.differences, 0.0);
+        for last in undifferenced..product.len() {
+            for j in (1..=last).rev() {
                 product[j] -= product[j - 1];
             }
         }

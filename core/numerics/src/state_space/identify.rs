@@ -28,6 +28,8 @@ pub struct Subspace {
     pub weighting: Weighting,
     /// How many states.
     pub order: StateOrder,
+    /// How many records tell of the same time, 1 or more: as many as series were interleaved.
+    pub alike: usize,
     /// Whether inputs act on the output of the same sample.
     pub feedthrough: bool,
     /// Whether `B` and `D` are found anew.
@@ -50,9 +52,10 @@ pub enum Weighting {
 pub enum StateOrder {
     /// So many.
     Given(usize),
-    /// As many as there are singular values before the one that falls most, in proportion; half the horizon at most.
+    /// As many as there are singular values before the one that falls most, in proportion; half the horizon at most, and not
+    /// more than chance does not explain.
     LargestGap,
-    /// As many as there are singular values of at least this share of the largest.
+    /// As many as there are singular values of at least this share of the largest, and not more than chance does not explain.
     Threshold(f64),
 }
 
@@ -91,7 +94,14 @@ impl Subspace {
         }
         let projected = lagged.projected()?;
         let (values, observability) = self.ranked(&projected)?;
-        let order = self.order.of(&values, self.horizon);
+        let order = match self.order {
+            StateOrder::Given(order) => order,
+            told => {
+                let most = self.beyond_chance(&projected, lagged.windows, width)?;
+                told.of(&values, self.horizon).min(most)
+            }
+        };
+        let order = order.clamp(1, MOST_STATES.min(values.len()));
         let observability = observability.subcols(0, order).to_owned();
         let inverse = pseudo_inverse(&(observability.transpose() * &observability))?;
         let states = inverse * observability.transpose() * &projected.from_past;
@@ -150,6 +160,31 @@ impl Subspace {
         Ok(())
     }
 
+    /// How many canonical correlations are larger than the largest that a past would have with a future of which it tells
+    /// nothing (Wachter 1980).
+    fn beyond_chance(
+        &self,
+        projected: &Projected,
+        windows: usize,
+        width: usize,
+    ) -> Result<usize, NumericsError> {
+        let by_correlation = Self {
+            weighting: Weighting::Cva,
+            ..*self
+        };
+        let (correlations, _) = by_correlation.ranked(projected)?;
+        let windows = windows as f64 / self.alike.max(1) as f64;
+        let past = (self.horizon * (width + 1)) as f64 / windows;
+        let future = self.horizon as f64 / windows;
+        let chance = if past + future < 1.0 {
+            (past * (1.0 - future)).sqrt() + (future * (1.0 - past)).sqrt()
+        } else {
+            1.0
+        };
+        let beyond = correlations.iter().filter(|&&value| value > chance);
+        Ok(beyond.count())
+    }
+
     /// The singular values, and what each state shows of itself in the future outputs.
     fn ranked(&self, projected: &Projected) -> Result<(Vec<f64>, Mat<f64>), NumericsError> {
         let from = &projected.from_past;
@@ -179,7 +214,7 @@ impl Subspace {
 
 impl StateOrder {
     fn of(self, values: &[f64], horizon: usize) -> usize {
-        let order = match self {
+        match self {
             Self::Given(order) => order,
             Self::Threshold(share) => {
                 let least = share * values[0];
@@ -192,8 +227,7 @@ impl StateOrder {
                     .reduce(|a, b| if falls(b) > falls(a) { b } else { a })
                     .unwrap_or(1)
             }
-        };
-        order.clamp(1, MOST_STATES.min(values.len()))
+        }
     }
 }
 

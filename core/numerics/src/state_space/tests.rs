@@ -8,6 +8,7 @@ const PLAIN: Subspace = Subspace {
     horizon: 8,
     weighting: Weighting::N4sid,
     order: StateOrder::Given(3),
+    alike: 1,
     feedthrough: true,
     refined: false,
 };
@@ -166,6 +167,26 @@ fn three_states_are_told_by_a_threshold_and_none_is_more_than_is_there() {
     assert!((2..=3).contains(&order(StateOrder::Threshold(0.3))));
     assert!((1..=4).contains(&order(StateOrder::LargestGap)));
     assert_eq!(order(StateOrder::Threshold(0.999)), 1);
+}
+
+#[test]
+fn of_little_that_is_independent_one_state_is_told() {
+    let (inputs, outputs, _) = scaled();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    let order = |alike| {
+        let how = Subspace {
+            weighting: Weighting::Cva,
+            order: StateOrder::Threshold(0.01),
+            alike,
+            ..PLAIN
+        };
+        how.identify(&[record], 2).unwrap().model.order()
+    };
+    assert!((2..=3).contains(&order(1)), "{}", order(1));
+    assert_eq!(order(40), 1);
 }
 
 #[test]

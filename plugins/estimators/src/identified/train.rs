@@ -26,13 +26,14 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
         None
     }
 
-    /// The model; what there is to tell goes into the report.
+    /// The model, from samples of so many interleaved series; what there is to tell goes into the report.
     ///
     /// # Errors
     /// When the samples do not allow one.
     fn identify(
         &self,
         samples: &Samples,
+        series: usize,
         report: &mut TrainingReport,
     ) -> Result<Found, TrainingError>;
 }
@@ -167,7 +168,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         }
         let standard = standard.standardization();
         let samples = self.samples(pace, &standard);
-        let found = self.asked.identify(&samples, report)?;
+        let found = self.asked.identify(&samples, pace.series, report)?;
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
@@ -202,6 +203,7 @@ impl Identify for Asked {
     fn identify(
         &self,
         samples: &Samples,
+        _series: usize,
         report: &mut TrainingReport,
     ) -> Result<Found, TrainingError> {
         let fit = self.fit(samples, report)?;
@@ -261,7 +263,7 @@ impl Asked {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
-        report.orders = Some(table);
+        report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
     }
 }

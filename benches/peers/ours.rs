@@ -1,0 +1,128 @@
+//! Our side of the comparison with peers: one task on rows that `peers.py` has written, timed here, told as JSON.
+//!
+//! `ours TASK FILE WIDTH`: the file holds 64-bit floats, row by row, `WIDTH` regressors and a target.
+
+use std::error::Error;
+use std::time::Instant;
+
+use athermal_numerics::{
+    Folds, Forgetting, GramBlocks, Kalman, LeastSquares, Passage, Rls, RlsOptions, Search,
+    Standardization, Structural, cross_validated_penalties, logarithmic_grid,
+};
+
+type Found = Result<Vec<f64>, Box<dyn Error>>;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [task, file, width] = &arguments[..] else {
+        return Err("usage: ours TASK FILE WIDTH".into());
+    };
+    let width: usize = width.parse()?;
+    let bytes = std::fs::read(file)?;
+    let value = |bytes: &[u8; 8]| f64::from_le_bytes(*bytes);
+    let values: Vec<f64> = bytes.as_chunks().0.iter().map(value).collect();
+    let rows: Vec<(&[f64], f64)> = values
+        .chunks_exact(width + 1)
+        .map(|row| (&row[..width], row[width]))
+        .collect();
+    let run = match task.as_str() {
+        "forward_selection" => forward_selection,
+        "ridge_penalty" => ridge_penalty,
+        "least_squares" => least_squares,
+        "recursive_least_squares" => recursive_least_squares,
+        "local_linear_trend" => local_linear_trend,
+        other => return Err(format!("there is no task `{other}`").into()),
+    };
+    let start = Instant::now();
+    let found = run(&rows, width)?;
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "{}",
+        serde_json::json!({ "seconds": seconds, "found": found })
+    );
+    Ok(())
+}
+
+fn blocks(rows: &[(&[f64], f64)], width: usize) -> GramBlocks {
+    let mut blocks = GramBlocks::new(width);
+    for (x, y) in rows {
+        blocks.push(x, *y);
+    }
+    blocks
+}
+
+/// The columns chosen, in order.
+fn forward_selection(rows: &[(&[f64], f64)], width: usize) -> Found {
+    let blocks = blocks(rows, width);
+    let scales = Standardization::of(&blocks.total()).scales;
+    let search = Search {
+        alpha: 1.0,
+        tolerance: Some(1e-3),
+        ..Search::forward()
+    };
+    let selection = search.run(&blocks, &Folds::contiguous(3), &scales)?;
+    Ok(selection
+        .columns
+        .iter()
+        .map(|&column| column as f64)
+        .collect())
+}
+
+/// The best penalty of 37, and the coefficients with it.
+fn ridge_penalty(rows: &[(&[f64], f64)], width: usize) -> Found {
+    let blocks = blocks(rows, width);
+    let total = blocks.total();
+    let scales = Standardization::of(&total).scales;
+    let columns: Vec<_> = (0..width).collect();
+    let alphas = logarithmic_grid(1e-3, 1e6, 4);
+    let splits = blocks.splits(&Folds::contiguous(3))?;
+    let scores = cross_validated_penalties(&splits, &columns, &scales, &alphas)?;
+    let means = scores.iter().map(|folds| folds.iter().sum::<f64>());
+    let (best, _) = alphas
+        .iter()
+        .zip(means)
+        .reduce(|best, next| if next.1 > best.1 { next } else { best })
+        .ok_or("there is a penalty")?;
+    let fit = LeastSquares::ridge(*best).solve(&total, &columns, &scales, blocks.rows())?;
+    Ok(std::iter::once(*best).chain(fit.coefficients).collect())
+}
+
+/// The coefficients.
+fn least_squares(rows: &[(&[f64], f64)], width: usize) -> Found {
+    let blocks = blocks(rows, width);
+    let total = blocks.total();
+    let scales = Standardization::of(&total).scales;
+    let columns: Vec<_> = (0..width).collect();
+    let fit = LeastSquares::ordinary().solve(&total, &columns, &scales, blocks.rows())?;
+    Ok(fit.coefficients)
+}
+
+/// The coefficients after all rows, forgetting by 0.999.
+fn recursive_least_squares(rows: &[(&[f64], f64)], width: usize) -> Found {
+    let options = RlsOptions {
+        forgetting: Forgetting::Constant { factor: 0.999 },
+        most_trace: 1e12,
+    };
+    let mut rls = Rls::new(width, 1.0, options)?;
+    for (x, y) in rows {
+        rls.step(x, *y);
+    }
+    Ok(rls.coefficients().to_vec())
+}
+
+/// Level and trend after all rows, by known variances.
+fn local_linear_trend(rows: &[(&[f64], f64)], _width: usize) -> Found {
+    let model = Structural {
+        observation: 1.0,
+        level: 0.01,
+        trend: Some(1e-4),
+        returning: 0.0,
+        passage: Passage::Steps,
+    };
+    let mut filter = Kalman::diffuse(model, 0)?;
+    for (_, y) in rows {
+        filter.advance(1.0);
+        filter.observe(&[], *y);
+    }
+    Ok(filter.state().to_vec())
+}
