@@ -166,6 +166,10 @@ pub struct Regressor {
 pub struct TrainingSetup {
     /// The regressors, in the order of a row's values.
     pub regressors: Vec<Regressor>,
+    /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out.
+    pub places: Vec<usize>,
+    /// How many it asked for.
+    pub asked_for: usize,
     /// The unit of the truth.
     pub truth_unit: String,
     /// How many bytes of rows the trainer may keep.
