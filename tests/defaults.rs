@@ -99,7 +99,7 @@ fn estimators() -> Vec<&'static Kind> {
 fn worse(machine: &Machine, folder: &Path) -> Vec<String> {
     let scratch = Scratch::new(&format!("defaults-{}-{}", machine.graph, machine.ahead));
     let kinds = estimators();
-    let path = scratch.file("defaults.toml", &text(machine, &kinds));
+    let path = scratch.file("defaults.toml", text(machine, &kinds));
     let model = Model::load(path).unwrap_or_else(|error| panic!("{error}"));
     let recording = |file: &str| Dataset::new(vec![folder.join(file)], Options::default());
     let options = FitOptions::default();

@@ -123,7 +123,7 @@ fn what_was_written_is_told_to_programs_too() {
             &"-o",
             &folder,
         ]);
-        wrote.ended(0);
+        let wrote = wrote.ended(0);
         let told: serde_json::Value = serde_json::from_str(&wrote.out).unwrap();
         assert_eq!(told["role"], role);
         assert_eq!(told["kind"].to_string(), kind);

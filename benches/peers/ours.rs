@@ -116,6 +116,7 @@ fn local_linear_trend(rows: &[(&[f64], f64)], _width: usize) -> Found {
         observation: 1.0,
         level: 0.01,
         trend: Some(1e-4),
+        returning: 0.0,
         passage: Passage::Steps,
     };
     let mut filter = Kalman::diffuse(model, 0)?;

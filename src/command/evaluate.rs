@@ -68,7 +68,7 @@ enum Horizon {
     /// nothing is learned from them. A step is the time from the newest truth that an estimator may read to the predicted one
     KStep,
     /// From its own predictions: a measured truth is read only where there is none yet, as at the beginning of a segment, and
-    /// nothing is learned from any
+    /// nothing is learned from any; what follows a state is told as many as it takes to know where it is
     FreeRun,
 }
 

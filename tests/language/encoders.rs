@@ -113,11 +113,17 @@ impl Trainer for Collecting {
     }
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
-        let mean = |of: &dyn Fn(&(Instant, Vec<f64>, f64)) -> f64| {
-            self.rows.iter().map(of).sum::<f64>() / self.rows.len() as f64
+        let rows = || {
+            self.rows
+                .iter()
+                .map(|(_, regressors, truth)| (regressors, truth))
         };
-        let truth = mean(&|row| row.2);
-        let covariance = |i: usize| mean(&|row| row.1[i] * (row.2 - truth));
+        let count = self.rows.len() as f64;
+        let mean = rows().map(|(_, truth)| truth).sum::<f64>() / count;
+        let covariance = |i: usize| {
+            let products = rows().map(|(regressors, truth)| regressors[i] * (truth - mean));
+            products.sum::<f64>() / count
+        };
         let fit = Covariances {
             weights: (0..self.uses.len()).map(covariance).collect(),
             uses: self.uses,
@@ -275,9 +281,9 @@ ahead = \"30s\"
     assert_eq!(fitted.len(), 3);
 }
 
-#[test]
-fn its_fit_stands_in_the_model_and_comes_back_to_the_last_bit() {
-    let text = with_output(&nodes("model", ""), "plain");
+/// A model of the graph, in which nothing has been fitted yet.
+fn model(label: &str) -> Model {
+    let text = with_output(&nodes(label, ""), "plain");
     let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
     let graph = load_text(
         "graph.toml",
@@ -288,12 +294,17 @@ fn its_fit_stands_in_the_model_and_comes_back_to_the_last_bit() {
     )
     .and_then(|read| declare(read, &mut diagnostics))
     .unwrap();
-    let mut model = Model {
+    Model {
         graph,
         plan: plan(&text),
         fitted: Fitted::new(),
         card: None,
-    };
+    }
+}
+
+#[test]
+fn its_fit_stands_in_the_model_and_comes_back_to_the_last_bit() {
+    let mut model = model("model");
     assert_eq!(model.unfitted(), ["code", "plain"]);
     model.fitted = fitted(&model.plan).0;
     assert!(model.unfitted().is_empty());
@@ -308,6 +319,21 @@ fn its_fit_stands_in_the_model_and_comes_back_to_the_last_bit() {
         given += usize::from(!one.outputs()[0].is_nan());
     }
     assert!(given > 1900);
+}
+
+#[test]
+fn a_model_of_a_node_type_that_this_program_lacks_is_told_by_the_name_of_the_type() {
+    let mut model = model("lacking");
+    model.fitted = fitted(&model.plan).0;
+    let text = model.to_text().unwrap().replace("test_along", "test_gone");
+    let told = match Model::from_text("model.json", text) {
+        Err(athermal::core::model::ModelError::Graph {
+            diagnostics,
+            sources,
+        }) => diagnostics.render(&sources, false, 200),
+        other => panic!("{other:?}"),
+    };
+    assert!(told.contains("there is no node type `test_gone`"), "{told}");
 }
 
 #[test]

@@ -12,18 +12,18 @@ use crate::order::Order;
 
 /// ARX whose noise is a moving average: what was not foreseen of the truth is told from what the features bring about.
 ///
-/// `A(q) (y − μ) = Σ B_i(q) u_i(t − nk) + C(q) e` (Åström and Bohlin 1965; Ljung 1999, section 4.2). The sum of squared one-step
-/// prediction errors is made least by damped Gauss–Newton steps with exact derivatives, starting where Hannan and Rissanen (1982)
-/// end; roots of `A` and `C` stay inside the unit circle.
+/// `A(q) (y − μ) = Σ B_i(q) u_i(t − nk) + C(q) e` (Åström and Bohlin 1965; Ljung 1999, section 4.2). The sum of squared
+/// one-step prediction errors is made least by damped Gauss–Newton steps with exact derivatives, starting where Hannan
+/// and Rissanen (1982) end; roots of `A` and `C` stay inside the unit circle.
 ///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span of
-/// the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a series of its
-/// own, which are fitted together and followed side by side. The time between two truths of a series counts as so many steps,
-/// rounded; for those that are missing it takes what it had predicted. Running, it is told each truth that the embargo lets
-/// through and predicts as many steps ahead of the newest as there are. Where truths or rows are missing in the fit, the filters
-/// start again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays
-/// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time
-/// alone, the node runs at every tick.
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
+/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
+/// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
+/// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it is told each
+/// truth that the embargo lets through and predicts as many steps ahead of the newest as there are. Where truths or rows
+/// are missing in the fit, the filters start again. A segment begins with its first truth, as if that and the features
+/// had always been what they are; with `learn = false` it stays at rest. The port `deviation` is the standard deviation
+/// of the truth about its prediction. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Armax {
@@ -31,7 +31,7 @@ pub struct Armax {
     #[serde(default = "one")]
     #[schemars(range(min = 0, max = 100))]
     pub na: usize,
-    /// How many values of each feature, 1 to 100: a number for all, or a list with one for each.
+    /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
     #[serde(default = "one_each")]
     pub nb: PerInput,
     /// How many past innovations, 0 to 100.

@@ -12,22 +12,23 @@ use crate::order::Order;
 
 /// Box–Jenkins: what the features bring about, and noise that has filters of its own.
 ///
-/// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + C(q)/D(q) e` (Box and Jenkins 1970; Ljung 1999, section 4.2). The sum of squared one-step
-/// prediction errors is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz and McBride (1965)
-/// end for the features and Hannan and Rissanen (1982) for the noise; roots of each `F`, `C` and `D` stay inside the unit circle.
+/// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + C(q)/D(q) e` (Box and Jenkins 1970; Ljung 1999, section 4.2). The sum of
+/// squared one-step prediction errors is made least by damped Gauss–Newton steps with exact derivatives, starting where
+/// Steiglitz and McBride (1965) end for the features and Hannan and Rissanen (1982) for the noise; roots of each `F`, `C`
+/// and `D` stay inside the unit circle.
 ///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span of
-/// the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a series of its
-/// own, which are fitted together and followed side by side. The time between two truths of a series counts as so many steps,
-/// rounded; for those that are missing it takes what it had predicted. Running, it is told each truth that the embargo lets
-/// through and predicts as many steps ahead of the newest as there are. Where truths or rows are missing in the fit, the filters
-/// start again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays
-/// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time
-/// alone, the node runs at every tick.
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
+/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
+/// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
+/// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it is told each
+/// truth that the embargo lets through and predicts as many steps ahead of the newest as there are. Where truths or rows
+/// are missing in the fit, the filters start again. A segment begins with its first truth, as if that and the features
+/// had always been what they are; with `learn = false` it stays at rest. The port `deviation` is the standard deviation
+/// of the truth about its prediction. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bj {
-    /// How many values of each feature, 1 to 100: a number for all, or a list with one for each.
+    /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
     #[serde(default = "one_each")]
     pub nb: PerInput,
     /// How many past innovations, 0 to 100.

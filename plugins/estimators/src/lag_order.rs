@@ -67,7 +67,7 @@ impl LagOrder {
                 needed: 4,
                 found: gram.count(),
             })?;
-        report.orders = Some(table);
+        report.orders = Some(Box::new(table));
         Ok(all.swap_remove(best))
     }
 

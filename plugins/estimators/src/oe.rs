@@ -12,22 +12,24 @@ use crate::order::Order;
 
 /// Output error: what the features bring about through filters of their own, whatever the truth was before.
 ///
-/// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + e` (Dugard and Landau 1980; Ljung 1999, section 4.2). The sum of squared errors of the
-/// simulated output is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz and McBride (1965)
-/// end; roots of each `F` stay inside the unit circle. Past truths are not read: it is as good in a free run as beside a machine.
+/// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + e` (Dugard and Landau 1980; Ljung 1999, section 4.2). The sum of squared errors
+/// of the simulated output is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz
+/// and McBride (1965) end; roots of each `F` stay inside the unit circle. Other truths than the first are not read: it is
+/// as good in a free run as beside a machine.
 ///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span of
-/// the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a series of its
-/// own, which are fitted together and followed side by side. The time between two truths of a series counts as so many steps,
-/// rounded; for those that are missing it takes what it had predicted. Running, it is told each truth that the embargo lets
-/// through and predicts as many steps ahead of the newest as there are. Where truths or rows are missing in the fit, the filters
-/// start again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays
-/// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time
-/// alone, the node runs at every tick.
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
+/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
+/// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
+/// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it goes on by
+/// the features alone. Where truths or rows are missing in the fit, the filters start again. A segment begins at rest, as
+/// if the features had always been what they are first, until the first truth says where the filters are: each has its
+/// share of what that differs by, which dies away. With `learn = false` it stays at rest. The port `deviation` is the
+/// standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs at every
+/// tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Oe {
-    /// How many values of each feature, 1 to 100: a number for all, or a list with one for each.
+    /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
     #[serde(default = "one_each")]
     pub nb: PerInput,
     /// How many past values of what each feature brings about, 0 to 100: a number for all, or a list with one for each.

@@ -3,8 +3,8 @@
 use athermal_core::conformance;
 use athermal_core::testkit::{Case, assert_every_kind_conforms};
 use athermal_estimators::{
-    Ar, Arx, ElasticNet, Huber, Kalman, Lasso, Linear, Narx, Persistence, Polynomial, Rls, Stack,
-    StateSpace, Zero,
+    Ar, Arimax, Arma, Armax, Arx, Bj, ElasticNet, Huber, Kalman, Lasso, Linear, Narx, Oe,
+    Persistence, Polynomial, Rls, Stack, StateSpace, Zero,
 };
 
 conformance!(
@@ -152,6 +152,125 @@ conformance!(
         selection = { method = "forward" }
         "#
     ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        lags = ["30s", "1min"]
+        feature_lags = ["0s", "30s"]
+        order = { by = "aicc", na = "1..2", nb = "0..2" }
+        "#
+    ),
+);
+
+conformance!(
+    Arma,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        na = 0
+        nc = 2
+        every = "20s"
+        "#
+    ),
+    Case::new(
+        r#"
+        ahead = "30s"
+        order = { by = "bic", na = "0..2", nc = "0..1" }
+        learn = { outliers = 8.0 }
+        "#
+    )
+    .input("freeze", 1, "1"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        learn = false
+        "#
+    )
+    .speaks_without_input(&["prediction", "deviation"]),
+);
+
+conformance!(
+    Armax,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "30s"
+        na = 2
+        nb = [2, 1]
+        nk = [0, 1]
+        nc = 0
+        penalty = 0.0
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "0s"
+        order = { by = "aicc", na = "0..1", nb = "1..2", nk = "0..1" }
+        "#
+    )
+    .input("features", 1, "Cel"),
+);
+
+conformance!(
+    Oe,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        nb = [2, 1]
+        nf = [1, 2]
+        nk = 1
+        every = "20s"
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        order = { by = "fpe", nf = "0..1" }
+        learn = false
+        "#
+    )
+    .input("features", 1, "Cel"),
+);
+
+conformance!(
+    Bj,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        nb = 2
+        nf = 2
+        nc = 0
+        nd = 2
+        penalty = 0.1
+        "#
+    )
+    .input("features", 1, "K"),
+);
+
+conformance!(
+    Arimax,
+    Case::new(r#"ahead = "1min""#),
+    Case::new(
+        r#"
+        ahead = "0s"
+        na = 2
+        differences = 0
+        "#
+    )
+    .input("features", 2, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        nc = 2
+        differences = 2
+        "#
+    )
+    .input("features", 1, "K"),
 );
 
 conformance!(

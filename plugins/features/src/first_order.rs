@@ -150,7 +150,7 @@ impl Feature for FirstOrder {
                 if self.output == FirstOrderOutput::Difference {
                     channel.unit = from.unit.difference();
                 }
-                channel.span = channel.span + self.span.unwrap_or_default();
+                channel.span += self.span.unwrap_or_default();
                 channels.push(channel);
             }
         }

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import sippy_unipi
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lfiltic
 from statsmodels.tsa.arima.model import ARIMA
 
 r = np.random.default_rng(21)
@@ -62,7 +62,11 @@ def by_scipy(name):
         if len(b):
             rest = u[0] * b.sum() / (1 + f.sum())
             w = rest + lfilter(np.r_[0.0, b], p(f), u - u[0])
-        first = len(a) if len(f) else max(len(a), len(b))
+            if name == "oe":  # nor has it been elsewhere than where it was measured first, which is left to die away
+                past = lfiltic([1.0], p(f), np.ones(len(f)))
+                w[0] += y[0] - level - rest
+                w[1:] += (y[0] - level - rest) * lfilter([1.0], p(f), np.zeros(n - 1), zi=past)[0]
+        first = (1 if name == "oe" else len(a)) if len(f) else max(len(a), len(b))
         left = lfilter(p(a), [1.0], y - level) - w
         whitening = np.convolve(p(d), [1.0, -1.0]) if integrated else p(d)
         # Filters of the noise begin with what is known of it.

@@ -58,7 +58,7 @@ pub(crate) struct Estimate {
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
     pub(super) learning: Option<Learning>,
     /// What is read in place of measured past truths, in an evaluation that says so.
-    feedback: Option<Feedback>,
+    feedback: Option<Box<Feedback>>,
 }
 
 impl Estimate {
@@ -113,7 +113,7 @@ impl Estimate {
     pub(crate) fn predict_in(&mut self, mode: Mode, link: &TruthLink, gathers: &[Gather]) {
         self.feedback = match mode {
             Mode::OneStep => None,
-            mode => Feedback::new(mode, link, &self.places, gathers),
+            mode => Feedback::new(mode, link, &self.places, gathers).map(Box::new),
         };
         if let Some(learning) = &mut self.learning {
             learning.predict_in(mode);
@@ -122,7 +122,7 @@ impl Estimate {
 
     /// What is read in place of measured past truths.
     pub(crate) fn feedback(&mut self) -> Option<&mut Feedback> {
-        self.feedback.as_mut()
+        self.feedback.as_deref_mut()
     }
 
     /// The prediction and its stamp, the oldest among the values used; none where one of them is missing that is needed.

@@ -74,10 +74,9 @@ impl Learning {
         self.mode = mode;
     }
 
-    /// The newest arrival that a prediction made at `now` may know of; none where it may know of no truth.
-    fn newest(&self, now: Instant) -> Option<Instant> {
-        let earlier = self.mode.earlier(self.step.length())?;
-        Some(self.withheld.newest(now) - earlier)
+    /// The newest arrival that a prediction made at `now` may know of.
+    fn newest(&self, now: Instant) -> Instant {
+        self.withheld.newest(now) - self.mode.earlier(self.step.length())
     }
 
     pub(crate) fn predict(&self, row: &[f64], now: Instant) -> f64 {
@@ -98,9 +97,8 @@ impl Learning {
     pub(crate) fn run(&mut self, row: &[f64], now: Instant, gathered: &[Gathered], on: bool) {
         let frozen = [self.frozen(gathered, on)];
         self.withheld.run(now, [row, &frozen]);
-        let (of, newest) = (now + self.withheld.link().ahead, self.withheld.newest(now));
-        self.learner
-            .run(row, of, self.newest(now).unwrap_or(newest));
+        let of = now + self.withheld.link().ahead;
+        self.learner.run(row, of, self.newest(now));
     }
 
     /// Takes a truth that has just been measured.
@@ -122,10 +120,14 @@ impl Learning {
         on: bool,
     ) -> Option<(Became, Instant)> {
         let frozen = self.frozen(gathered, on);
-        let newest = self.newest(now)?;
+        let newest = self.newest(now);
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
         let mut news = None;
+        let free = self.mode == Mode::FreeRun;
         self.withheld.release(newest, |released| {
+            if free && learner.settled() {
+                return;
+            }
             news = Some((gate.offer(learner, released, frozen), released.arrived));
         });
         news
@@ -135,9 +137,9 @@ impl Learning {
     pub(crate) fn segment(&mut self, last: Instant, gathered: &[Gathered], on: bool) {
         let frozen = self.frozen(gathered, on);
         let (learner, gate) = (&mut *self.learner, &mut self.gate);
-        let tell = self.mode != Mode::FreeRun;
+        let free = self.mode == Mode::FreeRun;
         self.withheld.end_segment(last, |released| {
-            if tell {
+            if !(free && learner.settled()) {
                 gate.offer(learner, released, frozen);
             }
         });
@@ -225,7 +227,8 @@ impl Gate {
             return Became::OutsideRange;
         }
         let error = truth - learner.predict(row, arrived);
-        if !self.recent.admits(error, self.planned.outliers) {
+        // What has yet to find out where it is may be far off.
+        if learner.settled() && !self.recent.admits(error, self.planned.outliers) {
             return Became::Outlier;
         }
         learner.learn(row, truth, arrived);

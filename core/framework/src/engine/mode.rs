@@ -20,12 +20,11 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// How much earlier than in one step the newest truth must have arrived; none where no truth counts.
-    pub(super) fn earlier(self, step: Duration) -> Option<Duration> {
+    /// How much earlier than in one step the newest truth must have arrived that is told at all.
+    pub(super) fn earlier(self, step: Duration) -> Duration {
         match self {
-            Self::OneStep => Some(Duration::ZERO),
-            Self::Steps(steps) => Some(times(step, i64::from(steps.get()) - 1)),
-            Self::FreeRun => None,
+            Self::OneStep | Self::FreeRun => Duration::ZERO,
+            Self::Steps(steps) => times(step, i64::from(steps.get()) - 1),
         }
     }
 }

@@ -58,6 +58,8 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
             .iter()
             .map(|&candidate| regressors[candidate].clone())
             .collect::<Vec<Regressor>>(),
+        places: kept.clone(),
+        asked_for: regressors.len(),
         truth_unit: plan.channels[trainee.link.slot].channel.unit.to_string(),
         memory,
         ahead: trainee.link.ahead,

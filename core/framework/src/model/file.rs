@@ -43,7 +43,8 @@ struct Written<'a> {
 struct ReadBack {
     card: Option<Card>,
     graph: serde_json::Value,
-    fitted: BTreeMap<String, Box<dyn Predictor>>,
+    /// Read once the graph is: where a node type is not known, the graph is what says so.
+    fitted: BTreeMap<String, serde_json::Value>,
 }
 
 #[derive(Deserialize)]
@@ -122,11 +123,12 @@ impl Model {
                 sources: Box::new(sources),
             });
         };
-        let fitted = read
-            .fitted
-            .into_iter()
-            .map(|(node, predictor)| (node, Arc::from(predictor)))
-            .collect();
+        let mut fitted = Fitted::new();
+        for (node, written) in read.fitted {
+            let predictor: Box<dyn Predictor> =
+                serde_json::from_value(written).map_err(not_a_model)?;
+            fitted.insert(node, Arc::from(predictor));
+        }
         Ok(Self {
             graph,
             plan: Arc::new(plan),

@@ -166,6 +166,10 @@ pub struct Regressor {
 pub struct TrainingSetup {
     /// The regressors, in the order of a row's values.
     pub regressors: Vec<Regressor>,
+    /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out.
+    pub places: Vec<usize>,
+    /// How many it asked for.
+    pub asked_for: usize,
     /// The unit of the truth.
     pub truth_unit: String,
     /// How many bytes of rows the trainer may keep.
@@ -245,7 +249,7 @@ pub struct TrainingReport {
     pub refused: Option<SelectionStep>,
     /// The orders that were compared, where they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub orders: Option<OrderTable>,
+    pub orders: Option<Box<OrderTable>>,
     /// Condition number of the standardised design.
     #[serde(
         default,

@@ -107,6 +107,12 @@ pub trait Learner: Debug + Send {
         false
     }
 
+    /// Whether the state is where it should be, after as many truths as that takes. Until it is, truths are handed over in a
+    /// free run too.
+    fn settled(&self) -> bool {
+        true
+    }
+
     /// A truth, measured at `at`, and the regressors of the run that it belongs to. Instants never go back.
     ///
     /// Nothing is allocated here.

@@ -7,6 +7,9 @@ use crate::{GramBlocks, LeastSquares, NumericsError, Standardization};
 /// How often the filters of Steiglitz and McBride are renewed.
 const RENEWALS: usize = 20;
 
+/// Where poles are looked for beside.
+const POLES: [f64; 6] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.995];
+
 /// Models to start from; the best of them is taken.
 pub(super) fn starts(
     orders: &Orders,
@@ -27,7 +30,13 @@ pub(super) fn starts(
     };
     let filtered = orders.inputs.iter().any(|input| input.nf > 0);
     let plants = if filtered {
-        vec![steiglitz_mcbride(&direct, &differenced, penalty)?]
+        let searched = steiglitz_mcbride(&direct, &differenced, penalty);
+        let given = POLES
+            .iter()
+            .map(|&pole| one_pole(&direct, &differenced, penalty, pole));
+        std::iter::once(searched)
+            .chain(given)
+            .collect::<Result<Vec<_>, _>>()?
     } else {
         vec![regression(&direct, &differenced, penalty, 0)?]
     };
@@ -175,7 +184,7 @@ fn residuals_of(model: &Polynomials, samples: &Samples) -> Vec<Vec<f64>> {
             alone.push(inputs.iter().map(|input| input[sample]), *value);
         }
         let mut found = Vec::with_capacity(segment.len());
-        residuals(model, &alone, 0, |residual, _| found.push(residual));
+        residuals(model, &alone, 0, |residual| found.push(residual));
         let mut own = vec![f64::NAN; segment.len() - found.len()];
         own.extend(found);
         all.push(own);
@@ -275,7 +284,7 @@ fn steiglitz_mcbride(
                 )
             };
         }
-        model.level = mean_left(&model, samples);
+        model.level = level_left(&model, samples);
         let sum = sum_of_squares(&model, samples, 0);
         if best.as_ref().is_none_or(|(least, _)| sum < *least) {
             best = Some((sum, model));
@@ -288,14 +297,56 @@ fn steiglitz_mcbride(
     best.map(|(_, model)| model).ok_or(NumericsError::NotFinite)
 }
 
-/// What a model without a level leaves over on average.
-fn mean_left(model: &Polynomials, samples: &Samples) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    residuals(model, samples, 0, |residual, _| {
-        sum += residual;
-        count += 1.0;
-    });
-    if count > 0.0 { sum / count } else { 0.0 }
+/// What the inputs leave over on average, had they always been as they are on average.
+fn level_left(model: &Polynomials, samples: &Samples) -> f64 {
+    let mean =
+        |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / samples.count().max(1) as f64;
+    let all = 0..samples.count();
+    let inputs = model.inputs.iter().enumerate();
+    let brought =
+        inputs.map(|(nth, of)| of.gain() * mean(&mut samples.input(all.clone(), nth).into_iter()));
+    mean(&mut samples.values(all.clone()).iter().copied()) - brought.sum::<f64>()
+}
+
+/// Least squares of `y` on inputs that have gone through filters with one pole, which is given.
+fn one_pole(
+    orders: &Orders,
+    samples: &Samples,
+    penalty: f64,
+    pole: f64,
+) -> Result<Polynomials, NumericsError> {
+    let mut filtered = Samples::new(samples.width());
+    for segment in samples.segments().filter(|segment| !segment.is_empty()) {
+        filtered.segment();
+        let inputs: Vec<Vec<f64>> = (0..samples.width())
+            .map(|nth| {
+                let input = samples.input(segment.clone(), nth);
+                let has_filter = orders.inputs[nth].nf > 0;
+                if has_filter {
+                    through(&[-pole], &input, input[0]).0
+                } else {
+                    input
+                }
+            })
+            .collect();
+        for (sample, value) in samples.values(segment.clone()).iter().enumerate() {
+            filtered.push(inputs.iter().map(|input| input[sample]), *value);
+        }
+    }
+    let as_regression = Orders {
+        inputs: orders.inputs.clone(),
+        ..Orders::default()
+    };
+    let found = regression(&as_regression, &filtered, penalty, 0)?;
+    let mut model = Polynomials::zero(orders);
+    for (transfer, found) in model.inputs.iter_mut().zip(found.inputs) {
+        transfer.b = found.b;
+        if let Some(first) = transfer.f.first_mut() {
+            *first = -pole;
+        }
+    }
+    model.level = found.level;
+    Ok(model)
 }
 
 /// The transfer function with fewer coefficients in `F` whose answer to an impulse is nearest, as Steiglitz and McBride find it.

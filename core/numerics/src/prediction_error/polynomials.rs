@@ -47,13 +47,16 @@ impl Orders {
     /// The first sample of a segment whose residual has all that it needs.
     #[must_use]
     pub fn first(&self) -> usize {
-        // Where an input goes through a filter, that is taken to have been at rest.
         let direct = self
             .inputs
             .iter()
             .filter(|input| input.nf == 0 && input.nb > 0);
         let reach = direct.map(|input| input.nk + input.nb - 1).max();
-        self.na.max(reach.unwrap_or(0)) + self.nd + self.differences
+        let reach = self.na.max(reach.unwrap_or(0)) + self.nd + self.differences;
+        let follows = self.na + self.nc + self.nd + self.differences > 0;
+        let filtered = self.inputs.iter().any(|input| input.nf > 0);
+        // The first value says where the filters begin.
+        reach.max(usize::from(filtered && !follows))
     }
 }
 
@@ -122,12 +125,41 @@ impl Polynomials {
         self.level + sum / (1.0 + self.a.iter().sum::<f64>())
     }
 
+    /// Makes it a model of values that are so many times as large.
+    pub fn rescale(&mut self, times: f64) {
+        self.level *= times;
+        let b = self.inputs.iter_mut().flat_map(|of| &mut of.b);
+        b.for_each(|b| *b *= times);
+    }
+
+    /// Whether predictions depend on what has been measured before.
+    #[must_use]
+    pub fn follows(&self) -> bool {
+        self.a.len() + self.c.len() + self.d.len() + self.differences > 0
+    }
+
+    /// The share of each filter of an input in what they are off by together when the first value is measured: nothing is known
+    /// of which it is. In a model that follows, the noise is off.
+    pub(super) fn share(&self) -> f64 {
+        let filters = self
+            .inputs
+            .iter()
+            .filter(|input| !input.f.is_empty())
+            .count();
+        if self.follows() || filters == 0 {
+            0.0
+        } else {
+            1.0 / filters as f64
+        }
+    }
+
     /// `D(q) (1 − q⁻¹)^d`, without its leading 1.
     pub(super) fn whitening(&self) -> Vec<f64> {
         let mut product: Vec<f64> = std::iter::once(1.0).chain(self.d.iter().copied()).collect();
-        for _ in 0..self.differences {
-            product.push(0.0);
-            for j in (1..product.len()).rev() {
+        let undifferenced = product.len();
+        product.resize(undifferenced + self.differences, 0.0);
+        for last in undifferenced..product.len() {
+            for j in (1..=last).rev() {
                 product[j] -= product[j - 1];
             }
         }

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::{Orders, Polynomials};
 use crate::Record;
+use crate::Standardizer;
 
 /// Evenly spaced samples of the inputs and of what they lead to, in segments.
 #[derive(Debug, Clone, Default)]
@@ -53,6 +54,24 @@ impl Samples {
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
+    }
+
+    /// The standard deviation of the values; 1 where they are all the same.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        let mut values = Standardizer::new(1);
+        self.values
+            .iter()
+            .for_each(|&value| values.partial_fit(&[value]));
+        values.standardization().scales[0]
+    }
+
+    /// The same with values that are so many times smaller.
+    #[must_use]
+    pub fn divided(&self, by: f64) -> Self {
+        let mut divided = self.clone();
+        divided.values.iter_mut().for_each(|value| *value /= by);
+        divided
     }
 
     /// How many are left when the first of each segment are not counted.
@@ -143,6 +162,24 @@ pub(super) fn through(f: &[f64], x: &[f64], before: f64) -> (Vec<f64>, f64) {
     (filtered, rest)
 }
 
+/// What is left of a unit at each sample, if all samples up to the first are 1 and the filter is left to itself.
+fn dying(f: &[f64], count: usize) -> Vec<f64> {
+    let mut left: Vec<f64> = Vec::with_capacity(count);
+    for sample in 0..count {
+        let past = Past {
+            values: &left,
+            before: 1.0,
+        };
+        let sum: f64 = f
+            .iter()
+            .enumerate()
+            .map(|(j, f)| f * past.at(sample, j + 1))
+            .sum();
+        left.push(if sample == 0 { 1.0 } else { -sum });
+    }
+    left
+}
+
 /// An input of a segment on its way through the model.
 struct Brought {
     delay: usize,
@@ -154,10 +191,17 @@ struct Brought {
     of_f: (Vec<f64>, f64),
     /// `w = B/F u`.
     whole: Vec<f64>,
+    /// What it would be had the input always been what it was first.
+    rest: f64,
+    /// `F` of an input at rest.
+    gain: f64,
+    /// What is left of a unit that `w` was off by up to the first sample, and how that changes with each `f`.
+    left: Vec<f64>,
+    of_left: Vec<Vec<f64>>,
 }
 
 impl Brought {
-    fn new(transfer: &super::Transfer, input: &[f64]) -> Self {
+    fn new(transfer: &super::Transfer, input: &[f64], measured: bool, derive: bool) -> Self {
         let first = input.first().copied().unwrap_or(0.0);
         let of_b = through(&transfer.f, input, first);
         let past = Past {
@@ -171,27 +215,91 @@ impl Brought {
         };
         let whole: Vec<f64> = (0..input.len()).map(whole).collect();
         let rest = transfer.b.iter().sum::<f64>() * of_b.1;
+        let mut left = Vec::new();
+        let mut of_left = Vec::new();
+        if measured && !transfer.f.is_empty() {
+            left = dying(&transfer.f, input.len());
+            let derived = if derive { transfer.f.len() } else { 0 };
+            for j in 1..=derived {
+                let past = Past {
+                    values: &left,
+                    before: 1.0,
+                };
+                let driven: Vec<f64> = (0..input.len())
+                    .map(|sample| {
+                        if sample == 0 {
+                            0.0
+                        } else {
+                            -past.at(sample, j)
+                        }
+                    })
+                    .collect();
+                of_left.push(through(&transfer.f, &driven, 0.0).0);
+            }
+        }
         Self {
+            rest,
+            gain: 1.0 + transfer.f.iter().sum::<f64>(),
+            left,
+            of_left,
             delay: transfer.delay,
             nb: transfer.b.len(),
             nf: transfer.f.len(),
-            of_f: through(&transfer.f, &whole, rest),
+            of_f: if derive {
+                through(&transfer.f, &whole, rest)
+            } else {
+                (Vec::new(), rest)
+            },
             of_b,
             whole,
         }
     }
+
+    /// Puts down how the noise changes with each `b` and `f`; of what all filters were off by at first, `left` is left.
+    fn derive(&self, sample: usize, left: f64, off: f64, put: &mut impl FnMut(f64)) {
+        let past = |of: &(Vec<f64>, f64), lag| {
+            let (values, before) = (&of.0, of.1);
+            Past { values, before }.at(sample, lag)
+        };
+        let at_rest = left * self.of_b.1;
+        (0..self.nb).for_each(|j| put(at_rest - past(&self.of_b, self.delay + j)));
+        let at_rest = left * self.rest / self.gain;
+        for j in 1..=self.nf {
+            let dying = self.of_left.get(j - 1).map_or(0.0, |of| of[sample]);
+            put(past(&self.of_f, j) - at_rest - off * dying);
+        }
+    }
 }
 
-/// Goes through the residuals of a model, each with its derivatives in the order of [`Polynomials::flat`] (Ljung 1999, section
-/// 10.3). The first `first` of each segment are left out.
+/// Goes through the residuals of a model. The first `first` of each segment are left out.
 pub(super) fn residuals(
     model: &Polynomials,
     samples: &Samples,
     first: usize,
+    mut take: impl FnMut(f64),
+) {
+    go_through(model, samples, first, false, |residual, _| take(residual));
+}
+
+/// Goes through the residuals of a model, each with its derivatives in the order of [`Polynomials::flat`] (Ljung 1999, section
+/// 10.3). The first `first` of each segment are left out.
+pub(super) fn derivatives(
+    model: &Polynomials,
+    samples: &Samples,
+    first: usize,
+    take: impl FnMut(f64, &[f64]),
+) {
+    go_through(model, samples, first, true, take);
+}
+
+fn go_through(
+    model: &Polynomials,
+    samples: &Samples,
+    first: usize,
+    derive: bool,
     mut take: impl FnMut(f64, &[f64]),
 ) {
-    let count = model.flat().len();
-    let has_level = model.differences == 0;
+    let count = if derive { model.flat().len() } else { 0 };
     let whitening = model.whitening();
     let integrating = Polynomials {
         d: Vec::new(),
@@ -199,6 +307,7 @@ pub(super) fn residuals(
     }
     .whitening();
     let of_level = -(1.0 + model.a.iter().sum::<f64>());
+    let share = model.share();
     for segment in samples.segments() {
         let values: Vec<f64> = samples
             .values(segment.clone())
@@ -209,33 +318,41 @@ pub(super) fn residuals(
             .inputs
             .iter()
             .enumerate()
-            .map(|(nth, transfer)| Brought::new(transfer, &samples.input(segment.clone(), nth)))
+            .map(|(nth, transfer)| {
+                let input = samples.input(segment.clone(), nth);
+                Brought::new(transfer, &input, share > 0.0, derive)
+            })
             .collect();
+        let off = match values.first() {
+            Some(first) => share * (first - brought.iter().map(|of| of.rest).sum::<f64>()),
+            None => 0.0,
+        };
         // Before this sample something that `A` or a direct input needs is missing.
         let begin = first_of(model);
         let mut ring = Ring::new(count, whitening.len(), model.c.len(), integrating.len());
         for sample in begin..values.len() {
             let row = ring.next();
             let a = model.a.iter().enumerate();
+            let left_of = |of: &Brought| of.left.get(sample).copied().unwrap_or(0.0);
+            let left: f64 = brought.iter().map(left_of).sum();
             let brought_now: f64 = brought.iter().map(|of| of.whole[sample]).sum();
+            let brought_now = brought_now + off * left;
+            let left = share * left;
             row.noise = values[sample] + a.map(|(j, a)| a * values[sample - 1 - j]).sum::<f64>()
                 - brought_now;
             let mut at = 0;
-            let mut put = |value: f64| {
-                row.raw[at] = value;
-                at += 1;
-            };
-            if has_level {
-                put(of_level);
-            }
-            (1..=model.a.len()).for_each(|j| put(values[sample - j]));
-            for of in &brought {
-                let past = |of: &(Vec<f64>, f64), lag| {
-                    let (values, before) = (&of.0, of.1);
-                    Past { values, before }.at(sample, lag)
+            if derive {
+                let mut put = |value: f64| {
+                    row.raw[at] = value;
+                    at += 1;
                 };
-                (0..of.nb).for_each(|j| put(-past(&of.of_b, of.delay + j)));
-                (1..=of.nf).for_each(|j| put(past(&of.of_f, j)));
+                if model.differences == 0 {
+                    put(of_level + left);
+                }
+                (1..=model.a.len()).for_each(|j| put(values[sample - j]));
+                brought
+                    .iter()
+                    .for_each(|of| of.derive(sample, left, off, &mut put));
             }
             if sample < begin + whitening.len() {
                 continue;
@@ -312,10 +429,12 @@ impl Ring {
                 *to += d * from;
             }
         }
-        for j in 0..c.len() {
+        let derived = if new.is_empty() { 0 } else { c.len() };
+        for j in 0..derived {
             new[at + j] = -self.rows[self.back(j + 1)].residual;
         }
-        for j in 0..nd {
+        let derived = if new.is_empty() { 0 } else { nd };
+        for j in 0..derived {
             // The noise, integrated back, `j + 1` samples ago.
             let mut noise = self.rows[self.back(j + 1)].noise;
             for (i, d) in integrating.iter().enumerate() {
@@ -347,9 +466,7 @@ impl Ring {
 /// The sum of the squared residuals; infinite where it is not a number.
 pub(super) fn sum_of_squares(model: &Polynomials, samples: &Samples, first: usize) -> f64 {
     let mut sum = 0.0;
-    residuals(model, samples, first, |residual, _| {
-        sum += residual * residual
-    });
+    residuals(model, samples, first, |residual| sum += residual * residual);
     if sum.is_finite() { sum } else { f64::INFINITY }
 }
 

@@ -4,13 +4,13 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::initial::starts;
-use super::residuals::{counted_from, residuals, sum_of_squares};
+use super::residuals::{counted_from, derivatives, sum_of_squares};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
-use crate::NumericsError;
 use crate::checks::check_penalty;
+use crate::{GramBlocks, NumericsError};
 
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
-const TOLERANCE: f64 = 1e-10;
+const TOLERANCE: f64 = 1e-9;
 const MOST_DAMPING: f64 = 1e12;
 
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B`, by damped Gauss–Newton
@@ -27,7 +27,7 @@ impl Default for PredictionError {
     fn default() -> Self {
         Self {
             penalty: 0.0,
-            most_steps: 100,
+            most_steps: 50,
         }
     }
 }
@@ -166,19 +166,14 @@ impl PredictionError {
     ) -> (Mat<f64>, Vec<f64>) {
         let flat = model.flat();
         let count = flat.len();
-        let mut squares = vec![0.0; count * count];
-        let mut gradient = vec![0.0; count];
-        residuals(model, samples, first, |residual, derivatives| {
-            for (i, &of) in derivatives.iter().enumerate() {
-                gradient[i] += of * residual;
-                let row = &mut squares[i * count..i * count + i + 1];
-                for (to, other) in row.iter_mut().zip(derivatives) {
-                    *to += of * other;
-                }
-            }
+        let mut rows = GramBlocks::with_row_memory(count, 0);
+        derivatives(model, samples, first, |residual, by| {
+            rows.push(by, residual)
         });
+        let moments = rows.total().moments_about(&vec![0.0; count + 1]);
+        let mut gradient: Vec<f64> = (0..count).map(|i| moments[(count, i)]).collect();
+        let mut hessian = moments.submatrix(0, 0, count, count).to_owned();
         let of_b = model.penalised();
-        let mut hessian = Mat::from_fn(count, count, |i, j| squares[i.max(j) * count + i.min(j)]);
         for i in (0..count).filter(|&i| of_b[i]) {
             hessian[(i, i)] += self.penalty;
             gradient[i] += self.penalty * flat[i];

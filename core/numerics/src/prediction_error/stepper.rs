@@ -66,7 +66,8 @@ impl Stepper {
         self.innovations.fill(0.0);
     }
 
-    /// Where it is has been measured: what the inputs do not explain of it has always been there.
+    /// Where it is has been measured: what the inputs do not explain of it has always been there, in the noise, or where there
+    /// is no model of that, in the filters of the inputs.
     pub fn settle_on(&mut self, value: f64) {
         let value = value - self.model.level;
         let brought: f64 = self
@@ -78,6 +79,17 @@ impl Stepper {
                 None => of.gain() * past.values.first().copied().unwrap_or(0.0),
             })
             .sum();
+        let share = self.model.share();
+        for (past, of) in self.inputs.iter_mut().zip(&self.model.inputs) {
+            let off = if of.f.is_empty() {
+                0.0
+            } else {
+                share * (value - brought)
+            };
+            past.filtered
+                .iter_mut()
+                .for_each(|filtered| *filtered += off);
+        }
         self.past.fill(value);
         let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - brought;
         self.noise.fill(noise);

@@ -1,4 +1,4 @@
-use super::residuals::residuals;
+use super::residuals::{derivatives, residuals};
 use super::*;
 
 /// Numbers between −1 and 1 that nobody could guess.
@@ -133,8 +133,8 @@ fn derivatives_are_those_of_the_residuals() {
         let at = model.with(&moved);
         let all = |model: &Polynomials| {
             let mut all = Vec::new();
-            residuals(model, &samples, 0, |residual, derivatives| {
-                all.push((residual, derivatives.to_vec()));
+            derivatives(model, &samples, 0, |residual, by| {
+                all.push((residual, by.to_vec()));
             });
             all
         };
@@ -164,7 +164,7 @@ fn a_stepper_errs_by_the_residuals() {
     for (name, model) in models() {
         let samples = simulated(&model, 90, 0.3, 3);
         let mut found = Vec::new();
-        residuals(&model, &samples, 0, |residual, _| found.push(residual));
+        residuals(&model, &samples, 0, |residual| found.push(residual));
         // What the noise was before the first sample is not known; it is forgotten.
         let last: f64 = found[found.len() - 1];
         let segment = samples.segments().last().unwrap();

@@ -70,8 +70,8 @@ struct Followed {
     stepper: Stepper,
     /// The instant of its last sample.
     at: Instant,
-    /// Whether a truth has been told since the segment began.
-    measured: bool,
+    /// How many truths have been told since the segment began, as far as that counts.
+    told: u32,
 }
 
 /// What is known since the segment began.
@@ -105,7 +105,7 @@ impl Following {
         let followed = Followed {
             stepper: stepper.clone(),
             at: Instant::MIN,
-            measured: false,
+            told: 0,
         };
         Self {
             known: Known {
@@ -136,7 +136,7 @@ impl Known {
         for (nth, followed) in series.iter_mut().enumerate() {
             followed.stepper.rest(scaling.of(row));
             followed.at = of - *step + part(*step, nth as i64, count);
-            followed.measured = false;
+            followed.told = 0;
         }
         self.begun = true;
     }
@@ -183,7 +183,7 @@ impl Known {
     /// The series whose newest sample is the newest that lies a step before an instant.
     fn nearest(&self, of: Instant) -> &Followed {
         let before = of - part(self.step, 1, 2);
-        let key = |followed: &&Followed| (followed.at <= before, followed.measured, followed.at);
+        let key = |followed: &&Followed| (followed.at <= before, followed.told > 0, followed.at);
         self.series
             .iter()
             .max_by_key(key)
@@ -200,6 +200,11 @@ fn part(of: Duration, count: i64, parts: i64) -> Duration {
 impl Learner for Following {
     fn follows(&self) -> bool {
         true
+    }
+
+    fn settled(&self) -> bool {
+        let mut series = self.known.series.iter();
+        series.all(|followed| followed.told as usize >= followed.stepper.model().a.len().max(1))
     }
 
     fn run(&mut self, regressors: &[f64], of: Instant, told: Instant) {
@@ -247,11 +252,11 @@ impl Learner for Following {
     }
 
     fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
-        if !self.known.begun {
-            let scratch = self.scratch.borrow();
-            return scratch.model().at_rest(self.known.scaling.of(regressors));
-        }
         let followed = self.known.nearest(of);
+        let blind = followed.told == 0 && followed.stepper.model().follows();
+        if !self.known.begun || blind {
+            return f64::NAN;
+        }
         let mut scratch = self.scratch.borrow_mut();
         scratch.take(&followed.stepper);
         self.known
@@ -260,7 +265,7 @@ impl Learner for Following {
 
     fn deviation(&self, _regressors: &[f64], of: Instant) -> f64 {
         let followed = self.known.nearest(of);
-        let steps = if followed.measured {
+        let steps = if followed.told > 0 {
             self.known.steps(followed.at, of)
         } else {
             i64::MAX
@@ -291,13 +296,13 @@ impl Learner for Following {
         scratch.take(&followed.stepper);
         self.known
             .advance(scratch, followed.at, at, regressors, Some(truth));
-        if !followed.measured {
+        if followed.told == 0 {
             scratch.settle_on(truth);
         }
         let followed = &mut self.known.series[nth];
         followed.stepper.take(scratch);
         followed.at = at;
-        followed.measured = true;
+        followed.told = followed.told.saturating_add(1);
     }
 
     fn segment(&mut self, _shift: Duration) {
@@ -329,7 +334,7 @@ impl Learner for Following {
             if !own.stepper.resume(&other.stepper) {
                 return Restored::cold("it was followed with other orders");
             }
-            (own.at, own.measured) = (other.at, other.measured);
+            (own.at, own.told) = (other.at, other.told);
         }
         self.known.series = series;
         self.known.begun = known.begun;

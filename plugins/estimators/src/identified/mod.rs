@@ -25,6 +25,9 @@ pub(crate) struct Asked {
     pub(crate) penalty: f64,
     pub(crate) every: Option<Duration>,
     pub(crate) order: Option<Order>,
+    /// Where the inputs stand among the features, of which there are so many: those without values are left out.
+    pub(crate) places: Vec<usize>,
+    pub(crate) features: usize,
 }
 
 impl Asked {
@@ -39,23 +42,19 @@ impl Asked {
             self.nk.is_some(),
         ];
         let of_all = [("na", self.na), ("nc", self.nc), ("nd", self.nd)];
-        let of_inputs = [
-            ("nb", &self.nb, 1),
-            ("nf", &self.nf, 0),
-            ("nk", &self.nk, 0),
-        ];
-        let mut check = |name: &str, order: usize, least: usize| {
-            if !(least..=LARGEST).contains(&order) {
-                let message = format!("`{name}` is {order} and must be {least} to {LARGEST}");
+        let of_inputs = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
+        let mut check = |name: &str, order: usize| {
+            if order > LARGEST {
+                let message = format!("`{name}` is {order} and must be 0 to {LARGEST}");
                 mistakes.push(Mistake::at(name, message));
             }
         };
         for (name, order) in of_all {
-            order.into_iter().for_each(|order| check(name, order, 0));
+            order.into_iter().for_each(|order| check(name, order));
         }
-        for (name, orders, least) in of_inputs {
+        for (name, orders) in of_inputs {
             let orders = orders.iter().flat_map(PerInput::each);
-            orders.for_each(|order| check(name, order, least));
+            orders.for_each(|order| check(name, order));
         }
         if self.differences > 2 {
             let message = format!("`differences` is {} and must be 0 to 2", self.differences);
@@ -78,7 +77,12 @@ impl Asked {
     }
 
     pub(crate) fn trainer(self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        Box::new(IdentifiedTrainer::new(setup, self))
+        let asked = Self {
+            places: setup.places.clone(),
+            features: setup.asked_for,
+            ..self
+        };
+        Box::new(IdentifiedTrainer::new(setup, asked))
     }
 
     /// The orders as they are given, those of the first input standing for all.
@@ -94,8 +98,8 @@ impl Asked {
         ]
     }
 
-    /// The orders of a model with so many inputs, the open ones as in `chosen`.
-    fn orders(&self, inputs: usize, chosen: &[usize; 6]) -> Orders {
+    /// The orders of a model, the open ones as in `chosen`.
+    fn orders(&self, chosen: &[usize; 6]) -> Orders {
         let open = self.order.as_ref().map_or([false; 6], Order::open);
         let of = |orders: &Option<PerInput>, letter: usize, nth: usize| match orders {
             Some(orders) if !open[letter] => orders.of(nth),
@@ -103,8 +107,10 @@ impl Asked {
         };
         Orders {
             na: chosen[0],
-            inputs: (0..inputs)
-                .map(|nth| InputOrders {
+            inputs: self
+                .places
+                .iter()
+                .map(|&nth| InputOrders {
                     nb: of(&self.nb, 1, nth),
                     nf: of(&self.nf, 4, nth),
                     nk: of(&self.nk, 5, nth),
@@ -116,13 +122,14 @@ impl Asked {
         }
     }
 
-    /// Lists of orders that are not as long as there are inputs.
-    fn misfit(&self, inputs: usize) -> Option<String> {
+    /// Lists of orders that are not as long as there are features.
+    fn misfit(&self) -> Option<String> {
         let lists = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
         lists.into_iter().find_map(|(name, orders)| match orders {
-            Some(PerInput::Each(list)) if list.len() != inputs => Some(format!(
-                "`{name}` has {} orders for {inputs} features; one number stands for all",
-                list.len()
+            Some(PerInput::Each(list)) if list.len() != self.features => Some(format!(
+                "`{name}` has {} orders for {} features; one number stands for all",
+                list.len(),
+                self.features
             )),
             _ => None,
         })

@@ -3,8 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    Polynomials, PredictionError, PredictionErrorFit, Samples, Standardization, Standardizer,
-    Stepper,
+    InformationCriteria, Polynomials, PredictionError, PredictionErrorFit, Samples,
+    Standardization, Standardizer, Stepper,
 };
 
 use super::Asked;
@@ -196,8 +196,8 @@ impl Identify for Asked {
         self.every
     }
 
-    fn misfit(&self, inputs: usize) -> Option<String> {
-        Asked::misfit(self, inputs)
+    fn misfit(&self, _inputs: usize) -> Option<String> {
+        Asked::misfit(self)
     }
 
     fn identify(
@@ -206,7 +206,11 @@ impl Identify for Asked {
         _series: usize,
         report: &mut TrainingReport,
     ) -> Result<Found, TrainingError> {
-        let fit = self.fit(samples, report)?;
+        // In units of their spread, or the search would depend on the unit of the truth.
+        let spread = samples.spread();
+        let mut fit = self.fit(&samples.divided(spread), spread, report)?;
+        fit.model.rescale(spread);
+        fit.residual_sum_of_squares *= spread * spread;
         if !fit.converged {
             report.notes.push(format!(
                 "the search had not ended after {} steps",
@@ -226,22 +230,19 @@ impl Asked {
     fn fit(
         &self,
         samples: &Samples,
+        spread: f64,
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
         let search = PredictionError {
             penalty: self.penalty,
             ..PredictionError::default()
         };
-        let width = samples.width();
         let Some(order) = self.order else {
-            let orders = self.orders(width, &self.given());
+            let orders = self.orders(&self.given());
             return search.fit(&orders, samples, 0).map_err(told);
         };
         let candidates = order.combinations(self.given());
-        let orders: Vec<_> = candidates
-            .iter()
-            .map(|one| self.orders(width, one))
-            .collect();
+        let orders: Vec<_> = candidates.iter().map(|one| self.orders(one)).collect();
         let first = orders
             .iter()
             .map(athermal_numerics::Orders::first)
@@ -253,7 +254,10 @@ impl Asked {
         for (candidate, orders) in candidates.iter().zip(&orders) {
             match search.fit(orders, samples, first) {
                 Ok(fit) => {
-                    tried.push((*candidate, orders.coefficients(), fit.criteria()));
+                    let squares = fit.residual_sum_of_squares * spread * spread;
+                    let coefficients = orders.coefficients();
+                    let figures = InformationCriteria::of(fit.rows, coefficients, squares);
+                    tried.push((*candidate, coefficients, figures));
                     fits.push(fit);
                 }
                 Err(error) => failed = Some(error),
@@ -263,7 +267,7 @@ impl Asked {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
-        report.orders = Some(table);
+        report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
     }
 }
