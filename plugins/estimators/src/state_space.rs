@@ -44,11 +44,11 @@ const LARGEST_PAST: usize = 1000;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateSpace {
-    /// How many states, 1 to 20 and not more than `horizon`; or how that is told from the singular values, such as
+    /// How many states, 1 to 20; or how that is told from the singular values, such as
     /// `{ by = "threshold", share = 0.25 }`.
     #[serde(default)]
     pub states: States,
-    /// How many steps past and future have each, 2 to 100.
+    /// How many steps past and future have each, 2 to 100; as many as there are states where that is more.
     #[serde(default = "ten")]
     #[schemars(range(min = 2, max = 100))]
     pub horizon: usize,
@@ -171,13 +171,6 @@ impl Estimator for StateSpace {
                 let message = format!("`states` is {states} and must be 1 to {MOST_STATES}");
                 mistakes.push(Mistake::at("states", message));
             }
-            States::Given(states) if states > self.horizon => {
-                let message = format!(
-                    "`states` is {states} and `horizon` {}, which tells of no more",
-                    self.horizon
-                );
-                mistakes.push(Mistake::at("states", message).help("give a longer `horizon`"));
-            }
             States::Told(By::Threshold { share }) if !(share > 0.0 && share < 1.0) => {
                 let message = format!("`share` is {share} and must be above 0 and below 1");
                 mistakes.push(Mistake::at("states.share", message));
@@ -209,9 +202,17 @@ impl Estimator for StateSpace {
 athermal_core::register!(StateSpace, Estimator, "state_space");
 
 impl StateSpace {
+    /// The horizon: what is told of fewer steps than there are states does not tell them.
+    fn reach(&self) -> usize {
+        match self.states {
+            States::Given(states) => self.horizon.max(states),
+            States::Told(_) => self.horizon,
+        }
+    }
+
     fn subspace(&self, series: usize) -> Subspace {
         Subspace {
-            horizon: self.horizon,
+            horizon: self.reach(),
             weighting: match self.weighting {
                 Weighting::N4sid => athermal_numerics::Weighting::N4sid,
                 Weighting::Moesp => athermal_numerics::Weighting::Moesp,
@@ -235,12 +236,12 @@ impl Identify for StateSpace {
     }
 
     fn misfit(&self, inputs: usize) -> Option<String> {
-        let past = self.horizon * (inputs + 1);
+        let past = self.reach() * (inputs + 1);
         (past > LARGEST_PAST).then(|| {
             format!(
                 "{inputs} features over a `horizon` of {} steps make a past of {past} values, and at most {LARGEST_PAST} are \
                  fitted: name fewer features, or give a shorter horizon",
-                self.horizon
+                self.reach()
             )
         })
     }
