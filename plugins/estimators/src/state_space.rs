@@ -25,22 +25,24 @@ const LARGEST_PAST: usize = 1000;
 
 /// A state-space model by subspace identification: states that sum up what the past tells of the future.
 ///
-/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter 4; Ljung 1999,
-/// section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the features meanwhile, is
-/// decomposed by singular values: as many as count, and chance does not explain (Wachter 1980), are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how
-/// those go on. `B` and `D` are then found such that one-step errors are least. The singular values are printed and kept. A mode
-/// that would grow is brought back to one that barely fades. No search is made and no start needed, so that a fit takes little
-/// more than one pass over the rows; `oe` or `armax` may come closer from there.
+/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter
+/// 4; Ljung 1999, section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the
+/// features meanwhile, is decomposed by singular values: as many as count, and chance does not explain (Wachter 1980),
+/// are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how those go on. `B` and `D` are then
+/// found such that one-step errors are least. The singular values are printed and kept. A mode that would grow is
+/// brought back to one that barely fades. No search is made and no start needed, so that a fit takes little more than
+/// one pass over the rows; `oe` or `armax` may come closer from there.
 ///
-/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed as a
-/// filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default
-/// the span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
-/// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts as so
-/// many steps, rounded. Running, it is told each truth that the embargo lets through, takes for one that is missing what it had
-/// predicted, and for features that are missing the last ones. Where truths or rows are missing in the fit, windows end and begin
-/// again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays there.
-/// The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the
-/// node runs at every tick.
+/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed
+/// as a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart:
+/// `every`, by default the span of the truth, since truths whose windows overlap share their noise; where several come
+/// within a step, each begins a series of its own, which are fitted together and followed side by side. The time
+/// between two truths of a series counts as so many steps, rounded. Running, it is told each truth that the embargo
+/// lets through, takes for one that is missing what it had predicted, and for features that are missing the last ones.
+/// Where truths or rows are missing in the fit, windows end and begin again. A segment begins with its first truth, as
+/// if that and the features had always been what they are; with `learn = false` it stays at rest. The port `deviation`
+/// is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs
+/// at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateSpace {
