@@ -279,6 +279,8 @@ fn a_level_is_followed_by_the_textbook_recursion() {
     let written = serde_json::to_value(&*fitted["level"]).unwrap();
     let start = &written["at_large"][0];
     let (mut level, mut variance) = (start[0].as_f64().unwrap(), start[1].as_f64().unwrap());
+    // The level is told about the mean of the truths of the fit.
+    level += written["scaling"]["truth"].as_f64().unwrap();
     let (observation, gained_per_s) = (4.0, 9.0 / 60.0);
     let mut last = None::<f64>;
     for tick in 0..60_usize {

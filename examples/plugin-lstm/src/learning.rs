@@ -326,13 +326,13 @@ mod tests {
             name: name.to_owned(),
             unit: "K".to_owned(),
             sensors: Vec::new(),
-            lag: Duration::ZERO,
+            lag: name
+                .split_once(" lag ")
+                .map_or(Duration::ZERO, |(_, lag)| lag.parse().unwrap()),
             of_truth: false,
         };
         TrainingSetup {
             regressors: ["f.a", "f.a lag 10s", "f.a lag 20s"].map(regressor).into(),
-            places: vec![0, 1, 2],
-            asked_for: 3,
             truth_unit: "nm".to_owned(),
             memory,
             ahead: Duration::ZERO,

@@ -370,7 +370,7 @@ impl Predictor for NarxPredictor {
         let terms = self.terms.iter().zip(&self.coefficients);
         terms.fold(self.mean, |sum, (term, coefficient)| {
             let product = if term.0.len() > 1 {
-                term.of(|j| z(j).clamp(self.lowest[j], self.highest[j]))
+                term.of(|j| z(j).max(self.lowest[j]).min(self.highest[j]))
             } else {
                 term.of(z)
             };

@@ -25,30 +25,32 @@ const LARGEST_PAST: usize = 1000;
 
 /// A state-space model by subspace identification: states that sum up what the past tells of the future.
 ///
-/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter 4; Ljung 1999,
-/// section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the features meanwhile, is
-/// decomposed by singular values: as many as count, and chance does not explain (Wachter 1980), are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how
-/// those go on. `B` and `D` are then found such that one-step errors are least. The singular values are printed and kept. A mode
-/// that would grow is brought back to one that barely fades. No search is made and no start needed, so that a fit takes little
-/// more than one pass over the rows; `oe` or `armax` may come closer from there.
+/// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter
+/// 4; Ljung 1999, section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the
+/// features meanwhile, is decomposed by singular values: as many as count, and chance does not explain (Wachter 1980),
+/// are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how those go on. `B` and `D` are then
+/// found such that one-step errors are least. The singular values are printed and kept. A mode that would grow is
+/// brought back to one that barely fades. No search is made and no start needed, so that a fit takes little more than
+/// one pass over the rows; `oe` or `armax` may come closer from there.
 ///
-/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed as a
-/// filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default
-/// the span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
-/// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts as so
-/// many steps, rounded. Running, it is told each truth that the embargo lets through, takes for one that is missing what it had
-/// predicted, and for features that are missing the last ones. Where truths or rows are missing in the fit, windows end and begin
-/// again. A segment begins at rest, as if the features had always been what they are first; with `learn = false` it stays there.
-/// The port `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the
-/// node runs at every tick.
+/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed
+/// as a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart:
+/// `every`, by default the span of the truth, since truths whose windows overlap share their noise; where several come
+/// within a step, each begins a series of its own, which are fitted together and followed side by side. The time
+/// between two truths of a series counts as so many steps, rounded. Running, it is told each truth that the embargo
+/// lets through, takes for one that is missing what it had predicted, and for features that are missing the last ones.
+/// Where truths or rows are missing in the fit, windows end and begin again. A segment begins with its first truth, as
+/// if that and the features had always been what they are; with `learn = false` it stays at rest. The port `deviation`
+/// is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs
+/// at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateSpace {
-    /// How many states, 1 to 20 and not more than `horizon`; or how that is told from the singular values, such as
+    /// How many states, 1 to 20; or how that is told from the singular values, such as
     /// `{ by = "threshold", share = 0.25 }`.
     #[serde(default)]
     pub states: States,
-    /// How many steps past and future have each, 2 to 100.
+    /// How many steps past and future have each, 2 to 100; as many as there are states where that is more.
     #[serde(default = "ten")]
     #[schemars(range(min = 2, max = 100))]
     pub horizon: usize,
@@ -171,13 +173,6 @@ impl Estimator for StateSpace {
                 let message = format!("`states` is {states} and must be 1 to {MOST_STATES}");
                 mistakes.push(Mistake::at("states", message));
             }
-            States::Given(states) if states > self.horizon => {
-                let message = format!(
-                    "`states` is {states} and `horizon` {}, which tells of no more",
-                    self.horizon
-                );
-                mistakes.push(Mistake::at("states", message).help("give a longer `horizon`"));
-            }
             States::Told(By::Threshold { share }) if !(share > 0.0 && share < 1.0) => {
                 let message = format!("`share` is {share} and must be above 0 and below 1");
                 mistakes.push(Mistake::at("states.share", message));
@@ -209,9 +204,17 @@ impl Estimator for StateSpace {
 athermal_core::register!(StateSpace, Estimator, "state_space");
 
 impl StateSpace {
+    /// The horizon: what is told of fewer steps than there are states does not tell them.
+    fn reach(&self) -> usize {
+        match self.states {
+            States::Given(states) => self.horizon.max(states),
+            States::Told(_) => self.horizon,
+        }
+    }
+
     fn subspace(&self, series: usize) -> Subspace {
         Subspace {
-            horizon: self.horizon,
+            horizon: self.reach(),
             weighting: match self.weighting {
                 Weighting::N4sid => athermal_numerics::Weighting::N4sid,
                 Weighting::Moesp => athermal_numerics::Weighting::Moesp,
@@ -235,12 +238,12 @@ impl Identify for StateSpace {
     }
 
     fn misfit(&self, inputs: usize) -> Option<String> {
-        let past = self.horizon * (inputs + 1);
+        let past = self.reach() * (inputs + 1);
         (past > LARGEST_PAST).then(|| {
             format!(
                 "{inputs} features over a `horizon` of {} steps make a past of {past} values, and at most {LARGEST_PAST} are \
                  fitted: name fewer features, or give a shorter horizon",
-                self.horizon
+                self.reach()
             )
         })
     }
