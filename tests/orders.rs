@@ -48,15 +48,15 @@ fn expected() -> Vec<Value> {
 }
 
 /// The table of orders that a fit told, and the text for people.
-fn fitted(graph: &str) -> (Value, String) {
-    let scratch = Scratch::new("orders");
+fn fitted(name: &str, graph: &str) -> (Value, String) {
+    let scratch = Scratch::new(&format!("orders-{name}"));
     let graph = scratch.file("graph.toml", graph);
     let (data, model) = (oracle("series.csv"), scratch.path("model.json"));
     let told = athermal(&[&"fit", &graph, &"--data", &data, &"--output", &model]).ended(0);
     let text = std::fs::read_to_string(&model).unwrap();
     let model: Value = serde_json::from_str(&text).unwrap();
-    let report = &model["card"]["estimators"][0]["report"];
-    (report["orders"].clone(), told.out)
+    let orders = &model["card"]["estimators"][0]["orders"];
+    (orders.clone(), told.out)
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn criteria_of_an_autoregression_equal_the_oracle_of_statsmodels() {
         ("bic", "BIC"),
         ("fpe", "FPE"),
     ] {
-        let (orders, told) = fitted(&graph(by, AR));
+        let (orders, told) = fitted(by, &graph(by, AR));
         let tried = orders["tried"].as_array().unwrap();
         assert_eq!(tried.len(), expected.len());
         for (tried, expected) in tried.iter().zip(&expected) {
@@ -94,7 +94,7 @@ fn criteria_of_an_autoregression_equal_the_oracle_of_statsmodels() {
 
 #[test]
 fn the_search_for_a_model_without_a_moving_average_compares_as_least_squares_do() {
-    let (orders, _) = fitted(&graph("bic", ARMA));
+    let (orders, _) = fitted("search", &graph("bic", ARMA));
     for (tried, expected) in orders["tried"].as_array().unwrap().iter().zip(expected()) {
         assert_eq!(tried["order"], format!("na {}", expected["na"]));
         for figure in ["aic", "bic"] {
