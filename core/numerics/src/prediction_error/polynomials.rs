@@ -80,7 +80,7 @@ impl Transfer {
     }
 }
 
-/// A model: see [the module](self) for the equation.
+/// A model, `A(q) (y − μ) = Σ B_i(q)/F_i(q) u_i + C(q)/(D(q) (1 − q⁻¹)^d) e` (Ljung 1999, eq. 4.33).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Polynomials {
