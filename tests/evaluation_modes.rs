@@ -192,43 +192,70 @@ fn part(
 }
 
 /// The free run of a shipped graph, fitted on the first rows of a file, over the rest.
-fn free_run(name: &str, file: &str, rows: usize, first: usize) -> Option<Vec<serde_json::Value>> {
+fn free_run(
+    name: &str,
+    file: &str,
+    rows: usize,
+    first: usize,
+    how: &[&str],
+) -> Option<Vec<serde_json::Value>> {
     let file = data()?.join(file);
-    let scratch = Scratch::new(&format!("modes-{name}"));
+    let scratch = Scratch::new(&format!("modes-{name}-{}", how.len()));
     let train = part(&scratch, "train.csv", &file, 0..first);
     let test = part(&scratch, "test.csv", &file, first..rows);
     let model = fitted(&scratch, "model.json", &graph(name), &train);
-    let mode = ["--mode", "free-run", "--each-on-its-own"];
+    let mode = [&["--mode", "free-run"], how].concat();
     Some(scores(&model, &test, &mode))
 }
 
+const ITS_OWN: &[&str] = &["--each-on-its-own"];
+
 #[test]
 fn arx_runs_free_on_the_hairdryer_as_the_textbook_has_it() {
-    let Some(free) = free_run("hairdryer", "hairdryer/hairdryer.csv", 1000, 500) else {
+    let Some(free) = free_run("hairdryer", "hairdryer/hairdryer.csv", 1000, 500, ITS_OWN) else {
         return;
     };
     // Least squares of numpy on the same rows: 85.51 %.
     let fit = figure(&free, "arx", "fit");
     assert!(fit >= 85.0, "{fit}");
     assert!((fit - 85.508).abs() < 0.01, "{fit}");
+    for node in ["output_error", "armax", "box_jenkins"] {
+        let fit = figure(&free, node, "fit");
+        assert!(fit > 80.0, "{node}: {fit}");
+    }
 }
 
 #[test]
-fn arx_runs_free_on_a_wall_and_on_a_plate() {
+fn arx_runs_free_on_a_wall_and_on_a_plate_and_output_error_no_worse() {
     // Least squares of numpy on the same rows: 0.97149 and 0.72358.
-    for (name, file, rows, expected) in [
-        ("wall-heatflow", "wall-heatflow/wall.csv", 1680, 0.971_49),
+    for (name, file, rows, expected, least) in [
+        (
+            "wall-heatflow",
+            "wall-heatflow/wall.csv",
+            1680,
+            0.971_49,
+            0.97,
+        ),
         (
             "heating-system",
             "heating-system/heating.csv",
             801,
             0.723_58,
+            0.72,
         ),
     ] {
-        let Some(free) = free_run(name, file, rows, rows * 7 / 10) else {
+        let first = rows * 7 / 10;
+        let Some(free) = free_run(name, file, rows, first, ITS_OWN) else {
             return;
         };
         let found = figure(&free, "arx", "r2_mean");
         assert!((found - expected).abs() < 1e-4, "{name}: {found}");
+        let common = free_run(name, file, rows, first, &[]).unwrap();
+        let found = figure(&common, "output_error", "r2_mean");
+        assert!(found >= least, "{name}: {found}");
+        assert!(
+            found >= figure(&common, "arx", "r2_mean"),
+            "{name}: {found}"
+        );
     }
 }

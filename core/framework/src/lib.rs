@@ -12,20 +12,21 @@
 //!                                                  samples from a recording, a live source or a simulated machine
 //! ```
 //!
-//! In a program that is three steps. The node here is a feature that doubles; the shipped ones come from plugin crates:
+//! In a program that is three steps: load, make an engine, step it. The node here is a feature that doubles; the shipped ones
+//! come from plugin crates:
 //!
 //! ```
 //! # use athermal_core::node::{Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick};
-//! # /// Twice its input.
+//! # /// Doubled its input.
 //! # #[derive(Debug, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 //! # #[serde(deny_unknown_fields)]
-//! # pub struct Twice {}
-//! # impl Feature for Twice {
+//! # pub struct Doubled {}
+//! # impl Feature for Doubled {
 //! #     fn inputs() -> &'static [InputPort] {
 //! #         const { &[InputPort::fresh("signal", "what is doubled")] }
 //! #     }
 //! #     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-//! #         Ok(vec![OutputPort { name: "twice", channels: inputs.port("signal").to_vec() }])
+//! #         Ok(vec![OutputPort { name: "doubled", channels: inputs.port("signal").to_vec() }])
 //! #     }
 //! #     fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
 //! #         Box::new(Doubling)
@@ -40,14 +41,14 @@
 //! #     }
 //! #     fn segment(&mut self) {}
 //! # }
-//! # athermal_core::register!(Twice, Feature, "twice");
+//! # athermal_core::register!(Doubled, Feature, "doubled");
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # use athermal_core::{model::Model, time::Instant};
 //! # let path = std::env::temp_dir().join(format!("athermal-core-{}.toml", std::process::id()));
 //! std::fs::write(&path, r#"
 //!     schema = 1
 //!     signals.rise = { unit = "K", channels = ["plate", "room"], max_age = "1min" }
-//!     nodes.doubled = { type = "twice", inputs.signal = "rise" }
+//!     nodes.doubled = { type = "doubled", inputs.signal = "rise" }
 //!     outputs.doubled = "doubled"
 //! "#)?;
 //! let mut engine = Model::load(&path)?.engine()?;

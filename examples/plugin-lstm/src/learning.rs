@@ -326,6 +326,10 @@ mod tests {
             name: name.to_owned(),
             unit: "K".to_owned(),
             sensors: Vec::new(),
+            lag: name
+                .split_once(" lag ")
+                .map_or(Duration::ZERO, |(_, lag)| lag.parse().unwrap()),
+            of_truth: false,
         };
         TrainingSetup {
             regressors: ["f.a", "f.a lag 10s", "f.a lag 20s"].map(regressor).into(),

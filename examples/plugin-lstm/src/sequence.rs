@@ -66,7 +66,7 @@ impl Layout {
             false => format!("{channel} lag {lag}"),
         };
         let find = |name: &String| regressors.iter().position(|known| known.name == *name);
-        let present = regressors.iter().filter(|r| !r.name.contains(" lag "));
+        let present = regressors.iter().filter(|r| r.lag.is_zero());
         let (complete, incomplete): (Vec<_>, Vec<_>) = present
             .map(|regressor| regressor.name.as_str())
             .partition(|channel| lags.iter().all(|lag| find(&name(channel, lag)).is_some()));
@@ -92,6 +92,10 @@ mod tests {
             name: (*name).to_owned(),
             unit: "K".to_owned(),
             sensors: Vec::new(),
+            lag: name
+                .split_once(" lag ")
+                .map_or(Duration::ZERO, |(_, lag)| lag.parse().unwrap()),
+            of_truth: false,
         };
         names.iter().map(regressor).collect()
     }

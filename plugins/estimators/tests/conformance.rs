@@ -238,7 +238,7 @@ conformance!(
 
 conformance!(
     Bj,
-    Case::new(r#"ahead = "1min""#),
+    Case::new(r#"ahead = "1min""#).input("features", 1, "K"),
     Case::new(
         r#"
         ahead = "0s"

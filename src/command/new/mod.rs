@@ -16,7 +16,6 @@ pub struct New {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Write a crate with a node type, a source, a sink or a machine of your own
     Plugin(plugin::Plugin),
 }
 

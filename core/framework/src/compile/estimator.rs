@@ -281,13 +281,18 @@ impl Resolver<'_> {
     /// Notes which measured channels each regressor is made from, which is known once loops have been followed.
     pub(super) fn name_sensors(&mut self) {
         for node in &mut self.nodes {
-            let PlannedRole::Estimator {
-                regressors,
-                gathers,
-                ..
-            } = &mut node.role
-            else {
-                continue;
+            let (regressors, gathers) = match &mut node.role {
+                PlannedRole::Estimator {
+                    regressors,
+                    gathers,
+                    ..
+                } => (regressors, gathers),
+                PlannedRole::Feature {
+                    fit: Some(fit),
+                    gathers,
+                    ..
+                } => (&mut fit.regressors, gathers),
+                PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => continue,
             };
             let entries = gathers
                 .iter()

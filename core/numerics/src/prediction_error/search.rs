@@ -10,7 +10,9 @@ use crate::checks::check_penalty;
 use crate::{GramBlocks, NumericsError};
 
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
-const TOLERANCE: f64 = 1e-9;
+const TOLERANCE: f64 = 1e-14;
+/// A search that ends while it still gains more than this has not converged.
+const SMALL: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e12;
 
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B`, by damped Gauss–Newton
@@ -27,7 +29,7 @@ impl Default for PredictionError {
     fn default() -> Self {
         Self {
             penalty: 0.0,
-            most_steps: 50,
+            most_steps: 100,
         }
     }
 }
@@ -128,6 +130,7 @@ impl PredictionError {
         let mut model = start;
         let mut least = self.objective(&model, samples, first);
         let mut damping = 1e-3;
+        let mut gained = f64::INFINITY;
         for step in 0..self.most_steps {
             let (hessian, gradient) = self.normal_equations(&model, samples, first);
             let flat = model.flat();
@@ -140,7 +143,7 @@ impl PredictionError {
                 let tried = tried.filter(Polynomials::is_stable);
                 let found = tried.map(|tried| (self.objective(&tried, samples, first), tried));
                 if let Some((sum, tried)) = found.filter(|(sum, _)| *sum <= least) {
-                    let gained = least - sum;
+                    gained = least - sum;
                     (model, damping) = (tried, (damping / 10.0).max(1e-12));
                     least = sum;
                     if gained <= TOLERANCE * least {
@@ -154,7 +157,7 @@ impl PredictionError {
                 }
             }
         }
-        (model, self.most_steps, false)
+        (model, self.most_steps, gained <= SMALL * least)
     }
 
     /// `JᵀJ` and `Jᵀε`, with the penalty.

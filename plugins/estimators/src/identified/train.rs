@@ -16,6 +16,9 @@ const MOST_SERIES: usize = 16;
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
 const STEPS_AHEAD: usize = 256;
 
+/// Steps of the search times coefficients, of which many are never all settled.
+const MOST_WORK: usize = 1000;
+
 /// How a model is found from evenly spaced samples.
 pub(crate) trait Identify: std::fmt::Debug + Send {
     /// How long a step is, where that is stated.
@@ -233,13 +236,16 @@ impl Asked {
         spread: f64,
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
-        let search = PredictionError {
-            penalty: self.penalty,
-            ..PredictionError::default()
+        let search = |orders: &athermal_numerics::Orders| {
+            let most = MOST_WORK / orders.coefficients().max(1);
+            PredictionError {
+                penalty: self.penalty,
+                most_steps: most.clamp(20, 100),
+            }
         };
         let Some(order) = self.order else {
             let orders = self.orders(&self.given());
-            return search.fit(&orders, samples, 0).map_err(told);
+            return search(&orders).fit(&orders, samples, 0).map_err(told);
         };
         let candidates = order.combinations(self.given());
         let orders: Vec<_> = candidates.iter().map(|one| self.orders(one)).collect();
@@ -252,7 +258,7 @@ impl Asked {
         let mut fits = Vec::new();
         let mut failed = None;
         for (candidate, orders) in candidates.iter().zip(&orders) {
-            match search.fit(orders, samples, first) {
+            match search(orders).fit(orders, samples, first) {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     let coefficients = orders.coefficients();
