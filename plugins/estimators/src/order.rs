@@ -13,7 +13,7 @@ const MOST: usize = 500;
 /// The largest order.
 pub(crate) const LARGEST: usize = 100;
 
-/// Orders from one to another, both included: `"1..6"`, or a number for one alone.
+/// Orders from one to another, both included: `"1..6"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema)]
 #[schemars(with = "String", extend("pattern" = r"^\d+\.\.\d+$"))]
 pub struct OrderRange {

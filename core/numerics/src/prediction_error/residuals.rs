@@ -470,7 +470,7 @@ pub(super) fn sum_of_squares(model: &Polynomials, samples: &Samples, first: usiz
     if sum.is_finite() { sum } else { f64::INFINITY }
 }
 
-/// Whether the orders leave residuals to be counted from `first` on.
+/// The first sample of a segment that is counted: `first`, or a later one before which a model of these orders lacks something.
 pub(super) fn counted_from(orders: &Orders, first: usize) -> usize {
     first.max(orders.first())
 }
