@@ -319,37 +319,29 @@ impl Course {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use athermal_core::node::Regressor;
 
-    fn setup(memory: usize) -> TrainingSetup {
-        let regressor = |name: &str| Regressor {
-            name: name.to_owned(),
-            unit: "K".to_owned(),
-            sensors: Vec::new(),
-            lag: name
-                .split_once(" lag ")
-                .map_or(Duration::ZERO, |(_, lag)| lag.parse().unwrap()),
-            of_truth: false,
-        };
-        TrainingSetup {
-            regressors: ["f.a", "f.a lag 10s", "f.a lag 20s"].map(regressor).into(),
-            truth_unit: "nm".to_owned(),
-            memory,
-            ahead: Duration::ZERO,
-            span: Duration::from_ns(100_000_000_000),
-            learns: false,
-        }
-    }
-
-    fn learning(memory: usize, training: Training) -> Learning {
-        let lags = [0, 10, 20].map(|s| Duration::from_ns(s * 1_000_000_000));
-        Learning::new(
+    /// What learns from three steps of one channel, and may keep so many numbers.
+    fn learning(room: usize, training: Training) -> Learning {
+        Learning {
             training,
-            4,
-            &lags,
-            &setup(memory),
-            crate::estimator::predictor,
-        )
+            units: 4,
+            steps: 3,
+            layout: Layout {
+                channels: 1,
+                places: vec![0, 1, 2],
+                names: ["f.a lag 20s", "f.a lag 10s", "f.a"]
+                    .map(str::to_owned)
+                    .into(),
+                incomplete: Vec::new(),
+            },
+            span: Duration::from_ns(100_000_000_000),
+            unit: "nm".to_owned(),
+            room,
+            thinned: 1,
+            seen: 0,
+            rows: Rows::default(),
+            finish: crate::estimator::predictor,
+        }
     }
 
     /// A truth that hangs on the product of two steps, which no linear model of them finds.
@@ -393,7 +385,7 @@ mod tests {
 
     #[test]
     fn rows_that_do_not_fit_into_the_memory_are_thinned() {
-        let mut learning = learning(3 * 8 * 100, Training::default());
+        let mut learning = learning(3 * 100, Training::default());
         feed(&mut learning, 1000);
         assert!((50..=100).contains(&learning.rows.at.len()));
         let apart = learning.rows.at[1] - learning.rows.at[0];

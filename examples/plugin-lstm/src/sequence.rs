@@ -88,14 +88,10 @@ mod tests {
     use super::*;
 
     fn regressors(names: &[&str]) -> Vec<Regressor> {
-        let regressor = |name: &&str| Regressor {
-            name: (*name).to_owned(),
-            unit: "K".to_owned(),
-            sensors: Vec::new(),
-            lag: name
-                .split_once(" lag ")
-                .map_or(Duration::ZERO, |(_, lag)| lag.parse().unwrap()),
-            of_truth: false,
+        let regressor = |name: &&str| {
+            let lag = name.split_once(" lag ").map_or("0s", |(_, lag)| lag);
+            let written = serde_json::json!({ "name": name, "unit": "K", "lag": lag });
+            serde_json::from_value(written).unwrap()
         };
         names.iter().map(regressor).collect()
     }

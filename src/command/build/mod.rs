@@ -77,10 +77,12 @@ impl Build {
         let built = Path::new(target)
             .join("release")
             .join(project::executable());
-        let kinds = kinds(&built)?;
-        twice(&kinds)?;
+        let kinds = known(&built, "nodes")?;
+        twice("node type", &kinds)?;
+        let machines = known(&built, "machines")?;
+        twice("machine", &machines)?;
         place(&built, &self.output)?;
-        self.tell(terminal, &wishes, &resolved, &kinds);
+        self.tell(terminal, &wishes, &resolved, &kinds, &machines);
         Ok(Answer::Fine)
     }
 
@@ -93,25 +95,38 @@ impl Build {
     }
 
     /// Tells what the new binary has.
-    fn tell(&self, terminal: &Terminal, wishes: &[Wish], resolved: &Value, kinds: &[Known]) {
+    fn tell(
+        &self,
+        terminal: &Terminal,
+        wishes: &[Wish],
+        resolved: &Value,
+        kinds: &[Known],
+        machines: &[Known],
+    ) {
         if terminal.format == Format::Json {
             println!(
                 "{:#}",
-                json!({ "binary": self.output, "project": self.folder(), "nodes": kinds })
+                json!({ "binary": self.output, "project": self.folder(), "nodes": kinds, "machines": machines })
             );
             return;
         }
-        println!("{} has {} node types", self.output.display(), kinds.len());
+        println!(
+            "{} has {} node types and {} machines",
+            self.output.display(),
+            kinds.len(),
+            machines.len()
+        );
         for wish in wishes {
             let version = packages(resolved, wish.package()).next();
             let version = version.and_then(|package| package["version"].as_str());
             let brought: Vec<String> = kinds
                 .iter()
-                .filter(|kind| kind.package == wish.package())
-                .map(|kind| format!("{} ({})", kind.name, kind.role))
+                .chain(machines)
+                .filter(|known| known.package == wish.package())
+                .map(|known| format!("{} ({})", known.name, known.role))
                 .collect();
             let brought = if brought.is_empty() {
-                "no node type; a kind is made known by `athermal_core::register!`".to_owned()
+                "no node type and no machine; they are made known by `athermal_core::register!` and `register_machine!`".to_owned()
             } else {
                 brought.join(", ")
             };
@@ -128,40 +143,46 @@ impl Build {
     }
 }
 
-/// A kind of a binary.
+/// A kind or a machine of a binary.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Known {
     name: String,
+    #[serde(default = "machine")]
     role: String,
     package: String,
     version: String,
 }
 
-/// Asks a binary for its kinds.
-fn kinds(binary: &Path) -> Result<Vec<Known>, Failure> {
+fn machine() -> String {
+    "machine".to_owned()
+}
+
+/// Asks a binary for its `nodes` or its `machines`.
+fn known(binary: &Path, what: &str) -> Result<Vec<Known>, Failure> {
     let binary = std::fs::canonicalize(binary).unwrap_or_else(|_| binary.to_owned());
     let failed = |reason: String| {
         Failure::Outside(format!(
-            "{} was built and cannot list its nodes: {reason}",
+            "{} was built and cannot list its {what}: {reason}",
             binary.display()
         ))
     };
+    let command = if what == "machines" { "simulate" } else { what };
     let output = Command::new(&binary)
-        .args(["nodes", "--format", "json"])
+        .args([command, "--format", "json"])
         .output()
         .map_err(|error| failed(error.to_string()))?;
     let listed: Value =
         serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))?;
-    serde_json::from_value(listed["nodes"].clone()).map_err(|error| failed(error.to_string()))
+    serde_json::from_value(listed[what].clone()).map_err(|error| failed(error.to_string()))
 }
 
 /// Refuses a name that two crates use.
-fn twice(kinds: &[Known]) -> Result<(), Failure> {
-    for (nth, kind) in kinds.iter().enumerate() {
-        if let Some(other) = kinds[..nth].iter().find(|other| other.name == kind.name) {
+fn twice(what: &str, all: &[Known]) -> Result<(), Failure> {
+    for (nth, known) in all.iter().enumerate() {
+        if let Some(other) = all[..nth].iter().find(|other| other.name == known.name) {
             return Err(Failure::Request(format!(
-                "the node type `{}` is in {} {} and in {} {}: no graph could use it; leave one of them out, or rename its type",
-                kind.name, other.package, other.version, kind.package, kind.version
+                "the {what} `{}` is in {} {} and in {} {}: no graph could use it; leave one of them out, or rename it",
+                known.name, other.package, other.version, known.package, known.version
             )));
         }
     }
@@ -227,8 +248,12 @@ mod tests {
 
     #[test]
     fn two_crates_with_the_same_kind_are_both_named() {
-        assert!(twice(&[known("a", "one"), known("b", "two")]).is_ok());
-        let refused = twice(&[known("a", "one"), known("b", "one"), known("a", "two")]);
+        let of = |package: &str, name: &str| known(name, package);
+        assert!(twice("node type", &[of("one", "a"), of("two", "b")]).is_ok());
+        let refused = twice(
+            "node type",
+            &[of("one", "a"), of("one", "b"), of("two", "a")],
+        );
         let Err(Failure::Request(told)) = refused else {
             panic!("{refused:?}")
         };
