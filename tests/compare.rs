@@ -239,6 +239,19 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
                     runs.push((name.clone(), probe(train, test)));
                 }
             }
+            // One recording each; `evaluation_modes` fits on a part and lets the rest run free.
+            name if name == "hairdryer" => runs.push((
+                name.clone(),
+                probe("hairdryer/hairdryer.csv", "hairdryer/hairdryer.csv"),
+            )),
+            name if name == "heating-system" => runs.push((
+                name.clone(),
+                probe("heating-system/heating.csv", "heating-system/heating.csv"),
+            )),
+            name if name == "wall-heatflow" => runs.push((
+                name.clone(),
+                probe("wall-heatflow/wall.csv", "wall-heatflow/wall.csv"),
+            )),
             name => panic!("no recording is named for graphs/{name}.toml"),
         }
     }
