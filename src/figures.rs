@@ -129,29 +129,75 @@ pub fn matrix(corner: &str, columns: &[String], rows: &[(String, Vec<String>)]) 
     text
 }
 
-/// Words that follow a label, in lines that fit into [`WIDTH`]; lines after the first are indented by four more than the label.
+/// Words that follow a label, in lines that fit into [`WIDTH`]; lines after the first are indented.
 #[must_use]
-pub fn paragraph(label: &str, words: &str) -> String {
-    let indent = label.len() - label.trim_start().len() + 4;
+pub fn paragraph(label: &str, indent: usize, words: &str) -> String {
     let mut text = label.to_owned();
     let mut used = label.chars().count();
+    let mut begins = label.trim_end().len() < label.len() || label.is_empty();
     for word in words.split_whitespace() {
         let length = word.chars().count();
-        if used + 1 + length > WIDTH && used > indent {
+        let gap = usize::from(!begins);
+        if used + gap + length > WIDTH && !begins {
             let _ = write!(text, "\n{:indent$}{word}", "");
             used = indent + length;
         } else {
-            let _ = write!(text, " {word}");
-            used += 1 + length;
+            text.push_str(&" "[..gap]);
+            text.push_str(word);
+            used += gap + length;
         }
+        begins = false;
     }
     text.push('\n');
     text
 }
 
+/// A text of paragraphs and lists in lines that fit into [`WIDTH`]; tables and code stay as they are.
+#[must_use]
+pub fn page(text: &str) -> String {
+    let stays = |line: &str| line.starts_with('|') || line.starts_with("    ");
+    let blocks = text.split("\n\n").map(|block| {
+        if block.starts_with("```") || block.lines().any(stays) {
+            return format!("{block}\n");
+        }
+        let mut parts: Vec<(&str, String)> = Vec::new();
+        for line in block.lines() {
+            match (line.strip_prefix("- "), parts.last_mut()) {
+                (Some(item), _) => parts.push(("- ", item.to_owned())),
+                (None, Some((_, part))) => {
+                    part.push(' ');
+                    part.push_str(line);
+                }
+                (None, None) => parts.push(("", line.to_owned())),
+            }
+        }
+        let parts = parts.iter();
+        parts
+            .map(|(mark, words)| paragraph(mark, mark.len(), words))
+            .collect()
+    });
+    blocks.collect::<Vec<String>>().join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pages_keep_lists_and_tables() {
+        let long = "word ".repeat(20);
+        let told = page(&format!(
+            "{long}\n\n- one\n  more\n- {long}\n\n| a | {long} |"
+        ));
+        let lines: Vec<_> = told.lines().collect();
+        let words = |count| vec!["word"; count].join(" ");
+        assert_eq!(lines[..4], [&*words(16), &words(4), "", "- one more"]);
+        assert_eq!(
+            lines[4..6],
+            [format!("- {}", words(15)), format!("  {}", words(5))]
+        );
+        assert!(lines[7].starts_with("| a | word") && lines[7].len() > 80);
+    }
 
     #[test]
     fn paragraphs_fit_and_a_word_that_is_too_long_has_a_line_of_its_own() {

@@ -246,7 +246,7 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     }
     for (name, share) in &fit.dropped_candidates {
         let why = format!("a value in only {:.0} % of the rows", 100.0 * share);
-        text.push_str(&paragraph(&format!("  left out {name}:"), &why));
+        text.push_str(&paragraph(&format!("  left out {name}:"), 6, &why));
     }
     let Outcome::Fitted(report) = &fit.outcome else {
         return text;
@@ -280,7 +280,7 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         let _ = writeln!(text, "  {}", facts.join(", "));
     }
     for note in &report.notes {
-        text.push_str(&paragraph("  note:", note));
+        text.push_str(&paragraph("  note:", 6, note));
     }
     text
 }

@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::parameters;
+use crate::figures::{page, paragraph};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// List the node types, or explain one
@@ -51,14 +52,16 @@ fn list(terminal: &Terminal) {
         println!("{:#}", json!({ "nodes": all }));
         return;
     }
-    let mut roles: Vec<_> = kinds().values().flatten().map(|kind| kind.role).collect();
-    roles.sort();
-    roles.dedup();
-    for role in roles {
-        println!("{role}s");
-        for kind in kinds().values().flatten().filter(|kind| kind.role == role) {
-            let (name, summary) = (kind.name, kind.summary());
-            println!("  {name:<14} {summary} ({} {})", kind.package, kind.version);
+    let group = |kind: &Kind| (kind.role, kind.package, kind.version);
+    let mut groups: Vec<_> = kinds().values().flatten().map(|kind| group(kind)).collect();
+    groups.sort();
+    groups.dedup();
+    for of in groups {
+        let (role, package, version) = of;
+        println!("{role}s, from {package} {version}");
+        for kind in kinds().values().flatten().filter(|kind| group(kind) == of) {
+            let name = format!("  {:<18} ", kind.name);
+            print!("{}", paragraph(&name, name.len(), &kind.summary()));
         }
     }
 }
@@ -72,7 +75,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         "{} ({}, from {} {})\n",
         kind.name, kind.role, kind.package, kind.version
     );
-    println!("{}\n", kind.documentation());
+    println!("{}", page(&kind.documentation()));
     println!("Inputs:");
     for port in (kind.inputs)() {
         let read = match port.read {
@@ -88,10 +91,9 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         let unit = port
             .unit
             .map_or_else(String::new, |unit| format!(", in {unit}"));
-        println!(
-            "  inputs.{:<10} {} ({read}{unit}{optional})",
-            port.name, port.summary
-        );
+        let name = format!("  inputs.{:<10} ", port.name);
+        let what = format!("{} ({read}{unit}{optional})", port.summary);
+        print!("{}", paragraph(&name, 6, &what));
     }
     let schema = Value::from((kind.schema)());
     println!("\nParameters:");
@@ -100,14 +102,17 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             RoleName::Feature => "that it is fitted on is measured",
             RoleName::Estimator | RoleName::Combiner => "is predicted",
         };
-        println!("  ahead (duration) – how far ahead of now the truth {truth}; required");
-        println!(
-            "  train.abs_truth (table) – `{{ below = \"…\", above = \"…\" }}`: the truths that are fitted on"
+        let tell = |what: &str| print!("{}", paragraph("  ", 6, what));
+        tell(&format!(
+            "ahead (duration) – how far ahead of now the truth {truth}; required"
+        ));
+        tell(
+            "train.abs_truth (table) – `{ below = \"…\", above = \"…\" }`: the truths that are fitted on",
         );
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
-            println!(
-                "  learn (true, false or table) – whether it goes on learning while it runs; `{{ outliers = 6.0, margin = 0.0 }}`: not from \
-                 truths that miss by more than so many times the recent error, nor so many widths outside the range of the fit"
+            tell(
+                "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
+                 truths that miss by more than so many times the recent error, nor so many widths outside the range of the fit",
             );
         }
     }

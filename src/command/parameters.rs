@@ -3,7 +3,9 @@
 
 use serde_json::{Map, Value};
 
-/// All parameters of a table, a line each, and below each the forms that its value may have.
+use crate::figures::paragraph;
+
+/// All parameters of a table, and below each the forms that its value may have.
 pub fn explain(schema: &Value) -> String {
     let empty = Map::new();
     let definitions = schema["$defs"].as_object().unwrap_or(&empty);
@@ -25,9 +27,9 @@ struct Page<'a> {
 
 impl<'a> Page<'a> {
     fn line(&mut self, depth: usize, text: &str) {
-        self.text.push_str(&"  ".repeat(depth));
-        self.text.push_str(text);
-        self.text.push('\n');
+        let indent = 2 * depth;
+        self.text
+            .push_str(&paragraph(&" ".repeat(indent), indent + 4, text));
     }
 
     /// The parameters of a table, but for the one that tells which form it has.

@@ -58,3 +58,24 @@ fn what_fit_and_evaluate_tell_fits_80_columns() {
         }
     }
 }
+
+#[test]
+fn what_is_told_of_node_types_fits_80_columns() {
+    let listed = athermal(&[&"nodes"]).ended(0).out;
+    let kinds = listed
+        .lines()
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let kinds: Vec<_> = kinds
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert!(kinds.contains(&"slope") && kinds.len() > 40, "{kinds:?}");
+    let told = kinds
+        .iter()
+        .map(|kind| athermal(&[&"nodes", kind]).ended(0).out);
+    for page in std::iter::once(listed.clone()).chain(told) {
+        // What cannot be broken may be longer: a formula in a table, a list of numbers.
+        for line in page.lines().filter(|line| !line.starts_with('|')) {
+            assert!(line.chars().count() <= 80, "{line}");
+        }
+    }
+}

@@ -186,8 +186,11 @@ fn reference_adding_the_last_residual_does_not_help() {
         without.push(f64::sqrt(cheat / plain));
     }
     println!("{with:?}\n{without:?}");
+    // On an axis whose creep outlasts the embargo the trick may still gain a little (2 % on Z1): that is knowledge of
+    // the past. What overlaps is worth much more, and on every axis.
     let mean = |ratios: &[f64]| ratios.iter().sum::<f64>() / ratios.len() as f64;
     assert!(mean(&with) > 1.0, "the trick is worth {with:?}");
+    assert!(with.iter().all(|&ratio| ratio > 0.97), "{with:?}");
     assert!(
         mean(&without) < 0.95,
         "without the embargo it would be, and this proves nothing: {without:?}"
