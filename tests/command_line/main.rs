@@ -7,6 +7,7 @@
 mod workbench;
 
 mod columns;
+mod mistakes;
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

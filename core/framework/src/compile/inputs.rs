@@ -1,13 +1,14 @@
 //! Decides which slots the inputs of a node name, how old a held value may be, and what is converted on the way.
 
 use super::conversion;
-use super::instance::Instance;
+use super::instance::{Instance, context};
 use super::plan::{Conversion, Entry, Gather};
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use super::scope::Found;
 use crate::channel::Channel;
 use crate::diagnostic::Place;
+use crate::document::{InstanceDecl, NodeDecl};
 use crate::node::{InputPort, Inputs, Read};
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -40,6 +41,17 @@ impl Resolver<'_> {
             }
         }
         whole.then_some(slots)
+    }
+
+    /// Looks up what a node refers to that is broken for other reasons.
+    pub(super) fn references(&mut self, node: &NodeDecl, instance: &InstanceDecl) {
+        let outer = self.diagnostics.scope(Some(context(node, instance)));
+        for input in &instance.inputs {
+            for (text, place) in &input.references {
+                self.look_up(text, *place);
+            }
+        }
+        self.diagnostics.scope(outer);
     }
 
     pub(super) fn look_up(&mut self, text: &str, place: Place) -> Option<Vec<usize>> {

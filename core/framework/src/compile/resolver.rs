@@ -70,6 +70,9 @@ impl<'g> Resolver<'g> {
         for node in &self.graph.nodes {
             self.scopes.declare(&node.name);
         }
+        for name in &self.graph.broken {
+            self.scopes.get_mut(name).broken = true;
+        }
         for &node in &order.looping {
             self.scopes.get_mut(&self.graph.nodes[node].name).broken = true;
         }
@@ -80,6 +83,7 @@ impl<'g> Resolver<'g> {
             for (instance, decl) in read[position].instances.iter().zip(&node.instances) {
                 let (Some(kind), Some(read)) = (read[position].kind, instance) else {
                     self.scopes.get_mut(&node.name).broken = true;
+                    self.references(node, decl);
                     continue;
                 };
                 let instance = Instance {

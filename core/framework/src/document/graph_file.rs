@@ -25,6 +25,8 @@ pub struct GraphFile {
     pub signals: Vec<SignalDecl>,
     /// The nodes, in the order of the file.
     pub nodes: Vec<NodeDecl>,
+    /// Signals and nodes that are not among them because of mistakes of their own, which have been told.
+    pub broken: Vec<String>,
     /// What comes out, in the order of the file.
     pub outputs: Vec<OutputDecl>,
     /// The list under `[[tests]]`, as it stands.

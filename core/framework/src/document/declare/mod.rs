@@ -41,7 +41,8 @@ const MODEL: &str = "model";
 /// Sections that only a running machine needs; they are handed on as they stand.
 const DEPLOYMENT: [&str; 4] = ["source", "sinks", "runtime", MODEL];
 
-/// Checks names, expands sets and `each`, and gives what the file declares; `None` after any error, all of which are reported.
+/// Checks names, expands sets and `each`, and gives what the file declares. All mistakes are reported; `None` where they leave open
+/// which names there are.
 pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
     let before = diagnostics.error_count();
     let tree = document.tree;
@@ -63,12 +64,17 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     let description = text_of(root, "description", diagnostics);
     names::check(root, diagnostics);
     let sets = sets::declare(root.get("sets"), diagnostics);
+    let mut of_names = diagnostics.error_count() - before;
     let time = time_base::declare(root.get("time"), diagnostics);
     let sample = time.sample();
-    let signals = signals::declare(root.get("signals"), &sets, sample, diagnostics);
+    let mut broken = Vec::new();
+    let signals = root.get("signals");
+    let signals = signals::declare(signals, &sets, sample, &mut broken, diagnostics);
+    let earlier = diagnostics.error_count();
     modules::check(root.get("modules"), diagnostics);
     let expanded = modules::expand(root, &sets, diagnostics);
-    let nodes = nodes::declare(&expanded.nodes, &sets, sample, diagnostics);
+    of_names += diagnostics.error_count() - earlier;
+    let nodes = nodes::declare(&expanded.nodes, &sets, sample, &mut broken, diagnostics);
     let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
     let mut tests = expanded.tests;
     if let Some(tests) = &mut tests {
@@ -91,7 +97,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         .iter()
         .filter_map(|key| Some(((*key).to_owned(), root.get(key)?.clone())))
         .collect();
-    if document.faulty || diagnostics.error_count() > before {
+    if document.faulty || of_names > 0 {
         return None;
     }
     Some(GraphFile {
@@ -101,6 +107,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         time,
         signals,
         nodes,
+        broken,
         outputs,
         tests,
         deployment,

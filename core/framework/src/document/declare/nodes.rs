@@ -28,6 +28,7 @@ pub(super) fn declare(
     nodes: &[Placed],
     sets: &Sets,
     sample: Option<Duration>,
+    broken: &mut Vec<String>,
     diagnostics: &mut Diagnostics,
 ) -> Vec<NodeDecl> {
     let mut total = Total::default();
@@ -36,7 +37,11 @@ pub(super) fn declare(
         // Inside a module, one place in a file stands for a node of each instance.
         let context = (!placed.around.is_empty()).then(|| format!("node `{}`", placed.name));
         let outer = diagnostics.scope(context);
-        declared.extend(node(placed, sets, sample, &mut total, diagnostics));
+        let before = diagnostics.error_count();
+        match node(placed, sets, sample, &mut total, diagnostics) {
+            Some(node) if diagnostics.error_count() == before => declared.push(node),
+            _ => broken.push(placed.name.clone()),
+        }
         diagnostics.scope(outer);
     }
     declared

@@ -19,15 +19,21 @@ pub(super) fn declare(
     signals: Option<&Value>,
     sets: &Sets,
     sample: Option<Duration>,
+    broken: &mut Vec<String>,
     diagnostics: &mut Diagnostics,
 ) -> Vec<SignalDecl> {
     let Some(signals) = signals.and_then(|signals| table(signals, "signals", diagnostics)) else {
         return Vec::new();
     };
-    signals
-        .iter()
-        .filter_map(|(name, entry)| signal(name, entry, sets, sample, diagnostics))
-        .collect()
+    let mut declared = Vec::new();
+    for (name, entry) in signals.iter() {
+        let before = diagnostics.error_count();
+        match signal(name, entry, sets, sample, diagnostics) {
+            Some(signal) if diagnostics.error_count() == before => declared.push(signal),
+            _ => broken.push(name.to_owned()),
+        }
+    }
+    declared
 }
 
 fn signal(
