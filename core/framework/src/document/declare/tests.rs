@@ -19,6 +19,7 @@ fn graph(text: &str) -> GraphFile {
     );
     document
         .and_then(|document| declare(document, &mut diagnostics))
+        .filter(|_| !diagnostics.has_errors())
         .unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 120)))
 }
 

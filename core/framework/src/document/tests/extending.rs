@@ -27,7 +27,8 @@ fn graph(files: &[(&str, &str)]) -> GraphFile {
         sources,
         diagnostics,
     } = read(files);
-    graph.unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 120)))
+    let whole = graph.filter(|_| !diagnostics.has_errors());
+    whole.unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 120)))
 }
 
 fn node<'a>(graph: &'a GraphFile, name: &str) -> &'a NodeDecl {
