@@ -203,6 +203,7 @@ mod tests {
     fn paragraphs_fit_and_a_word_that_is_too_long_has_a_line_of_its_own() {
         let told = paragraph(
             "  note:",
+            6,
             &format!("{} {}", "word ".repeat(20), "x".repeat(90)),
         );
         let lines: Vec<_> = told.lines().collect();
