@@ -1,13 +1,11 @@
 //! The estimator whose noise has no level to return to.
 
-use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
-};
+use athermal_core::node::InputPort;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::identified::{Asked, PerInput};
+use crate::identified::{Asked, PerInput, identified};
 use crate::order::Order;
 
 /// ARMAX whose noise is integrated: it has no level to return to, so that an offset that comes to stay is followed.
@@ -29,26 +27,26 @@ use crate::order::Order;
 #[serde(deny_unknown_fields)]
 pub struct Arimax {
     /// How many past values of the truth, 0 to 100.
-    #[serde(default = "one")]
+    #[serde(default = "crate::identified::one")]
     #[schemars(range(min = 0, max = 100))]
     pub na: usize,
     /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
-    #[serde(default = "one_each")]
+    #[serde(default = "PerInput::one")]
     pub nb: PerInput,
     /// How many past innovations, 0 to 100.
-    #[serde(default = "one")]
+    #[serde(default = "crate::identified::one")]
     #[schemars(range(min = 0, max = 100))]
     pub nc: usize,
     /// How many steps the newest value of each feature that counts lies before the run, 0 to 100: a number for all, or a list
     /// with one for each.
-    #[serde(default = "none_each")]
+    #[serde(default = "PerInput::none")]
     pub nk: PerInput,
     /// How often the noise is integrated, 0 to 2.
-    #[serde(default = "one")]
+    #[serde(default = "crate::identified::one")]
     #[schemars(range(min = 0, max = 2))]
     pub differences: usize,
     /// The penalty on the coefficients of standardised features, at least 0, as in ridge.
-    #[serde(default = "penalty")]
+    #[serde(default = "crate::identified::penalty")]
     #[schemars(range(min = 0.0))]
     pub penalty: f64,
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
@@ -57,22 +55,6 @@ pub struct Arimax {
     /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
     #[serde(default)]
     pub order: Option<Order>,
-}
-
-fn one() -> usize {
-    1
-}
-
-fn one_each() -> PerInput {
-    PerInput::All(1)
-}
-
-fn none_each() -> PerInput {
-    PerInput::All(0)
-}
-
-fn penalty() -> f64 {
-    1.0
 }
 
 impl Arimax {
@@ -91,41 +73,11 @@ impl Arimax {
     }
 }
 
-impl Estimator for Arimax {
-    fn inputs() -> &'static [InputPort] {
-        const {
-            &[
-                InputPort::held("features", "what the prediction is made of beside the past")
-                    .or_none(),
-                InputPort::truth("what is predicted, and followed"),
-                InputPort::freeze(),
-            ]
-        }
-    }
-
-    fn regressors(&self) -> Regressors {
-        Regressors {
-            feature_lags: vec![Duration::ZERO],
-            every_tick: true,
-            ..Regressors::default()
-        }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        self.asked().mistakes()
-    }
-
-    fn learns(&self) -> Learns {
-        Learns::UnlessTold
-    }
-
-    fn deviates(&self) -> bool {
-        true
-    }
-
-    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        self.asked().trainer(setup)
-    }
-}
-
-athermal_core::register!(Arimax, Estimator, "arimax");
+identified!(
+    Arimax,
+    "arimax",
+    [
+        InputPort::held("features", "what the prediction is made of beside the past").or_none(),
+        InputPort::truth("what is predicted, and followed")
+    ]
+);

@@ -1,13 +1,11 @@
 //! The estimator that tells the truth from its own past and from what was not foreseen of it.
 
-use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
-};
+use athermal_core::node::InputPort;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::identified::Asked;
+use crate::identified::{Asked, identified};
 use crate::order::Order;
 
 /// Autoregressive moving average: what the truth does by itself, and what was not foreseen of it.
@@ -28,11 +26,11 @@ use crate::order::Order;
 #[serde(deny_unknown_fields)]
 pub struct Arma {
     /// How many past values of the truth, 0 to 100.
-    #[serde(default = "one")]
+    #[serde(default = "crate::identified::one")]
     #[schemars(range(min = 0, max = 100))]
     pub na: usize,
     /// How many past innovations, 0 to 100.
-    #[serde(default = "one")]
+    #[serde(default = "crate::identified::one")]
     #[schemars(range(min = 0, max = 100))]
     pub nc: usize,
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
@@ -41,10 +39,6 @@ pub struct Arma {
     /// Which orders are compared, such as `{ by = "aicc", na = "0..3", nc = "0..3" }`; without it they are as given.
     #[serde(default)]
     pub order: Option<Order>,
-}
-
-fn one() -> usize {
-    1
 }
 
 impl Arma {
@@ -59,38 +53,8 @@ impl Arma {
     }
 }
 
-impl Estimator for Arma {
-    fn inputs() -> &'static [InputPort] {
-        const {
-            &[
-                InputPort::truth("what is predicted, and followed"),
-                InputPort::freeze(),
-            ]
-        }
-    }
-
-    fn regressors(&self) -> Regressors {
-        Regressors {
-            every_tick: true,
-            ..Regressors::default()
-        }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        self.asked().mistakes()
-    }
-
-    fn learns(&self) -> Learns {
-        Learns::UnlessTold
-    }
-
-    fn deviates(&self) -> bool {
-        true
-    }
-
-    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        self.asked().trainer(setup)
-    }
-}
-
-athermal_core::register!(Arma, Estimator, "arma");
+identified!(
+    Arma,
+    "arma",
+    [InputPort::truth("what is predicted, and followed")]
+);

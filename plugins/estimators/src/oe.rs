@@ -1,13 +1,11 @@
 //! The estimator that tells the truth from features through filters of their own.
 
-use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
-};
+use athermal_core::node::InputPort;
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::identified::{Asked, PerInput};
+use crate::identified::{Asked, PerInput, identified};
 use crate::order::Order;
 
 /// Output error: what the features bring about through filters of their own, whatever the truth was before.
@@ -30,17 +28,17 @@ use crate::order::Order;
 #[serde(deny_unknown_fields)]
 pub struct Oe {
     /// How many values of each feature, 0 to 100: a number for all, or a list with one for each.
-    #[serde(default = "one_each")]
+    #[serde(default = "PerInput::one")]
     pub nb: PerInput,
     /// How many past values of what each feature brings about, 0 to 100: a number for all, or a list with one for each.
-    #[serde(default = "one_each")]
+    #[serde(default = "PerInput::one")]
     pub nf: PerInput,
     /// How many steps the newest value of each feature that counts lies before the run, 0 to 100: a number for all, or a list
     /// with one for each.
-    #[serde(default = "none_each")]
+    #[serde(default = "PerInput::none")]
     pub nk: PerInput,
     /// The penalty on the coefficients of standardised features, at least 0, as in ridge.
-    #[serde(default = "penalty")]
+    #[serde(default = "crate::identified::penalty")]
     #[schemars(range(min = 0.0))]
     pub penalty: f64,
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
@@ -49,18 +47,6 @@ pub struct Oe {
     /// Which orders are compared, such as `{ by = "aicc", nb = "1..4", nf = "1..4" }`; without it they are as given.
     #[serde(default)]
     pub order: Option<Order>,
-}
-
-fn one_each() -> PerInput {
-    PerInput::All(1)
-}
-
-fn none_each() -> PerInput {
-    PerInput::All(0)
-}
-
-fn penalty() -> f64 {
-    1.0
 }
 
 impl Oe {
@@ -77,40 +63,11 @@ impl Oe {
     }
 }
 
-impl Estimator for Oe {
-    fn inputs() -> &'static [InputPort] {
-        const {
-            &[
-                InputPort::held("features", "what the prediction is made of"),
-                InputPort::truth("what is predicted"),
-                InputPort::freeze(),
-            ]
-        }
-    }
-
-    fn regressors(&self) -> Regressors {
-        Regressors {
-            feature_lags: vec![Duration::ZERO],
-            every_tick: true,
-            ..Regressors::default()
-        }
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        self.asked().mistakes()
-    }
-
-    fn learns(&self) -> Learns {
-        Learns::UnlessTold
-    }
-
-    fn deviates(&self) -> bool {
-        true
-    }
-
-    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
-        self.asked().trainer(setup)
-    }
-}
-
-athermal_core::register!(Oe, Estimator, "oe");
+identified!(
+    Oe,
+    "oe",
+    [
+        InputPort::held("features", "what the prediction is made of"),
+        InputPort::truth("what is predicted")
+    ]
+);

@@ -4,13 +4,58 @@ mod follow;
 mod per_input;
 mod train;
 
-use athermal_core::node::{Mistake, Trainer, TrainingSetup};
+use athermal_core::node::{Mistake, Regressors, Trainer, TrainingSetup};
 use athermal_core::time::Duration;
 use athermal_numerics::{InputOrders, Orders};
 
 use crate::order::{LARGEST, Order};
 pub use per_input::PerInput;
 pub(crate) use train::{Found, IdentifiedTrainer, Identify};
+
+/// Makes a kind known as an estimator that is what it has [`Asked`] for: its type, its name and its inputs beside `freeze`.
+macro_rules! identified {
+    ($kind:ty, $name:literal, [$($input:expr),+ $(,)?]) => {
+        impl athermal_core::node::Estimator for $kind {
+            fn inputs() -> &'static [athermal_core::node::InputPort] {
+                const { &[$($input,)+ athermal_core::node::InputPort::freeze()] }
+            }
+
+            fn regressors(&self) -> athermal_core::node::Regressors {
+                self.asked().regressors()
+            }
+
+            fn mistakes(&self) -> Vec<athermal_core::node::Mistake> {
+                self.asked().mistakes()
+            }
+
+            fn learns(&self) -> athermal_core::node::Learns {
+                athermal_core::node::Learns::UnlessTold
+            }
+
+            fn deviates(&self) -> bool {
+                true
+            }
+
+            fn trainer(
+                &self,
+                setup: &athermal_core::node::TrainingSetup,
+            ) -> Box<dyn athermal_core::node::Trainer> {
+                self.asked().trainer(setup)
+            }
+        }
+
+        athermal_core::register!($kind, Estimator, $name);
+    };
+}
+pub(crate) use identified;
+
+pub(crate) fn one() -> usize {
+    1
+}
+
+pub(crate) fn penalty() -> f64 {
+    1.0
+}
 
 /// What a kind asks for, in the letters of Ljung (1999), chapter 4; those that it does not have are none.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +76,15 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
+    /// The features as the run saw them, where there can be any.
+    pub(crate) fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: self.nb.iter().map(|_| Duration::ZERO).collect(),
+            every_tick: true,
+            ..Regressors::default()
+        }
+    }
+
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         let has = [

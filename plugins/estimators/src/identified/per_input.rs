@@ -17,6 +17,16 @@ pub enum PerInput {
 }
 
 impl PerInput {
+    /// One of each.
+    pub(crate) fn one() -> Self {
+        Self::All(1)
+    }
+
+    /// None of any.
+    pub(crate) fn none() -> Self {
+        Self::All(0)
+    }
+
     /// That of one input.
     pub(super) fn of(&self, nth: usize) -> usize {
         match self {
