@@ -29,6 +29,23 @@ pub(crate) fn check_parameter(
     }
 }
 
+/// What was stored has as many numbers as the rest of it asks for.
+pub(crate) fn check_length(
+    name: &'static str,
+    expected: usize,
+    found: usize,
+) -> Result<(), NumericsError> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(NumericsError::Length {
+            name,
+            expected,
+            found,
+        })
+    }
+}
+
 /// A scale is positive and finite.
 pub(crate) fn check_scale(column: usize, scale: f64) -> Result<(), NumericsError> {
     if scale > 0.0 && scale.is_finite() {

@@ -13,6 +13,15 @@ pub enum NumericsError {
         /// The width that was given.
         found: usize,
     },
+    /// What was stored has more or fewer numbers than the rest of it asks for.
+    Length {
+        /// The name of what was stored.
+        name: &'static str,
+        /// How many numbers are needed.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
     /// A difference of two Gram matrices needs one shift in both, and the part may not be larger than the whole.
     NotAPart,
     /// A column index is not below the number of regressors.
@@ -69,6 +78,14 @@ impl fmt::Display for NumericsError {
             Self::Width { expected, found } => {
                 write!(f, "{found} regressors where {expected} are needed")
             }
+            Self::Length {
+                name,
+                expected,
+                found,
+            } => write!(
+                f,
+                "the length of {name} is {found} where {expected} is needed"
+            ),
             Self::NotAPart => write!(
                 f,
                 "the rows to take away are not a part of these: their shift or their number does not fit"

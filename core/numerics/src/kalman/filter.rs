@@ -3,6 +3,8 @@
 
 use super::Structural;
 use crate::NumericsError;
+use crate::checks::{check_length, check_parameter};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 /// Below this share of what a row could at most say about states of which nothing is known, it says nothing about them.
@@ -13,17 +15,65 @@ const NOTHING_NEW: f64 = 1e-9;
 /// States whose variance is given as infinite are diffuse: nothing is known of them, exactly (Koopman 1997; Durbin and
 /// Koopman 2012, chapter 5), rather than something with a large variance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Saved")]
 pub struct Kalman {
     model: Structural,
     state: Vec<f64>,
     /// Row by row; where something is diffuse, the finite part.
     covariance: Vec<f64>,
-    /// Row by row, the part of the covariance that is multiplied by infinity; empty once nothing is diffuse.
+    /// Row by row, the part of the covariance that is multiplied by infinity; empty where nothing ever was diffuse.
     diffuse: Vec<f64>,
     /// How many more observations it takes at least until nothing is diffuse.
     unknown: usize,
+    /// Scratch.
+    #[serde(skip)]
     room: Vec<f64>,
+}
+
+/// A filter as it is read, before it is known whether its parts fit together.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Saved {
+    model: Structural,
+    state: Vec<f64>,
+    covariance: Vec<f64>,
+    diffuse: Vec<f64>,
+    unknown: usize,
+    /// The scratch, which was once written too.
+    #[serde(default, rename = "room")]
+    _room: IgnoredAny,
+}
+
+impl TryFrom<Saved> for Kalman {
+    type Error = NumericsError;
+
+    fn try_from(saved: Saved) -> Result<Self, NumericsError> {
+        let Saved {
+            model,
+            state,
+            covariance,
+            diffuse,
+            unknown,
+            ..
+        } = saved;
+        model.check()?;
+        let order = state.len();
+        check_length("state", order.max(model.moving()), order)?;
+        check_length("covariance", order * order, covariance.len())?;
+        let fine = unknown <= order;
+        check_parameter("unknown", unknown as f64, fine, "at most one per state")?;
+        if unknown > 0 || !diffuse.is_empty() {
+            check_length("diffuse", order * order, diffuse.len())?;
+        }
+        Ok(Self {
+            model,
+            state,
+            covariance,
+            diffuse,
+            unknown,
+            room: vec![0.0; 2 * order],
+        })
+    }
 }
 
 /// What an observation brought.
@@ -113,6 +163,12 @@ impl Kalman {
     #[must_use]
     pub fn model(&self) -> Structural {
         self.model
+    }
+
+    /// How many regressors an observation has: one per coefficient.
+    #[must_use]
+    pub fn regressors(&self) -> usize {
+        self.state.len() - self.model.moving()
     }
 
     /// Level, trend where there is one, and coefficients.
@@ -266,23 +322,28 @@ impl Kalman {
         }
     }
 
+    /// Whether level and trend can be started afresh from this: there is one pair of a mean and a variance for each of
+    /// them, and all are finite.
+    #[must_use]
+    pub fn can_restart(&self, known: &[(f64, f64)]) -> bool {
+        let fine = |&(mean, variance): &(f64, f64)| {
+            mean.is_finite() && variance >= 0.0 && variance.is_finite()
+        };
+        known.len() == self.model.moving() && known.iter().all(fine)
+    }
+
     /// Starts level and trend afresh from what is known of them, each a mean and a variance; the coefficients stay.
     ///
     /// # Panics
-    /// When there is not one pair for the level and, where there is one, the trend; or one is not finite.
+    /// When it [cannot](Self::can_restart).
     pub fn restart_level(&mut self, known: &[(f64, f64)]) {
-        assert_eq!(
-            known.len(),
-            self.model.moving(),
-            "level and trend are told together"
+        assert!(
+            self.can_restart(known),
+            "level and trend are told together, and what is known of them is finite"
         );
         let order = self.state.len();
         self.forget_level();
         for (state, &(mean, variance)) in known.iter().enumerate() {
-            assert!(
-                mean.is_finite() && variance >= 0.0 && variance.is_finite(),
-                "what is known is finite"
-            );
             self.state[state] = mean;
             self.covariance[state * order + state] = variance;
             self.diffuse[state * order + state] = 0.0;
@@ -294,9 +355,8 @@ impl Kalman {
     /// states.
     #[must_use]
     pub fn resume(&mut self, from: &Self) -> bool {
-        let same = self.model.moving() == from.model.moving()
-            && self.state.len() == from.state.len()
-            && from.covariance.len() == from.state.len().pow(2);
+        let same =
+            self.model.moving() == from.model.moving() && self.state.len() == from.state.len();
         if same {
             self.state.clone_from(&from.state);
             self.covariance.clone_from(&from.covariance);

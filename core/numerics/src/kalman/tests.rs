@@ -467,6 +467,55 @@ fn a_filter_goes_on_from_another_of_the_same_states_only() {
 }
 
 #[test]
+fn a_filter_is_read_back_as_it_was_and_refused_where_its_parts_do_not_fit() {
+    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+    for (x, y) in [(1.0, 2.0), (3.0, 1.0)] {
+        filter.observe(&[x], y);
+        filter.advance(1.0);
+    }
+    let saved = serde_json::to_value(&filter).unwrap();
+    let read = |saved: &serde_json::Value| serde_json::from_value::<Kalman>(saved.clone());
+    let with = |part: &str, instead: serde_json::Value| {
+        let mut other = saved.clone();
+        other[part] = instead;
+        read(&other)
+    };
+    let mut back = read(&saved).unwrap();
+    assert_eq!(back.regressors(), 1);
+    assert_eq!(back.observe(&[2.0], 5.0), filter.observe(&[2.0], 5.0));
+    assert_eq!(back.state(), filter.state());
+    assert!(with("room", serde_json::json!([0.0])).is_ok());
+    let error = with("covariance", serde_json::json!([1.0])).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "the length of covariance is 1 where 9 is needed"
+    );
+    for (part, instead) in [
+        ("state", serde_json::json!([1.0])),
+        ("diffuse", serde_json::json!([])),
+        ("unknown", serde_json::json!(4)),
+        ("other", serde_json::json!(0)),
+    ] {
+        assert!(with(part, instead).is_err(), "{part}");
+    }
+}
+
+#[test]
+fn a_level_restarts_from_a_finite_pair_for_each_of_its_parts_only() {
+    let filter = Kalman::diffuse(OWN, 1).unwrap();
+    assert!(filter.can_restart(&[(1.0, 2.0), (0.0, 0.0)]));
+    for known in [
+        &[(1.0, 2.0)][..],
+        &[(1.0, 2.0), (0.0, -1.0)],
+        &[(1.0, f64::NAN), (0.0, 1.0)],
+        &[(1.0, f64::INFINITY), (0.0, 1.0)],
+        &[(f64::NAN, 1.0), (0.0, 1.0)],
+    ] {
+        assert!(!filter.can_restart(known), "{known:?}");
+    }
+}
+
+#[test]
 fn what_is_no_number_is_no_observation() {
     let mut filter = Kalman::diffuse(OWN, 1).unwrap();
     let before = filter.clone();
