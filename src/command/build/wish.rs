@@ -126,7 +126,7 @@ impl Wish {
         });
         let Some(core) = core else {
             return Err(Failure::Request(format!(
-                "{package} does not depend on athermal-core, so it can bring no node type"
+                "{package} does not depend on athermal-core, so it can bring no node type and no machine"
             )));
         };
         made_for(package, core, checkout)?;

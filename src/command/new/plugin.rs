@@ -93,7 +93,7 @@ impl Plugin {
         let name = &self.name;
         let names = Names::of(name).ok_or_else(|| {
             Failure::Request(format!(
-                "`{name}` cannot be the name of a crate and a node type: begin with a small letter, go on with small letters, \
+                "`{name}` cannot be the name of a crate and of what it brings: begin with a small letter, go on with small letters, \
                  digits and single `-`"
             ))
         })?;
