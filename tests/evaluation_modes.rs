@@ -154,10 +154,15 @@ fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
         figure(&free, "level", "rmse"),
         figure(&scores(&still, &data, &[]), "level", "rmse")
     );
-    assert_eq!(
-        scores(&model, &data, &["--mode", "k-step", "--steps", "1"])[0]["rmse"],
-        scores(&model, &data, &[])[0]["rmse"]
-    );
+    let first = scores(&model, &data, &["--mode", "k-step", "--steps", "1"]);
+    let one = scores(&model, &data, &[]);
+    for node in ["lasting", "features", "level"] {
+        assert_eq!(
+            figure(&first, node, "rmse"),
+            figure(&one, node, "rmse"),
+            "{node}"
+        );
+    }
 }
 
 #[test]

@@ -95,7 +95,9 @@ fn criteria_of_an_autoregression_equal_the_oracle_of_statsmodels() {
 #[test]
 fn the_search_for_a_model_without_a_moving_average_compares_as_least_squares_do() {
     let (orders, _) = fitted("search", &graph("bic", ARMA));
-    for (tried, expected) in orders["tried"].as_array().unwrap().iter().zip(expected()) {
+    let (tried, expected) = (orders["tried"].as_array().unwrap(), expected());
+    assert_eq!(tried.len(), expected.len());
+    for (tried, expected) in tried.iter().zip(&expected) {
         assert_eq!(tried["order"], format!("na {}", expected["na"]));
         for figure in ["aic", "bic"] {
             let (found, expected) = (

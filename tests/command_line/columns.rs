@@ -73,7 +73,7 @@ fn what_is_told_of_node_types_fits_80_columns() {
         .iter()
         .map(|kind| athermal(&[&"nodes", kind]).ended(0).out);
     for page in std::iter::once(listed.clone()).chain(told) {
-        // What cannot be broken may be longer: a formula in a table, a list of numbers.
+        // A table stays as it is: a formula in it cannot be broken.
         for line in page.lines().filter(|line| !line.starts_with('|')) {
             assert!(line.chars().count() <= 80, "{line}");
         }
