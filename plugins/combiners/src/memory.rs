@@ -1,12 +1,8 @@
 //! Decides how long errors count: for a time, for so many truths, or ever less.
 
-use std::fmt;
-
-use athermal_core::node::Mistake;
+use athermal_core::node::{Forms, Mistake};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
-use serde::de::value::{MapAccessDeserializer, StrDeserializer};
-use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// How long an error is remembered, counted from the arrival of its truth.
@@ -44,44 +40,38 @@ pub struct Fading {
 /// After this many half-lives an error counts less than a thousandth, and is forgotten.
 const FORGOTTEN: i64 = 10;
 
-// Not derived, since an untagged enum forgets what was wrong with any form.
 impl<'de> Deserialize<'de> for Memory {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = Memory;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(
-                    "a duration such as \"15min\", { truths = 12 } or { half_life = \"15min\" }",
-                )
-            }
-
-            fn visit_str<E: serde::de::Error>(self, time: &str) -> Result<Memory, E> {
-                Duration::deserialize(StrDeserializer::new(time)).map(Memory::Time)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, form: A) -> Result<Memory, A::Error> {
-                let form = Table::deserialize(MapAccessDeserializer::new(form))?;
-                match (form.truths, form.half_life) {
-                    (Some(truths), None) => Ok(Memory::Truths(LastTruths { truths })),
-                    (None, Some(half_life)) => Ok(Memory::HalfLife(Fading { half_life })),
-                    _ => Err(serde::de::Error::custom(
-                        "a memory has either `truths` or `half_life`",
-                    )),
-                }
-            }
-        }
-        deserializer.deserialize_any(Form)
+        Forms::new("a duration such as \"15min\", { truths = 12 } or { half_life = \"15min\" }")
+            .text(Self::Time)
+            .table(|Tabled(memory)| memory)
+            .read(deserializer)
     }
 }
 
-/// The keys of a memory that is written as a table.
+/// A memory that is written as a table.
+#[derive(Deserialize)]
+#[serde(try_from = "Table")]
+struct Tabled(Memory);
+
+/// Its keys.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Table {
     truths: Option<usize>,
     half_life: Option<Duration>,
+}
+
+impl TryFrom<Table> for Tabled {
+    type Error = &'static str;
+
+    fn try_from(table: Table) -> Result<Self, Self::Error> {
+        match (table.truths, table.half_life) {
+            (Some(truths), None) => Ok(Self(Memory::Truths(LastTruths { truths }))),
+            (None, Some(half_life)) => Ok(Self(Memory::HalfLife(Fading { half_life }))),
+            _ => Err("a memory has either `truths` or `half_life`"),
+        }
+    }
 }
 
 impl Memory {

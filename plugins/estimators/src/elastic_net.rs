@@ -1,16 +1,12 @@
 //! The estimator that leaves features out by its penalty: lasso and elastic net share it.
 
-use std::fmt;
-
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
+    Estimator, Forms, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{Gram, GramBlocks, NumericsError, Standardization, logarithmic_grid};
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::folds::Folds;
@@ -84,35 +80,12 @@ impl Default for SparsePenalty {
     }
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for SparsePenalty {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = SparsePenalty;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or a table such as `{ folds = 5 }`")
-            }
-
-            fn visit_f64<E>(self, alpha: f64) -> Result<SparsePenalty, E> {
-                Ok(SparsePenalty::Fixed(alpha))
-            }
-
-            fn visit_u64<E>(self, alpha: u64) -> Result<SparsePenalty, E> {
-                Ok(SparsePenalty::Fixed(alpha as f64))
-            }
-
-            fn visit_i64<E>(self, alpha: i64) -> Result<SparsePenalty, E> {
-                Ok(SparsePenalty::Fixed(alpha as f64))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, path: A) -> Result<SparsePenalty, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(path))
-                    .map(SparsePenalty::Chosen)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        Forms::new("a number or a table such as `{ folds = 5 }`")
+            .number(Self::Fixed)
+            .table(Self::Chosen)
+            .read(deserializer)
     }
 }
 

@@ -1,11 +1,7 @@
 //! Decides how a user says in which folds rows are cut for cross-validation.
 
-use std::fmt;
-
-use athermal_core::node::Mistake;
+use athermal_core::node::{Forms, Mistake};
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// How rows, in the order of time, are cut for cross-validation.
@@ -46,34 +42,12 @@ pub enum Cut {
     },
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for Folds {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = Folds;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a whole number or a table with `type` and `count`")
-            }
-
-            fn visit_u64<E: serde::de::Error>(self, count: u64) -> Result<Folds, E> {
-                Ok(Folds::Contiguous(
-                    usize::try_from(count).unwrap_or(usize::MAX),
-                ))
-            }
-
-            fn visit_i64<E: serde::de::Error>(self, count: i64) -> Result<Folds, E> {
-                u64::try_from(count)
-                    .map_err(|_| E::invalid_value(serde::de::Unexpected::Signed(count), &self))
-                    .and_then(|count| self.visit_u64(count))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, cut: A) -> Result<Folds, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(cut)).map(Folds::Cut)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        Forms::new("a whole number or a table with `type` and `count`")
+            .whole(Self::Contiguous)
+            .table(Self::Cut)
+            .read(deserializer)
     }
 }
 

@@ -1,15 +1,11 @@
 //! Decides how a user states the penalty of ridge, and how the best of several is found.
 
-use std::fmt;
-
-use athermal_core::node::Mistake;
+use athermal_core::node::{Forms, Mistake};
 use athermal_numerics::{
     GramBlocks, NumericsError, cross_validated_penalties, generalised_cross_validation,
     logarithmic_grid,
 };
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::folds::Folds;
@@ -76,34 +72,12 @@ fn four() -> u32 {
     4
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for Penalty {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = Penalty;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or a table with `by`")
-            }
-
-            fn visit_f64<E>(self, alpha: f64) -> Result<Penalty, E> {
-                Ok(Penalty::Fixed(alpha))
-            }
-
-            fn visit_u64<E>(self, alpha: u64) -> Result<Penalty, E> {
-                Ok(Penalty::Fixed(alpha as f64))
-            }
-
-            fn visit_i64<E>(self, alpha: i64) -> Result<Penalty, E> {
-                Ok(Penalty::Fixed(alpha as f64))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, choice: A) -> Result<Penalty, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(choice)).map(Penalty::Chosen)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        Forms::new("a number or a table with `by`")
+            .number(Self::Fixed)
+            .table(Self::Chosen)
+            .read(deserializer)
     }
 }
 

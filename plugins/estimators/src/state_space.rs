@@ -1,16 +1,12 @@
 //! The estimator whose states are told from the past.
 
-use std::fmt;
-
 use athermal_core::node::{
-    Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Estimator, Forms, InputPort, Learns, Mistake, Regressors, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{Polynomials, Record, Samples, StateOrder, Subspace, Transfer};
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::identified::{Found, IdentifiedTrainer, Identify};
@@ -114,32 +110,12 @@ impl Default for States {
     }
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for States {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = States;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a whole number or a table such as `{ by = \"gap\" }`")
-            }
-
-            fn visit_u64<E>(self, states: u64) -> Result<States, E> {
-                Ok(States::Given(usize::try_from(states).unwrap_or(usize::MAX)))
-            }
-
-            fn visit_i64<E: serde::de::Error>(self, states: i64) -> Result<States, E> {
-                usize::try_from(states)
-                    .map(States::Given)
-                    .map_err(|_| E::invalid_value(serde::de::Unexpected::Signed(states), &self))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, told: A) -> Result<States, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(told)).map(States::Told)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        Forms::new("a whole number or a table such as `{ by = \"gap\" }`")
+            .whole(Self::Given)
+            .table(Self::Told)
+            .read(deserializer)
     }
 }
 

@@ -1,14 +1,12 @@
 //! First-order lags: the thermal masses between a sensor and what it explains.
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, Forms, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored,
+    State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
-
-use crate::forms::list_or_table;
 
 /// A bank of first-order lags: each channel as thermal masses of several time constants would follow it.
 ///
@@ -65,8 +63,10 @@ pub enum FirstOrderOutput {
 
 impl<'de> Deserialize<'de> for TimeConstants {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let expected = "a list of durations or a logarithmic grid of them";
-        list_or_table(deserializer, expected, Self::List, Self::Grid)
+        Forms::new("a list of durations or a logarithmic grid of them")
+            .list(Self::List)
+            .table(Self::Grid)
+            .read(deserializer)
     }
 }
 

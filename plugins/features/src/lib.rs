@@ -4,7 +4,6 @@ mod arithmetic;
 mod delay;
 mod difference;
 mod first_order;
-mod forms;
 mod hampel;
 mod lag;
 mod minimum_difference;

@@ -1,12 +1,10 @@
 //! Decides which trailing windows a node looks back over, and what a window must hold before it has a value.
 
 use athermal_core::channel::Channel;
-use athermal_core::node::Mistake;
+use athermal_core::node::{Forms, Mistake};
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
-
-use crate::forms::list_or_table;
 
 /// Trailing windows.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -121,8 +119,10 @@ pub struct DynamicRange {
 
 impl<'de> Deserialize<'de> for Windows {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let expected = "a list of durations or a dynamic range";
-        list_or_table(deserializer, expected, Self::Lengths, Self::Range)
+        Forms::new("a list of durations or a dynamic range")
+            .list(Self::Lengths)
+            .table(Self::Range)
+            .read(deserializer)
     }
 }
 

@@ -1,10 +1,6 @@
 //! Decides whether an estimator goes on learning while it runs, and what it never learns from.
 
-use std::fmt;
-
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::instance::Instance;
@@ -12,7 +8,7 @@ use super::plan::PlannedLearning;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use crate::channel::Channel;
-use crate::node::{Estimator, FREEZE, InputPort, Learns, Mistake, OutputPort};
+use crate::node::{Estimator, FREEZE, Forms, InputPort, Learns, Mistake, OutputPort};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -47,26 +43,12 @@ impl Default for LearnLimits {
     }
 }
 
-// Not derived, since an untagged enum forgets what was wrong with either form.
 impl<'de> Deserialize<'de> for Learn {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
-            type Value = Learn;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("true, false or a table of limits")
-            }
-
-            fn visit_bool<E>(self, on: bool) -> Result<Learn, E> {
-                Ok(Learn::Switch(on))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, limits: A) -> Result<Learn, A::Error> {
-                Deserialize::deserialize(MapAccessDeserializer::new(limits)).map(Learn::Within)
-            }
-        }
-        deserializer.deserialize_any(Form)
+        Forms::new("true, false or a table of limits")
+            .truth(Self::Switch)
+            .table(Self::Within)
+            .read(deserializer)
     }
 }
 

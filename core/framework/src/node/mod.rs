@@ -13,6 +13,7 @@ mod combiner;
 mod encoder;
 mod estimator;
 mod feature;
+mod forms;
 mod learner;
 mod port;
 mod reach;
@@ -27,6 +28,7 @@ pub use estimator::{
     Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
+pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
 pub use reach::Reach;
