@@ -62,13 +62,7 @@ impl Combiner for Conformal {
             );
             mistakes.push(Mistake::at("coverage", message).help("0.9 is nine of ten truths"));
         }
-        if self.memory <= Duration::ZERO {
-            let message = format!(
-                "`memory` is {} and must be longer than nothing",
-                self.memory
-            );
-            mistakes.push(Mistake::at("memory", message));
-        }
+        mistakes.extend(Mistake::unless_lasting("memory", self.memory));
         if !(0.0..=1.0).contains(&self.gain) {
             let message = format!("`gain` is {} and must be from 0 to 1", self.gain);
             mistakes.push(Mistake::at("gain", message));

@@ -65,12 +65,7 @@ impl Combiner for Hedge {
             let help = "leave it out, and the rate is found on the way";
             mistakes.push(Mistake::at("rate", message).help(help));
         }
-        if let Some(half_life) = self.half_life
-            && half_life <= Duration::ZERO
-        {
-            let message = format!("`half_life` is {half_life} and must be longer than nothing");
-            mistakes.push(Mistake::at("half_life", message));
-        }
+        mistakes.extend(Mistake::unless_lasting("half_life", self.half_life));
         if !(0.0..=1.0).contains(&self.floor) {
             let message = format!("`floor` is {} and must be from 0 to 1", self.floor);
             mistakes.push(Mistake::at("floor", message));

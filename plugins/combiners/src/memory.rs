@@ -77,24 +77,18 @@ impl TryFrom<Table> for Tabled {
 impl Memory {
     /// What is wrong with it as the parameter `memory`.
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
-        let message = match *self {
-            Self::Time(time) if time <= Duration::ZERO => {
-                format!("`memory` is {time} and must be longer than nothing")
+        let mistake = match *self {
+            Self::Time(time) => Mistake::unless_lasting("memory", time),
+            Self::Truths(LastTruths { truths }) => {
+                let message = format!("`truths` is {truths} and must be from 1 to 10000");
+                let fits = (1..=10_000).contains(&truths);
+                (!fits).then(|| Mistake::at("memory.truths", message))
             }
-            Self::Truths(LastTruths { truths }) if !(1..=10_000).contains(&truths) => {
-                format!("`truths` is {truths} and must be from 1 to 10000")
+            Self::HalfLife(Fading { half_life }) => {
+                Mistake::unless_lasting("memory.half_life", half_life)
             }
-            Self::HalfLife(Fading { half_life }) if half_life <= Duration::ZERO => {
-                format!("`half_life` is {half_life} and must be longer than nothing")
-            }
-            _ => return Vec::new(),
         };
-        let at = match self {
-            Self::Time(_) => "memory",
-            Self::Truths(_) => "memory.truths",
-            Self::HalfLife(_) => "memory.half_life",
-        };
-        vec![Mistake::at(at, message)]
+        mistake.into_iter().collect()
     }
 
     /// How long anything counts; nothing is known of it where truths are counted.

@@ -180,12 +180,7 @@ impl Feature for Compensate {
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let rate = inputs.port("rate");
         let mut mistakes = Vec::new();
-        if self.max_gap <= Duration::ZERO {
-            mistakes.push(Mistake::at(
-                "max_gap",
-                "`max_gap` must be longer than nothing",
-            ));
-        }
+        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
         if let Some(first) = rate.first() {
             mistakes.extend(self.limits(first).err().into_iter().flatten());
             if let Some(other) = rate

@@ -57,9 +57,7 @@ impl Settled {
             }
         };
         let (loss, set_point) = (one("loss"), one("set_point"));
-        if self.r#for <= Duration::ZERO {
-            mistakes.push(Mistake::at("for", "`for` must be longer than nothing"));
-        }
+        mistakes.extend(Mistake::unless_lasting("for", self.r#for));
         if let (Some(loss), Some(set_point)) = (loss, set_point) {
             let below = limit::size(&self.below, &loss.unit, "below");
             let change = limit::size(&self.change, &set_point.unit.difference(), "change");

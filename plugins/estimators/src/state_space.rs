@@ -155,12 +155,7 @@ impl Estimator for StateSpace {
             }
             States::Given(_) | States::Told(_) => {}
         }
-        if let Some(every) = self.every
-            && every <= Duration::ZERO
-        {
-            let message = format!("`every` is {every} and must be longer than nothing");
-            mistakes.push(Mistake::at("every", message));
-        }
+        mistakes.extend(Mistake::unless_lasting("every", self.every));
         mistakes
     }
 

@@ -41,10 +41,12 @@ impl Difference {
 
     fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
-        if self.over.is_some_and(|over| over <= Duration::ZERO) {
-            let mistake = Mistake::at("over", "`over` must be longer than nothing");
-            mistakes.push(mistake.help("leave it out for the change from one value to the next"));
-        }
+        let nothing = Mistake::unless_lasting("over", self.over);
+        mistakes.extend(
+            nothing.map(|mistake| {
+                mistake.help("leave it out for the change from one value to the next")
+            }),
+        );
         mistakes.extend(max_age_mistake(self.max_age, channels));
         mistakes
     }

@@ -126,13 +126,7 @@ impl Feature for FirstOrder {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        let mut mistakes = Vec::new();
-        if let Some(span) = self.span
-            && span <= Duration::ZERO
-        {
-            let message = format!("`span` is {span} and must be longer than nothing");
-            mistakes.push(Mistake::at("span", message));
-        }
+        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("span", self.span));
         let constants = match self.time_constants.list() {
             Ok(constants) if mistakes.is_empty() => constants,
             found => {

@@ -10,11 +10,7 @@ use serde::{Deserialize, Serialize};
 /// How old a value of the past may be: as stated, or as a held value of the channel.
 pub(crate) fn max_age(stated: Option<Duration>, of: &Channel) -> Result<Duration, Mistake> {
     match stated.or_else(|| of.default_max_age()) {
-        Some(age) if age > Duration::ZERO => Ok(age),
-        Some(age) => {
-            let message = format!("`max_age` is {age} and must be longer than nothing");
-            Err(Mistake::at("max_age", message))
-        }
+        Some(age) => Mistake::unless_lasting("max_age", age).map_or(Ok(age), Err),
         None => {
             let message = format!("how old a value of `{}` may be is not known", of.name);
             let help = "add `max_age = \"1min\"` here, or to the signal";

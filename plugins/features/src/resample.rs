@@ -49,9 +49,8 @@ impl Feature for Resample {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        if self.every <= Duration::ZERO {
-            let message = format!("`every` is {} and must be longer than nothing", self.every);
-            return Err(vec![Mistake::at("every", message)]);
+        if let Some(mistake) = Mistake::unless_lasting("every", self.every) {
+            return Err(vec![mistake]);
         }
         let span = match self.method {
             ResampleMethod::Mean => self.every,

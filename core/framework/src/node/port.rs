@@ -2,6 +2,7 @@
 
 use super::FeatureFit;
 use crate::channel::Channel;
+use crate::time::Duration;
 
 /// How an input port reads its channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -146,6 +147,15 @@ impl Mistake {
             message: message.into(),
             help: None,
         }
+    }
+
+    /// That of a length of time which is nothing or less, where one is stated.
+    #[must_use]
+    pub fn unless_lasting(at: &str, length: impl Into<Option<Duration>>) -> Option<Self> {
+        let length = length.into().filter(|length| *length <= Duration::ZERO)?;
+        let name = at.rsplit('.').next().unwrap_or(at);
+        let message = format!("`{name}` is {length} and must be longer than nothing");
+        Some(Self::at(at, message))
     }
 
     /// Adds the way out.

@@ -118,12 +118,7 @@ impl Asked {
             let message = format!("`penalty` is {} and must be 0 or more", self.penalty);
             mistakes.push(Mistake::at("penalty", message));
         }
-        if let Some(every) = self.every
-            && every <= Duration::ZERO
-        {
-            let message = format!("`every` is {every} and must be longer than nothing");
-            mistakes.push(Mistake::at("every", message));
-        }
+        mistakes.extend(Mistake::unless_lasting("every", self.every));
         if let Some(order) = &self.order {
             mistakes.extend(order.mistakes(has.map(|has| has.then_some(LARGEST))));
         }
