@@ -434,11 +434,14 @@ impl Engine {
                 }
                 let (value, stamp) = vote.run(votes, now);
                 self.slots.set(node.slots.start, value, stamp);
-                if let Some(first) = beside.weights {
-                    let slots = first..first + votes.values.len();
-                    vote.weights(votes, &mut self.slots.values[slots.clone()]);
-                    self.slots.stamps[slots.clone()].fill(stamp);
-                    self.slots.written[slots].fill(self.slots.tick);
+                if beside.weights.is_some() || beside.deviation.is_some() {
+                    let weights = vote.weigh(votes);
+                    if let Some(first) = beside.weights {
+                        let slots = first..first + weights.len();
+                        self.slots.values[slots.clone()].copy_from_slice(weights);
+                        self.slots.stamps[slots.clone()].fill(stamp);
+                        self.slots.written[slots].fill(self.slots.tick);
+                    }
                 }
                 if let Some(slot) = beside.reason {
                     self.slots.set(slot, vote.reason(votes), stamp);

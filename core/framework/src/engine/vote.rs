@@ -14,7 +14,7 @@ pub(crate) struct Vote {
     withheld: Option<Withheld>,
     /// Both ends of the interval of this tick, for a combiner that gives intervals.
     interval: Option<[f64; 2]>,
-    /// Room for the weights that deviations are combined by.
+    /// What each vote of this tick weighs, for whoever reads it or a deviation.
     weights: Vec<f64>,
 }
 
@@ -77,9 +77,11 @@ impl Vote {
     }
 
     /// The weights by which the votes of this tick are combined.
-    pub(crate) fn weights(&self, votes: &Gathered, weights: &mut [f64]) {
-        weights.fill(f64::NAN);
-        self.combine.weights(Votes(&votes.values), weights);
+    pub(crate) fn weigh(&mut self, votes: &Gathered) -> &[f64] {
+        self.weights.fill(f64::NAN);
+        self.combine
+            .weights(Votes(&votes.values), &mut self.weights);
+        &self.weights
     }
 
     /// Both ends of the interval of this tick.
@@ -87,22 +89,19 @@ impl Vote {
         self.interval.unwrap_or([f64::NAN; 2])
     }
 
-    /// The standard deviation of the truth about the combination of this tick, from those about the votes.
+    /// The standard deviation of the truth about the combination of this tick, from those about the votes, which have been weighed.
     ///
     /// The truth is taken to follow one of the voters, each with the probability of its weight, so that the variance is
     /// `Σ w_i (σ_i² + (ŷ_i − ŷ)²)`: what voters disagree about is uncertain too (Hoeting, Madigan, Raftery and Volinsky 1999,
     /// section 2). NaN where a vote that counts has none, or the weights do not add up to 1.
-    pub(crate) fn deviation(&mut self, votes: &Gathered, of_votes: &[f64], combined: f64) -> f64 {
-        let mut weights = std::mem::take(&mut self.weights);
-        self.weights(votes, &mut weights);
+    pub(crate) fn deviation(&self, votes: &Gathered, of_votes: &[f64], combined: f64) -> f64 {
         let (mut sum, mut variance) = (0.0, 0.0);
-        for ((&weight, &vote), deviation) in weights.iter().zip(&votes.values).zip(of_votes) {
+        for ((&weight, &vote), deviation) in self.weights.iter().zip(&votes.values).zip(of_votes) {
             if weight != 0.0 && !vote.is_nan() {
                 sum += weight;
                 variance += weight * (deviation * deviation + (vote - combined).powi(2));
             }
         }
-        self.weights = weights;
         // Written so that NaN fails.
         if (sum - 1.0).abs() < 1e-9 && variance >= 0.0 && variance.is_finite() {
             variance.sqrt()
