@@ -363,12 +363,19 @@ expect = [{ of = "temperature.chuck", from = "2h", between = ["44 Cel", "46 Cel"
     scratch.file("steps.csv", "time_h,chuck_degC\n0,20\n1,45\n");
     athermal(&[&"test", &path]).ended(0);
     scratch.file("steps.csv", "time_h,chuck_degC\n0,20\n1,45\n0.5,999\n");
-    athermal(&[&"test", &path]).ended(2).tells(&[
+    let again = format!("{text}fit = {{ simulate = \"die-tester\", schedule = \"steps.csv\" }}\n");
+    scratch.file("graph.toml", again);
+    let finished = athermal(&[&"test", &path]).ended(2);
+    finished.tells(&[
         "A170",
         "the time 0.5 must be after that of the row before",
         "steps.csv:4:1",
         "test \"the chuck is warm\"",
     ]);
+    let times = finished
+        .told
+        .matches("must be after that of the row before");
+    assert_eq!(times.count(), 1, "{}", finished.told);
 }
 
 #[test]

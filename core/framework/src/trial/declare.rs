@@ -1,5 +1,9 @@
 //! Decides what `[[tests]]` mean for a graph: channels looked up, units checked, mistakes told where they stand.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
 use super::channels::{look_up, look_up_measured};
 use super::data::{DataSet, Simulation};
 use super::expectation::Expectation;
@@ -59,6 +63,7 @@ pub fn declare(
     let before = diagnostics.error_count();
     let mut trials: Vec<Trial> = Vec::new();
     let mut names: Vec<(&str, Place)> = Vec::new();
+    let mut schedules = Schedules::new();
     for test in tests {
         let Some(table) = test.as_table() else {
             diagnostics.report(test.place, wrong_type("tests", "a table", test));
@@ -84,6 +89,7 @@ pub fn declare(
                 plan,
                 reader,
                 sources,
+                schedules: &mut schedules,
                 diagnostics,
             }
             .trial(test, table)
@@ -116,11 +122,15 @@ pub fn observe(plan: &mut Plan, trials: &[Trial]) {
     }
 }
 
+/// The schedules that have been read for a machine, so that mistakes in one are told once; nothing for one that has any.
+type Schedules = BTreeMap<(PathBuf, &'static str), Option<Schedule>>;
+
 /// Reads one test; what it expects is read in a file of its own.
 pub(super) struct Declaring<'a> {
     pub(super) plan: &'a Plan,
     reader: &'a dyn FileReader,
     sources: &'a mut Sources,
+    schedules: &'a mut Schedules,
     pub(super) diagnostics: &'a mut Diagnostics,
 }
 
@@ -282,8 +292,12 @@ impl Declaring<'_> {
     /// A schedule from its file, in which its mistakes are told.
     fn schedule(&mut self, path: &str, place: Place, machine: &dyn Machine) -> Option<Schedule> {
         let path = self.sources.resolve(place, path);
+        let known = (path.clone(), machine.name());
+        if let Some(read) = self.schedules.get(&known) {
+            return read.clone();
+        }
         let shown = path.display().to_string();
-        let text: std::sync::Arc<str> = match self.reader.read(&path) {
+        let text: Arc<str> = match self.reader.read(&path) {
             Ok(text) => text.into(),
             Err(error) => {
                 let reason = unreadable(&error);
@@ -295,17 +309,19 @@ impl Declaring<'_> {
                 return None;
             }
         };
-        let errors = match Schedule::parse(&text, machine.set_points()) {
-            Ok(schedule) => return Some(schedule),
-            Err(errors) => errors,
-        };
-        let file = self.sources.add(shown, std::sync::Arc::clone(&text));
-        for error in errors {
-            let place = self.sources.line(file, error.line);
-            self.diagnostics
-                .report(place, TrialProblem::Schedule(error.reason));
-        }
-        None
+        let parsed = Schedule::parse(&text, machine.set_points());
+        let schedule = parsed
+            .map_err(|errors| {
+                let file = self.sources.add(shown, Arc::clone(&text));
+                for error in errors {
+                    let place = self.sources.line(file, error.line);
+                    self.diagnostics
+                        .report(place, TrialProblem::Schedule(error.reason));
+                }
+            })
+            .ok();
+        self.schedules.insert(known, schedule.clone());
+        schedule
     }
 
     fn inputs(&mut self, value: &Value) -> Option<Synthetic> {
