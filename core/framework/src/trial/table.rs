@@ -146,7 +146,7 @@ pub(super) struct ExpectTable {
     pub(super) absent: Option<bool>,
     /// From one value to the next the change is always below.
     pub(super) max_step_below: Option<Quantity>,
-    /// The time of the one value that `equals` and `between` look at: the last one computed at or before it.
+    /// The time of the one value that `equals` and `between` look at, the last one computed at or before it, and of the tick that `absent` looks at.
     pub(super) at: Option<Duration>,
     /// Only what comes at this time or later counts.
     pub(super) from: Option<Duration>,
