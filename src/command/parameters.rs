@@ -1,6 +1,7 @@
 //! Explains the parameters of a node type from their schema. Decides how forms and choices are laid out; what they are called
 //! and mean stands beside them in the source.
 
+use athermal::core::node::first_paragraph;
 use serde_json::{Map, Value};
 
 use crate::figures::paragraph;
@@ -101,6 +102,5 @@ impl<'a> Page<'a> {
 
 fn described(value: &Value) -> String {
     let text = value["description"].as_str().unwrap_or_default();
-    let summary = text.split("\n\n").next().unwrap_or_default();
-    summary.replace('\n', " ").trim_end_matches('.').to_owned()
+    first_paragraph(text).trim_end_matches('.').to_owned()
 }

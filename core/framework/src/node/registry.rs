@@ -94,7 +94,7 @@ impl Kind {
         }
     }
 
-    /// The first sentence of the documentation.
+    /// The first paragraph of the documentation.
     #[must_use]
     pub fn summary(&self) -> String {
         first_paragraph(&self.documentation())
@@ -129,7 +129,8 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
 }
 
 /// The first paragraph of a documentation, on one line.
-fn first_paragraph(documentation: &str) -> String {
+#[must_use]
+pub fn first_paragraph(documentation: &str) -> String {
     let paragraph = documentation.split("\n\n").next().unwrap_or_default();
     paragraph.replace('\n', " ")
 }
