@@ -77,6 +77,9 @@ pub(crate) struct Errors {
     memory: Memory,
     /// For each voter the arrival and square of its errors; of a memory that fades, of the last one.
     squares: Vec<VecDeque<(Instant, f64)>>,
+    /// Their sums, oldest first, so that one more is only added.
+    #[serde(skip)]
+    sums: Vec<f64>,
     /// For each voter the mean of what is in memory.
     means: Vec<Option<f64>>,
     /// For each voter how many errors a memory that fades comes to.
@@ -89,6 +92,7 @@ impl Errors {
         Self {
             memory,
             squares: vec![VecDeque::new(); voters],
+            sums: vec![0.0; voters],
             means: vec![None; voters],
             counts: vec![0.0; voters],
         }
@@ -124,10 +128,15 @@ impl Errors {
         match self.memory {
             Memory::Time(_) => squares.push_back((arrived, square)),
             Memory::Truths(last) => {
-                if squares.len() >= last.truths {
+                let full = squares.len() >= last.truths;
+                if full {
                     squares.pop_front();
                 }
                 squares.push_back((arrived, square));
+                if full {
+                    self.refresh(voter);
+                    return;
+                }
             }
             Memory::HalfLife(fading) => {
                 let last = squares.pop_front();
@@ -140,7 +149,8 @@ impl Errors {
                 return;
             }
         }
-        self.refresh(voter);
+        self.sums[voter] += square;
+        self.means[voter] = Some(self.sums[voter] / self.squares[voter].len() as f64);
     }
 
     /// Forgets what arrived longer than the memory before `newest`.
@@ -216,6 +226,7 @@ impl Errors {
     fn refresh(&mut self, voter: usize) {
         let squares = &self.squares[voter];
         let sum: f64 = squares.iter().map(|(_, square)| square).sum();
+        self.sums[voter] = sum;
         self.means[voter] = (!squares.is_empty()).then(|| sum / squares.len() as f64);
         self.counts[voter] = 0.0;
     }
