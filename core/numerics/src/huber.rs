@@ -42,7 +42,8 @@ pub struct HuberFit {
 }
 
 impl Huber {
-    /// Fits `columns` of the rows, each centred by its mean and divided by its scale.
+    /// Fits `columns` of the rows, each centred by its mean and divided by its scale. All rows count alike: there are none here that
+    /// weigh more than others.
     ///
     /// # Errors
     /// [`NumericsError::Parameter`], [`NumericsError::Column`], [`NumericsError::RepeatedColumn`], [`NumericsError::Scale`],
@@ -66,6 +67,9 @@ impl Huber {
                 needed: 2,
                 found: rows.count(),
             });
+        }
+        for (_, _, weight) in rows.iter() {
+            check_parameter("weight", weight, weight == 1.0, "1 for every row")?;
         }
         let mut descent = Descent::new(self, rows, columns, means, scales);
         if !descent.residuals.iter().all(|r| r.is_finite()) {
@@ -444,6 +448,11 @@ mod tests {
             how.solve(rows, &[12], &standard.means, &standard.scales)
                 .is_err()
         );
+        let mut weighted = blocks.clone();
+        weighted.push_weighted(&[0.0; 12], 0.0, 2.0);
+        let rows = weighted.rows().unwrap();
+        let found = how.solve(rows, &ALL, &standard.means, &standard.scales);
+        assert!(found.is_err_and(|error| error.to_string().starts_with("weight is 2")));
         blocks.push(&[0.0; 12], f64::NAN);
         let rows = blocks.rows().unwrap();
         let found = how.solve(rows, &ALL, &standard.means, &standard.scales);
