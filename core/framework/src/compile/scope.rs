@@ -57,6 +57,11 @@ impl Scopes {
             }
         }
         let Some(scope) = self.scopes.get(reference.node) else {
+            // What an instance of a module stands for is not there either when the instance is broken.
+            let outer = reference.node.split(['/', '[']).next().unwrap_or_default();
+            if self.scopes.get(outer).is_some_and(|outer| outer.broken) {
+                return Ok(Found::Broken);
+            }
             return Err(Box::new(CompileProblem::UnknownNode {
                 node: reference.node.to_owned(),
                 known: outermost(self.scopes.keys().map(String::as_str)),

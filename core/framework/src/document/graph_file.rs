@@ -25,7 +25,7 @@ pub struct GraphFile {
     pub signals: Vec<SignalDecl>,
     /// The nodes, in the order of the file.
     pub nodes: Vec<NodeDecl>,
-    /// Signals and nodes that are not among them because of mistakes of their own, which have been told.
+    /// Names that stand for nothing because of mistakes that have been told, so that references to them say no more.
     pub broken: Vec<String>,
     /// What comes out, in the order of the file.
     pub outputs: Vec<OutputDecl>,

@@ -41,10 +41,12 @@ const MODEL: &str = "model";
 /// Sections that only a running machine needs; they are handed on as they stand.
 const DEPLOYMENT: [&str; 4] = ["source", "sinks", "runtime", MODEL];
 
+/// Sections that say which names there are.
+const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
+
 /// Checks names, expands sets and `each`, and gives what the file declares. All mistakes are reported; `None` where they leave open
 /// which names there are.
 pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
-    let before = diagnostics.error_count();
     let tree = document.tree;
     let Data::Table(root) = &tree.data else {
         let expected = "a table".to_owned();
@@ -62,19 +64,22 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     known_keys(root, &known, "a graph file", diagnostics);
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
-    names::check(root, diagnostics);
-    let sets = sets::declare(root.get("sets"), diagnostics);
-    let mut of_names = diagnostics.error_count() - before;
+    let mut broken = Vec::new();
+    // Whoever refers to what stands in a section that is none has been told of the section.
+    let strange = root.iter().filter(|(key, _)| !known.contains(key));
+    let below = strange.filter_map(|(_, section)| section.value.as_table());
+    broken.extend(below.flat_map(Table::keys).map(str::to_owned));
+    let shared = names::check(root, &mut broken, diagnostics);
+    let sets = sets::declare(root.get("sets"), &mut broken, diagnostics);
     let time = time_base::declare(root.get("time"), diagnostics);
     let sample = time.sample();
-    let mut broken = Vec::new();
     let signals = root.get("signals");
-    let signals = signals::declare(signals, &sets, sample, &mut broken, diagnostics);
-    let earlier = diagnostics.error_count();
-    modules::check(root.get("modules"), diagnostics);
-    let expanded = modules::expand(root, &sets, diagnostics);
-    of_names += diagnostics.error_count() - earlier;
-    let nodes = nodes::declare(&expanded.nodes, &sets, sample, &mut broken, diagnostics);
+    let mut signals = signals::declare(signals, &sets, sample, &mut broken, diagnostics);
+    let expanded = modules::expand(root, &sets, &mut broken, diagnostics);
+    let mut nodes = nodes::declare(&expanded, &sets, sample, &mut broken, diagnostics);
+    signals.retain(|signal| !shared.contains(&signal.name));
+    nodes.retain(|node| !shared.contains(&node.name));
+    broken.extend(shared);
     let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
     let mut tests = expanded.tests;
     if let Some(tests) = &mut tests {
@@ -97,7 +102,11 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         .iter()
         .filter_map(|key| Some(((*key).to_owned(), root.get(key)?.clone())))
         .collect();
-    if document.faulty || of_names > 0 {
+    let is_whole = |section: &&str| {
+        root.get(section)
+            .is_none_or(|value| value.as_table().is_some())
+    };
+    if document.faulty || expanded.cut || !NAMING.iter().all(|section| is_whole(section)) {
         return None;
     }
     Some(GraphFile {

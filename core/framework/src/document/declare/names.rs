@@ -6,15 +6,25 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::Table;
 
-/// Reports names of sets, signals, nodes and outputs that break the rules, and names that two of the first three share.
-pub(super) fn check(root: &Table, diagnostics: &mut Diagnostics) {
+/// Reports names of sets, signals, nodes and outputs that break the rules, and names that two of the first three share. What a reference
+/// to one that breaks the rules would name goes to `broken`; the answer are those that are shared.
+pub(super) fn check(
+    root: &Table,
+    broken: &mut Vec<String>,
+    diagnostics: &mut Diagnostics,
+) -> Vec<String> {
+    let mut shared = Vec::new();
     let mut taken: HashMap<&str, (&'static str, Place)> = HashMap::new();
     for (section, role) in [("sets", "set"), ("signals", "signal"), ("nodes", "node")] {
         let Some(table) = root.get(section).and_then(|value| value.as_table()) else {
             continue;
         };
         for (name, entry) in table.iter() {
+            let before = diagnostics.error_count();
             name_rule(name, entry.key, role, false, diagnostics);
+            if diagnostics.error_count() > before {
+                broken.extend(name.split(['.', ':']).next().map(str::to_owned));
+            }
             if let Some(&(first_role, first)) = taken.get(name) {
                 let problem = DocumentProblem::DuplicateName {
                     role,
@@ -23,6 +33,7 @@ pub(super) fn check(root: &Table, diagnostics: &mut Diagnostics) {
                     first: Some(first),
                 };
                 diagnostics.report(entry.key, problem);
+                shared.push(name.to_owned());
             } else {
                 taken.insert(name, (role, entry.key));
             }
@@ -33,6 +44,7 @@ pub(super) fn check(root: &Table, diagnostics: &mut Diagnostics) {
             name_rule(name, entry.key, "output", false, diagnostics);
         }
     }
+    shared
 }
 
 /// Reports a name that is not a letter (or a digit, where that is allowed), then letters, digits, `_` and `-`.

@@ -1,6 +1,6 @@
 //! `[nodes]`: each node expanded into one instance per member; kinds, references and parameters are left to the compiler.
 
-use super::modules::Placed;
+use super::modules::{Expanded, Placed};
 use super::placeholder;
 use super::reading::{in_samples, known_keys, length, missing, one_or_more, samples, table, text};
 use super::sets::{self, Sets};
@@ -25,13 +25,14 @@ struct Total {
 }
 
 pub(super) fn declare(
-    nodes: &[Placed],
+    expanded: &Expanded,
     sets: &Sets,
     sample: Option<Duration>,
     broken: &mut Vec<String>,
     diagnostics: &mut Diagnostics,
 ) -> Vec<NodeDecl> {
     let mut total = Total::default();
+    let nodes = &expanded.nodes;
     let mut declared = Vec::with_capacity(nodes.len());
     for placed in nodes {
         // Inside a module, one place in a file stands for a node of each instance.
@@ -39,7 +40,13 @@ pub(super) fn declare(
         let outer = diagnostics.scope(context);
         let before = diagnostics.error_count();
         match node(placed, sets, sample, &mut total, diagnostics) {
-            Some(node) if diagnostics.error_count() == before => declared.push(node),
+            Some(node)
+                if diagnostics.error_count() == before
+                    && (placed.around.is_empty() || !expanded.faulty)
+                    && !node.each.iter().any(|set| broken.contains(set)) =>
+            {
+                declared.push(node);
+            }
             _ => broken.push(placed.name.clone()),
         }
         diagnostics.scope(outer);

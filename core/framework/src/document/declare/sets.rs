@@ -1,6 +1,6 @@
 //! The members of each set; where sets are used is decided by signals and nodes.
 
-use indexmap::IndexMap;
+use indexmap::{IndexMap, IndexSet};
 
 use super::names::distinct;
 use super::reading::{table, texts};
@@ -10,12 +10,17 @@ use crate::document::tree::Value;
 
 pub(super) type Sets = IndexMap<String, Vec<String>>;
 
-pub(super) fn declare(sets: Option<&Value>, diagnostics: &mut Diagnostics) -> Sets {
+pub(super) fn declare(
+    sets: Option<&Value>,
+    broken: &mut Vec<String>,
+    diagnostics: &mut Diagnostics,
+) -> Sets {
     let mut declared = Sets::new();
     let Some(sets) = sets.and_then(|sets| table(sets, "sets", diagnostics)) else {
         return declared;
     };
     for (name, entry) in sets.iter() {
+        let before = diagnostics.error_count();
         // A set with a mistake in it is known all the same, so that its users are not told that it does not exist.
         let members = texts(&entry.value, name, "a list of names", diagnostics).unwrap_or_default();
         if entry.value.as_list().is_some_and(<[Value]>::is_empty) {
@@ -27,10 +32,12 @@ pub(super) fn declare(sets: Option<&Value>, diagnostics: &mut Diagnostics) -> Se
             );
         }
         distinct(&members, "member", diagnostics);
-        declared.insert(
-            name.to_owned(),
-            members.into_iter().map(|(member, _)| member).collect(),
-        );
+        if diagnostics.error_count() > before {
+            broken.push(name.to_owned());
+        }
+        // Of those that stand twice one, lest every user of the set is told of it.
+        let members: IndexSet<_> = members.into_iter().map(|(member, _)| member).collect();
+        declared.insert(name.to_owned(), members.into_iter().collect());
     }
     declared
 }

@@ -14,6 +14,8 @@ use crate::unit::Unit;
 const KEYS: [&str; 6] = ["unit", "channels", "column", "range", "max_age", "optional"];
 /// The placeholder in column patterns.
 const CHANNEL: &str = "channel";
+/// Stands in for an age that cannot be read, so that nobody asks for one.
+const SOME_AGE: Duration = Duration::from_ns(60_000_000_000);
 
 pub(super) fn declare(
     signals: Option<&Value>,
@@ -27,22 +29,24 @@ pub(super) fn declare(
     };
     let mut declared = Vec::new();
     for (name, entry) in signals.iter() {
-        let before = diagnostics.error_count();
-        match signal(name, entry, sets, sample, diagnostics) {
-            Some(signal) if diagnostics.error_count() == before => declared.push(signal),
-            _ => broken.push(name.to_owned()),
+        match signal(name, entry, sets, sample, broken, diagnostics) {
+            Some(signal) => declared.push(signal),
+            None => broken.push(name.to_owned()),
         }
     }
     declared
 }
 
+/// A signal whose channels and unit are known: what else is wrong with it is told, and says nothing of those who refer to it.
 fn signal(
     name: &str,
     entry: &Entry,
     sets: &Sets,
     sample: Option<Duration>,
+    broken: &[String],
     diagnostics: &mut Diagnostics,
 ) -> Option<SignalDecl> {
+    let before = diagnostics.error_count();
     let keys = table(&entry.value, name, diagnostics)?;
     let what = format!("signal \"{name}\"");
     known_keys(keys, &KEYS, &what, diagnostics);
@@ -72,6 +76,11 @@ fn signal(
             None
         }
     };
+    let of_broken = keys
+        .get("channels")
+        .and_then(Value::as_text)
+        .is_some_and(|set| broken.iter().any(|broken| broken == set));
+    let known = diagnostics.error_count() == before && !of_broken;
     let column = match keys.get("column") {
         Some(value) => column(value, channels.as_deref(), &what, diagnostics),
         None => Some(format!("{{{CHANNEL}}}")),
@@ -82,19 +91,19 @@ fn signal(
     };
     let max_age = keys
         .get("max_age")
-        .and_then(|value| length(value, "max_age", sample, diagnostics));
+        .map(|value| length(value, "max_age", sample, diagnostics).unwrap_or(SOME_AGE));
     let optional = match (keys.get("optional"), &channels) {
         (Some(value), Some(channels)) => optional(value, name, channels, diagnostics),
         _ => Vec::new(),
     };
-    let (unit, unit_place) = unit?;
+    let (unit, unit_place) = unit.filter(|_| known)?;
     Some(SignalDecl {
         name: name.to_owned(),
         place: entry.key,
         unit,
         unit_place,
         channels: channels?,
-        column: column?,
+        column: column.unwrap_or_default(),
         range,
         max_age,
         optional,

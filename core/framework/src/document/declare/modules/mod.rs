@@ -44,9 +44,7 @@ use super::sets::Sets;
 use crate::diagnostic::Diagnostics;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
-use module::{Module, find};
-
-pub(super) use module::check;
+use module::{Module, check, find};
 
 /// How deep modules may nest.
 const DEEPEST: usize = 16;
@@ -86,14 +84,27 @@ pub(super) struct Expanded {
     pub(super) outputs: Option<Value>,
     /// The same of `[[tests]]`.
     pub(super) tests: Option<Value>,
+    /// A mistake in a module or an instance of one has been told: what is inside may not be what was meant.
+    pub(super) faulty: bool,
+    /// Not all nodes are there, since they would be too many.
+    pub(super) cut: bool,
 }
 
-/// Expands the modules of a graph file.
-pub(super) fn expand(root: &Table, sets: &Sets, diagnostics: &mut Diagnostics) -> Expanded {
+/// Expands the modules of a graph file; those that are instances of one go to `broken` after a mistake.
+pub(super) fn expand(
+    root: &Table,
+    sets: &Sets,
+    broken: &mut Vec<String>,
+    diagnostics: &mut Diagnostics,
+) -> Expanded {
+    let before = diagnostics.error_count();
+    check(root.get("modules"), diagnostics);
     let mut expanded = Expanded {
         nodes: Vec::new(),
         outputs: root.get("outputs").cloned(),
         tests: root.get("tests").cloned(),
+        faulty: false,
+        cut: false,
     };
     let Some(nodes) = root
         .get("nodes")
@@ -132,7 +143,13 @@ pub(super) fn expand(root: &Table, sets: &Sets, diagnostics: &mut Diagnostics) -
             expansion.tests(tests, &level);
         }
     }
+    expanded.cut = expansion.full;
     expanded.nodes = expansion.placed;
+    expanded.faulty = diagnostics.error_count() > before;
+    if expanded.faulty {
+        let instances = nodes.iter().filter(|(_, entry)| is_instance(entry));
+        broken.extend(instances.map(|(name, _)| name.to_owned()));
+    }
     expanded
 }
 

@@ -141,7 +141,7 @@ impl<'a> Module<'a> {
 }
 
 /// Reports what is wrong with modules as they are declared, used or not.
-pub(in crate::document::declare) fn check(modules: Option<&Value>, diagnostics: &mut Diagnostics) {
+pub(super) fn check(modules: Option<&Value>, diagnostics: &mut Diagnostics) {
     let Some(modules) = modules.and_then(|modules| table(modules, "modules", diagnostics)) else {
         return;
     };
