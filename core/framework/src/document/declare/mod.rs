@@ -102,11 +102,9 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         .iter()
         .filter_map(|key| Some(((*key).to_owned(), root.get(key)?.clone())))
         .collect();
-    let is_whole = |section: &&str| {
-        root.get(section)
-            .is_none_or(|value| value.as_table().is_some())
-    };
-    if document.faulty || expanded.cut || !NAMING.iter().all(|section| is_whole(section)) {
+    let mut naming = NAMING.iter().filter_map(|section| root.get(section));
+    let whole = naming.all(|section| section.as_table().is_some());
+    if document.faulty || expanded.cut || !whole {
         return None;
     }
     Some(GraphFile {
