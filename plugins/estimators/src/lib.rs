@@ -26,6 +26,7 @@ mod persistence;
 mod polynomial;
 mod regression;
 mod rls;
+mod scaling;
 mod selection;
 mod solver;
 mod stack;

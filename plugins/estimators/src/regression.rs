@@ -2,7 +2,7 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
+    Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
     TrainingSetup,
 };
 use athermal_numerics::{
@@ -312,6 +312,20 @@ pub struct LinearPredictor {
 impl Predictor for LinearPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let lists = [("coefficients", self.coefficients.len())];
+        let mut mistakes = Mistake::of_lengths(width, &lists);
+        if let Some(PredictionVariance { centre, root, .. }) = &self.variance {
+            if !centre.is_empty() {
+                mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
+            }
+            let triangle = width * (width + 1) / 2;
+            mistakes.extend(Mistake::of_lengths(triangle, &[("root", root.len())]));
+        }
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -5,29 +5,20 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use athermal_core::model::numbers;
-use athermal_core::node::{Learner, Predictor, Restored, State};
+use athermal_core::node::{Learner, Mistake, Predictor, Restored, State};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Polynomials, Stepper};
 use serde::{Deserialize, Serialize};
 
+use crate::order::LARGEST;
+use crate::scaling::Scaling;
+
+/// The most interleaved series.
+pub(super) const MOST_SERIES: usize = 16;
+/// How often the noise is integrated at most.
+pub(super) const MOST_DIFFERENCES: usize = 2;
 /// How many runs within a step are kept.
 const RUNS_PER_STEP: i64 = 16;
-
-/// How inputs are brought to a common scale.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Scaling {
-    #[serde(with = "numbers")]
-    pub(super) means: Vec<f64>,
-    #[serde(with = "numbers")]
-    pub(super) scales: Vec<f64>,
-}
-
-impl Scaling {
-    fn of<'a>(&'a self, row: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
-        |nth| (row[nth] - self.means[nth]) / self.scales[nth]
-    }
-}
 
 /// A model as it was identified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +40,48 @@ pub(super) struct Identified {
 impl Predictor for Identified {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let mut mistakes = self.scaling.mistakes(width);
+        let inputs = &self.model.inputs;
+        mistakes.extend(Mistake::of_lengths(width, &[("inputs", inputs.len())]));
+        let mut check = |at: &str, found: String, fits: bool, allowed: &str| {
+            if !fits {
+                let message = format!("`{at}` is {found} and must be {allowed}");
+                mistakes.push(Mistake::at(at, message));
+            }
+        };
+        let delays = inputs.iter().map(|input| ("delay", input.delay, LARGEST));
+        let differences = ("differences", self.model.differences, MOST_DIFFERENCES);
+        for (at, found, most) in delays.chain([differences]) {
+            check(
+                at,
+                found.to_string(),
+                found <= most,
+                &format!("0 to {most}"),
+            );
+        }
+        let step = self.step;
+        check(
+            "step",
+            step.to_string(),
+            step > Duration::ZERO,
+            "longer than nothing",
+        );
+        let series = self.series;
+        let allowed = format!("from 1 to {MOST_SERIES}");
+        check(
+            "series",
+            series.to_string(),
+            (1..=MOST_SERIES).contains(&series),
+            &allowed,
+        );
+        if self.deviations.is_empty() {
+            mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
+        }
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
@@ -112,7 +145,7 @@ impl Following {
                 regressors: of.regressors.clone(),
                 scaling: of.scaling.clone(),
                 step: of.step,
-                series: vec![followed; of.series.max(1)],
+                series: vec![followed; of.series],
                 begun: false,
                 runs: VecDeque::new(),
                 inputs: VecDeque::new(),
@@ -163,7 +196,7 @@ impl Known {
     fn pass(&self, stepper: &mut Stepper, at: Instant, row: &[f64]) {
         let count = self.runs.partition_point(|&of| of <= at);
         let width = self.scaling.means.len();
-        let Scaling { means, scales } = &self.scaling;
+        let Scaling { means, scales, .. } = &self.scaling;
         match count.checked_sub(1) {
             Some(run) => stepper.step(
                 |nth| (self.inputs[run * width + nth] - means[nth]) / scales[nth],
@@ -328,6 +361,9 @@ impl Learner for Following {
         }
         if known.step != self.known.step || known.series.len() != self.known.series.len() {
             return Restored::cold("it was followed in other steps");
+        }
+        if known.inputs.len() != known.runs.len() * known.regressors.len() {
+            return Restored::cold("its runs have other inputs");
         }
         let mut series = self.known.series.clone();
         for (own, other) in series.iter_mut().zip(&known.series) {

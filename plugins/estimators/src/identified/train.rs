@@ -8,11 +8,10 @@ use athermal_numerics::{
 };
 
 use super::Asked;
-use super::follow::{Identified, Scaling};
+use super::follow::{Identified, MOST_SERIES};
 use crate::regression::told;
+use crate::scaling::Scaling;
 
-/// The most interleaved series.
-const MOST_SERIES: usize = 16;
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
 const STEPS_AHEAD: usize = 256;
 
@@ -182,6 +181,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             scaling: Scaling {
                 means: standard.means,
                 scales: standard.scales,
+                truth: 0.0,
             },
             deviations: variances
                 .iter()

@@ -9,7 +9,8 @@ use athermal_numerics::{
     most_likely,
 };
 
-use super::{Kalman, KalmanPredictor, Noises, Scaling};
+use super::{Kalman, KalmanPredictor, Noises};
+use crate::scaling::Scaling;
 
 /// The most rows that the search for variances goes through, again and again.
 const MOST_ROWS: usize = 20_000;
