@@ -17,6 +17,9 @@ use crate::scaling::Scaling;
 pub(super) const MOST_SERIES: usize = 16;
 /// How often the noise is integrated at most.
 pub(super) const MOST_DIFFERENCES: usize = 2;
+/// After more steps than that without inputs a model begins anew, unless it reaches further back itself. A mode that hardly
+/// decays would go anywhere with inputs that stay as they last were.
+const UNSEEN: usize = 10;
 /// How many runs within a step are kept.
 const RUNS_PER_STEP: i64 = 16;
 
@@ -206,6 +209,29 @@ impl Known {
         };
     }
 
+    /// Whether too long ago there was a run, of a model that has inputs.
+    fn lost(&self, of: Instant) -> bool {
+        let inputs = self
+            .series
+            .first()
+            .map(|followed| &followed.stepper.model().inputs);
+        let reaches = inputs
+            .into_iter()
+            .flatten()
+            .map(|input| input.delay + input.b.len());
+        let longest = reaches.max().map(|reach| reach.max(UNSEEN) as i64);
+        let last = self.runs.back();
+        last.zip(longest)
+            .is_some_and(|(&last, longest)| self.steps(last, of) > longest)
+    }
+
+    /// Forgets where it was.
+    fn end(&mut self) {
+        self.begun = false;
+        self.runs.clear();
+        self.inputs.clear();
+    }
+
     /// How many steps lie between two instants.
     fn steps(&self, from: Instant, to: Instant) -> i64 {
         let steps = ((to - from).secs() / self.step.secs()).round();
@@ -244,6 +270,9 @@ impl Learner for Following {
         let known = &mut self.known;
         if regressors.iter().any(|value| value.is_nan()) {
             return;
+        }
+        if known.lost(of) {
+            known.end();
         }
         if !known.begun {
             known.begin(regressors, of);
@@ -339,9 +368,7 @@ impl Learner for Following {
     }
 
     fn segment(&mut self, _shift: Duration) {
-        self.known.begun = false;
-        self.known.runs.clear();
-        self.known.inputs.clear();
+        self.known.end();
     }
 
     fn snapshot(&self) -> Box<dyn State> {
@@ -381,5 +408,73 @@ impl Learner for Following {
         runs.reserve(runs.len().max(16));
         inputs.reserve(inputs.len().max(16));
         Restored::Accepted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use athermal_numerics::Transfer;
+
+    /// What a model that sums its input up, nearly, predicts of a truth of 0 around a pause of so many steps.
+    fn around_a_pause(steps: i64) -> Vec<f64> {
+        let step = Duration::from_ns(1_000_000_000);
+        let model = Identified {
+            regressors: vec!["input".to_owned()],
+            scaling: Scaling {
+                means: vec![0.0],
+                scales: vec![1.0],
+                truth: 0.0,
+            },
+            model: Polynomials {
+                a: vec![-0.9995],
+                inputs: vec![Transfer {
+                    delay: 0,
+                    b: vec![0.1],
+                    f: Vec::new(),
+                }],
+                c: Vec::new(),
+                d: Vec::new(),
+                differences: 0,
+                level: 0.0,
+            },
+            step,
+            series: 1,
+            deviations: vec![1.0],
+        };
+        assert_eq!(model.mistakes(), []);
+        let mut learner = Following::new(&model);
+        let instants = (0..20).chain(20 + steps..40 + steps);
+        let predicted = instants.map(|nth| {
+            let of = Instant::from_ns(0) + part(step, nth, 1);
+            learner.run(&[1.0], of, of - step);
+            let predicted = learner.predict(&[1.0], of);
+            learner.learn(&[1.0], 0.0, of);
+            predicted
+        });
+        predicted.collect()
+    }
+
+    #[test]
+    fn a_short_pause_is_bridged_with_the_inputs_before_it() {
+        let predicted = around_a_pause(5);
+        assert!(predicted[0].is_nan(), "nothing has been told");
+        assert!(
+            predicted[1..].iter().all(|value| value.abs() < 0.7),
+            "{predicted:?}"
+        );
+    }
+
+    #[test]
+    fn after_a_long_pause_it_begins_anew() {
+        let predicted = around_a_pause(100);
+        assert!(
+            predicted[20].is_nan(),
+            "nothing has been told: {predicted:?}"
+        );
+        assert!(
+            predicted[21..].iter().all(|value| value.abs() < 0.2),
+            "{predicted:?}"
+        );
     }
 }
