@@ -8,6 +8,7 @@ mod arma;
 mod armax;
 mod arx;
 mod bj;
+mod conditioning;
 mod elastic_net;
 mod folds;
 mod huber;

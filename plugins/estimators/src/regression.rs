@@ -11,6 +11,7 @@ use athermal_numerics::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
@@ -216,25 +217,7 @@ impl LinearTrainer {
     }
 
     fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
-        let names = |columns: &[usize]| {
-            columns
-                .iter()
-                .map(|&c| self.regressors[c].name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        if !fit.constant.is_empty() {
-            report.notes.push(format!(
-                "constant, so without effect: {}",
-                names(&fit.constant)
-            ));
-        }
-        if !fit.collinear.is_empty() {
-            report.notes.push(format!(
-                "nearly a combination of the others: {}",
-                names(&fit.collinear)
-            ));
-        }
+        name_columns(fit, |column| &self.regressors[column].name, report);
         match fit.method {
             Method::Cholesky => {}
             // Every coefficient is determined, so there is nothing to worry about.

@@ -9,6 +9,7 @@ use athermal_numerics::{
 
 use super::Asked;
 use super::follow::{Identified, MOST_SERIES};
+use crate::conditioning::tell_rows;
 use crate::regression::told;
 use crate::scaling::Scaling;
 
@@ -171,6 +172,8 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let standard = standard.standardization();
         let samples = self.samples(pace, &standard);
         let found = self.asked.identify(&samples, pace.series, report)?;
+        let truths: Vec<f64> = self.rows.iter().map(|row| row.truth).collect();
+        tell_rows(&self.names, &self.regressors, &truths, report);
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
