@@ -302,9 +302,7 @@ impl Predictor for LinearPredictor {
         let lists = [("coefficients", self.coefficients.len())];
         let mut mistakes = Mistake::of_lengths(width, &lists);
         if let Some(PredictionVariance { centre, root, .. }) = &self.variance {
-            if !centre.is_empty() {
-                mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
-            }
+            mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
             let triangle = width * (width + 1) / 2;
             mistakes.extend(Mistake::of_lengths(triangle, &[("root", root.len())]));
         }
