@@ -9,6 +9,7 @@ use athermal_numerics::{Gram, GramBlocks, NumericsError, Standardization, logari
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::conditioning::tell_columns;
 use crate::folds::Folds;
 use crate::regression::{LinearPredictor, told};
 
@@ -238,6 +239,7 @@ impl SparseTrainer {
         let how = self.settle(&gram, &scales, report)?;
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let fit = how.solve(&gram, &all, &scales)?;
+        tell_columns(&gram, |column| &self.regressors[column].name, report);
         if !fit.converged {
             report.notes.push(
                 "the descent did not come to its end: a larger penalty or fewer features would help"

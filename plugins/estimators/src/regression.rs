@@ -2,7 +2,7 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
+    Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
     TrainingSetup,
 };
 use athermal_numerics::{
@@ -11,6 +11,7 @@ use athermal_numerics::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
@@ -216,25 +217,7 @@ impl LinearTrainer {
     }
 
     fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
-        let names = |columns: &[usize]| {
-            columns
-                .iter()
-                .map(|&c| self.regressors[c].name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        if !fit.constant.is_empty() {
-            report.notes.push(format!(
-                "constant, so without effect: {}",
-                names(&fit.constant)
-            ));
-        }
-        if !fit.collinear.is_empty() {
-            report.notes.push(format!(
-                "nearly a combination of the others: {}",
-                names(&fit.collinear)
-            ));
-        }
+        name_columns(fit, |column| &self.regressors[column].name, report);
         match fit.method {
             Method::Cholesky => {}
             // Every coefficient is determined, so there is nothing to worry about.
@@ -312,6 +295,18 @@ pub struct LinearPredictor {
 impl Predictor for LinearPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let lists = [("coefficients", self.coefficients.len())];
+        let mut mistakes = Mistake::of_lengths(width, &lists);
+        if let Some(PredictionVariance { centre, root, .. }) = &self.variance {
+            mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
+            let triangle = width * (width + 1) / 2;
+            mistakes.extend(Mistake::of_lengths(triangle, &[("root", root.len())]));
+        }
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
