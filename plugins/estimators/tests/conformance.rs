@@ -238,7 +238,7 @@ conformance!(
 
 conformance!(
     Bj,
-    Case::new(r#"ahead = "1min""#).input("features", 1, "K"),
+    Case::new(r#"ahead = "1min""#),
     Case::new(
         r#"
         ahead = "0s"
@@ -250,6 +250,15 @@ conformance!(
         "#
     )
     .input("features", 1, "K"),
+    Case::new(
+        r#"
+        ahead = "30s"
+        nb = [2, 1]
+        nf = [1, 2]
+        penalty = 0.0
+        "#
+    )
+    .input("features", 2, "K"),
 );
 
 conformance!(
