@@ -209,7 +209,13 @@ fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<
         (true, false) => hessian[(i, j)] / (scales[i] * scales[j]) + damping[i],
         (false, false) => hessian[(i, j)] / (scales[i] * scales[j]),
     });
-    let right = |i: usize| if held(i) { 0.0 } else { gradient[i] / scales[i] };
+    let right = |i: usize| {
+        if held(i) {
+            0.0
+        } else {
+            gradient[i] / scales[i]
+        }
+    };
     let right = Mat::from_fn(count, 1, |i, _| right(i));
     let solved = scaled.llt(Side::Lower).ok()?.solve(&right);
     let step: Vec<f64> = (0..count).map(|i| solved[(i, 0)] / scales[i]).collect();
