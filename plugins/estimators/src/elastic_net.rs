@@ -14,7 +14,7 @@ use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::folds::Folds;
-use crate::regression::{LinearPredictor, told};
+use crate::regression::{LinearPredictor, tell_condition, told};
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
 ///
@@ -281,6 +281,7 @@ impl SparseTrainer {
             kept.len(),
             self.regressors.len()
         ));
+        tell_condition(&self.regressors, &gram, report)?;
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
         Ok(LinearPredictor {
             regressors: kept

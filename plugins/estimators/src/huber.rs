@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::elastic_net::{FEATURES_AND_TRUTH, present_features};
-use crate::regression::{LinearPredictor, rows_gone, told};
+use crate::regression::{LinearPredictor, rows_gone, tell_condition, told};
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.
 ///
@@ -109,6 +109,7 @@ impl Trainer for RobustTrainer {
             in_sample_rmse: Some((fit.residual_sum_of_squares / count as f64).sqrt()),
             ..TrainingReport::default()
         };
+        tell_condition(&self.regressors, &gram, &mut report).map_err(told)?;
         report.notes.push(format!(
             "{} of {count} rows count as outliers; the scale of the others is {:.4} {}",
             fit.outliers, fit.scale, self.unit

@@ -216,25 +216,7 @@ impl LinearTrainer {
     }
 
     fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
-        let names = |columns: &[usize]| {
-            columns
-                .iter()
-                .map(|&c| self.regressors[c].name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        if !fit.constant.is_empty() {
-            report.notes.push(format!(
-                "constant, so without effect: {}",
-                names(&fit.constant)
-            ));
-        }
-        if !fit.collinear.is_empty() {
-            report.notes.push(format!(
-                "nearly a combination of the others: {}",
-                names(&fit.collinear)
-            ));
-        }
+        name_dependent(&self.regressors, fit, report);
         match fit.method {
             Method::Cholesky => {}
             // Every coefficient is determined, so there is nothing to worry about.
@@ -266,6 +248,41 @@ impl Trainer for LinearTrainer {
         };
         Ok(Trained { predictor, report })
     }
+}
+
+/// Names the regressors that are constant, and those that others stand in for.
+fn name_dependent(regressors: &[Regressor], fit: &LinearFit, report: &mut TrainingReport) {
+    let names = |columns: &[usize]| {
+        let names = columns.iter().map(|&c| regressors[c].name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    if !fit.constant.is_empty() {
+        report.notes.push(format!(
+            "constant, so without effect: {}",
+            names(&fit.constant)
+        ));
+    }
+    if !fit.collinear.is_empty() {
+        report.notes.push(format!(
+            "nearly a combination of the others: {}",
+            names(&fit.collinear)
+        ));
+    }
+}
+
+/// Tells how well the rows determine a fit that is not found by least squares: its condition number, and the names of regressors
+/// that are constant or that others stand in for.
+pub(crate) fn tell_condition(
+    regressors: &[Regressor],
+    gram: &Gram,
+    report: &mut TrainingReport,
+) -> Result<(), NumericsError> {
+    let all: Vec<usize> = (0..regressors.len()).collect();
+    let scales = Standardization::of(gram).scales;
+    let fit = LeastSquares::ordinary().solve(gram, &all, &scales, None)?;
+    report.condition = Some(fit.condition);
+    name_dependent(regressors, &fit, report);
+    Ok(())
 }
 
 /// Why the numbers allow no fit, as the framework tells it.
