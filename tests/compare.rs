@@ -252,6 +252,14 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
                 name.clone(),
                 probe("wall-heatflow/wall.csv", "wall-heatflow/wall.csv"),
             )),
+            name if name == "machine-temperature" => {
+                let file = "temperature-faults/nab_machine_temperature_system_failure.csv";
+                runs.push((name.clone(), probe(file, file)));
+            }
+            name if name == "ambient-temperature" => {
+                let file = "temperature-faults/nab_ambient_temperature_system_failure.csv";
+                runs.push((name.clone(), probe(file, file)));
+            }
             name => panic!("no recording is named for graphs/{name}.toml"),
         }
     }

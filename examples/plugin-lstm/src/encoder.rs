@@ -156,6 +156,10 @@ impl Predictor for FittedEncoder {
         &self.0.uses
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        self.0.mistakes()
+    }
+
     fn predict(&self, regressors: &[f64]) -> f64 {
         self.0.predict(regressors)
     }

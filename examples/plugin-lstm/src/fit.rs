@@ -1,5 +1,6 @@
 //! Decides what a fit gives: a network with the scales of what it reads and answers, and what it makes of a row.
 
+use athermal_core::node::Mistake;
 use serde::{Deserialize, Serialize};
 
 use crate::network::{MOST_UNITS, Memory, Network};
@@ -50,17 +51,35 @@ impl Scale {
 pub(crate) const MOST_CHANNELS: usize = 256;
 
 impl Fit {
-    /// What the network remembers of a row; none where the model file makes no sense.
-    fn remember(&self, row: &[f64]) -> Option<Memory> {
-        let channels = self.network.channels();
-        let sound = self.network.is_sound()
-            && (1..=MOST_CHANNELS).contains(&channels)
-            && self.inputs.len() == channels
-            && row.len() == self.uses.len()
-            && row.len().is_multiple_of(channels);
-        if !sound {
-            return None;
-        }
+    /// What of it does not fit together: a model file may have been written by hand.
+    pub(crate) fn mistakes(&self) -> Vec<Mistake> {
+        let (channels, steps) = (self.inputs.len(), self.uses.len());
+        let mut mistakes = self.network.mistakes(channels);
+        let mut check = |at: &str, found: usize, fits: bool, allowed: &str| {
+            if !fits {
+                let message = format!("`{at}` has {found} values and must have {allowed}");
+                mistakes.push(Mistake::at(at, message));
+            }
+        };
+        let most = format!("1 to {MOST_CHANNELS}");
+        check(
+            "inputs",
+            channels,
+            (1..=MOST_CHANNELS).contains(&channels),
+            &most,
+        );
+        let whole = steps > 0 && steps.is_multiple_of(channels.max(1));
+        check(
+            "uses",
+            steps,
+            whole,
+            "as many for each step of the sequence",
+        );
+        mistakes
+    }
+
+    fn remember(&self, row: &[f64]) -> Memory {
+        let channels = self.inputs.len();
         let mut memory = Memory::empty();
         let mut scaled = [0.0; MOST_CHANNELS];
         for step in row.chunks_exact(channels) {
@@ -69,21 +88,18 @@ impl Fit {
             }
             self.network.step(&scaled[..channels], &mut memory);
         }
-        Some(memory)
+        memory
     }
 
     /// The answer of the network, in the unit of the truth.
     pub(crate) fn predict(&self, row: &[f64]) -> f64 {
-        self.remember(row).map_or(f64::NAN, |memory| {
-            self.truth.mean + self.truth.deviation * self.network.read_out(&memory)
-        })
+        let shown = self.network.read_out(&self.remember(row));
+        self.truth.mean + self.truth.deviation * shown
     }
 
     /// What each unit shows at the end of a row.
     pub(crate) fn encode(&self, row: &[f64], code: &mut [f64; MOST_UNITS]) {
-        if let Some(memory) = self.remember(row) {
-            let units = self.network.units();
-            code[..units].copy_from_slice(memory.hidden(units));
-        }
+        let units = self.network.units();
+        code[..units].copy_from_slice(self.remember(row).hidden(units));
     }
 }

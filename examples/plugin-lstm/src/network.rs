@@ -1,5 +1,6 @@
 //! Decides what a network is, and what it makes of one sequence. Nothing is allocated here once it is there.
 
+use athermal_core::node::Mistake;
 use athermal_core::prng::Prng;
 use serde::{Deserialize, Serialize};
 
@@ -71,10 +72,22 @@ impl Network {
         &mut self.weights
     }
 
-    /// Whether it is one that can be run: a model file may have been written by hand.
-    pub(crate) fn is_sound(&self) -> bool {
-        (1..=MOST_UNITS).contains(&self.units)
-            && self.weights.len() == self.gates() + self.units + 1
+    /// What of it does not fit together, or so many channels.
+    pub(crate) fn mistakes(&self, channels: usize) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        if !(1..=MOST_UNITS).contains(&self.units) {
+            let message = format!("`units` is {} and must be 1 to {MOST_UNITS}", self.units);
+            mistakes.push(Mistake::at("network.units", message));
+        }
+        if self.channels != channels {
+            let message = format!("`channels` is {} and must be {channels}", self.channels);
+            mistakes.push(Mistake::at("network.channels", message));
+        }
+        if mistakes.is_empty() {
+            let needed = self.gates() + self.units + 1;
+            mistakes = Mistake::of_lengths(needed, &[("weights", self.weights.len())]);
+        }
+        mistakes
     }
 
     /// The readout.
@@ -150,7 +163,7 @@ mod tests {
                 2.0, -0.25, // v and d
             ],
         };
-        assert!(network.is_sound());
+        assert!(network.mistakes(1).is_empty());
         let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
         let (mut h, mut c) = (0.0_f64, 0.0_f64);
         for x in [1.5, -0.7] {
@@ -173,6 +186,6 @@ mod tests {
         let network = |seed| Network::random(3, 5, seed);
         assert_eq!(network(1), network(1));
         assert_ne!(network(1), network(2));
-        assert!(network(1).is_sound());
+        assert!(network(1).mistakes(3).is_empty());
     }
 }

@@ -13,8 +13,9 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::conditioning::tell_columns;
 use crate::folds::Folds;
-use crate::regression::{LinearPredictor, tell_condition, told};
+use crate::regression::{LinearPredictor, told};
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
 ///
@@ -266,6 +267,7 @@ impl SparseTrainer {
         let how = self.settle(&gram, &scales, report)?;
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let fit = how.solve(&gram, &all, &scales)?;
+        tell_columns(&gram, |column| &self.regressors[column].name, report);
         if !fit.converged {
             report.notes.push(
                 "the descent did not come to its end: a larger penalty or fewer features would help"
@@ -281,7 +283,6 @@ impl SparseTrainer {
             kept.len(),
             self.regressors.len()
         ));
-        tell_condition(&self.regressors, &gram, report)?;
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
         Ok(LinearPredictor {
             regressors: kept

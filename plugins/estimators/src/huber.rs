@@ -8,8 +8,9 @@ use athermal_numerics::{GramBlocks, Standardization};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::conditioning::tell_columns;
 use crate::elastic_net::{FEATURES_AND_TRUTH, present_features};
-use crate::regression::{LinearPredictor, rows_gone, tell_condition, told};
+use crate::regression::{LinearPredictor, rows_gone, told};
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.
 ///
@@ -109,7 +110,7 @@ impl Trainer for RobustTrainer {
             in_sample_rmse: Some((fit.residual_sum_of_squares / count as f64).sqrt()),
             ..TrainingReport::default()
         };
-        tell_condition(&self.regressors, &gram, &mut report).map_err(told)?;
+        tell_columns(&gram, |column| &self.regressors[column].name, &mut report);
         report.notes.push(format!(
             "{} of {count} rows count as outliers; the scale of the others is {:.4} {}",
             fit.outliers, fit.scale, self.unit

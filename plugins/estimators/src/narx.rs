@@ -6,12 +6,13 @@ use athermal_core::node::{
     Trainer, TrainingError, TrainingReport, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
-use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, NumericsError, Standardizer};
+use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::lags::{lag_mistakes, now};
 use crate::regression::told;
+use crate::scaling::{scale_mistakes, term_mistake};
 
 /// More terms would take the memory of many rows.
 const MOST_TERMS: usize = 500;
@@ -312,7 +313,7 @@ impl Trainer for NarxTrainer {
         used.dedup();
         let place = |variable: &usize| used.binary_search(variable).unwrap_or(0);
         let edge = |j: usize, value: f64| (value - expanding.centres[j]) / expanding.scales[j];
-        let predictor = NarxPredictor(Fitted {
+        let predictor = NarxPredictor {
             regressors: used
                 .iter()
                 .map(|&j| self.regressors[j].name.clone())
@@ -328,7 +329,7 @@ impl Trainer for NarxTrainer {
                 .collect(),
             coefficients: found.coefficients.clone(),
             mean: expanding.mean,
-        });
+        };
         let mut report = self.report(&found);
         report.in_sample_rmse = Some(mean_square.sqrt());
         Ok(Trained {
@@ -340,12 +341,7 @@ impl Trainer for NarxTrainer {
 
 /// A fitted polynomial in features and past truths.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Fitted", into = "Fitted")]
-pub struct NarxPredictor(Fitted);
-
-/// The same as a model file has it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Fitted {
+pub struct NarxPredictor {
     regressors: Vec<String>,
     #[serde(with = "numbers")]
     centres: Vec<f64>,
@@ -364,99 +360,38 @@ struct Fitted {
     mean: f64,
 }
 
-impl From<NarxPredictor> for Fitted {
-    fn from(predictor: NarxPredictor) -> Self {
-        predictor.0
-    }
-}
-
-impl TryFrom<Fitted> for NarxPredictor {
-    type Error = NumericsError;
-
-    fn try_from(fitted: Fitted) -> Result<Self, NumericsError> {
-        let width = fitted.regressors.len();
-        for list in [
-            &fitted.centres,
-            &fitted.scales,
-            &fitted.lowest,
-            &fitted.highest,
-        ] {
-            if list.len() != width {
-                return Err(NumericsError::Width {
-                    expected: width,
-                    found: list.len(),
-                });
-            }
-        }
-        if fitted.coefficients.len() != fitted.terms.len() {
-            return Err(NumericsError::Width {
-                expected: fitted.terms.len(),
-                found: fitted.coefficients.len(),
-            });
-        }
-        let mut variables = fitted.terms.iter().flat_map(|term| &term.0);
-        match variables.find(|&&variable| variable >= width) {
-            Some(&column) => Err(NumericsError::Column { column, width }),
-            None => Ok(Self(fitted)),
-        }
-    }
-}
-
 #[typetag::serde(name = "narx")]
 impl Predictor for NarxPredictor {
     fn uses(&self) -> &[String] {
-        &self.0.regressors
+        &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let (centres, scales) = (("centres", &*self.centres), ("scales", &*self.scales));
+        let mut mistakes = scale_mistakes(width, centres, scales);
+        let edges = [
+            ("lowest", self.lowest.len()),
+            ("highest", self.highest.len()),
+        ];
+        mistakes.extend(Mistake::of_lengths(width, &edges));
+        let coefficients = [("coefficients", self.coefficients.len())];
+        mistakes.extend(Mistake::of_lengths(self.terms.len(), &coefficients));
+        let variables = self.terms.iter().flat_map(|term| &term.0);
+        mistakes.extend(term_mistake(width, variables.copied()));
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
-        let Self(fitted) = self;
-        let z = |j: usize| (regressors[j] - fitted.centres[j]) / fitted.scales[j];
-        let terms = fitted.terms.iter().zip(&fitted.coefficients);
-        terms.fold(fitted.mean, |sum, (term, coefficient)| {
+        let z = |j: usize| (regressors[j] - self.centres[j]) / self.scales[j];
+        let terms = self.terms.iter().zip(&self.coefficients);
+        terms.fold(self.mean, |sum, (term, coefficient)| {
             let product = if term.0.len() > 1 {
-                term.of(|j| z(j).max(fitted.lowest[j]).min(fitted.highest[j]))
+                term.of(|j| z(j).max(self.lowest[j]).min(self.highest[j]))
             } else {
                 term.of(z)
             };
             sum + coefficient * product
         })
-    }
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_model_whose_lists_do_not_fit_is_refused() {
-        let fitted = || Fitted {
-            regressors: vec!["a".to_owned(), "b".to_owned()],
-            centres: vec![1.0, 2.0],
-            scales: vec![1.0, 2.0],
-            lowest: vec![-1.0; 2],
-            highest: vec![1.0; 2],
-            terms: vec![Term(vec![0]), Term(vec![0, 1])],
-            coefficients: vec![3.0, 5.0],
-            mean: 7.0,
-        };
-        let read = |fitted: &Fitted| {
-            let text = serde_json::to_string(fitted).unwrap();
-            serde_json::from_str::<NarxPredictor>(&text)
-        };
-        let predictor = read(&fitted()).unwrap();
-        assert_eq!(predictor.predict(&[1.5, 3.0]), 7.0 + 3.0 * 0.5 + 5.0 * 0.25);
-        let edits: [fn(&mut Fitted); 5] = [
-            |fitted| fitted.regressors.truncate(1),
-            |fitted| fitted.scales.clear(),
-            |fitted| fitted.highest.push(1.0),
-            |fitted| fitted.coefficients.truncate(1),
-            |fitted| fitted.terms[1].0[1] = 2,
-        ];
-        for (nth, edit) in edits.into_iter().enumerate() {
-            let mut edited = fitted();
-            edit(&mut edited);
-            assert!(read(&edited).is_err(), "edit {nth}");
-        }
     }
 }

@@ -1,10 +1,12 @@
 //! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
 
 use athermal_core::model::{number, numbers};
-use athermal_core::node::{Learner, Predictor, Restored, State, TrainedRange};
+use athermal_core::node::{Learner, Mistake, Predictor, Restored, State, TrainedRange};
 use athermal_core::time::Instant;
 use athermal_numerics::{Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};
+
+use crate::scaling::scale_mistakes;
 
 /// Regressors as the recursion sees them: standardised as in the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +51,11 @@ impl Frame {
             scales: of(&standard.scales),
             level,
         }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        scale_mistakes(width, ("means", &self.means), ("scales", &self.scales))
     }
 
     /// Puts the standardised values at the beginning of a row.
@@ -96,6 +103,16 @@ impl Frame {
 }
 
 impl Recursion {
+    /// What does not fit so many regressors.
+    fn mistakes(&self, width: usize) -> Vec<Mistake> {
+        match self {
+            Self::Sgd(sgd) => Mistake::of_lengths(width, &[("weights", sgd.weights().len())]),
+            Self::Rls { rls, .. } => {
+                Mistake::of_lengths(width + 1, &[("coefficients", rls.coefficients().len())])
+            }
+        }
+    }
+
     /// The weights of the standardised regressors, and the intercept.
     fn weights(&self) -> (&[f64], f64) {
         match self {
@@ -143,6 +160,16 @@ impl OnlinePredictor {
 impl Predictor for OnlinePredictor {
     fn uses(&self) -> &[String] {
         &self.frame.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.frame.regressors.len();
+        let lists = [("coefficients", self.coefficients.len())];
+        let mut mistakes = Mistake::of_lengths(width, &lists);
+        mistakes.extend(self.frame.mistakes());
+        mistakes.extend(self.recursion.mistakes(width));
+        mistakes.extend(self.range.mistakes(width));
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
@@ -239,6 +266,10 @@ impl Learner for OnlineLearner {
         };
         if known.frame.regressors != self.state.frame.regressors {
             return Restored::cold("another fit chose other regressors");
+        }
+        let width = known.frame.regressors.len();
+        if !(known.frame.mistakes().is_empty() && known.recursion.mistakes(width).is_empty()) {
+            return Restored::cold("its parts do not fit together");
         }
         // What was learned goes on; how it goes on is said by the parameters of now.
         known.recursion = match (known.recursion, &self.state.recursion) {

@@ -1,8 +1,8 @@
 //! The baseline "it goes on as it did".
 
 use athermal_core::node::{
-    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
-    TrainingSetup, TruthLags,
+    Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError,
+    TrainingReport, TrainingSetup, TruthLags,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,10 @@ struct Same {
 impl Predictor for Same {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        Mistake::of_lengths(1, &[("regressors", self.regressors.len())])
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::elastic_net::{FEATURES_AND_TRUTH, present_features};
 use crate::regression::LinearTrainer;
+use crate::scaling::{scale_mistakes, term_mistake};
 use crate::selection::Selection;
 use crate::solver::Solver;
 
@@ -284,6 +285,17 @@ pub struct PolynomialPredictor {
 impl Predictor for PolynomialPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let (centres, scales) = (("centres", &*self.centres), ("scales", &*self.scales));
+        let mut mistakes = scale_mistakes(width, centres, scales);
+        let coefficients = [("coefficients", self.coefficients.len())];
+        mistakes.extend(Mistake::of_lengths(self.terms.len(), &coefficients));
+        let features = self.terms.iter().flat_map(|term| [Some(term.0), term.1]);
+        mistakes.extend(term_mistake(width, features.flatten()));
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -2,7 +2,7 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
+    Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
     TrainingSetup,
 };
 use athermal_numerics::{
@@ -11,6 +11,7 @@ use athermal_numerics::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::conditioning::name_columns;
 use crate::lag_order::LagOrder;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
@@ -216,7 +217,7 @@ impl LinearTrainer {
     }
 
     fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
-        name_dependent(&self.regressors, fit, report);
+        name_columns(fit, |column| &self.regressors[column].name, report);
         match fit.method {
             Method::Cholesky => {}
             // Every coefficient is determined, so there is nothing to worry about.
@@ -248,41 +249,6 @@ impl Trainer for LinearTrainer {
         };
         Ok(Trained { predictor, report })
     }
-}
-
-/// Names the regressors that are constant, and those that others stand in for.
-fn name_dependent(regressors: &[Regressor], fit: &LinearFit, report: &mut TrainingReport) {
-    let names = |columns: &[usize]| {
-        let names = columns.iter().map(|&c| regressors[c].name.as_str());
-        names.collect::<Vec<_>>().join(", ")
-    };
-    if !fit.constant.is_empty() {
-        report.notes.push(format!(
-            "constant, so without effect: {}",
-            names(&fit.constant)
-        ));
-    }
-    if !fit.collinear.is_empty() {
-        report.notes.push(format!(
-            "nearly a combination of the others: {}",
-            names(&fit.collinear)
-        ));
-    }
-}
-
-/// Tells how well the rows determine a fit that is not found by least squares: its condition number, and the names of regressors
-/// that are constant or that others stand in for.
-pub(crate) fn tell_condition(
-    regressors: &[Regressor],
-    gram: &Gram,
-    report: &mut TrainingReport,
-) -> Result<(), NumericsError> {
-    let all: Vec<usize> = (0..regressors.len()).collect();
-    let scales = Standardization::of(gram).scales;
-    let fit = LeastSquares::ordinary().solve(gram, &all, &scales, None)?;
-    report.condition = Some(fit.condition);
-    name_dependent(regressors, &fit, report);
-    Ok(())
 }
 
 /// Why the numbers allow no fit, as the framework tells it.
@@ -329,6 +295,18 @@ pub struct LinearPredictor {
 impl Predictor for LinearPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let lists = [("coefficients", self.coefficients.len())];
+        let mut mistakes = Mistake::of_lengths(width, &lists);
+        if let Some(PredictionVariance { centre, root, .. }) = &self.variance {
+            mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
+            let triangle = width * (width + 1) / 2;
+            mistakes.extend(Mistake::of_lengths(triangle, &[("root", root.len())]));
+        }
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

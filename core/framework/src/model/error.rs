@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::diagnostic::{Diagnostics, Sources};
 use crate::engine::EngineError;
+use crate::node::Mistake;
 
 /// Why a model or graph cannot be used.
 #[derive(Debug)]
@@ -22,6 +23,13 @@ pub enum ModelError {
         path: PathBuf,
         /// Why.
         source: serde_json::Error,
+    },
+    /// What was fitted cannot be used.
+    Fits {
+        /// The file.
+        path: PathBuf,
+        /// The nodes of which it cannot, and why.
+        refused: Vec<(String, Vec<Mistake>)>,
     },
     /// The file was written by a later version.
     TooNew {
@@ -60,6 +68,23 @@ impl fmt::Display for ModelError {
                     "{} is no model: {source}; a model is what `athermal fit GRAPH --data FILE -o MODEL` writes",
                     path.display()
                 )
+            }
+            Self::Fits { path, refused } => {
+                const MOST: usize = 6;
+                let path = path.display();
+                write!(
+                    f,
+                    "{path}: what was fitted cannot be used as it stands there"
+                )?;
+                for (node, mistakes) in &refused[..refused.len().min(MOST)] {
+                    let told: Vec<_> = mistakes.iter().map(|mistake| &*mistake.message).collect();
+                    write!(f, "\n  `{node}`: {}", told.join("; "))?;
+                }
+                let more = refused.len().saturating_sub(MOST);
+                if more > 0 {
+                    write!(f, "\n  and {more} more")?;
+                }
+                write!(f, "\ntake the file as it was written, or fit again")
             }
             Self::TooNew { path, version } => write!(
                 f,

@@ -11,7 +11,7 @@ use crate::compile::{Change, Plan, PlannedNode, Wanted, compile, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
 use crate::engine::{Engine, Fitted};
-use crate::node::Predictor;
+use crate::node::{Mistake, Predictor};
 
 /// The format that this version writes.
 pub(super) const FORMAT: u64 = 1;
@@ -50,6 +50,18 @@ struct ReadBack {
 #[derive(Deserialize)]
 struct Version {
     athermal_model: u64,
+}
+
+/// What was fitted, where it can be used as it is written.
+fn sound(written: serde_json::Value) -> Result<Box<dyn Predictor>, Vec<Mistake>> {
+    let predictor: Box<dyn Predictor> = serde_json::from_value(written)
+        .map_err(|error| vec![Mistake::at("", error.to_string())])?;
+    let mistakes = predictor.mistakes();
+    if mistakes.is_empty() {
+        Ok(predictor)
+    } else {
+        Err(mistakes)
+    }
 }
 
 impl Model {
@@ -123,11 +135,18 @@ impl Model {
                 sources: Box::new(sources),
             });
         };
-        let mut fitted = Fitted::new();
+        let (mut fitted, mut refused) = (Fitted::new(), Vec::new());
         for (node, written) in read.fitted {
-            let predictor: Box<dyn Predictor> =
-                serde_json::from_value(written).map_err(not_a_model)?;
-            fitted.insert(node, Arc::from(predictor));
+            match sound(written) {
+                Ok(predictor) => _ = fitted.insert(node, Arc::from(predictor)),
+                Err(mistakes) => refused.push((node, mistakes)),
+            }
+        }
+        if !refused.is_empty() {
+            return Err(ModelError::Fits {
+                path: path.to_owned(),
+                refused,
+            });
         }
         Ok(Self {
             graph,

@@ -347,6 +347,12 @@ pub trait Predictor: Any + Debug + Send + Sync {
     /// The names of the regressors that [`predict`](Predictor::predict) takes, in order.
     fn uses(&self) -> &[String];
 
+    /// What of it does not fit together, all of it, each at its path in the model file; asked for when a model is read, which
+    /// may have been edited by hand. Where there is any, nothing else is asked of it.
+    fn mistakes(&self) -> Vec<Mistake> {
+        Vec::new()
+    }
+
     /// The prediction, from present values of the used regressors.
     fn predict(&self, regressors: &[f64]) -> f64;
 

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Restored, State};
+use super::{Mistake, Restored, State};
 use crate::model::numbers;
 use crate::time::{Duration, Instant};
 
@@ -170,6 +170,16 @@ impl TrainedRange {
             lowest: some(&self.lowest),
             highest: some(&self.highest),
         }
+    }
+
+    /// What of it does not fit so many regressors.
+    #[must_use]
+    pub fn mistakes(&self, width: usize) -> Vec<Mistake> {
+        let ends = [
+            ("lowest", self.lowest.len()),
+            ("highest", self.highest.len()),
+        ];
+        Mistake::of_lengths(width, &ends)
     }
 
     /// Whether each value lies within its range, widened on either side by `margin` times its width.

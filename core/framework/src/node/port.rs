@@ -126,7 +126,7 @@ impl Inputs {
     }
 }
 
-/// What a kind finds wrong with its parameters or inputs when a graph is compiled.
+/// What a kind finds wrong with its parameters or inputs when a graph is compiled, or with what was fitted when a model is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mistake {
     /// The parameter (`windows`, `selection.folds`, `lags.1` for the second of a list) or input port (`inputs.signal`) at fault.
@@ -146,6 +146,21 @@ impl Mistake {
             message: message.into(),
             help: None,
         }
+    }
+
+    /// A mistake at each of these lists that has more or fewer values than it must have.
+    #[must_use]
+    pub fn of_lengths(needed: usize, lists: &[(&str, usize)]) -> Vec<Self> {
+        let wrong = lists.iter().filter(|(_, found)| *found != needed);
+        wrong
+            .map(|(at, found)| {
+                let plural = if *found == 1 { "" } else { "s" };
+                Self::at(
+                    *at,
+                    format!("`{at}` has {found} value{plural} and must have {needed}"),
+                )
+            })
+            .collect()
     }
 
     /// Adds the way out.

@@ -38,6 +38,8 @@ pub enum Rule {
     Fits,
     /// A fitted estimator written into a model and read back predicts with the same bits.
     Models,
+    /// A model that was edited by hand is refused in words, or runs.
+    Edited,
 }
 
 impl Rule {
@@ -61,6 +63,7 @@ impl Rule {
             Self::NoTrace => "no trace",
             Self::Fits => "fits",
             Self::Models => "models",
+            Self::Edited => "edited",
         }
     }
 
@@ -123,6 +126,10 @@ impl Rule {
             Self::Models => {
                 "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \
                  one may be infinite or NaN"
+            }
+            Self::Edited => {
+                "say in `Predictor::mistakes` what does not fit together, such as a list that is not as long as `uses`: it is asked \
+                 when a model is read, and nothing else of the predictor is if there is any"
             }
         }
     }

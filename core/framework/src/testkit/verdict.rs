@@ -75,7 +75,7 @@ fn broken_in(rule: Rule, case: Option<&Case>, found: String) -> Broken {
 }
 
 /// What a check finds; a panic in it is a finding too.
-fn tried<T>(check: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(super) fn tried<T>(check: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(check)).unwrap_or_else(|panic| {
         let said = panic
             .downcast_ref::<String>()

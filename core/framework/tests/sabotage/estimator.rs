@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use athermal_core::node::{
-    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use athermal_core::testkit::{Case, Rule};
 use athermal_core::time::Duration;
@@ -35,6 +35,8 @@ enum Fault {
     Unwritten,
     /// Counts on ten rows or more.
     Panics,
+    /// Counts on a model file that nobody has edited.
+    Trusting,
 }
 
 impl Estimator for Ratio {
@@ -105,7 +107,8 @@ impl Trainer for Averaging {
         let written = self.fault != Fault::Unwritten;
         let fitted = Fitted {
             regressors: self.regressors,
-            mean: if written { mean } else { 0.0 },
+            means: vec![if written { mean } else { 0.0 }],
+            trusting: self.fault == Fault::Trusting,
             unwritten: if written { 0.0 } else { mean },
         };
         Ok(Trained {
@@ -118,7 +121,9 @@ impl Trainer for Averaging {
 #[derive(Debug, Serialize, Deserialize)]
 struct Fitted {
     regressors: Vec<String>,
-    mean: f64,
+    /// Of the truths, the only one.
+    means: Vec<f64>,
+    trusting: bool,
     #[serde(skip)]
     unwritten: f64,
 }
@@ -129,8 +134,15 @@ impl Predictor for Fitted {
         &self.regressors
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        if self.trusting {
+            return Vec::new();
+        }
+        Mistake::of_lengths(1, &[("means", self.means.len())])
+    }
+
     fn predict(&self, _regressors: &[f64]) -> f64 {
-        self.mean + self.unwritten
+        self.means[0] + self.unwritten
     }
 }
 
@@ -164,4 +176,14 @@ fn a_fit_without_a_seed_is_another_every_time() {
 fn a_model_holds_all_that_predicts() {
     breaks_only::<Ratio>(with("unwritten"), &[Rule::Models]);
     breaks::<Ratio>(with("unwritten"), Rule::Models, "predicts otherwise");
+}
+
+#[test]
+fn a_model_that_was_edited_is_not_trusted() {
+    breaks_only::<Ratio>(with("trusting"), &[Rule::Edited]);
+    breaks::<Ratio>(
+        with("trusting"),
+        Rule::Edited,
+        "with the last dropped of /fitted/node/means, it panics: index out of bounds",
+    );
 }

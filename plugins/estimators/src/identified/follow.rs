@@ -5,29 +5,23 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use athermal_core::model::numbers;
-use athermal_core::node::{Learner, Predictor, Restored, State};
+use athermal_core::node::{Learner, Mistake, Predictor, Restored, State};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Polynomials, Stepper};
 use serde::{Deserialize, Serialize};
 
+use crate::order::LARGEST;
+use crate::scaling::Scaling;
+
+/// The most interleaved series.
+pub(super) const MOST_SERIES: usize = 16;
+/// How often the noise is integrated at most.
+pub(super) const MOST_DIFFERENCES: usize = 2;
+/// After more steps than that without inputs a model begins anew, unless it reaches further back itself. A mode that hardly
+/// decays would go anywhere with inputs that stay as they last were.
+const UNSEEN: usize = 10;
 /// How many runs within a step are kept.
 const RUNS_PER_STEP: i64 = 16;
-
-/// How inputs are brought to a common scale.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Scaling {
-    #[serde(with = "numbers")]
-    pub(super) means: Vec<f64>,
-    #[serde(with = "numbers")]
-    pub(super) scales: Vec<f64>,
-}
-
-impl Scaling {
-    fn of<'a>(&'a self, row: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
-        |nth| (row[nth] - self.means[nth]) / self.scales[nth]
-    }
-}
 
 /// A model as it was identified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +43,48 @@ pub(super) struct Identified {
 impl Predictor for Identified {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let mut mistakes = self.scaling.mistakes(width);
+        let inputs = &self.model.inputs;
+        mistakes.extend(Mistake::of_lengths(width, &[("inputs", inputs.len())]));
+        let mut check = |at: &str, found: String, fits: bool, allowed: &str| {
+            if !fits {
+                let message = format!("`{at}` is {found} and must be {allowed}");
+                mistakes.push(Mistake::at(at, message));
+            }
+        };
+        let delays = inputs.iter().map(|input| ("delay", input.delay, LARGEST));
+        let differences = ("differences", self.model.differences, MOST_DIFFERENCES);
+        for (at, found, most) in delays.chain([differences]) {
+            check(
+                at,
+                found.to_string(),
+                found <= most,
+                &format!("0 to {most}"),
+            );
+        }
+        let step = self.step;
+        check(
+            "step",
+            step.to_string(),
+            step > Duration::ZERO,
+            "longer than nothing",
+        );
+        let series = self.series;
+        let allowed = format!("from 1 to {MOST_SERIES}");
+        check(
+            "series",
+            series.to_string(),
+            (1..=MOST_SERIES).contains(&series),
+            &allowed,
+        );
+        if self.deviations.is_empty() {
+            mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
+        }
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
@@ -112,7 +148,7 @@ impl Following {
                 regressors: of.regressors.clone(),
                 scaling: of.scaling.clone(),
                 step: of.step,
-                series: vec![followed; of.series.max(1)],
+                series: vec![followed; of.series],
                 begun: false,
                 runs: VecDeque::new(),
                 inputs: VecDeque::new(),
@@ -163,7 +199,7 @@ impl Known {
     fn pass(&self, stepper: &mut Stepper, at: Instant, row: &[f64]) {
         let count = self.runs.partition_point(|&of| of <= at);
         let width = self.scaling.means.len();
-        let Scaling { means, scales } = &self.scaling;
+        let Scaling { means, scales, .. } = &self.scaling;
         match count.checked_sub(1) {
             Some(run) => stepper.step(
                 |nth| (self.inputs[run * width + nth] - means[nth]) / scales[nth],
@@ -171,6 +207,29 @@ impl Known {
             ),
             None => stepper.step(self.scaling.of(row), None),
         };
+    }
+
+    /// Whether too long ago there was a run, of a model that has inputs.
+    fn lost(&self, of: Instant) -> bool {
+        let inputs = self
+            .series
+            .first()
+            .map(|followed| &followed.stepper.model().inputs);
+        let reaches = inputs
+            .into_iter()
+            .flatten()
+            .map(|input| input.delay + input.b.len());
+        let longest = reaches.max().map(|reach| reach.max(UNSEEN) as i64);
+        let last = self.runs.back();
+        last.zip(longest)
+            .is_some_and(|(&last, longest)| self.steps(last, of) > longest)
+    }
+
+    /// Forgets where it was.
+    fn end(&mut self) {
+        self.begun = false;
+        self.runs.clear();
+        self.inputs.clear();
     }
 
     /// How many steps lie between two instants.
@@ -211,6 +270,9 @@ impl Learner for Following {
         let known = &mut self.known;
         if regressors.iter().any(|value| value.is_nan()) {
             return;
+        }
+        if known.lost(of) {
+            known.end();
         }
         if !known.begun {
             known.begin(regressors, of);
@@ -306,9 +368,7 @@ impl Learner for Following {
     }
 
     fn segment(&mut self, _shift: Duration) {
-        self.known.begun = false;
-        self.known.runs.clear();
-        self.known.inputs.clear();
+        self.known.end();
     }
 
     fn snapshot(&self) -> Box<dyn State> {
@@ -329,6 +389,9 @@ impl Learner for Following {
         if known.step != self.known.step || known.series.len() != self.known.series.len() {
             return Restored::cold("it was followed in other steps");
         }
+        if known.inputs.len() != known.runs.len() * known.regressors.len() {
+            return Restored::cold("its runs have other inputs");
+        }
         let mut series = self.known.series.clone();
         for (own, other) in series.iter_mut().zip(&known.series) {
             if !own.stepper.resume(&other.stepper) {
@@ -345,5 +408,73 @@ impl Learner for Following {
         runs.reserve(runs.len().max(16));
         inputs.reserve(inputs.len().max(16));
         Restored::Accepted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use athermal_numerics::Transfer;
+
+    /// What a model that sums its input up, nearly, predicts of a truth of 0 around a pause of so many steps.
+    fn around_a_pause(steps: i64) -> Vec<f64> {
+        let step = Duration::from_ns(1_000_000_000);
+        let model = Identified {
+            regressors: vec!["input".to_owned()],
+            scaling: Scaling {
+                means: vec![0.0],
+                scales: vec![1.0],
+                truth: 0.0,
+            },
+            model: Polynomials {
+                a: vec![-0.9995],
+                inputs: vec![Transfer {
+                    delay: 0,
+                    b: vec![0.1],
+                    f: Vec::new(),
+                }],
+                c: Vec::new(),
+                d: Vec::new(),
+                differences: 0,
+                level: 0.0,
+            },
+            step,
+            series: 1,
+            deviations: vec![1.0],
+        };
+        assert_eq!(model.mistakes(), []);
+        let mut learner = Following::new(&model);
+        let instants = (0..20).chain(20 + steps..40 + steps);
+        let predicted = instants.map(|nth| {
+            let of = Instant::from_ns(0) + part(step, nth, 1);
+            learner.run(&[1.0], of, of - step);
+            let predicted = learner.predict(&[1.0], of);
+            learner.learn(&[1.0], 0.0, of);
+            predicted
+        });
+        predicted.collect()
+    }
+
+    #[test]
+    fn a_short_pause_is_bridged_with_the_inputs_before_it() {
+        let predicted = around_a_pause(5);
+        assert!(predicted[0].is_nan(), "nothing has been told");
+        assert!(
+            predicted[1..].iter().all(|value| value.abs() < 0.7),
+            "{predicted:?}"
+        );
+    }
+
+    #[test]
+    fn after_a_long_pause_it_begins_anew() {
+        let predicted = around_a_pause(100);
+        assert!(
+            predicted[20].is_nan(),
+            "nothing has been told: {predicted:?}"
+        );
+        assert!(
+            predicted[21..].iter().all(|value| value.abs() < 0.2),
+            "{predicted:?}"
+        );
     }
 }

@@ -9,6 +9,7 @@ use athermal_core::time::Duration;
 use athermal_numerics::{InputOrders, Orders};
 
 use crate::order::{LARGEST, Order};
+use follow::MOST_DIFFERENCES;
 pub use per_input::PerInput;
 pub(crate) use train::{Found, IdentifiedTrainer, Identify};
 
@@ -110,8 +111,11 @@ impl Asked {
             let orders = orders.iter().flat_map(PerInput::each);
             orders.for_each(|order| check(name, order));
         }
-        if self.differences > 2 {
-            let message = format!("`differences` is {} and must be 0 to 2", self.differences);
+        if self.differences > MOST_DIFFERENCES {
+            let message = format!(
+                "`differences` is {} and must be 0 to {MOST_DIFFERENCES}",
+                self.differences
+            );
             mistakes.push(Mistake::at("differences", message));
         }
         if !(self.penalty >= 0.0 && self.penalty.is_finite()) {

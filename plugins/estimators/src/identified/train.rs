@@ -8,11 +8,11 @@ use athermal_numerics::{
 };
 
 use super::Asked;
-use super::follow::{Identified, Scaling};
+use super::follow::{Identified, MOST_SERIES};
+use crate::conditioning::tell_rows;
 use crate::regression::told;
+use crate::scaling::Scaling;
 
-/// The most interleaved series.
-const MOST_SERIES: usize = 16;
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
 const STEPS_AHEAD: usize = 256;
 
@@ -172,6 +172,8 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let standard = standard.standardization();
         let samples = self.samples(pace, &standard);
         let found = self.asked.identify(&samples, pace.series, report)?;
+        let truths: Vec<f64> = self.rows.iter().map(|row| row.truth).collect();
+        tell_rows(&self.names, &self.regressors, &truths, report);
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
@@ -182,6 +184,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             scaling: Scaling {
                 means: standard.means,
                 scales: standard.scales,
+                truth: 0.0,
             },
             deviations: variances
                 .iter()

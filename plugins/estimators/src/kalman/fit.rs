@@ -9,7 +9,9 @@ use athermal_numerics::{
     most_likely,
 };
 
-use super::{Kalman, KalmanPredictor, Noises, Scaling};
+use super::{Kalman, KalmanPredictor, Noises};
+use crate::conditioning::tell_rows;
+use crate::scaling::Scaling;
 
 /// The most rows that the search for variances goes through, again and again.
 const MOST_ROWS: usize = 20_000;
@@ -138,6 +140,7 @@ impl KalmanTrainer {
                 "the rows do not determine all coefficients; with a `penalty` above 0 they need not",
             ));
         }
+        tell_rows(&self.names, &scaled, &truths, report);
         self.tell(&followed, report);
         let mut filter = followed.filter;
         filter.restart_level(&followed.at_large);

@@ -1,6 +1,5 @@
 //! The estimator that follows a level and a trend while truths come in.
 
-use athermal_core::model::{number, numbers};
 use athermal_core::node::{
     Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored, State,
     Trainer, TrainingSetup,
@@ -14,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 mod fit;
 
+use crate::scaling::Scaling;
 use fit::KalmanTrainer;
 
 /// Kalman filter of a structural model: a level that wanders, maybe with a trend, and linear regression on features.
@@ -209,25 +209,6 @@ impl Noises {
     }
 }
 
-/// How regressors are brought to a common scale.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Scaling {
-    #[serde(with = "numbers")]
-    means: Vec<f64>,
-    #[serde(with = "numbers")]
-    scales: Vec<f64>,
-    /// The mean of the truth.
-    #[serde(default, with = "number")]
-    truth: f64,
-}
-
-impl Scaling {
-    fn of<'a>(&'a self, regressors: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
-        |nth| (regressors[nth] - self.means[nth]) / self.scales[nth]
-    }
-}
-
 /// A fitted structural model: where its filter starts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -246,6 +227,21 @@ struct KalmanPredictor {
 impl Predictor for KalmanPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let width = self.regressors.len();
+        let mut mistakes = self.scaling.mistakes(width);
+        let known = self.filter.regressors();
+        if known != width {
+            let message = format!("`filter` has {known} coefficients and must have {width}");
+            mistakes.push(Mistake::at("filter", message));
+        }
+        if !self.filter.can_restart(&self.at_large) {
+            let message = "`at_large` must have a finite mean and variance for the level, and for the trend where there is one";
+            mistakes.push(Mistake::at("at_large", message));
+        }
+        mistakes
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -129,15 +129,7 @@ pub(super) fn models(subject: &Subject<'_>) -> Result<(), String> {
 
 /// What was fitted, written into a model and read back.
 fn through_a_model(subject: &Subject<'_>, fitted: &Fitted) -> Result<Fitted, String> {
-    let model = Model {
-        graph: subject.fixture.graph.clone(),
-        plan: subject.fixture.plan.clone(),
-        fitted: fitted.clone(),
-        card: None,
-    };
-    let text = model
-        .to_text()
-        .map_err(|error| format!("its model cannot be written: {error}"))?;
+    let text = text_of(subject, fitted)?;
     let read = Model::from_text("model.json", text.clone())
         .map_err(|error| format!("its model cannot be read back: {error}"))?;
     let again = read.to_text().map_err(|error| error.to_string())?;
@@ -148,6 +140,19 @@ fn through_a_model(subject: &Subject<'_>, fitted: &Fitted) -> Result<Fitted, Str
             "its model, read back, is written otherwise: {text} and {again}"
         ))
     }
+}
+
+/// The text of a model of what was fitted.
+pub(super) fn text_of(subject: &Subject<'_>, fitted: &Fitted) -> Result<String, String> {
+    let model = Model {
+        graph: subject.fixture.graph.clone(),
+        plan: subject.fixture.plan.clone(),
+        fitted: fitted.clone(),
+        card: None,
+    };
+    model
+        .to_text()
+        .map_err(|error| format!("its model cannot be written: {error}"))
 }
 
 /// What was fitted, as a model holds it.

@@ -2,6 +2,7 @@
 
 mod absence;
 mod allocation;
+mod edited;
 mod explained;
 mod fitting;
 mod parameters;
@@ -43,7 +44,7 @@ pub(super) struct Subject<'a> {
 type Check = fn(&Subject<'_>, others: &[Subject<'_>]) -> Result<(), String>;
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 15] = [
+pub(super) const ALL: [(Rule, Check); 16] = [
     (Rule::Answers, |subject, _| subject.answers()),
     (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
     (Rule::Ranges, |subject, _| parameters::ranges(subject)),
@@ -63,6 +64,7 @@ pub(super) const ALL: [(Rule, Check); 15] = [
     (Rule::NoTrace, |subject, _| traces::no_trace(subject)),
     (Rule::Fits, |subject, _| fitting::fits(subject)),
     (Rule::Models, |subject, _| fitting::models(subject)),
+    (Rule::Edited, |subject, _| edited::edited(subject)),
 ];
 
 impl<'a> Subject<'a> {

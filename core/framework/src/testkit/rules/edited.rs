@@ -1,0 +1,130 @@
+//! Decides whether a model that was edited by hand is refused in words or runs.
+
+use serde_json::{Value, json};
+
+use super::super::compared::course;
+use super::super::fixture::NODE;
+use super::super::verdict::tried;
+use super::Subject;
+use super::fitting::text_of;
+use crate::model::Model;
+
+/// How many ticks an edited model is run for.
+const TICKS: usize = 200;
+
+/// What is written in place of a number that counts or points at something.
+const MANY: u64 = 1 << 40;
+
+pub(super) fn edited(subject: &Subject<'_>) -> Result<(), String> {
+    if !subject.is_fitted() {
+        return Ok(());
+    }
+    let text = text_of(subject, &subject.fitted)?;
+    let model: Value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
+    let mut places = Vec::new();
+    find(
+        &model["fitted"][NODE],
+        &format!("/fitted/{NODE}"),
+        &mut places,
+    );
+    for place in places {
+        for (edit, what) in EDITS {
+            let mut model = model.clone();
+            if model.pointer_mut(&place).is_some_and(edit) {
+                tried(|| runs(subject, &model))
+                    .map_err(|found| format!("with {what} {place}, {found}"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What may have been done to a list or number; false where it cannot be done to this one.
+type Edit = fn(&mut Value) -> bool;
+
+const EDITS: [(Edit, &str); 5] = [
+    (
+        |value| {
+            value
+                .as_array_mut()
+                .is_some_and(|list| list.pop().is_some())
+        },
+        "the last dropped of",
+    ),
+    (
+        |value| {
+            let list = value.as_array_mut().filter(|list| !list.is_empty());
+            list.is_some_and(|list| {
+                list.remove(0);
+                true
+            })
+        },
+        "the first dropped of",
+    ),
+    (
+        |value| {
+            let list = value.as_array_mut().filter(|list| !list.is_empty());
+            list.is_some_and(|list| {
+                list.clear();
+                true
+            })
+        },
+        "nothing left of",
+    ),
+    (
+        |value| {
+            let list = value.as_array_mut();
+            list.is_some_and(|list| {
+                let again = list.last().cloned().unwrap_or_else(|| json!(1.0));
+                list.push(again);
+                true
+            })
+        },
+        "one more in",
+    ),
+    (
+        |value| {
+            let counts = value.is_u64();
+            if counts {
+                *value = json!(MANY);
+            }
+            counts
+        },
+        "a large number in place of",
+    ),
+];
+
+/// The places of lists and of numbers that count, as JSON pointers.
+fn find(value: &Value, at: &str, places: &mut Vec<String>) {
+    match value {
+        Value::Array(list) => {
+            places.push(at.to_owned());
+            for (nth, value) in list.iter().enumerate() {
+                find(value, &format!("{at}/{nth}"), places);
+            }
+        }
+        Value::Object(table) => {
+            for (key, value) in table {
+                find(value, &format!("{at}/{key}"), places);
+            }
+        }
+        Value::Number(number) if number.is_u64() => places.push(at.to_owned()),
+        _ => {}
+    }
+}
+
+/// Reads a model and runs it, unless it is refused.
+fn runs(subject: &Subject<'_>, model: &Value) -> Result<(), String> {
+    let read = Model::from_text("model.json", model.to_string());
+    let engine = read.and_then(|model| model.engine());
+    let Ok(mut engine) = engine else {
+        return Ok(());
+    };
+    let events = subject.events();
+    course(
+        &subject.fixture,
+        &mut engine,
+        &events[..TICKS.min(events.len())],
+    );
+    Ok(())
+}

@@ -1,0 +1,53 @@
+//! Decides how columns that say nothing, or nothing new, are told; what is made of them is each estimator's.
+
+use athermal_core::node::TrainingReport;
+use athermal_numerics::{Gram, LeastSquares, LinearFit, Standardization};
+
+/// Names the constant columns of a fit and those that are nearly a combination of others.
+pub(crate) fn name_columns<'a>(
+    fit: &LinearFit,
+    name: impl Fn(usize) -> &'a str,
+    report: &mut TrainingReport,
+) {
+    let told = [
+        ("constant, so without effect", &fit.constant),
+        ("nearly a combination of the others", &fit.collinear),
+    ];
+    for (what, columns) in told {
+        let names: Vec<&str> = columns.iter().map(|&column| name(column)).collect();
+        if !names.is_empty() {
+            report.notes.push(format!("{what}: {}", names.join(", ")));
+        }
+    }
+}
+
+/// The same of all columns of some rows, with their condition number, for a fit that is not made by least squares.
+pub(crate) fn tell_columns<'a>(
+    gram: &Gram,
+    name: impl Fn(usize) -> &'a str,
+    report: &mut TrainingReport,
+) {
+    let all: Vec<usize> = (0..gram.width()).collect();
+    let scales = Standardization::of(gram).scales;
+    let solved = LeastSquares::ridge(1.0).solve(gram, &all, &scales, None);
+    if let Ok(fit) = solved
+        && !all.is_empty()
+    {
+        report.condition = Some(fit.condition);
+        name_columns(&fit, name, report);
+    }
+}
+
+/// The same of rows that stand one after the other.
+pub(crate) fn tell_rows(
+    names: &[String],
+    rows: &[f64],
+    truths: &[f64],
+    report: &mut TrainingReport,
+) {
+    let mut gram = Gram::new(names.len());
+    for (row, truth) in rows.chunks_exact(names.len().max(1)).zip(truths) {
+        gram.push(row, *truth);
+    }
+    tell_columns(&gram, |column| &names[column], report);
+}

@@ -1,0 +1,66 @@
+//! Decides how a fitted model brings regressors to a common scale, and what makes no scale.
+
+use athermal_core::model::{number, numbers};
+use athermal_core::node::Mistake;
+use serde::{Deserialize, Serialize};
+
+/// What each regressor varies about and how far, as a model file has it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Scaling {
+    #[serde(with = "numbers")]
+    pub(crate) means: Vec<f64>,
+    #[serde(with = "numbers")]
+    pub(crate) scales: Vec<f64>,
+    /// The mean of the truth, where that is subtracted too.
+    #[serde(default, with = "number", skip_serializing_if = "is_zero")]
+    pub(crate) truth: f64,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+impl Scaling {
+    /// The scaled values of a row, by their places.
+    pub(crate) fn of<'a>(&'a self, row: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
+        |nth| (row[nth] - self.means[nth]) / self.scales[nth]
+    }
+
+    /// What is wrong with it for so many regressors.
+    pub(crate) fn mistakes(&self, width: usize) -> Vec<Mistake> {
+        scale_mistakes(width, ("means", &self.means), ("scales", &self.scales))
+    }
+}
+
+/// What is wrong with means and scales of so many regressors.
+pub(crate) fn scale_mistakes(
+    width: usize,
+    means: (&str, &[f64]),
+    scales: (&str, &[f64]),
+) -> Vec<Mistake> {
+    let lists = [(means.0, means.1.len()), (scales.0, scales.1.len())];
+    let mut mistakes = Mistake::of_lengths(width, &lists);
+    let (at, scales) = scales;
+    if let Some(scale) = scales
+        .iter()
+        .find(|scale| !(**scale > 0.0 && scale.is_finite()))
+    {
+        mistakes.push(Mistake::at(
+            at,
+            format!("`{at}` has {scale} and must have values above 0"),
+        ));
+    }
+    mistakes
+}
+
+/// What is wrong with terms whose variables stand at these places, of so many.
+pub(crate) fn term_mistake(
+    width: usize,
+    mut places: impl Iterator<Item = usize>,
+) -> Option<Mistake> {
+    let place = places.find(|&place| place >= width)?;
+    let message = format!("`terms` names regressor {place} and there are {width}, from 0 on");
+    Some(Mistake::at("terms", message))
+}
