@@ -166,7 +166,7 @@ fn a_truth_that_follows_a_sensor_ten_minutes_later_has_its_largest_correlation_t
         1000.0 * course[row.saturating_sub(60)][0]
     });
     let observation = observe(&model, &table).unwrap();
-    let found = lag::lags(&model, &table, &observation).unwrap();
+    let found = lag::lags(&model, &table, &observation, &[]).unwrap();
     assert_eq!(found.len(), 1);
     let of = |name: &str| {
         found[0]
@@ -437,12 +437,28 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
     let facts = diagnosed(&[&"--no-fit", &"--format", &"json"]).json();
     assert_eq!(facts["diagnosis"]["main"].as_array().unwrap().len(), 6);
     assert!(facts["diagnosis"]["days"].is_null());
-    let of_one = diagnosed(&[&"--no-fit", &"--of", &"thermal.Z1"]);
+    let few = scratch.path("few");
+    let of_one = diagnosed(&[&"--no-fit", &"--of", &"thermal.Z1", &"--plots", &few]);
     assert!(
-        of_one.out.contains("per σ") && !of_one.out.contains("vote.X1"),
+        of_one.out.contains("per σ") && !of_one.out.contains("vote."),
         "{}",
         of_one.out
     );
+    assert!(of_one.out.contains("left of it by thermal.Z1"));
+    let drawn = std::fs::read_dir(few).unwrap();
+    let mut drawn: Vec<_> = drawn
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".svg"))
+        .collect();
+    drawn.sort();
+    let expected = [
+        "autocorrelation-thermal_Z1.svg",
+        "impulse-thermal_Z1.svg",
+        "lags-drift_Z1.svg",
+        "lags-residual-drift_Z1.svg",
+        "step-thermal_Z1.svg",
+    ];
+    assert_eq!(drawn, expected);
 }
 
 #[test]
@@ -474,6 +490,7 @@ fn a_recording_without_a_truth_is_no_reason_to_stop() {
     let options = Options {
         day: "1d".parse().ok(),
         windows: true,
+        ..Options::default()
     };
     let mut empty = Table::default();
     diagnose(&model, &empty, &options, &mut |_, _| {}).unwrap();

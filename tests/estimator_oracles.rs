@@ -161,6 +161,29 @@ fn the_penalty_of_a_lasso_is_the_best_over_the_folds_of_the_oracle() {
     );
     let largest = expected["largest_alpha"].as_f64().unwrap();
     assert!((word("up to") / largest - 1.0).abs() < 1e-3, "{note}");
+    // Twenty to each factor of ten, over the four that glmnet goes down where there are more rows than features.
+    assert_eq!(word("from"), 81.0, "{note}");
+}
+
+#[test]
+fn constant_and_equal_features_are_named_by_what_is_not_least_squares_too() {
+    let mut rows = rows(None);
+    for row in &mut rows {
+        (row[10], row[11]) = (row[0], 3.0);
+    }
+    for kind in ["huber", "lasso", "elastic_net"] {
+        let (_, report) = on_rows(&format!("type = \"{kind}\""), "x", &rows);
+        let notes = report.notes.join("; ");
+        assert!(report.condition.unwrap() > 1e12, "{kind}: {report:?}");
+        assert!(
+            notes.contains("constant, so without effect: x.x11"),
+            "{kind}: {notes}"
+        );
+        assert!(
+            notes.contains("nearly a combination of the others: x.x10"),
+            "{kind}: {notes}"
+        );
+    }
 }
 
 #[test]

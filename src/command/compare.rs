@@ -132,7 +132,7 @@ fn free_name(own: Option<&str>, path: &str, fits: &[Fitted]) -> String {
     free.unwrap_or_default()
 }
 
-/// Whether an estimator could not be fitted; each is told.
+/// Whether a node could not be fitted; each is told.
 fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
     let mut failed = false;
     for fit in fits {

@@ -74,7 +74,7 @@ impl Demo {
         let estimators = fitted.card.as_ref().map_or(0, |card| card.estimators.len());
         tell(
             &model,
-            &format!("the graph and what its {estimators} estimators have learned"),
+            &format!("the graph and what {estimators} of its nodes have learned"),
         );
         folder.close()?;
 

@@ -1,4 +1,4 @@
-//! `athermal fit`: fits a graph's estimators on recorded data and writes a model.
+//! `athermal fit`: fits what a graph has to learn on recorded data, estimators and encoders, and writes a model.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -15,9 +15,9 @@ use super::data::{self, Data};
 use crate::figures::{count, number, paragraph, table};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
-/// Fit a graph's estimators on recorded data
+/// Fit a graph on recorded data
 ///
-/// Prints for each estimator the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
+/// Prints for each node that is fitted (estimators, and features that learn) the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
 /// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run.
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub struct Fit {
     /// Where the model goes; `-` is standard output
     #[arg(long, short, value_name = "MODEL")]
     output: PathBuf,
-    /// Threads that train estimators; the result does not depend on it
+    /// Threads that train; the result does not depend on it
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
@@ -111,7 +111,7 @@ impl Fit {
     }
 }
 
-/// Fits the estimators of a model on data, fills in its card, and tells what was left out of the data.
+/// Fits a model on data, fills in its card, and tells what was left out of the data.
 ///
 /// # Errors
 /// When the data cannot be read.
@@ -219,7 +219,7 @@ fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
     taken.chain(tried).max().unwrap_or(0)
 }
 
-/// What is told of one estimator.
+/// What is told of one fitted node.
 fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let mut text = String::new();
     let _ = write!(

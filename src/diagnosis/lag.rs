@@ -70,7 +70,8 @@ impl Correlogram {
     }
 }
 
-/// Works out the correlations of every truth of a model. Truths without a feature are left out.
+/// Works out the correlations of every truth of a model. Truths without a feature are left out. Residuals are those of predictions
+/// asked for by name, or else of what the graph puts out.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.
@@ -78,6 +79,7 @@ pub fn lags(
     model: &Model,
     recording: &dyn Recording,
     observation: &Observation,
+    of: &[String],
 ) -> Result<Vec<Lags>, FitError> {
     let plan = &*model.plan;
     let features: Vec<Vec<usize>> = observation
@@ -119,7 +121,7 @@ pub fn lags(
     let facts = with_features
         .filter(|(_, features)| !features.is_empty())
         .filter_map(|(truth, features)| {
-            let main = &truth.predictions[main_prediction(plan, truth)?];
+            let main = &truth.predictions[main_prediction(plan, truth, of)?];
             let left: Vec<f64> = truth
                 .values
                 .iter()
@@ -131,15 +133,15 @@ pub fn lags(
                 let smooth = autocorrelation(&series, REACH * count);
                 (series, smooth)
             });
-            let of = |slot: usize, (y, y_smooth): &(Vec<f64>, Vec<f64>), from_s: f64| {
+            let against = |slot: usize, (y, y_smooth): &(Vec<f64>, Vec<f64>), from_s: f64| {
                 let place = grid.place_of(slot);
                 let (x, x_smooth) = (&grid.series[place], &smoothness[place]);
                 correlogram((x, x_smooth), (y, y_smooth), &lag_s, from_s)
             };
             let features = features.iter().map(|&slot| FeatureLags {
                 feature: plan.channels[slot].name.clone(),
-                truth: of(slot, &sides[0], f64::NEG_INFINITY),
-                residual: of(slot, &sides[1], main.ahead.secs()),
+                truth: against(slot, &sides[0], f64::NEG_INFINITY),
+                residual: against(slot, &sides[1], main.ahead.secs()),
             });
             Some(Lags {
                 truth: plan.channels[truth.slot].name.clone(),

@@ -14,8 +14,9 @@ pub mod response;
 pub mod sensor;
 pub mod window;
 
-pub use observation::{Observation, SourceStatistics, observe};
+pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
 pub use plot::plots;
+pub(crate) use plot::{Picture, response as response_picture, with_truth as truth_picture};
 
 use athermal_core::compile::Plan;
 use athermal_core::fit::FitError;
@@ -51,7 +52,7 @@ pub struct Diagnosis {
     pub windows: Vec<window::Windows>,
 }
 
-/// A truth and the prediction that the graph is about: the first that it puts out, else the last one.
+/// A truth and the prediction of it that is meant: of those asked for, or else all, the first that the graph puts out, or the last.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Main {
     /// The truth: `drift.Z1`.
@@ -65,8 +66,10 @@ pub struct Main {
 }
 
 /// What is diagnosed beside what always is.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Options {
+    /// Names of predictions that are asked for, by channel, node or axis; none for what the graph puts out.
+    pub of: Vec<String>,
     /// How long a day is of which fits are made and scored; none leaves fits out.
     pub day: Option<Duration>,
     /// Whether drifts are set against their windows.
@@ -86,7 +89,7 @@ pub fn diagnose(
     let plan = &*model.plan;
     let observation = observe(model, recording)?;
     let main = observation.trace.truths.iter().filter_map(|truth| {
-        let of = &truth.predictions[main_prediction(plan, truth)?];
+        let of = &truth.predictions[main_prediction(plan, truth, &options.of)?];
         let channel = &plan.channels[truth.slot];
         Some(Main {
             truth: channel.name.clone(),
@@ -99,7 +102,7 @@ pub fn diagnose(
         graph: plan.name.clone().unwrap_or_default(),
         main: main.collect(),
         residuals: residual::residuals(plan, &observation),
-        lags: lag::lags(model, recording, &observation)?,
+        lags: lag::lags(model, recording, &observation, &options.of)?,
         responses: response::responses(model, &observation)?,
         designs: regressor::designs(model, recording)?,
         contributions: sensor::contributions(model, recording, &observation)?,

@@ -109,9 +109,28 @@ impl Observation {
     }
 }
 
-/// Which prediction of a truth the graph is about: the first that it puts out, else the last one.
-pub(super) fn main_prediction(plan: &Plan, truth: &TruthTrace) -> Option<usize> {
+/// Whether a prediction goes by a name: that of its channel, its node or its axis.
+#[must_use]
+pub fn is_called(prediction: &str, name: &str) -> bool {
+    let parts = prediction.split_once('.');
+    prediction == name || parts.is_some_and(|(node, axis)| node == name || axis == name)
+}
+
+/// Whether a prediction is among those asked for by name: every one where none is named.
+#[must_use]
+pub fn is_asked(prediction: &str, of: &[String]) -> bool {
+    of.is_empty() || of.iter().any(|name| is_called(prediction, name))
+}
+
+/// Which prediction of a truth is meant: of those asked for the first that the graph puts out, else the last one; of all where none
+/// of this truth is asked for.
+pub(super) fn main_prediction(plan: &Plan, truth: &TruthTrace, of: &[String]) -> Option<usize> {
     let out = |slot: usize| plan.outputs.iter().any(|output| output.slot == slot);
-    let first = truth.predictions.iter().position(|of| out(of.slot));
-    first.or(truth.predictions.len().checked_sub(1))
+    let asked = |nth: &usize| is_asked(&plan.channels[truth.predictions[*nth].slot].name, of);
+    let mut meant: Vec<usize> = (0..truth.predictions.len()).filter(asked).collect();
+    if meant.is_empty() {
+        meant = (0..truth.predictions.len()).collect();
+    }
+    let first = meant.iter().find(|&&nth| out(truth.predictions[nth].slot));
+    first.or(meant.last()).copied()
 }

@@ -1,11 +1,12 @@
-//! Decides which pictures a diagnosis has; how one is drawn is decided by [`crate::chart`].
+//! Decides which pictures a diagnosis has, and how correlations and responses are shown wherever they are; how a picture is drawn
+//! is decided by [`crate::chart`].
 
-use super::Diagnosis;
 use super::day::{CurvePoint, DayScore, Days};
 use super::lag::{Correlogram, FeatureLags, Lags};
 use super::residual::Residuals;
 use super::response::{Response, Responses};
 use super::window::{Width, Windows};
+use super::{Diagnosis, Main, is_asked};
 use crate::chart::{Chart, LINES, Layer, Mark, Plot};
 
 /// Lines whose labels have room beside each other.
@@ -50,15 +51,17 @@ impl Points {
 }
 
 /// A picture without its name.
-struct Picture {
+#[derive(Default)]
+pub(crate) struct Picture {
     title: String,
     x_label: &'static str,
     y_label: String,
+    y_range: Option<(f64, f64)>,
     points: Vec<Points>,
 }
 
 impl Picture {
-    fn plot(&self, name: impl Into<String>) -> Option<Plot> {
+    pub(crate) fn chart(&self) -> Chart<'_> {
         let layers = self.points.iter().map(|of| Layer {
             x: &of.x,
             y: &of.y,
@@ -66,24 +69,28 @@ impl Picture {
             label: of.label.clone(),
             mark: of.mark,
         });
-        let chart = Chart {
+        Chart {
             title: self.title.clone(),
             x_label: self.x_label,
             y_label: self.y_label.clone(),
+            y_range: self.y_range,
             height: 340.0,
             layers: layers.collect(),
             ..Chart::default()
-        };
-        Plot::of(name, &chart)
+        }
     }
 }
 
-/// Every picture of a diagnosis; those with nothing to draw are left out.
+/// Every picture of a diagnosis, or of the predictions asked for by name; those with nothing to draw are left out.
 #[must_use]
-pub fn plots(diagnosis: &Diagnosis) -> Vec<Plot> {
+pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
     let mut plots = Vec::new();
-    let mut add = |name: String, picture: Picture| plots.extend(picture.plot(name));
-    let is_main = |name: &str| diagnosis.main.iter().any(|main| main.prediction == name);
+    let mut add = |name: String, picture: Picture| plots.extend(Plot::of(name, &picture.chart()));
+    let main = diagnosis.main.iter();
+    let main: Vec<&Main> = main
+        .filter(|main| is_asked(&main.prediction, asked))
+        .collect();
+    let is_main = |name: &str| main.iter().any(|main| main.prediction == name);
     let residuals = diagnosis.residuals.iter();
     for of in residuals.filter(|of| is_main(&of.prediction) && !of.bound.is_empty()) {
         add(
@@ -91,29 +98,34 @@ pub fn plots(diagnosis: &Diagnosis) -> Vec<Plot> {
             autocorrelation(of),
         );
     }
-    for of in &diagnosis.lags {
-        let truth = lags(of, &of.truth, |feature| &feature.truth);
-        add(format!("lags-{}", of.truth), truth);
+    for of in diagnosis.lags.iter().filter(|of| is_main(&of.prediction)) {
+        add(format!("lags-{}", of.truth), with_truth(of));
         let left = format!("what {} leaves of {}", of.prediction, of.truth);
         let left = lags(of, &left, |feature| &feature.residual);
         add(format!("lags-residual-{}", of.truth), left);
     }
-    for of in &diagnosis.responses {
+    for of in diagnosis
+        .responses
+        .iter()
+        .filter(|of| is_asked(&of.node, asked))
+    {
         add(format!("impulse-{}", of.node), response(of, true));
         add(format!("step-{}", of.node), response(of, false));
     }
     if let Some(days) = &diagnosis.days {
-        add("days".to_owned(), learning(diagnosis, days));
+        add("days".to_owned(), learning(&main, days));
     }
-    if !diagnosis.windows.is_empty() {
-        add("windows".to_owned(), windows(&diagnosis.windows));
+    let is_shown = |of: &&Windows| main.iter().any(|main| main.truth == of.truth);
+    let of_windows: Vec<&Windows> = diagnosis.windows.iter().filter(is_shown).collect();
+    if !of_windows.is_empty() {
+        add("windows".to_owned(), windows(&of_windows));
     }
     plots
 }
 
-fn learning(diagnosis: &Diagnosis, days: &Days) -> Picture {
+fn learning(main: &[&Main], days: &Days) -> Picture {
     let x: Vec<f64> = days.curve.iter().map(|point| point.days as f64).collect();
-    let curve = diagnosis.main.iter().enumerate().map(|(nth, main)| {
+    let curve = main.iter().enumerate().map(|(nth, main)| {
         let score = |point: &CurvePoint| {
             let mut scores = point.scores.iter();
             let score = scores.find(|score| score.prediction == main.prediction);
@@ -127,10 +139,11 @@ fn learning(diagnosis: &Diagnosis, days: &Days) -> Picture {
         x_label: "days",
         y_label: "times the error of all others".to_owned(),
         points: curve.collect(),
+        ..Picture::default()
     }
 }
 
-fn windows(windows: &[Windows]) -> Picture {
+fn windows(windows: &[&Windows]) -> Picture {
     let lines = windows.iter().enumerate().map(|(nth, of)| {
         let shown = |width: &&Width| {
             width.window_s <= WINDOWS_SHOWN * of.window_s && width.ratio.is_finite()
@@ -145,6 +158,7 @@ fn windows(windows: &[Windows]) -> Picture {
         x_label: "window in minutes",
         y_label: "signal to noise".to_owned(),
         points: lines.collect(),
+        ..Picture::default()
     }
 }
 
@@ -180,7 +194,13 @@ fn autocorrelation(of: &Residuals) -> Picture {
         x_label: "lag in minutes",
         y_label: of.prediction.clone(),
         points: vec![bars, above, below],
+        ..Picture::default()
     }
+}
+
+/// How features go with a truth.
+pub(crate) fn with_truth(of: &Lags) -> Picture {
+    lags(of, &of.truth, |feature| &feature.truth)
 }
 
 /// Of each sensor the feature that says most.
@@ -211,6 +231,7 @@ fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Pictu
         x_label: "minutes that it follows the feature",
         y_label: "r".to_owned(),
         points,
+        ..Picture::default()
     }
 }
 
@@ -219,7 +240,8 @@ fn short(name: &str) -> &str {
     name.split_once('.').map_or(name, |(_, channel)| channel)
 }
 
-fn response(of: &Responses, impulse: bool) -> Picture {
+/// How an estimator answers the sensors that it answers most: a step of one unit, or one unit for one minute.
+pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
     let mut largest: Vec<&Response> = of.sensors.iter().collect();
     largest.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
     largest.truncate(LINES.len());
@@ -232,6 +254,7 @@ fn response(of: &Responses, impulse: bool) -> Picture {
         };
         Points::line(nth, short(&sensor.sensor), x, y.clone())
     });
+    let lines: Vec<Points> = lines.collect();
     let of_unit = of.sensors.first().map_or("", |of| of.sensor_unit.as_str());
     let (what, unit) = if impulse {
         ("Impulse", format!("{} per {of_unit}·min", of.unit))
@@ -242,6 +265,16 @@ fn response(of: &Responses, impulse: bool) -> Picture {
         title: format!("{what} response of {}", of.node),
         x_label: "minutes after the change",
         y_label: unit,
-        points: lines.collect(),
+        y_range: impulse.then(|| most_of(&lines)).flatten(),
+        points: lines,
     }
+}
+
+/// Where nearly all of the lines lies. An impulse makes a spike in every slope that it enters, and beside that nothing would be seen.
+fn most_of(lines: &[Points]) -> Option<(f64, f64)> {
+    let values = lines.iter().flat_map(|line| &line.y);
+    let mut sizes: Vec<f64> = values.map(|v| v.abs()).filter(|v| *v > 0.0).collect();
+    sizes.sort_by(f64::total_cmp);
+    let size = sizes.get(sizes.len() * 95 / 100)?;
+    Some((-1.1 * size, 1.1 * size))
 }

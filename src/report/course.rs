@@ -1,15 +1,16 @@
-//! Decides what is written down while a model is stepped over a recording; not what it is worth.
+//! Decides what is written down while a model is stepped over a recording; not what it is worth, nor how truths are paired with
+//! predictions.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use athermal_control::Stability;
-use athermal_core::compile::{Plan, PlannedRole, TruthLink};
-use athermal_core::engine::{Engine, EngineError, Pairing};
+use athermal_core::compile::{Plan, PlannedRole};
+use athermal_core::engine::{Engine, EngineError};
 use athermal_core::model::Model;
 use athermal_core::quantity::Quantity;
 use athermal_core::recording::{Event, Recording};
+use athermal_core::score::{PredictionTrace, Trace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use serde::Serialize;
@@ -101,29 +102,26 @@ fn weights_of(ports: &[(&'static str, Range<usize>)]) -> Option<Range<usize>> {
     weights.map(|(_, slots)| slots.clone())
 }
 
-/// A prediction being paired with its truth.
-struct Pairs {
-    axis: usize,
-    voter: usize,
-    slot: usize,
+/// Where the truth of an axis is, and the weights by which it is voted.
+struct Places {
     truth: usize,
-    pairing: Pairing,
-    /// The slots of the weights by which it combines others.
     weights: Range<usize>,
 }
 
-/// Steps the model over the recording.
+/// Steps the model over the recording, whose truths and predictions have been paired in a pass of their own.
 pub(super) fn follow(
     model: &Model,
     recording: &dyn Recording,
+    trace: &Trace,
 ) -> Result<(Course, Option<Track>), ReportError> {
     let plan = Arc::new(telling(&model.plan));
     let mut engine = Engine::new(Arc::clone(&plan), &model.fitted)?;
+    let (axes, of_axes) = axes(&plan, trace);
     let mut course = Course {
         sensors: sensors(&plan),
+        axes,
         ..Course::default()
     };
-    let mut pairs = pairs(&plan, &mut course);
     let mut found = places(&plan);
     let mut rows = recording.open(&plan)?;
     let mut values = vec![f64::NAN; plan.sources.len()];
@@ -133,7 +131,6 @@ pub(super) fn follow(
         let time = match event {
             Event::Segment => {
                 engine.segment();
-                pairs.iter_mut().for_each(|pair| pair.pairing.clear());
                 course.sensors.iter_mut().for_each(SensorFacts::segment);
                 begins = true;
                 continue;
@@ -157,7 +154,9 @@ pub(super) fn follow(
         for (sensor, &value) in course.sensors.iter_mut().zip(&values) {
             sensor.look(now_s, value, &engine);
         }
-        look(&mut pairs, &mut course, &engine, time, now_s);
+        for (axis, places) in course.axes.iter_mut().zip(&of_axes) {
+            axis.look(places, &engine, now_s);
+        }
         if let Some((places, track)) = &mut found {
             track.look(places, &engine, now, begins);
         }
@@ -169,9 +168,8 @@ pub(super) fn follow(
     Ok((course, found.map(|(_, track)| track)))
 }
 
-fn pairs(plan: &Plan, course: &mut Course) -> Vec<Pairs> {
-    let mut of_truth: BTreeMap<usize, usize> = BTreeMap::new();
-    let mut pairs = Vec::new();
+/// Every truth with its predictions, in the order of the first of these.
+fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
     let put_out: Vec<usize> = plan.outputs.iter().map(|output| output.slot).collect();
     let rates: Vec<usize> = plan
         .nodes
@@ -183,97 +181,71 @@ fn pairs(plan: &Plan, course: &mut Course) -> Vec<Pairs> {
         })
         .flat_map(|&gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot))
         .collect();
-    let mut standing: Vec<u8> = Vec::new();
-    for (slot, channel) in plan.channels.iter().enumerate() {
-        let (Some(truth), Some(node)) = (channel.predicts, channel.node) else {
-            continue;
-        };
-        let of = &plan.channels[truth].channel;
-        let Some(limit) = of.default_max_age() else {
-            continue;
-        };
-        let axis = *of_truth.entry(truth).or_insert_with(|| {
-            course.axes.push(Axis {
-                name: of.name.clone(),
-                unit: of.unit.to_string(),
-                truth: Series::default(),
-                voters: Vec::new(),
-                main: 0,
-                ahead_s: channel.channel.ahead.secs(),
-                weights: Vec::new(),
-                states: states(plan, &of.unit),
-            });
-            standing.push(0);
-            course.axes.len() - 1
-        });
-        let link = TruthLink {
-            slot: truth,
-            ahead: channel.channel.ahead,
-            span: of.span,
-            limit,
-        };
-        let voter = course.axes[axis].voters.len();
-        course.axes[axis].voters.push(Voter {
-            node: plan.nodes[node].name.clone(),
-            kind: plan.nodes[node].kind.name,
-            value: Vec::new(),
-        });
-        // What is integrated counts most, then what is put out first.
-        let stands = 2 * u8::from(rates.contains(&slot)) + u8::from(put_out.contains(&slot));
-        if stands > standing[axis] {
-            standing[axis] = stands;
-            course.axes[axis].main = voter;
-            course.axes[axis].ahead_s = channel.channel.ahead.secs();
-        }
-        let combines = matches!(plan.nodes[node].role, PlannedRole::Combiner { .. });
+    // What is integrated counts most, then what is put out, of several the first.
+    let stands =
+        |slot: usize| 2 * u8::from(rates.contains(&slot)) + u8::from(put_out.contains(&slot));
+    let mut truths: Vec<&TruthTrace> = trace.truths.iter().collect();
+    truths.sort_by_key(|truth| truth.predictions.first().map(|of| of.slot));
+    let axis = |truth: &TruthTrace| {
+        let of = &plan.channels[truth.slot].channel;
+        let all = || truth.predictions.iter();
+        let main = all()
+            .enumerate()
+            .rev()
+            .max_by_key(|(_, of)| stands(of.slot));
+        let main = main.map_or(0, |(nth, _)| nth);
         // One vote is shown, the first: the picture of two would not be read.
-        let shown = combines && course.axes[axis].weights.is_empty();
-        let weights = weights_of(&plan.nodes[node].ports).filter(|_| shown);
-        let weights = weights.unwrap_or_default();
-        course.axes[axis]
-            .weights
-            .extend(weights.clone().map(|slot| {
-                Weight {
-                    node: plan.nodes[node].name.clone(),
-                    voter: plan.channels[slot]
-                        .channel
-                        .name
-                        .trim_start_matches("weight-")
-                        .to_owned(),
-                    value: Vec::new(),
-                }
-            }));
-        pairs.push(Pairs {
-            axis,
-            voter,
-            slot,
-            truth,
-            pairing: Pairing::new(&link, 1),
-            weights,
+        let vote = all().map(|of| &plan.nodes[of.node]).find_map(|node| {
+            let combines = matches!(node.role, PlannedRole::Combiner { .. });
+            Some((node, weights_of(&node.ports).filter(|_| combines)?))
         });
-    }
-    pairs
+        let slots = vote.as_ref().map_or(0..0, |(_, slots)| slots.clone());
+        let weight = |slot: usize| Weight {
+            node: vote
+                .as_ref()
+                .map_or_else(String::new, |(node, _)| node.name.clone()),
+            voter: plan.channels[slot]
+                .channel
+                .name
+                .trim_start_matches("weight-")
+                .to_owned(),
+            value: Vec::new(),
+        };
+        let voter = |of: &PredictionTrace| Voter {
+            node: plan.nodes[of.node].name.clone(),
+            kind: plan.nodes[of.node].kind.name,
+            value: of.values.clone(),
+        };
+        let axis = Axis {
+            name: of.name.clone(),
+            unit: of.unit.to_string(),
+            truth: Series::default(),
+            voters: all().map(voter).collect(),
+            main,
+            ahead_s: truth
+                .predictions
+                .get(main)
+                .map_or(0.0, |of| of.ahead.secs()),
+            weights: slots.clone().map(weight).collect(),
+            states: states(plan, &of.unit),
+        };
+        let places = Places {
+            truth: truth.slot,
+            weights: slots,
+        };
+        (axis, places)
+    };
+    truths.into_iter().map(axis).unzip()
 }
 
-fn look(pairs: &mut [Pairs], course: &mut Course, engine: &Engine, time: Instant, now_s: f64) {
-    for pair in pairs {
-        if engine.ran(pair.slot) {
-            pair.pairing.run(time, [&[engine.value(pair.slot)][..]]);
-        }
-        let truth = engine.value(pair.truth);
+impl Axis {
+    fn look(&mut self, places: &Places, engine: &Engine, now_s: f64) {
+        let truth = engine.value(places.truth);
         if truth.is_nan() {
-            continue;
+            return;
         }
-        let axis = &mut course.axes[pair.axis];
-        if pair.voter == 0 {
-            axis.truth.push(now_s, truth);
-        }
-        let paired = pair
-            .pairing
-            .truth(time)
-            .map_or(f64::NAN, |paired| paired.row[0]);
-        axis.voters[pair.voter].value.push(paired);
-        for (weight, slot) in axis.weights.iter_mut().zip(pair.weights.clone()) {
+        self.truth.push(now_s, truth);
+        for (weight, slot) in self.weights.iter_mut().zip(places.weights.clone()) {
             weight.value.push(engine.value(slot));
         }
     }

@@ -127,7 +127,7 @@ pub fn gather(
         &mut |_| {},
     )?;
     let observation = observe(model, recording)?;
-    let (course, track) = course::follow(model, recording)?;
+    let (course, track) = course::follow(model, recording, &observation.trace)?;
     let worth = track
         .map(|mut track| worth::worth(&mut track))
         .transpose()?;
@@ -138,7 +138,7 @@ pub fn gather(
         verdicts: course.axes.iter().map(verdict).collect(),
         published: published::published(&course),
         errors: course.axes.iter().map(Errors::of).collect(),
-        lags: lags(model, recording, &observation)?,
+        lags: lags(model, recording, &observation, &[])?,
         responses: responses(model, &observation)?,
         scores,
         course,

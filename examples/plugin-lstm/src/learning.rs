@@ -56,7 +56,7 @@ impl Learning {
             steps: lags.len(),
             layout: Layout::of(&setup.regressors, lags),
             span: setup.span,
-            unit: setup.truth_unit.clone(),
+            unit: setup.error_unit.clone(),
             room: setup.memory / size_of::<f64>(),
             thinned: 1,
             seen: 0,

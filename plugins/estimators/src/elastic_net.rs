@@ -53,8 +53,9 @@ pub struct Path {
     /// How the rows are cut: a number of contiguous folds, or a table.
     #[serde(default = "Folds::three")]
     pub folds: Folds,
-    /// The smallest penalty tried, as a share of the one that leaves out every feature; above 0, below 1.
-    #[serde(default = "thousandth")]
+    /// The smallest penalty tried, as a share of the one that leaves out every feature; above 0, below 1. The default is that
+    /// of the authors' program glmnet for more rows than features.
+    #[serde(default = "ten_thousandth")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub smallest_share: f64,
     /// How many are tried to each factor of ten, 1 or more.
@@ -63,8 +64,8 @@ pub struct Path {
     pub per_decade: u32,
 }
 
-fn thousandth() -> f64 {
-    1e-3
+fn ten_thousandth() -> f64 {
+    1e-4
 }
 
 fn twenty() -> u32 {
@@ -75,7 +76,7 @@ impl Default for SparsePenalty {
     fn default() -> Self {
         Self::Chosen(Path {
             folds: Folds::three(),
-            smallest_share: thousandth(),
+            smallest_share: ten_thousandth(),
             per_decade: twenty(),
         })
     }

@@ -64,7 +64,7 @@ impl Estimator for Huber {
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(RobustTrainer {
             regressors: setup.regressors.clone(),
-            unit: setup.truth_unit.clone(),
+            unit: setup.error_unit.clone(),
             how: athermal_numerics::Huber {
                 epsilon: self.epsilon,
                 alpha: self.alpha,

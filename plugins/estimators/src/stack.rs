@@ -213,7 +213,7 @@ mod tests {
             regressors: (0..rows[0].0.len()).map(regressor).collect(),
             places: (0..rows[0].0.len()).collect(),
             asked_for: rows[0].0.len(),
-            truth_unit: "nm/min".to_owned(),
+            error_unit: "nm/min".to_owned(),
             memory: 1 << 20,
             ahead: Duration::ZERO,
             span: Duration::ZERO,

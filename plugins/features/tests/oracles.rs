@@ -229,6 +229,75 @@ fn oracle_of_differences() {
 }
 
 #[test]
+fn oracle_of_first_order_lags() {
+    for tau in ["5", "60", "900"] {
+        for (output, column) in [("value", 0), ("difference", 1)] {
+            let node = format!(
+                "type = \"first_order\"\ntime_constants = [\"{tau}s\"]\noutput = \"{output}\"\n"
+            );
+            compare(
+                &node,
+                "first_order.csv",
+                &[tau],
+                &[("lagged", column)],
+                1e-12,
+            );
+        }
+    }
+}
+
+#[test]
+fn oracle_of_minimum_differences() {
+    for least in ["0.005", "0.3"] {
+        let node = format!("type = \"minimum_difference\"\ndifference = \"{least} mm\"\n");
+        compare(
+            &node,
+            "minimum_difference.csv",
+            &[least],
+            &[("signal", 0)],
+            0.0,
+        );
+    }
+}
+
+#[test]
+fn oracle_of_a_factor_and_an_offset_in_another_unit() {
+    let node = "type = \"scale\"\nfactor = 2.5\noffset = \"-0.1 [in_i]\"\nunit = \"[in_i]\"\n";
+    compare(node, "scale.csv", &[], &[("scaled", 0)], 1e-14);
+}
+
+#[test]
+fn oracle_of_sums_and_products_of_held_values() {
+    let expected = table("together.csv");
+    for (node, output, column) in [
+        ("type = \"sum\"\nweights = [0.5, -2.5]\n", "sum", 1),
+        ("type = \"product\"\nunit = \"mm2\"\n", "product", 2),
+    ] {
+        let mut bench = Bench::new(node, &[output]);
+        let (mut compared, mut too_old) = (0, 0);
+        for (row, samples) in input().iter().enumerate() {
+            bench.tick(samples);
+            let line = expected.iter().find(|line| line[0] == row.to_string());
+            let Some(line) = line else {
+                continue;
+            };
+            let (expected, found) = (
+                number(&line[column]),
+                bench.output(&format!("{output}.{output}")),
+            );
+            assert!(
+                (found - expected).abs() <= 1e-13 * expected.abs()
+                    || (found.is_nan() && expected.is_nan()),
+                "{output} in row {row}: {found} for {expected}"
+            );
+            compared += usize::from(!expected.is_nan());
+            too_old += usize::from(expected.is_nan());
+        }
+        assert!(compared > 300 && too_old > 0, "{compared}, {too_old}");
+    }
+}
+
+#[test]
 fn oracle_of_a_regular_clock() {
     let rows = input();
     for (every, method, column) in [(10, "mean", 3), (10, "last", 4), (30, "mean", 3)] {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use athermal::Duration;
 use athermal::core::compile::{Plan, Wanted};
-use athermal::diagnosis::{Diagnosis, Options, day, diagnose, plots};
+use athermal::diagnosis::{Diagnosis, Options, day, diagnose, is_called, plots};
 use clap::Args;
 use serde_json::json;
 
@@ -72,6 +72,7 @@ impl Diagnose {
         self.check_names(&model.plan)?;
         let dataset = self.data.dataset();
         let options = Options {
+            of: self.of.clone(),
             day: (!self.no_fit).then_some(self.day),
             windows: self.window,
         };
@@ -93,7 +94,7 @@ impl Diagnose {
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
         self.tell(terminal, &diagnosis);
         if let Some(folder) = &self.plots {
-            write_plots(terminal, folder, &plots(&diagnosis))?;
+            write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
         }
         Ok(Answer::Fine)
     }
@@ -124,7 +125,7 @@ impl Diagnose {
         let unknown = self
             .of
             .iter()
-            .find(|name| !known.iter().any(|known| tables::is_called(known, name)));
+            .find(|name| !known.iter().any(|known| is_called(known, name)));
         let Some(unknown) = unknown else {
             return Ok(());
         };

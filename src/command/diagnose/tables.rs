@@ -8,7 +8,7 @@ use athermal::diagnosis::lag::{Correlogram, FeatureLags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::Residuals;
 use athermal::diagnosis::response::Response;
-use athermal::diagnosis::{Diagnosis, Main};
+use athermal::diagnosis::{Diagnosis, Main, is_asked};
 
 use crate::figures::{count, length, matrix, number, or_dash, table};
 
@@ -20,12 +20,6 @@ const SAYS_SOMETHING: f64 = 3.0;
 const INFLATED: f64 = 10.0;
 /// Fits on fewer days are enough when their error is at most so many times that of fits on all others.
 const ENOUGH: f64 = 1.05;
-
-/// Whether a prediction goes by a name: that of its channel, its node or its axis.
-pub fn is_called(prediction: &str, name: &str) -> bool {
-    let parts = prediction.split_once('.');
-    prediction == name || parts.is_some_and(|(node, axis)| node == name || axis == name)
-}
 
 /// The tables of a diagnosis, of the predictions asked for.
 pub struct Tables<'a> {
@@ -57,7 +51,7 @@ impl<'a> Tables<'a> {
         if self.asked.is_empty() {
             return self.main().any(|main| main.prediction == prediction);
         }
-        self.asked.iter().any(|name| is_called(prediction, name))
+        is_asked(prediction, self.asked)
     }
 
     /// The truths of which something is shown.
@@ -65,19 +59,14 @@ impl<'a> Tables<'a> {
         let shown = |main: &&Main| {
             let residuals = self.diagnosis.residuals.iter();
             let mut of_truth = residuals.filter(|of| of.truth == main.truth);
-            self.asked.is_empty()
-                || of_truth.any(|of| {
-                    self.asked
-                        .iter()
-                        .any(|name| is_called(&of.prediction, name))
-                })
+            of_truth.any(|of| is_asked(&of.prediction, self.asked))
         };
         self.diagnosis.main.iter().filter(shown)
     }
 
     /// Estimators are shown with the truths that they predict, or where they are asked for.
     fn shows_estimator(&self, node: &str) -> bool {
-        self.asked.is_empty() || self.asked.iter().any(|name| is_called(node, name))
+        is_asked(node, self.asked)
     }
 
     /// A text for the predictions of each unit, since headings tell it.
@@ -494,6 +483,8 @@ fn seconds(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use athermal::diagnosis::is_called;
+
     use super::*;
 
     #[test]

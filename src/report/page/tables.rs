@@ -180,7 +180,7 @@ pub(super) fn sensors(sensors: &[SensorFacts]) -> String {
     table(&header, &rows)
 }
 
-/// How the fit of each estimator went.
+/// How the fit of each node that has one went.
 pub(super) fn estimators(estimators: &[EstimatorCard]) -> String {
     let mut rows = String::new();
     for estimator in estimators {
@@ -201,7 +201,7 @@ pub(super) fn estimators(estimators: &[EstimatorCard]) -> String {
     }
     table(
         &[
-            "estimator",
+            "node",
             "kind",
             "rows",
             "left out",

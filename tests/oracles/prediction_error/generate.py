@@ -1,4 +1,4 @@
-"""Models identified by the prediction error: ARMA and ARIMA by statsmodels, ARMAX, OE and BJ by sippy_unipi, all by scipy.
+"""Models identified by the prediction error: ARMA, ARIMA and ARIMAX by statsmodels, ARMAX, OE and BJ by sippy_unipi, all by scipy.
 
 python 3.11, numpy 2.3, scipy 1.17, statsmodels 0.15, sippy_unipi 1.0. Run it in this folder; it is seeded and writes samples.csv
 and expected.json. statsmodels maximises the exact likelihood, with the variance of each coefficient; sippy_unipi and scipy
@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pandas as pd
 import sippy_unipi
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 from scipy.signal import lfilter, lfiltic
 from statsmodels.tsa.arima.model import ARIMA
 
@@ -93,6 +93,23 @@ def by_statsmodels(name, order):
     }
 
 
+def arimax_by_statsmodels():
+    """On the differences it is ARMAX, for each `a` a regression with an error that is a moving average; `a` is the likeliest."""
+    dy, du = np.diff(samples["arimax"]), np.diff(u)
+    inputs = np.c_[du[1:-1], du[:-2]]
+
+    def model(a):
+        return ARIMA(dy[2:] + a * dy[1:-1], exog=inputs, order=(0, 0, 1), trend="n").fit()
+
+    a = minimize_scalar(lambda a: -model(a).llf, bounds=(-0.9, -0.5), method="bounded", options={"xatol": 1e-8}).x
+    found = model(a)
+    *rest, variance = found.params
+    h = 1e-3  # the curvature of the likelihood of `a`, all others being the likeliest beside it
+    curvature = (2 * found.llf - model(a - h).llf - model(a + h).llf) / h**2
+    errors = [curvature**-0.5, *found.bse[:-1]]
+    return {"coefficients": [a, *rest], "errors": list(map(float, errors)), "variance": float(variance)}
+
+
 def by_sippy(name, kind, **orders):
     y = samples[name].to_numpy() - samples[name].mean()
     model = sippy_unipi.system_identification(y.reshape(1, -1), (u - u.mean()).reshape(1, -1), kind, **orders)
@@ -106,6 +123,7 @@ for name in TRUE:
     expected[name] = {"scipy": by_scipy(name)}
 expected["arma"]["statsmodels"] = by_statsmodels("arma", (2, 0, 1))
 expected["arima"]["statsmodels"] = by_statsmodels("arima", (1, 1, 1))
+expected["arimax"]["statsmodels"] = arimax_by_statsmodels()
 SIPPY = [("armax", "ARMAX", dict(ARMAX_orders=[2, 2, 1, 0], ARMAX_mod="ILLS", max_iterations=400)),
          ("oe", "OE", dict(OE_orders=[2, 2, 0])),
          ("bj", "BJ", dict(BJ_orders=[2, 1, 1, 1, 0]))]

@@ -1,10 +1,13 @@
-"""Statistics over trailing windows, lags, differences, a regular clock and the Hampel filter, by pandas and scipy, of a series with
-irregular times, absent values and spikes. Writes input.csv and one table for each kind of node."""
+"""Statistics over trailing windows, lags, differences, a regular clock, first-order lags, arithmetic and the Hampel filter, by pandas
+and scipy, of a series with irregular times, absent values and spikes. Writes input.csv and one table for each kind of node. No
+library has the minimum difference, which is told from its definition."""
 
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.constants import inch, milli
+from scipy.signal import cont2discrete
 from scipy.stats import linregress, median_abs_deviation
 
 HERE = Path(__file__).parent
@@ -32,7 +35,7 @@ def write(name, records, columns):
     (HERE / name).write_text("\n".join(text) + "\n")
 
 
-moving, lines, filtered, lagged, differences, regular = [], [], [], [], [], []
+moving, lines, filtered, lagged, differences, regular, followed, kept = [], [], [], [], [], [], [], []
 for name in ["y", "z"]:
     series = pd.Series(table[name].to_numpy(), index=at).dropna()
     number = [int(row) for row in np.flatnonzero(table[name].notna())]
@@ -77,11 +80,34 @@ for name in ["y", "z"]:
         bins = series.resample(f"{every}s", closed="right", label="right", origin="epoch")
         for end, mean, last, count in zip(bins.mean().index, bins.mean(), bins.last(), bins.count()):
             regular.append([name, every, int(end.timestamp()), float(mean), float(last), int(count)])
+    seconds, values = t[number], series.to_numpy()
+    for tau in [5, 60, 900]:
+        state = values[0]
+        for i, row in enumerate(number):
+            if i > 0:
+                [[_, b]], [_, a], _ = cont2discrete(([1.0], [tau, 1.0]), seconds[i] - seconds[i - 1], "zoh")
+                state = float(b * values[i - 1] - a * state)
+            followed.append([name, tau, row, state, float(values[i] - state)])
+    for least in [0.005, 0.3]:
+        last = values[0]
+        for value, row in zip(values, number):
+            last = value if abs(value - last) >= least else last
+            kept.append([name, least, row, float(last)])
 held = [pd.DataFrame({"at": at, name: table[name]}).dropna() for name in ["y", "z"]]
 asked = held[1].rename(columns={"z": "measured"})
 for column in held:
     asked = pd.merge_asof(asked, column, on="at", tolerance=pd.Timedelta(seconds=10))
 sampled = [[int(row), float(y), float(z)] for row, y, z in zip(np.flatnonzero(table["z"].notna()), asked["y"], asked["z"])]
+ticks = pd.DataFrame({"row": np.arange(rows), "at": at})[table[["y", "z"]].notna().any(axis=1)]
+for column in held:
+    ticks = pd.merge_asof(ticks, column, on="at", tolerance=pd.Timedelta(seconds=10))
+columns = [0.5 * ticks["y"] - 2.5 * ticks["z"], ticks["y"] * ticks["z"]]
+together = [[int(row), float(a), float(b)] for row, a, b in zip(ticks["row"], *columns)]
+inches = [[name, int(row), 2.5 * table[name][row] * milli / inch - 0.1] for name in ["y", "z"] for row in np.flatnonzero(table[name].notna())]
+write("first_order.csv", followed, ["channel", "tau", "row", "value", "difference"])
+write("minimum_difference.csv", kept, ["channel", "difference", "row", "value"])
+write("together.csv", together, ["row", "sum", "product"])
+write("scale.csv", inches, ["channel", "row", "inches"])
 write("moving.csv", moving, ["channel", "window", "row", "mean", "std", "min", "max", "median", "count"])
 write("lines.csv", lines, ["channel", "window", "row", "slope", "stderr", "value", "r2"])
 write("hampel.csv", filtered, ["channel", "window", "threshold", "floor", "row", "median", "outlier"])

@@ -78,7 +78,7 @@ pub struct EstimatorFit {
     pub kind: &'static str,
     /// What it predicts.
     pub truth: String,
-    /// The unit of the truth.
+    /// The unit of its errors: that of the truth, or K where that is a temperature.
     pub unit: String,
     /// Rows that it was fitted on.
     pub rows: u64,

@@ -60,7 +60,11 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
             .collect::<Vec<Regressor>>(),
         places: kept.clone(),
         asked_for: regressors.len(),
-        truth_unit: plan.channels[trainee.link.slot].channel.unit.to_string(),
+        error_unit: plan.channels[trainee.link.slot]
+            .channel
+            .unit
+            .difference()
+            .to_string(),
         memory,
         ahead: trainee.link.ahead,
         span: trainee.link.span,
@@ -113,7 +117,7 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
         node: node.instance(),
         kind: node.kind.name,
         truth: truth.name.clone(),
-        unit: truth.channel.unit.to_string(),
+        unit: truth.channel.unit.difference().to_string(),
         rows: making.rows,
         dropped,
         dropped_candidates,

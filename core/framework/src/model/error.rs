@@ -49,7 +49,7 @@ pub enum ModelError {
     NotFitted {
         /// The file.
         path: PathBuf,
-        /// The estimators without a fit.
+        /// The nodes without a fit.
         nodes: Vec<String>,
     },
     /// What was fitted does not belong to the graph.
@@ -107,7 +107,7 @@ impl fmt::Display for ModelError {
                 let shown = nodes[..nodes.len().min(MOST)].join(", ");
                 write!(
                     f,
-                    "{} is a graph whose estimators need a fit ({shown}{more}): run `athermal fit {} --data FILE -o MODEL` and use MODEL",
+                    "{} is a graph of which some nodes need a fit ({shown}{more}): run `athermal fit {} --data FILE -o MODEL` and use MODEL",
                     path.display(),
                     path.display()
                 )

@@ -170,8 +170,8 @@ pub struct TrainingSetup {
     pub places: Vec<usize>,
     /// How many it asked for.
     pub asked_for: usize,
-    /// The unit of the truth.
-    pub truth_unit: String,
+    /// The unit of errors, for what is told of the fit: that of the truth, or K where that is a temperature.
+    pub error_unit: String,
     /// How many bytes of rows the trainer may keep.
     pub memory: usize,
     /// How far ahead the truth is predicted.

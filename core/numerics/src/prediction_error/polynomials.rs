@@ -166,12 +166,18 @@ impl Polynomials {
         product.split_off(1)
     }
 
-    /// Whether every prediction forgets where it started.
-    pub(super) fn is_stable(&self) -> bool {
-        let filters = self.inputs.iter().map(|input| &input.f);
-        filters
-            .chain([&self.a, &self.c, &self.d])
-            .all(|p| is_stable(p))
+    /// Which of the coefficients, in the order of [`flat`](Self::flat), are of a filter that does not forget where it started.
+    pub(super) fn unstable(&self) -> Vec<bool> {
+        let of = |p: &[f64]| vec![!is_stable(p); p.len()];
+        let mut unstable = vec![false; usize::from(self.differences == 0)];
+        unstable.extend(of(&self.a));
+        for input in &self.inputs {
+            unstable.extend(input.b.iter().map(|_| false));
+            unstable.extend(of(&input.f));
+        }
+        unstable.extend(of(&self.c));
+        unstable.extend(of(&self.d));
+        unstable
     }
 
     /// The same with roots outside of the unit circle reflected into it.

@@ -129,30 +129,39 @@ impl PredictionError {
     ) -> (Polynomials, usize, bool) {
         let mut model = start;
         let mut least = self.objective(&model, samples, first);
-        let mut damping = 1e-3;
+        let mut damping = vec![1e-3; model.flat().len()];
         let mut gained = f64::INFINITY;
         for step in 0..self.most_steps {
             let (hessian, gradient) = self.normal_equations(&model, samples, first);
             let flat = model.flat();
             loop {
-                let tried = descend(&hessian, &gradient, damping).map(|change| {
+                let tried = descend(&hessian, &gradient, &damping).map(|change| {
                     let moved: Vec<f64> =
                         flat.iter().zip(&change).map(|(at, by)| at - by).collect();
                     model.with(&moved)
                 });
-                let tried = tried.filter(Polynomials::is_stable);
-                let found = tried.map(|tried| (self.objective(&tried, samples, first), tried));
+                // What would become unstable is held back alone: the others go on, and find the best beside it.
+                let unstable = tried.as_ref().map(Polynomials::unstable);
+                let unstable = unstable.filter(|of| of.contains(&true));
+                let found = tried.filter(|_| unstable.is_none());
+                let found = found.map(|tried| (self.objective(&tried, samples, first), tried));
                 if let Some((sum, tried)) = found.filter(|(sum, _)| *sum <= least) {
                     gained = least - sum;
-                    (model, damping) = (tried, (damping / 10.0).max(1e-12));
-                    least = sum;
+                    (model, least) = (tried, sum);
+                    for of in &mut damping {
+                        *of = (*of / 10.0).max(1e-12);
+                    }
                     if gained <= TOLERANCE * least {
                         return (model, step + 1, true);
                     }
                     break;
                 }
-                damping *= 10.0;
-                if damping > MOST_DAMPING {
+                for (nth, of) in damping.iter_mut().enumerate() {
+                    if unstable.as_ref().is_none_or(|unstable| unstable[nth]) {
+                        *of *= 10.0;
+                    }
+                }
+                if damping.iter().all(|of| *of > MOST_DAMPING) {
                     return (model, step, true);
                 }
             }
@@ -185,19 +194,29 @@ impl PredictionError {
     }
 }
 
-/// The step that `(H + λ diag H) δ = g` asks for; none where that has no solution.
-fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: f64) -> Option<Vec<f64>> {
+/// The step that `(H + diag λ diag H) δ = g` asks for, 0 where the damping `λ` is beyond all bounds; none where it has no solution.
+fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<f64>> {
     let count = gradient.len();
     let scales: Vec<f64> = (0..count).map(|i| hessian[(i, i)].sqrt()).collect();
     let scales: Vec<f64> = scales
         .iter()
         .map(|&s| if s > 0.0 { s } else { 1.0 })
         .collect();
-    let scaled = Mat::from_fn(count, count, |i, j| {
-        let damped = if i == j { damping } else { 0.0 };
-        hessian[(i, j)] / (scales[i] * scales[j]) + damped
+    let held = |i: usize| damping[i] > MOST_DAMPING;
+    let scaled = Mat::from_fn(count, count, |i, j| match (i == j, held(i) || held(j)) {
+        (true, true) => 1.0,
+        (false, true) => 0.0,
+        (true, false) => hessian[(i, j)] / (scales[i] * scales[j]) + damping[i],
+        (false, false) => hessian[(i, j)] / (scales[i] * scales[j]),
     });
-    let right = Mat::from_fn(count, 1, |i, _| gradient[i] / scales[i]);
+    let right = |i: usize| {
+        if held(i) {
+            0.0
+        } else {
+            gradient[i] / scales[i]
+        }
+    };
+    let right = Mat::from_fn(count, 1, |i, _| right(i));
     let solved = scaled.llt(Side::Lower).ok()?.solve(&right);
     let step: Vec<f64> = (0..count).map(|i| solved[(i, 0)] / scales[i]).collect();
     step.iter().all(|by| by.is_finite()).then_some(step)

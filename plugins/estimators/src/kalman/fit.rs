@@ -52,7 +52,7 @@ impl KalmanTrainer {
         Self {
             every: parameters.every.unwrap_or(setup.span),
             parameters,
-            unit: setup.truth_unit.clone(),
+            unit: setup.error_unit.clone(),
             most: (setup.memory / bytes).clamp(16, MOST_ROWS),
             names,
             stride: 1,
