@@ -139,7 +139,7 @@ impl Weigher {
         let best = known(errors, votes)
             .fold(f64::INFINITY, f64::min)
             .max(f64::MIN_POSITIVE);
-        let total: f64 = match form {
+        let roots: f64 = match form {
             Weighting::InversePower => 0.0,
             Weighting::AsPrinted | Weighting::AsPrintedRaw => {
                 known(errors, votes).map(f64::sqrt).sum()
@@ -154,19 +154,29 @@ impl Weigher {
                     ratio.powf(0.5 * power)
                 }
             }
-            Weighting::AsPrinted | Weighting::AsPrintedRaw if total > 0.0 => {
-                mean_square / (total * total)
+            Weighting::AsPrinted | Weighting::AsPrintedRaw if roots > 0.0 => {
+                mean_square / (roots * roots)
             }
             Weighting::AsPrinted | Weighting::AsPrintedRaw => 1.0,
         };
-        let (sum, count) = known(errors, votes).fold((0.0, 0.0), |(sum, count), known| {
-            (sum + weight(known), count + 1.0)
-        });
-        let of_unknown = if count > 0.0 { sum / count } else { 1.0 };
-        let mut total = 0.0;
+        let (mut total, mut count, mut present) = (0.0, 0.0, 0.0);
         for (voter, _) in votes.present() {
-            weights[voter] = errors.means()[voter].map_or(of_unknown, weight);
-            total += weights[voter];
+            present += 1.0;
+            if let Some(known) = errors.means()[voter] {
+                weights[voter] = weight(known);
+                total += weights[voter];
+                count += 1.0;
+            }
+        }
+        if count < present {
+            let of_unknown = if count > 0.0 { total / count } else { 1.0 };
+            total = 0.0;
+            for (voter, _) in votes.present() {
+                if errors.means()[voter].is_none() {
+                    weights[voter] = of_unknown;
+                }
+                total += weights[voter];
+            }
         }
         let AutoWeighted {
             shrinkage, floor, ..

@@ -37,13 +37,19 @@ impl Blending {
     /// Between two values that are shown, the offset falls by no more than the rate times the time between them. Where time
     /// starts again, no time has passed.
     pub(crate) fn pass(&mut self, now: Instant, value: f64, rate: Option<f64>) -> f64 {
+        let Some(rate) = rate else {
+            *self = Self {
+                shown: Some((now, value)),
+                own: Some((now, value)),
+                ..Self::default()
+            };
+            return value;
+        };
         if std::mem::take(&mut self.begins) {
             self.offset = self.shown.map_or(0.0, |(_, shown)| shown - value);
         }
         let elapsed = self.shown.map_or(Duration::ZERO, |(at, _)| now - at);
-        let most = rate.map_or(f64::INFINITY, |rate| {
-            rate * elapsed.max(Duration::ZERO).secs()
-        });
+        let most = rate * elapsed.max(Duration::ZERO).secs();
         self.offset = if self.offset.abs() <= most {
             0.0
         } else {

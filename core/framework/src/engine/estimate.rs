@@ -7,7 +7,7 @@ use super::gather::Gathered;
 use super::learning::Learning;
 use super::state::NodeState;
 use super::{EngineError, Mode};
-use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
+use crate::compile::{Entry, Gather, PlannedNode, PlannedRole, TruthLink};
 use crate::node::{FeatureFit, Predictor, Regressor, Restored};
 use crate::time::Instant;
 
@@ -47,12 +47,28 @@ pub(super) fn fit_of(
     })
 }
 
+/// Regressors that follow each other and are read by one gather.
+#[derive(Debug)]
+struct Part {
+    gather: usize,
+    /// Their places within it.
+    places: Vec<usize>,
+}
+
+impl Part {
+    /// What its regressors are.
+    fn entries<'a>(&'a self, gathers: &'a [Gather]) -> impl Iterator<Item = Entry> + 'a {
+        let entries = &gathers[self.gather].entries;
+        self.places.iter().map(|&place| entries[place])
+    }
+}
+
 /// A fitted estimator in a running plan.
 #[derive(Debug)]
 pub(crate) struct Estimate {
     predictor: Arc<dyn Predictor>,
-    /// Where the regressors that it uses are: gather and place within it.
-    places: Vec<(usize, usize)>,
+    /// Where the regressors that it uses are, in their order.
+    parts: Vec<Part>,
     row: Vec<f64>,
     takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
@@ -89,7 +105,17 @@ impl Estimate {
             .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
             .collect();
         let used = places_of(node, regressors, &*predictor)?;
-        let places: Vec<_> = used.into_iter().map(|index| places[index]).collect();
+        let mut parts: Vec<Part> = Vec::new();
+        for &index in &used {
+            let (gather, place) = places[index];
+            match parts.last_mut() {
+                Some(part) if part.gather == gather => part.places.push(place),
+                _ => parts.push(Part {
+                    gather,
+                    places: vec![place],
+                }),
+            }
+        }
         let learning = match learning {
             None => None,
             Some(planned) => {
@@ -100,10 +126,10 @@ impl Estimate {
             }
         };
         Ok(Self {
-            row: vec![0.0; places.len()],
+            row: vec![0.0; used.len()],
             takes_absent: predictor.takes_absent(),
             predictor,
-            places,
+            parts,
             learning,
             feedback: None,
         })
@@ -111,9 +137,10 @@ impl Estimate {
 
     /// Predicts from past truths as a mode allows.
     pub(crate) fn predict_in(&mut self, mode: Mode, link: &TruthLink, gathers: &[Gather]) {
+        let entries = self.parts.iter().flat_map(|part| part.entries(gathers));
         self.feedback = match mode {
             Mode::OneStep => None,
-            mode => Feedback::new(mode, link, &self.places, gathers).map(Box::new),
+            mode => Feedback::new(mode, link, entries).map(Box::new),
         };
         if let Some(learning) = &mut self.learning {
             learning.predict_in(mode);
@@ -134,17 +161,9 @@ impl Estimate {
         now: Instant,
         on: bool,
     ) -> Option<(f64, Instant)> {
-        let mut oldest = if self.places.is_empty() {
-            now
-        } else {
-            Instant::MAX
-        };
-        for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
-            let from = &gathered[gather];
-            *value = from.values[place];
-            if !value.is_nan() {
-                oldest = oldest.min(from.stamps[place]);
-            }
+        let (mut whole, mut oldest) = self.read(gathered);
+        if self.parts.is_empty() {
+            oldest = now;
         }
         if let Some(feedback) = &mut self.feedback {
             let (learning, predictor) = (&self.learning, &self.predictor);
@@ -152,9 +171,10 @@ impl Estimate {
                 Some(learning) => learning.predict(row, at),
                 None => predictor.predict(row),
             });
+            whole = self.row.iter().all(|value| !value.is_nan());
             oldest = oldest.min(now);
         }
-        let mut whole = self.takes_absent || self.row.iter().all(|value| !value.is_nan());
+        whole |= self.takes_absent;
         // Where none of several regressors is there, none had a stamp.
         whole &= oldest < Instant::MAX;
         if let Some(learning) = &mut self.learning {
@@ -173,6 +193,33 @@ impl Estimate {
             feedback.ran(&self.row, prediction, now);
         }
         prediction.is_finite().then_some((prediction, oldest))
+    }
+
+    /// Reads the row: whether all of it is there, and the oldest stamp of what is.
+    fn read(&mut self, gathered: &[Gathered]) -> (bool, Instant) {
+        let (mut whole, mut oldest) = (true, Instant::MAX);
+        let mut row = &mut self.row[..];
+        for part in &self.parts {
+            let from = &gathered[part.gather];
+            let (values, rest) = row.split_at_mut(part.places.len());
+            row = rest;
+            let there = &from.values[..];
+            for (value, &place) in values.iter_mut().zip(&part.places) {
+                *value = there[place];
+            }
+            if let Some(stamp) = from.together {
+                oldest = oldest.min(stamp);
+                continue;
+            }
+            for (value, &place) in values.iter().zip(&part.places) {
+                if value.is_nan() {
+                    whole = false;
+                } else {
+                    oldest = oldest.min(from.stamps[place]);
+                }
+            }
+        }
+        (whole, oldest)
     }
 
     /// The standard deviation of the truth about the prediction that was made at this tick.

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use super::mode::{Step, times};
 use super::pairing::Pairing;
 use super::{Mode, Slots};
-use crate::compile::{Gather, TruthLink};
+use crate::compile::{Entry, TruthLink};
 use crate::time::{Duration, Instant};
 
 /// The predictions of one estimator, as they stand in for the truths that it would read.
@@ -47,13 +47,11 @@ impl Feedback {
     pub(crate) fn new(
         mode: Mode,
         link: &TruthLink,
-        places: &[(usize, usize)],
-        gathers: &[Gather],
+        regressors: impl Iterator<Item = Entry>,
     ) -> Option<Self> {
-        let entries = places
-            .iter()
-            .map(|&(gather, place)| gathers[gather].entries[place]);
-        let past: Vec<Past> = entries
+        let mut width = 0;
+        let past: Vec<Past> = regressors
+            .inspect(|_| width += 1)
             .enumerate()
             .filter(|(_, entry)| entry.slot == link.slot)
             .map(|(place, entry)| Past {
@@ -69,10 +67,10 @@ impl Feedback {
             mode,
             step: Step::new(smallest + link.ahead),
             past,
-            pairing: Pairing::new(link, places.len() + 1),
+            pairing: Pairing::new(link, width + 1),
             truths: VecDeque::new(),
             deepest,
-            row: vec![0.0; places.len()],
+            row: vec![0.0; width],
         })
     }
 

@@ -18,9 +18,15 @@ pub(crate) struct Gathered {
     pub(crate) stamps: Vec<Instant>,
     /// Whether any of the slots, read without a lag, has a new value at this tick.
     pub(crate) fresh: bool,
+    /// The stamp of all values, where all are there, have the same, and lie side by side.
+    pub(crate) together: Option<Instant>,
     cursors: Vec<Cursor>,
+    /// Until when each value that is read with a lag stays as it is.
+    until: Vec<Instant>,
     /// The slots, where they lie side by side and none is read with a lag.
     side_by_side: Option<Range<usize>>,
+    /// How long any of them counts at least.
+    shortest: Duration,
 }
 
 impl Gathered {
@@ -30,8 +36,11 @@ impl Gathered {
             values: vec![ABSENT; width],
             stamps: vec![Instant::MIN; width],
             fresh: false,
+            together: None,
             cursors: vec![0; width],
+            until: vec![Instant::MIN; width],
             side_by_side: side_by_side(&gather.entries),
+            shortest: shortest(&gather.entries),
         }
     }
 
@@ -56,19 +65,46 @@ impl Gathered {
         }
     }
 
-    /// A whole port, as it is most often read. It has a loop of its own since it is the widest of a tick.
+    /// A whole port, as it is most often read. It has loops of its own since it is the widest of a tick.
     fn read_range(&mut self, gather: &Gather, slots: &Slots, range: Range<usize>, now: Instant) {
         let tick = slots.tick;
         let (values, written) = (&slots.values[range.clone()], &slots.written[range.clone()]);
+        self.values.copy_from_slice(values);
         self.stamps.copy_from_slice(&slots.stamps[range]);
-        let from = values.iter().zip(written).zip(&self.stamps);
-        let to = self.values.iter_mut().zip(&gather.entries);
-        let mut fresh = false;
-        for ((to, entry), ((&value, &written), &stamp)) in to.zip(from) {
-            fresh |= written == tick && !value.is_nan();
-            *to = seen(gather.read, entry, value, written == tick, now - stamp);
+        let first = self.stamps.first().copied().unwrap_or(Instant::MIN);
+        let oldest = now - self.shortest;
+        let (mut fresh, mut all_ran, mut old) = (false, true, false);
+        let (mut whole, mut same) = (true, true);
+        for ((value, &written), &stamp) in values.iter().zip(written).zip(&self.stamps) {
+            let (there, ran) = (!value.is_nan(), written == tick);
+            fresh |= ran & there;
+            all_ran &= ran;
+            old |= stamp < oldest;
+            whole &= there;
+            same &= stamp == first;
+        }
+        match gather.read {
+            Read::Fresh if !all_ran => {
+                whole = false;
+                for (to, &written) in self.values.iter_mut().zip(written) {
+                    if written != tick {
+                        *to = UNCHANGED;
+                    }
+                }
+            }
+            Read::Held | Read::Truth if old => {
+                whole = false;
+                let from = self.stamps.iter().zip(&gather.entries);
+                for (to, (&stamp, entry)) in self.values.iter_mut().zip(from) {
+                    if !to.is_nan() && now - stamp > entry.max_age {
+                        *to = ABSENT;
+                    }
+                }
+            }
+            _ => {}
         }
         self.fresh = fresh;
+        self.together = (whole && same).then_some(first);
     }
 
     fn read_each(
@@ -81,28 +117,51 @@ impl Gathered {
         self.fresh = false;
         for (i, entry) in gather.entries.iter().enumerate() {
             if entry.lag > Duration::ZERO {
-                self.read_past(i, entry, histories, now);
+                if now >= self.until[i] {
+                    self.read_past(i, gather, histories, now);
+                }
                 continue;
             }
             let (value, stamp) = (slots.values[entry.slot], slots.stamps[entry.slot]);
-            let ran = slots.ran(entry.slot);
-            self.fresh |= ran && !value.is_nan();
-            self.values[i] = seen(gather.read, entry, value, ran, now - stamp);
+            let (there, ran) = (!value.is_nan(), slots.ran(entry.slot));
+            self.fresh |= ran && there;
+            self.values[i] = match gather.read {
+                Read::Fresh if !ran => UNCHANGED,
+                Read::Held | Read::Truth if there && now - stamp > entry.max_age => ABSENT,
+                _ => value,
+            };
             self.stamps[i] = stamp;
         }
     }
 
-    fn read_past(&mut self, i: usize, entry: &Entry, histories: &[Option<History>], now: Instant) {
+    fn read_past(
+        &mut self,
+        i: usize,
+        gather: &Gather,
+        histories: &[Option<History>],
+        now: Instant,
+    ) {
+        let entry = &gather.entries[i];
         let history = histories[entry.slot]
             .as_ref()
             .expect("a slot that is read with a lag has a history");
-        let (value, stamp) = history.at(now - entry.lag, entry.max_age, &mut self.cursors[i]);
+        let (at, cursor) = (now - entry.lag, &mut self.cursors[i]);
+        let (value, stamp) = history.at(at, entry.max_age, cursor);
         self.values[i] = value;
         self.stamps[i] = stamp + entry.lag;
+        // A value that is converted is read afresh, lest it be converted twice.
+        self.until[i] = if gather.conversions.is_empty() {
+            history.stays(now, entry.max_age, *cursor) + entry.lag
+        } else {
+            now
+        };
     }
 
     /// The oldest stamp among the values that are there.
     pub(crate) fn oldest(&self) -> Option<Instant> {
+        if self.together.is_some() {
+            return self.together;
+        }
         let present = self
             .values
             .iter()
@@ -114,13 +173,15 @@ impl Gathered {
     /// Looks its places in histories up anew: they are not those that it read from before.
     pub(crate) fn forget_places(&mut self) {
         self.cursors.fill(0);
+        self.until.fill(Instant::MIN);
     }
 
     /// Starts afresh for another segment.
     pub(crate) fn clear(&mut self) {
         self.values.fill(ABSENT);
-        self.cursors.fill(0);
+        self.forget_places();
         self.fresh = false;
+        self.together = None;
     }
 }
 
@@ -131,13 +192,7 @@ fn side_by_side(entries: &[Entry]) -> Option<Range<usize>> {
     all.then_some(first..first + entries.len())
 }
 
-/// What a reader without a lag sees of a slot.
-#[inline]
-fn seen(read: Read, entry: &Entry, value: f64, ran: bool, age: Duration) -> f64 {
-    match read {
-        Read::Fresh if !ran => UNCHANGED,
-        Read::Fresh => value,
-        Read::Held | Read::Truth if !value.is_nan() && age > entry.max_age => ABSENT,
-        Read::Held | Read::Truth => value,
-    }
+fn shortest(entries: &[Entry]) -> Duration {
+    let ages = entries.iter().map(|entry| entry.max_age);
+    ages.min().unwrap_or(Duration::MAX)
 }

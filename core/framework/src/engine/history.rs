@@ -67,6 +67,18 @@ impl History {
         }
     }
 
+    /// From which instant on the answer that a cursor has just been given may be another, when nothing more is written down for
+    /// instants before `unwritten`.
+    pub(super) fn stays(&self, unwritten: Instant, max_age: Duration, cursor: Cursor) -> Instant {
+        let next = self.entry(cursor).map_or(unwritten, |next| next.at);
+        match cursor.checked_sub(1).and_then(|last| self.entry(last)) {
+            Some(past) => next.min(past.stamp + max_age + Duration::from_ns(1)),
+            // Whatever is written down first turns absent into cold.
+            None if self.entries.is_empty() => Instant::MIN,
+            None => next,
+        }
+    }
+
     /// Goes on from another history of the same channel, keeping what it reached back further.
     pub fn adopt(&mut self, other: &Self) {
         let begin = other.entries.front().map_or(Instant::MAX, |past| past.at);
@@ -133,6 +145,33 @@ mod tests {
         assert!(!is_cold(past.at(s(0), d(60), &mut 0).0));
         past.push(s(10), 1.0, s(10));
         assert!(is_cold(past.at(s(9), d(60), &mut 0).0));
+    }
+
+    /// A reader that asks again only when it must sees what one sees that always asks.
+    #[test]
+    fn an_answer_stays_as_it_is_until_it_was_said_to() {
+        let (lag, max_age) = (d(30), d(12));
+        let mut past = History::new(lag);
+        let (mut always, mut seldom) = (0, 0);
+        let (mut kept, mut until, mut asked) = (f64::NAN, Instant::MIN, 0);
+        let ticks = 2000;
+        for t in 0..ticks {
+            let now = s(t);
+            let expected = past.at(now - lag, max_age, &mut always).0;
+            if now >= until {
+                kept = past.at(now - lag, max_age, &mut seldom).0;
+                until = past.stays(now, max_age, seldom) + lag;
+                asked += 1;
+            }
+            assert_eq!(kept.to_bits(), expected.to_bits(), "at {t} s");
+            match t % 97 {
+                0 | 7 | 50 | 90 => past.push(now, t as f64, now),
+                60 => past.push(now, t as f64, now - d(10)),
+                20 => past.push(now, ABSENT, now),
+                _ => {}
+            }
+        }
+        assert!(asked < ticks, "{asked}");
     }
 
     #[test]

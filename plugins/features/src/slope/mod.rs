@@ -188,23 +188,36 @@ impl Sloping {
     /// second of the channel and still have to be brought to the unit of the slopes.
     fn give(&self, tick: &Tick<'_>, outputs: &mut Outputs<'_>, port: usize, scaled: bool) {
         let offset = port * self.results.len();
-        for (channel, (&sample, &factor)) in tick.port(0).iter().zip(&self.factors).enumerate() {
-            if sample.is_nan() {
-                continue;
+        let samples = tick.port(0);
+        if samples.iter().all(|sample| !sample.is_nan()) {
+            let given = outputs.fill_stamped(offset..offset + self.results.len(), tick.now);
+            let given = given.chunks_exact_mut(self.windows.max(1));
+            for (channel, given) in given.enumerate() {
+                self.scale(channel, given, scaled);
             }
-            let factor = if scaled { factor } else { 1.0 };
-            let windows = channel * self.windows..(channel + 1) * self.windows;
-            let results = &self.results[windows.clone()];
-            let given =
-                outputs.fill_stamped(offset + windows.start..offset + windows.end, tick.now);
-            for (given, &result) in given.iter_mut().zip(results) {
-                // A NaN says why there is no value, and must stay as it is.
-                *given = if result.is_nan() {
-                    result
-                } else {
-                    result * factor
-                };
+            return;
+        }
+        for (channel, sample) in samples.iter().enumerate() {
+            if !sample.is_nan() {
+                let first = offset + channel * self.windows;
+                let given = outputs.fill_stamped(first..first + self.windows, tick.now);
+                self.scale(channel, given, scaled);
             }
+        }
+    }
+
+    /// The results of a channel, in the unit of the slopes.
+    #[inline(always)]
+    fn scale(&self, channel: usize, given: &mut [f64], scaled: bool) {
+        let factor = if scaled { self.factors[channel] } else { 1.0 };
+        let results = &self.results[channel * self.windows..];
+        for (given, &result) in given.iter_mut().zip(results) {
+            // A NaN says why there is no value, and must stay as it is.
+            *given = if result.is_nan() {
+                result
+            } else {
+                result * factor
+            };
         }
     }
 }
