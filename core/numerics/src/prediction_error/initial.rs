@@ -15,6 +15,7 @@ pub(super) fn starts(
     orders: &Orders,
     samples: &Samples,
     penalty: f64,
+    radius: f64,
 ) -> Result<Vec<Polynomials>, NumericsError> {
     let mut differenced = samples.clone();
     for _ in 0..orders.differences {
@@ -22,7 +23,7 @@ pub(super) fn starts(
     }
     let whole = |model: Polynomials| Polynomials {
         differences: orders.differences,
-        ..model.stabilised()
+        ..model.stabilised(radius)
     };
     let direct = Orders {
         differences: 0,
@@ -42,13 +43,30 @@ pub(super) fn starts(
     };
     let mut starts = Vec::new();
     for plant in plants {
-        starts.push(whole(with_noise(&direct, &plant, &differenced)?));
+        // Segments may be too short for the longer regressions, which are but a better start.
+        starts.extend(with_noise(&direct, &plant, &differenced).map(whole));
         if !filtered && orders.nc > 0 {
-            starts.push(whole(hannan_rissanen(&direct, &differenced, penalty)?));
+            starts.extend(hannan_rissanen(&direct, &differenced, penalty).map(whole));
         }
         starts.push(whole(plant));
     }
     Ok(starts)
+}
+
+/// The plant with noise that is white and with that which it leaves over.
+pub(super) fn with_noises(
+    orders: &Orders,
+    plant: Polynomials,
+    samples: &Samples,
+    radius: f64,
+) -> Vec<Polynomials> {
+    let found = with_noise(orders, &plant, samples).map(|model| model.stabilised(radius));
+    let white = Polynomials {
+        c: vec![0.0; orders.nc],
+        d: vec![0.0; orders.nd],
+        ..plant
+    };
+    std::iter::once(white).chain(found).collect()
 }
 
 /// Least squares of `y` on its own past and that of the inputs, and with `longer` of it on as many more of both.
@@ -133,7 +151,7 @@ fn hannan_rissanen(
     let count = samples.count() as f64;
     let longer = (count.ln().powf(1.5).ceil() as usize).clamp(orders.nc + 1, 40);
     let most = samples.count() / (8 * (1 + samples.width()));
-    let longer = longer.min(most).max(1);
+    let longer = longer.min(most).min(samples.longest() / 2).max(1);
     let long = regression(orders, samples, penalty, longer)?;
     let innovations = residuals_of(&long, samples);
     let mut rows = Rows::new(0);
@@ -260,7 +278,7 @@ fn steiglitz_mcbride(
             inputs: orders.inputs.clone(),
             ..Orders::default()
         };
-        let found = regression(&as_regression, &filtered, penalty, 0)?.stabilised();
+        let found = regression(&as_regression, &filtered, penalty, 0)?.stabilised(1.0);
         let before = std::mem::replace(&mut shared, found.a.clone());
         let mut model = Polynomials::zero(orders);
         for ((transfer, found), input) in model

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::roots::{is_stable, reflected};
+use super::roots::{is_within, reflected};
 
 /// How many coefficients each polynomial has, in the letters of Ljung (1999), chapter 4.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -42,6 +42,12 @@ impl Orders {
     #[must_use]
     pub fn has_level(&self) -> bool {
         self.differences == 0
+    }
+
+    /// Whether inputs have filters of their own, and the noise others.
+    pub(super) fn has_noise_beside_filters(&self) -> bool {
+        let filtered = self.inputs.iter().any(|input| input.nf > 0);
+        filtered && self.differences == 0 && self.nc + self.nd > 0
     }
 
     /// The first sample of a segment whose residual has all that it needs.
@@ -166,28 +172,31 @@ impl Polynomials {
         product.split_off(1)
     }
 
-    /// Which of the coefficients, in the order of [`flat`](Self::flat), are of a filter that does not forget where it started.
-    pub(super) fn unstable(&self) -> Vec<bool> {
-        let of = |p: &[f64]| vec![!is_stable(p); p.len()];
+    /// Which of the coefficients, in the order of [`flat`](Self::flat), are of an unstable filter. Predictions are made through
+    /// `1/C` and `1/F`, of which the roots must lie inside this radius.
+    pub(super) fn unstable(&self, radius: f64) -> Vec<bool> {
+        let within = |p: &[f64], radius: f64| vec![!is_within(p, radius); p.len()];
+        let of = |p: &[f64]| within(p, 1.0);
         let mut unstable = vec![false; usize::from(self.differences == 0)];
         unstable.extend(of(&self.a));
         for input in &self.inputs {
             unstable.extend(input.b.iter().map(|_| false));
-            unstable.extend(of(&input.f));
+            unstable.extend(within(&input.f, radius));
         }
-        unstable.extend(of(&self.c));
+        unstable.extend(within(&self.c, radius));
         unstable.extend(of(&self.d));
         unstable
     }
 
-    /// The same with roots outside of the unit circle reflected into it.
-    pub(super) fn stabilised(mut self) -> Self {
-        for input in &mut self.inputs {
-            input.f = reflected(&input.f);
+    /// The same with roots outside of the unit circle reflected into it, and those of `C` and `F` inside this radius.
+    pub(super) fn stabilised(mut self, radius: f64) -> Self {
+        for p in self.inputs.iter_mut().map(|input| &mut input.f) {
+            *p = reflected(p, radius);
         }
-        for p in [&mut self.a, &mut self.c, &mut self.d] {
-            *p = reflected(p);
+        for p in [&mut self.a, &mut self.d] {
+            *p = reflected(p, 1.0);
         }
+        self.c = reflected(&self.c, radius);
         self
     }
 

@@ -82,6 +82,12 @@ impl Samples {
             .sum()
     }
 
+    /// How many samples the longest segment has.
+    pub(super) fn longest(&self) -> usize {
+        let lengths = self.segments().map(|segment| segment.len());
+        lengths.max().unwrap_or(0)
+    }
+
     /// The segments, as subspace identification takes them.
     pub fn records(&self) -> impl Iterator<Item = Record<'_>> {
         self.segments().map(|segment| Record {

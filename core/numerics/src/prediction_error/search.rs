@@ -3,7 +3,7 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::initial::starts;
+use super::initial::{starts, with_noises};
 use super::residuals::{counted_from, derivatives, sum_of_squares};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
@@ -94,8 +94,40 @@ impl PredictionError {
                 found: rows as u64,
             });
         }
+        let radius = remembered(samples);
+        let direct = starts(orders, samples, self.penalty, radius)?;
+        let found = self.from_best(direct, samples, first, radius)?;
+        if !orders.has_noise_beside_filters() {
+            return Ok(found);
+        }
+        // Noise of its own must not make a model worse than its plant alone.
+        let alone = Orders {
+            nc: 0,
+            nd: 0,
+            ..orders.clone()
+        };
+        let plants = starts(&alone, samples, self.penalty, radius)?;
+        let plant = self.from_best(plants, samples, first, radius)?.model;
+        let mut noisy = with_noises(orders, plant, samples, radius);
+        let of = |model: &Polynomials| self.objective(model, samples, first);
+        let least = of(&found.model);
+        noisy.retain(|start| of(start) < least);
+        if noisy.is_empty() {
+            return Ok(found);
+        }
+        self.from_best(noisy, samples, first, radius)
+    }
+
+    /// Searches from the best of several models.
+    fn from_best(
+        &self,
+        starts: Vec<Polynomials>,
+        samples: &Samples,
+        first: usize,
+        radius: f64,
+    ) -> Result<PredictionErrorFit, NumericsError> {
         let mut best: Option<(f64, Polynomials)> = None;
-        for start in starts(orders, samples, self.penalty)? {
+        for start in starts {
             let found = self.objective(&start, samples, first);
             if best.as_ref().is_none_or(|(least, _)| found < *least) {
                 best = Some((found, start));
@@ -105,11 +137,11 @@ impl PredictionError {
             .filter(|(found, _)| found.is_finite())
             .map(|(_, start)| start);
         let start = start.ok_or(NumericsError::NotFinite)?;
-        let (model, steps, converged) = self.search(start, samples, first);
+        let (model, steps, converged) = self.search(start, samples, first, radius);
         Ok(PredictionErrorFit {
             residual_sum_of_squares: sum_of_squares(&model, samples, first),
             model,
-            rows,
+            rows: samples.counted(first),
             steps,
             converged,
         })
@@ -126,6 +158,7 @@ impl PredictionError {
         start: Polynomials,
         samples: &Samples,
         first: usize,
+        radius: f64,
     ) -> (Polynomials, usize, bool) {
         let mut model = start;
         let mut least = self.objective(&model, samples, first);
@@ -141,7 +174,7 @@ impl PredictionError {
                     model.with(&moved)
                 });
                 // What would become unstable is held back alone: the others go on, and find the best beside it.
-                let unstable = tried.as_ref().map(Polynomials::unstable);
+                let unstable = tried.as_ref().map(|tried| tried.unstable(radius));
                 let unstable = unstable.filter(|of| of.contains(&true));
                 let found = tried.filter(|_| unstable.is_none());
                 let found = found.map(|tried| (self.objective(&tried, samples, first), tried));
@@ -192,6 +225,12 @@ impl PredictionError {
         }
         (hessian, gradient)
     }
+}
+
+/// The radius inside of which a filter forgets its start within these samples: from segments of `N` samples a root nearer than
+/// `1/N` to the unit circle is not told from one on it, and through it every error of the model adds up.
+pub(super) fn remembered(samples: &Samples) -> f64 {
+    1.0 - 1.0 / samples.longest().max(2) as f64
 }
 
 /// The step that `(H + diag λ diag H) δ = g` asks for, 0 where the damping `λ` is beyond all bounds; none where it has no solution.

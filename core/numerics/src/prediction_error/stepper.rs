@@ -17,6 +17,11 @@ pub struct Stepper {
     past: Vec<f64>,
     noise: Vec<f64>,
     innovations: Vec<f64>,
+    /// How unsure the innovations are, each with each, in the variance of one.
+    doubt: Vec<f64>,
+    /// `P c` of this doubt `P`, while it is worked out.
+    #[serde(skip)]
+    shared: Vec<f64>,
     inputs: Vec<PastInput>,
 }
 
@@ -42,6 +47,8 @@ impl Stepper {
             past: vec![0.0; model.a.len()],
             noise: vec![0.0; whitening.len()],
             innovations: vec![0.0; model.c.len()],
+            doubt: vec![0.0; model.c.len() * model.c.len()],
+            shared: vec![0.0; model.c.len()],
             inputs: inputs.collect(),
             whitening,
             model,
@@ -63,7 +70,18 @@ impl Stepper {
         }
         self.past.fill(level);
         self.noise.fill(0.0);
+        self.doubt_innovations();
+    }
+
+    /// What was not foreseen until now is not known, but for its variance.
+    fn doubt_innovations(&mut self) {
         self.innovations.fill(0.0);
+        self.doubt.fill(0.0);
+        let count = self.innovations.len();
+        self.doubt
+            .iter_mut()
+            .step_by(count + 1)
+            .for_each(|own| *own = 1.0);
     }
 
     /// Where it is has been measured: what the inputs do not explain of it has always been there, in the noise, or where there
@@ -93,7 +111,7 @@ impl Stepper {
         self.past.fill(value);
         let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - brought;
         self.noise.fill(noise);
-        self.innovations.fill(0.0);
+        self.doubt_innovations();
     }
 
     /// Goes on by one sample, and gives what was predicted of it.
@@ -112,8 +130,53 @@ impl Stepper {
         let innovation = value.map_or(0.0, |value| value - self.model.level - expected);
         push(&mut self.past, expected + innovation);
         push(&mut self.noise, noise + innovation);
-        push(&mut self.innovations, innovation);
+        self.take_innovation(value.map(|_| innovation));
         self.model.level + expected
+    }
+
+    /// Shares what was off among the newest innovation and those before it, as far as these are in doubt: the Kalman filter of
+    /// `C(q) e` (Ansley 1979). Its gain is that of `C` as soon as the start is forgotten, and for a root on the unit circle,
+    /// where it never is, that of a mean.
+    fn take_innovation(&mut self, off: Option<f64>) {
+        let count = self.innovations.len();
+        let c = &self.model.c;
+        let mut variance = 1.0;
+        for (nth, shared) in self.shared.iter_mut().enumerate() {
+            *shared = product(c, &self.doubt[nth * count..]);
+            variance += c[nth] * *shared;
+        }
+        let Some(off) = off else {
+            // It is taken for as it was foreseen.
+            self.shared.fill(0.0);
+            return self.pass(0.0, 0.0);
+        };
+        let newest = off / variance;
+        for (of, shared) in self.innovations.iter_mut().zip(&self.shared) {
+            *of += shared * newest;
+        }
+        for (nth, doubt) in self.doubt.iter_mut().enumerate() {
+            *doubt -= self.shared[nth / count] * self.shared[nth % count] / variance;
+        }
+        self.shared.iter_mut().for_each(|of| *of /= -variance);
+        self.pass(newest, 1.0 - 1.0 / variance);
+    }
+
+    /// Puts an innovation before those of the past, with what it is in doubt by itself and together with each of them.
+    fn pass(&mut self, newest: f64, doubt: f64) {
+        push(&mut self.innovations, newest);
+        let count = self.innovations.len();
+        for row in (1..count).rev() {
+            for column in (1..count).rev() {
+                self.doubt[row * count + column] = self.doubt[(row - 1) * count + column - 1];
+            }
+        }
+        for nth in 1..count {
+            self.doubt[nth] = self.shared[nth - 1];
+            self.doubt[nth * count] = self.shared[nth - 1];
+        }
+        if let Some(own) = self.doubt.first_mut() {
+            *own = doubt;
+        }
     }
 
     /// The variance of predictions one sample ahead, two samples and so on, in that of an innovation: sums of the squares of
@@ -142,7 +205,8 @@ impl Stepper {
         let shape = |of: &Self| {
             let inputs = of.inputs.iter();
             let inputs: Vec<_> = inputs.map(|p| (p.values.len(), p.filtered.len())).collect();
-            (of.past.len(), of.noise.len(), of.innovations.len(), inputs)
+            let innovations = (of.innovations.len(), of.doubt.len());
+            (of.past.len(), of.noise.len(), innovations, inputs)
         };
         let alike = shape(self) == shape(other);
         if alike {
@@ -156,6 +220,7 @@ impl Stepper {
         self.past.copy_from_slice(&other.past);
         self.noise.copy_from_slice(&other.noise);
         self.innovations.copy_from_slice(&other.innovations);
+        self.doubt.copy_from_slice(&other.doubt);
         for (to, from) in self.inputs.iter_mut().zip(&other.inputs) {
             to.values.copy_from_slice(&from.values);
             to.filtered.copy_from_slice(&from.filtered);

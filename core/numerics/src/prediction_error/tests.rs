@@ -1,4 +1,5 @@
 use super::residuals::{counted_from, derivatives, residuals, sum_of_squares};
+use super::search::remembered;
 use super::*;
 
 /// Numbers between −1 and 1 that nobody could guess.
@@ -234,7 +235,7 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
         let mut moved = at.clone();
         moved[nth] += by;
         let moved = fit.model.with(&moved);
-        if !moved.unstable().contains(&true) {
+        if !moved.unstable(remembered(&samples)).contains(&true) {
             let sum = sum_of_squares(&moved, &samples, first);
             assert!(sum > fit.residual_sum_of_squares, "{nth} by {by}: {fit:?}");
             compared += 1;
@@ -284,6 +285,122 @@ fn predictions_further_ahead_are_less_sure_and_in_the_end_as_sure_as_none() {
     assert_eq!(variances[0], 1.0);
     assert!((variances[1] - (1.0 + 0.64)).abs() < 1e-12);
     assert!((variances[199] - 1.0 / (1.0 - 0.64)).abs() < 1e-9);
+}
+
+/// What `y` is expected to be next, if it is `C(q) e` and nothing is known but its past: least squares on its autocovariance.
+fn expected_of_moving_average(c: &[f64], past: &[f64]) -> f64 {
+    let c: Vec<f64> = std::iter::once(1.0).chain(c.iter().copied()).collect();
+    let covariance = |lag: usize| -> f64 {
+        c.iter()
+            .zip(&c[lag.min(c.len())..])
+            .map(|(a, b)| a * b)
+            .sum()
+    };
+    let count = past.len();
+    let of = |i: usize, j: usize| covariance(i.abs_diff(j));
+    let among = faer::Mat::from_fn(count, count, of);
+    let with_next = faer::Mat::from_fn(count, 1, |i, _| of(i, count));
+    let weights = faer::linalg::solvers::Solve::solve(&among.partial_piv_lu(), &with_next);
+    (0..count).map(|i| weights[(i, 0)] * past[i]).sum()
+}
+
+#[test]
+fn from_the_start_a_moving_average_is_followed_as_well_as_its_past_allows() {
+    for c in [vec![-1.0], vec![0.5], vec![-1.2, 0.4], vec![0.3, -0.2, 0.9]] {
+        let mut stepper = Stepper::new(Polynomials {
+            a: vec![],
+            inputs: vec![],
+            c: c.clone(),
+            d: vec![],
+            differences: 0,
+            level: 3.0,
+        });
+        stepper.rest(|_| 0.0);
+        let (mut noise, mut past) = (noise(5), Vec::new());
+        for _ in 0..12 {
+            let value = noise();
+            let expected = expected_of_moving_average(&c, &past);
+            let found = stepper.step(|_| 0.0, Some(3.0 + value)) - 3.0;
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{c:?}: {found}, not {expected}"
+            );
+            past.push(value);
+        }
+    }
+}
+
+#[test]
+fn what_has_a_level_but_is_taken_for_integrated_is_followed_as_a_mean() {
+    let mut stepper = Stepper::new(Polynomials {
+        a: vec![],
+        inputs: vec![],
+        c: vec![-1.0],
+        d: vec![],
+        differences: 1,
+        level: 0.0,
+    });
+    let values = [40.0, 1.0, -2.0, 3.0, 0.5, -1.5];
+    stepper.rest(|_| 0.0);
+    stepper.step(|_| 0.0, Some(values[0]));
+    stepper.settle_on(values[0]);
+    for count in 1..values.len() {
+        let mean = values[..count].iter().sum::<f64>() / count as f64;
+        let found = stepper.step(|_| 0.0, Some(values[count]));
+        assert!((found - mean).abs() < 1e-12, "{count}: {found}, not {mean}");
+    }
+}
+
+#[test]
+fn what_a_short_record_cannot_tell_from_a_unit_root_is_not_told_as_one() {
+    // Differences of noise: its moving average has a root on the unit circle.
+    let mut samples = Samples::new(0);
+    let mut noise = noise(9);
+    for _ in 0..40 {
+        samples.segment();
+        let mut before = 0.0;
+        for _ in 0..20 {
+            let now = noise();
+            samples.push([], now - before);
+            before = now;
+        }
+    }
+    let fit = PredictionError::default()
+        .fit(&asked(0, None, 1, 0, 0), &samples, 0)
+        .unwrap();
+    assert!((-0.95..-0.94).contains(&fit.model.c[0]), "{fit:?}");
+}
+
+#[test]
+fn noise_of_its_own_makes_no_model_worse_than_its_plant_alone() {
+    let plant = Polynomials {
+        a: vec![],
+        inputs: vec![transfer(0, &[0.5], &[-0.9]), transfer(0, &[0.5], &[-0.9])],
+        c: vec![],
+        d: vec![],
+        differences: 0,
+        level: 0.0,
+    };
+    for seed in 1..20 {
+        let (mut u, mut e) = (noise(seed), noise(seed + 100));
+        let (mut samples, mut stepper) = (Samples::new(2), Stepper::new(plant.clone()));
+        for _ in 0..120 {
+            let input = u();
+            let expected = stepper.step(|_| input, None);
+            samples.push([input, input], expected + 0.3 * e());
+        }
+        let mut orders = orders(&plant);
+        let search = PredictionError {
+            penalty: 1.0,
+            ..PredictionError::default()
+        };
+        let alone = search.fit(&orders, &samples, 2).unwrap();
+        (orders.nc, orders.nd) = (1, 1);
+        let noisy = search.fit(&orders, &samples, 2).unwrap();
+        let ratio = noisy.residual_sum_of_squares / alone.residual_sum_of_squares;
+        eprintln!("{seed}: {ratio}");
+        assert!(ratio < 1.1, "{seed}: {ratio}");
+    }
 }
 
 /// What `generate.py` wrote.

@@ -124,7 +124,7 @@ struct Known {
     inputs: VecDeque<f64>,
 }
 
-athermal_core::state!(Known, "identified/1");
+athermal_core::state!(Known, "identified/2");
 
 /// Follows a model.
 #[derive(Debug)]
@@ -350,7 +350,9 @@ impl Learner for Following {
         let Some((nth, followed)) = oldest else {
             return;
         };
-        let soonest = followed.at + part(self.known.step, 1, 2);
+        // Not sooner than a step after it, as far as truths that come anyhow can keep to that.
+        let series = self.known.series.len() as i64;
+        let soonest = followed.at + part(self.known.step, (series - 1).max(1), series.max(2));
         if at < soonest {
             return;
         }
@@ -416,10 +418,9 @@ mod tests {
     use super::*;
     use athermal_numerics::Transfer;
 
-    /// What a model that sums its input up, nearly, predicts of a truth of 0 around a pause of so many steps.
-    fn around_a_pause(steps: i64) -> Vec<f64> {
-        let step = Duration::from_ns(1_000_000_000);
-        let model = Identified {
+    /// A model that sums its input up, nearly.
+    fn identified(step: Duration) -> Identified {
+        Identified {
             regressors: vec!["input".to_owned()],
             scaling: Scaling {
                 means: vec![0.0],
@@ -441,7 +442,13 @@ mod tests {
             step,
             series: 1,
             deviations: vec![1.0],
-        };
+        }
+    }
+
+    /// What it predicts of a truth of 0 around a pause of so many steps.
+    fn around_a_pause(steps: i64) -> Vec<f64> {
+        let step = Duration::from_ns(1_000_000_000);
+        let model = identified(step);
         assert_eq!(model.mistakes(), []);
         let mut learner = Following::new(&model);
         let instants = (0..20).chain(20 + steps..40 + steps);
@@ -476,5 +483,21 @@ mod tests {
             predicted[21..].iter().all(|value| value.abs() < 0.2),
             "{predicted:?}"
         );
+    }
+
+    #[test]
+    fn of_truths_that_come_much_faster_than_a_step_each_series_takes_one_a_step() {
+        let second = Duration::from_ns(1_000_000_000);
+        let mut model = identified(part(second, 99, 1));
+        model.series = MOST_SERIES;
+        let mut learner = Following::new(&model);
+        for nth in (0..1000).step_by(2) {
+            let at = Instant::from_ns(0) + part(second, nth, 1);
+            learner.run(&[1.0], at, at - part(second, 99, 1));
+            learner.learn(&[1.0], 0.0, at);
+        }
+        for followed in &learner.known.series {
+            assert!((10..=11).contains(&followed.told), "{followed:?}");
+        }
     }
 }

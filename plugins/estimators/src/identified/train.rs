@@ -120,9 +120,10 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             let rest = &self.rows[from + 1..];
             let length = 1 + rest.iter().position(|row| row.begins).unwrap_or(rest.len());
             for series in 0..pace.series {
+                let series = series * pace.truths / pace.series;
                 samples.segment();
                 let mut last: Option<Instant> = None;
-                for nth in (from + series..from + length).step_by(pace.series) {
+                for nth in (from + series..from + length).step_by(pace.truths) {
                     let Row { at, truth, .. } = self.rows[nth];
                     let steps = last.map_or(1.0, |last| (at - last).secs() / step);
                     if steps < 0.5 {
@@ -289,17 +290,20 @@ fn unsolved(reason: String) -> TrainingError {
 #[derive(Debug, Clone, Copy)]
 struct Pace {
     step: Duration,
-    /// How many truths come within a step: each begins a series of its own.
+    /// How many truths come within a step.
+    truths: usize,
+    /// How many of them begin a series of their own: all, or so many of them at even distances.
     series: usize,
 }
 
 impl Pace {
     fn of(every: Option<Duration>, span: Duration, between: Duration) -> Self {
         let step = every.unwrap_or_else(|| span.max(between));
-        let series = (step.secs() / between.secs()).round();
+        let truths = ((step.secs() / between.secs()).round() as usize).max(1);
         Self {
             step,
-            series: (series as usize).clamp(1, MOST_SERIES),
+            truths,
+            series: truths.min(MOST_SERIES),
         }
     }
 
@@ -344,5 +348,41 @@ impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
             predictor: Box::new(predictor),
             report,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_truths_that_come_much_faster_than_a_step_the_samples_are_a_step_apart() {
+        let second = Duration::from_ns(1_000_000_000);
+        let at = |nth: i64| Instant::from_ns(0) + Duration::from_ns(nth * 2_000_000_000);
+        let trainer = IdentifiedTrainer {
+            asked: Asked::default(),
+            names: Vec::new(),
+            span: second,
+            memory: usize::MAX,
+            rows: (0..500)
+                .map(|nth| Row {
+                    at: at(nth),
+                    truth: 2.0 * nth as f64,
+                    begins: nth == 0,
+                })
+                .collect(),
+            regressors: Vec::new(),
+            begins: false,
+            count: 500,
+        };
+        let pace = Pace::of(None, Duration::from_ns(99_000_000_000), 2 * second);
+        let samples = trainer.samples(pace, &Standardizer::new(0).standardization());
+        let mut series = 0;
+        for record in samples.records() {
+            series += 1;
+            let apart = record.outputs.windows(2).map(|pair| pair[1] - pair[0]);
+            assert!(apart.into_iter().all(|apart| apart == 100.0));
+        }
+        assert_eq!(series, MOST_SERIES);
     }
 }
