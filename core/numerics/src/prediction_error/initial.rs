@@ -53,22 +53,6 @@ pub(super) fn starts(
     Ok(starts)
 }
 
-/// The plant with noise that is white and with that which it leaves over.
-pub(super) fn with_noises(
-    orders: &Orders,
-    plant: Polynomials,
-    samples: &Samples,
-    radius: f64,
-) -> Vec<Polynomials> {
-    let found = with_noise(orders, &plant, samples).map(|model| model.stabilised(radius));
-    let white = Polynomials {
-        c: vec![0.0; orders.nc],
-        d: vec![0.0; orders.nd],
-        ..plant
-    };
-    std::iter::once(white).chain(found).collect()
-}
-
 /// Least squares of `y` on its own past and that of the inputs, and with `longer` of it on as many more of both.
 fn regression(
     orders: &Orders,

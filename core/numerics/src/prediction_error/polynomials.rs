@@ -44,12 +44,6 @@ impl Orders {
         self.differences == 0
     }
 
-    /// Whether inputs have filters of their own, and the noise others.
-    pub(super) fn has_noise_beside_filters(&self) -> bool {
-        let filtered = self.inputs.iter().any(|input| input.nf > 0);
-        filtered && self.differences == 0 && self.nc + self.nd > 0
-    }
-
     /// The first sample of a segment whose residual has all that it needs.
     #[must_use]
     pub fn first(&self) -> usize {

@@ -3,7 +3,7 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::initial::{starts, with_noises};
+use super::initial::starts;
 use super::residuals::{counted_from, derivatives, sum_of_squares};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
@@ -95,27 +95,8 @@ impl PredictionError {
             });
         }
         let radius = remembered(samples);
-        let direct = starts(orders, samples, self.penalty, radius)?;
-        let found = self.from_best(direct, samples, first, radius)?;
-        if !orders.has_noise_beside_filters() {
-            return Ok(found);
-        }
-        // Noise of its own must not make a model worse than its plant alone.
-        let alone = Orders {
-            nc: 0,
-            nd: 0,
-            ..orders.clone()
-        };
-        let plants = starts(&alone, samples, self.penalty, radius)?;
-        let plant = self.from_best(plants, samples, first, radius)?.model;
-        let mut noisy = with_noises(orders, plant, samples, radius);
-        let of = |model: &Polynomials| self.objective(model, samples, first);
-        let least = of(&found.model);
-        noisy.retain(|start| of(start) < least);
-        if noisy.is_empty() {
-            return Ok(found);
-        }
-        self.from_best(noisy, samples, first, radius)
+        let starts = starts(orders, samples, self.penalty, radius)?;
+        self.from_best(starts, samples, first, radius)
     }
 
     /// Searches from the best of several models.

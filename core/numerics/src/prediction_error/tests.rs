@@ -371,38 +371,6 @@ fn what_a_short_record_cannot_tell_from_a_unit_root_is_not_told_as_one() {
     assert!((-0.95..-0.94).contains(&fit.model.c[0]), "{fit:?}");
 }
 
-#[test]
-fn noise_of_its_own_makes_no_model_worse_than_its_plant_alone() {
-    let plant = Polynomials {
-        a: vec![],
-        inputs: vec![transfer(0, &[0.5], &[-0.9]), transfer(0, &[0.5], &[-0.9])],
-        c: vec![],
-        d: vec![],
-        differences: 0,
-        level: 0.0,
-    };
-    for seed in 1..20 {
-        let (mut u, mut e) = (noise(seed), noise(seed + 100));
-        let (mut samples, mut stepper) = (Samples::new(2), Stepper::new(plant.clone()));
-        for _ in 0..120 {
-            let input = u();
-            let expected = stepper.step(|_| input, None);
-            samples.push([input, input], expected + 0.3 * e());
-        }
-        let mut orders = orders(&plant);
-        let search = PredictionError {
-            penalty: 1.0,
-            ..PredictionError::default()
-        };
-        let alone = search.fit(&orders, &samples, 2).unwrap();
-        (orders.nc, orders.nd) = (1, 1);
-        let noisy = search.fit(&orders, &samples, 2).unwrap();
-        let ratio = noisy.residual_sum_of_squares / alone.residual_sum_of_squares;
-        eprintln!("{seed}: {ratio}");
-        assert!(ratio < 1.1, "{seed}: {ratio}");
-    }
-}
-
 /// What `generate.py` wrote.
 struct Oracle {
     expected: serde_json::Value,
