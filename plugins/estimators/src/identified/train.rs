@@ -375,7 +375,7 @@ mod tests {
             begins: false,
             count: 500,
         };
-        let pace = Pace::of(None, Duration::from_ns(99_000_000_000), 2 * second);
+        let pace = Pace::of(None, Duration::from_ns(99_000_000_000), at(1) - at(0));
         let samples = trainer.samples(pace, &Standardizer::new(0).standardization());
         let mut series = 0;
         for record in samples.records() {
