@@ -96,11 +96,11 @@ impl PredictionError {
         }
         let radius = remembered(samples);
         let starts = starts(orders, samples, self.penalty, radius)?;
-        self.from_best(starts, samples, first, radius)
+        self.best_from(starts, samples, first, radius)
     }
 
     /// Searches from the best of several models.
-    fn from_best(
+    fn best_from(
         &self,
         starts: Vec<Polynomials>,
         samples: &Samples,
