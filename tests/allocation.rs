@@ -12,10 +12,19 @@ use athermal::core::compile::Plan;
 use athermal::core::fit::{FitOptions, fit};
 use athermal::core::node::kinds;
 use athermal::core::recording::Table;
-use athermal::{Instant, Model};
+use athermal::{Duration, Instant, Model};
 use workbench::graphs;
 
-const STEP_NS: i64 = 10_000_000_000;
+/// The time between ticks: ten seconds, or so much that the longest window is long over when a graph counts as warm.
+fn step(plan: &Plan) -> Duration {
+    let spans = plan.channels.iter().map(|channel| channel.channel.span);
+    let longest = spans.max().unwrap_or(Duration::ZERO);
+    Duration::from_ns((longest.as_ns() / 200).max(10_000_000_000))
+}
+
+fn at(plan: &Plan, tick: i64) -> Instant {
+    Instant::from_ns(tick * step(plan).as_ns())
+}
 
 /// Temperatures swing at every tick; everything else follows them and is measured at every third.
 fn samples(plan: &Plan, tick: i64) -> Vec<f64> {
@@ -40,7 +49,7 @@ fn fitted(path: &Path) -> Model {
     let plan = Arc::clone(&model.plan);
     let mut log = Table::default();
     for tick in 0..3_000 {
-        log.push(Instant::from_ns(tick * STEP_NS), &samples(&plan, tick));
+        log.push(at(&plan, tick), &samples(&plan, tick));
     }
     model.fitted = fit(&plan, &log, &FitOptions::default(), &mut |_| ())
         .unwrap()
@@ -58,7 +67,7 @@ fn a_tick_of_every_shipped_graph_allocates_nothing_once_warm() {
         stepped.extend(model.plan.nodes.iter().map(|node| node.kind.name));
         let mut engine = model.engine().unwrap();
         let ticks: Vec<_> = (0..4_000)
-            .map(|tick| (Instant::from_ns(tick * STEP_NS), samples(&model.plan, tick)))
+            .map(|tick| (at(&model.plan, tick), samples(&model.plan, tick)))
             .collect();
         let (warm, steady) = ticks.split_at(2_000);
         for (time, samples) in warm {
