@@ -317,7 +317,6 @@ fn no_default_is_worse_than_no_model_on_a_dryer() {
         lags: r#"["1 sample", "2 samples"]"#,
         memory: "20 samples",
         limit: None,
-        ..DIE_TESTER
     });
 }
 
@@ -337,7 +336,6 @@ fn no_default_is_worse_than_no_model_on_a_wall() {
         lags: r#"["1 sample", "2 samples"]"#,
         memory: "48 samples",
         limit: None,
-        ..DIE_TESTER
     });
 }
 
@@ -357,7 +355,6 @@ fn no_default_is_worse_than_no_model_on_a_lamp_and_a_plate() {
         lags: r#"["2s", "4s"]"#,
         memory: "1min",
         limit: None,
-        ..DIE_TESTER
     });
 }
 
