@@ -1,5 +1,5 @@
-//! Decides whether the roots of a polynomial in the delay operator lie inside a circle, and brings them there. Without its leading 1 it is a list of
-//! coefficients: `1 + p₁ q⁻¹ + … + p_n q⁻ⁿ`.
+//! Decides whether the roots of a polynomial in the delay operator lie inside a circle, and brings them there. Without its
+//! leading 1 it is a list of coefficients: `1 + p₁ q⁻¹ + … + p_n q⁻ⁿ`.
 
 use faer::Mat;
 
