@@ -98,45 +98,33 @@ impl<T, Text, List, Table> Forms<T, Text, List, Table> {
     /// And a text, which is read as any type that a text says.
     #[must_use]
     pub fn text<X>(self, of: fn(X) -> T) -> Forms<T, X, List, Table> {
-        let Self {
-            plain, list, table, ..
-        } = self;
-        let text = Some(of);
         Forms {
-            plain,
-            text,
-            list,
-            table,
+            plain: self.plain,
+            text: Some(of),
+            list: self.list,
+            table: self.table,
         }
     }
 
     /// And a list.
     #[must_use]
     pub fn list<X>(self, of: fn(X) -> T) -> Forms<T, Text, X, Table> {
-        let Self {
-            plain, text, table, ..
-        } = self;
-        let list = Some(of);
         Forms {
-            plain,
-            text,
-            list,
-            table,
+            plain: self.plain,
+            text: self.text,
+            list: Some(of),
+            table: self.table,
         }
     }
 
     /// And a table.
     #[must_use]
     pub fn table<X>(self, of: fn(X) -> T) -> Forms<T, Text, List, X> {
-        let Self {
-            plain, text, list, ..
-        } = self;
-        let table = Some(of);
         Forms {
-            plain,
-            text,
-            list,
-            table,
+            plain: self.plain,
+            text: self.text,
+            list: self.list,
+            table: Some(of),
         }
     }
 
