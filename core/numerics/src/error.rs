@@ -43,6 +43,15 @@ pub enum NumericsError {
         /// How many there are.
         found: u64,
     },
+    /// Too few stretches of rows without a gap, each so long that it has a past and a future.
+    TooFewStretches {
+        /// How many rows a stretch has.
+        length: usize,
+        /// How many stretches are needed at least; they may overlap.
+        needed: usize,
+        /// How many there are.
+        found: usize,
+    },
     /// The statistics contain NaN or infinities.
     NotFinite,
     /// A column's scale is not a positive finite number.
@@ -97,6 +106,14 @@ impl fmt::Display for NumericsError {
             Self::TooFewRows { needed, found } => {
                 write!(f, "{found} rows where at least {needed} are needed")
             }
+            Self::TooFewStretches {
+                length,
+                needed,
+                found,
+            } => write!(
+                f,
+                "{found} stretches of {length} rows without a gap, and at least {needed} are needed"
+            ),
             Self::NotFinite => write!(f, "the rows contain NaN or infinite values"),
             Self::Scale { column, scale } => write!(
                 f,

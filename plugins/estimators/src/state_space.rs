@@ -5,7 +5,9 @@ use athermal_core::node::{
     TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
-use athermal_numerics::{Polynomials, Record, Samples, StateOrder, Subspace, Transfer};
+use athermal_numerics::{
+    NumericsError, Polynomials, Record, Samples, StateOrder, Subspace, Transfer,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -246,7 +248,12 @@ impl Identify for StateSpace {
             })
             .collect();
         let found = self.subspace(series).identify(&records, samples.width());
-        let found = found.map_err(told)?;
+        let found = found.map_err(|error| match error {
+            NumericsError::TooFewStretches { .. } => TrainingError::Unsolvable {
+                reason: format!("{error}; a shorter `horizon` needs fewer and shorter ones"),
+            },
+            error => told(error),
+        })?;
         report.notes.push(note(&found));
         let (squares, rows) = found.errors;
         let equation = found.model.difference_equation();

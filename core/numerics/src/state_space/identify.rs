@@ -76,7 +76,7 @@ impl Subspace {
     /// Identifies a model from records that have `width` inputs. Inputs and outputs should vary about 0 on one scale.
     ///
     /// # Errors
-    /// [`NumericsError::Parameter`], [`NumericsError::TooFewRows`] when there are not twice as many windows as a past has values,
+    /// [`NumericsError::Parameter`], [`NumericsError::TooFewStretches`] when there are not twice as many as a past has values,
     /// [`NumericsError::NotFinite`], [`NumericsError::NoConvergence`] for outputs that do not vary.
     pub fn identify(
         &self,
@@ -87,9 +87,10 @@ impl Subspace {
         let lagged = Lagged::of(records, width, self.horizon);
         let needed = 2 * self.horizon * (width + 1);
         if lagged.windows < needed {
-            return Err(NumericsError::TooFewRows {
-                needed: (needed + 2 * self.horizon) as u64,
-                found: records.iter().map(Record::len).sum::<usize>() as u64,
+            return Err(NumericsError::TooFewStretches {
+                length: 2 * self.horizon,
+                needed,
+                found: lagged.windows,
             });
         }
         let projected = lagged.projected()?;

@@ -246,10 +246,15 @@ fn wrong_requests_are_refused() {
         inputs: &inputs[..40],
         outputs: &outputs[..20],
     };
-    assert!(matches!(
-        PLAIN.identify(&[short], 2),
-        Err(NumericsError::TooFewRows { .. })
-    ));
+    // A record of 20 rows has one less than 20 of 2 rows, and so on.
+    let length = 2 * PLAIN.horizon;
+    let whole = PLAIN.identify(&[short], 2);
+    let found = 21 - length;
+    assert!(
+        matches!(whole, Err(NumericsError::TooFewStretches { length: l, needed, found: f })
+            if l == length && f == found && needed > found),
+        "{whole:?}"
+    );
     for how in [
         Subspace {
             horizon: 1,

@@ -8,9 +8,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum PerInput {
-    /// Of all.
+    /// A number for all.
     All(#[schemars(range(min = 0, max = 100))] usize),
-    /// Of each.
+    /// A list with one for each.
     Each(Vec<usize>),
 }
 
