@@ -13,7 +13,7 @@ use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Predictor, TrainingError, TrainingReport};
 use athermal::core::recording::Table;
 use serde_json::Value;
-use workbench::{coefficients, fitted, plan, problems, regression, secs};
+use workbench::{coefficients, fitted, numbers, plan, problems, regression, secs};
 
 const COLUMNS: usize = 12;
 
@@ -24,13 +24,6 @@ fn file(name: &str) -> String {
 
 fn expected(name: &str) -> Value {
     serde_json::from_str(&file(&format!("{name}/expected.json"))).unwrap()
-}
-
-fn numbers(text: &str) -> Vec<Vec<f64>> {
-    let lines = text.lines().skip(1);
-    lines
-        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
-        .collect()
 }
 
 /// The table of selections, its target replaced where another is given.
