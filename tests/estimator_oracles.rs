@@ -159,27 +159,6 @@ fn the_penalty_of_a_lasso_is_the_best_over_the_folds_of_the_oracle() {
 }
 
 #[test]
-fn constant_and_equal_features_are_named_by_what_is_not_least_squares_too() {
-    let mut rows = rows(None);
-    for row in &mut rows {
-        (row[10], row[11]) = (row[0], 3.0);
-    }
-    for kind in ["huber", "lasso", "elastic_net"] {
-        let (_, report) = on_rows(&format!("type = \"{kind}\""), "x", &rows);
-        let notes = report.notes.join("; ");
-        assert!(report.condition.unwrap() > 1e12, "{kind}: {report:?}");
-        assert!(
-            notes.contains("constant, so without effect: x.x11"),
-            "{kind}: {notes}"
-        );
-        assert!(
-            notes.contains("nearly a combination of the others: x.x10"),
-            "{kind}: {notes}"
-        );
-    }
-}
-
-#[test]
 fn a_robust_fit_is_that_of_the_oracle() {
     let rows = rows(Some("huber/target.csv"));
     let n = rows.len() as f64;
