@@ -1,5 +1,6 @@
 //! No estimator or combiner with its defaults is worse than no model: on any axis of any data set that is there. A printer is
-//! fitted on a probe and tested on the same probe, covered.
+//! fitted on a probe and tested on the same probe, covered; two more probes have no such recording. Some kinds see one window of
+//! each sensor, and on the printers all of them too.
 //!
 //! What does not hold, and why:
 //! - From one sort of probe to another nearly every kind is worse on some pair, least squares too (R² of `linear` −4.0 to 0.8 with
