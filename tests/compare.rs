@@ -221,6 +221,7 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
         Some("250 nm/min"),
     );
     let probe = |train, test| (train, test, None);
+    let alone = |file| probe(file, file);
     let mut runs = Vec::new();
     for path in graphs("graphs") {
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
@@ -240,26 +241,23 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
                 }
             }
             // One recording each; `evaluation_modes` fits on a part and lets the rest run free.
-            name if name == "hairdryer" => runs.push((
-                name.clone(),
-                probe("hairdryer/hairdryer.csv", "hairdryer/hairdryer.csv"),
-            )),
-            name if name == "heating-system" => runs.push((
-                name.clone(),
-                probe("heating-system/heating.csv", "heating-system/heating.csv"),
-            )),
-            name if name == "wall-heatflow" => runs.push((
-                name.clone(),
-                probe("wall-heatflow/wall.csv", "wall-heatflow/wall.csv"),
-            )),
-            name if name == "machine-temperature" => {
-                let file = "temperature-faults/nab_machine_temperature_system_failure.csv";
-                runs.push((name.clone(), probe(file, file)));
+            name if name == "hairdryer" => {
+                runs.push((name.clone(), alone("hairdryer/hairdryer.csv")))
             }
-            name if name == "ambient-temperature" => {
-                let file = "temperature-faults/nab_ambient_temperature_system_failure.csv";
-                runs.push((name.clone(), probe(file, file)));
+            name if name == "heating-system" => {
+                runs.push((name.clone(), alone("heating-system/heating.csv")))
             }
+            name if name == "wall-heatflow" => {
+                runs.push((name.clone(), alone("wall-heatflow/wall.csv")))
+            }
+            name if name == "machine-temperature" => runs.push((
+                name.clone(),
+                alone("temperature-faults/nab_machine_temperature_system_failure.csv"),
+            )),
+            name if name == "ambient-temperature" => runs.push((
+                name.clone(),
+                alone("temperature-faults/nab_ambient_temperature_system_failure.csv"),
+            )),
             name => panic!("no recording is named for graphs/{name}.toml"),
         }
     }

@@ -13,7 +13,7 @@ use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Predictor, TrainingError, TrainingReport};
 use athermal::core::recording::Table;
 use serde_json::Value;
-use workbench::{coefficients, fitted, plan, problems, regression, secs};
+use workbench::{coefficients, fitted, numbers, plan, problems, regression, secs};
 
 const COLUMNS: usize = 12;
 
@@ -24,13 +24,6 @@ fn file(name: &str) -> String {
 
 fn expected(name: &str) -> Value {
     serde_json::from_str(&file(&format!("{name}/expected.json"))).unwrap()
-}
-
-fn numbers(text: &str) -> Vec<Vec<f64>> {
-    let lines = text.lines().skip(1);
-    lines
-        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
-        .collect()
 }
 
 /// The table of selections, its target replaced where another is given.
@@ -163,27 +156,6 @@ fn the_penalty_of_a_lasso_is_the_best_over_the_folds_of_the_oracle() {
     assert!((word("up to") / largest - 1.0).abs() < 1e-3, "{note}");
     // Twenty to each factor of ten, over the four that glmnet goes down where there are more rows than features.
     assert_eq!(word("from"), 81.0, "{note}");
-}
-
-#[test]
-fn constant_and_equal_features_are_named_by_what_is_not_least_squares_too() {
-    let mut rows = rows(None);
-    for row in &mut rows {
-        (row[10], row[11]) = (row[0], 3.0);
-    }
-    for kind in ["huber", "lasso", "elastic_net"] {
-        let (_, report) = on_rows(&format!("type = \"{kind}\""), "x", &rows);
-        let notes = report.notes.join("; ");
-        assert!(report.condition.unwrap() > 1e12, "{kind}: {report:?}");
-        assert!(
-            notes.contains("constant, so without effect: x.x11"),
-            "{kind}: {notes}"
-        );
-        assert!(
-            notes.contains("nearly a combination of the others: x.x10"),
-            "{kind}: {notes}"
-        );
-    }
 }
 
 #[test]

@@ -2,25 +2,31 @@
 
 use crate::workbench::{Scratch, athermal};
 
+#[track_caller]
+fn assert_fits<'a>(lines: impl Iterator<Item = &'a str>) {
+    for line in lines {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+}
+
+/// What a list explains: the first word of each line that is set in by two spaces.
+fn listed<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let named = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    named
+        .filter_map(|line| line.split_whitespace().next())
+        .collect()
+}
+
 #[test]
 fn help_has_examples_and_fits_80_columns() {
-    let fits = |help: &str, of: &str| {
-        for line in help.lines() {
-            assert!(line.chars().count() <= 80, "{of}: {line}");
-        }
-    };
     let all = athermal(&[&"--help"]).ended(0).out;
-    fits(&all, "athermal");
-    let listed = all.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let listed = listed.take_while(|line| !line.is_empty());
-    let named = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
-    let commands: Vec<_> = named
-        .filter_map(|line| line.split_whitespace().next())
-        .collect();
+    assert_fits(all.lines());
+    let below = all.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let commands = listed(below.take_while(|line| !line.is_empty()));
     assert!(commands.len() > 15, "{commands:?}");
     for command in commands.into_iter().filter(|&command| command != "help") {
         let help = athermal(&[&command, &"--help"]).ended(0).out;
-        fits(&help, command);
+        assert_fits(help.lines());
         let taught = help.contains("Example") || help.contains("\nCommands:");
         assert!(taught, "{command} has no example:\n{help}");
     }
@@ -53,29 +59,19 @@ fn what_fit_and_evaluate_tell_fits_80_columns() {
     let evaluated = athermal(&[&"evaluate", &model, &"--data", &data]);
     for (told, holds) in [(fit.ended(0), "R²"), (evaluated.ended(0), "persistence")] {
         assert!(told.out.contains(holds), "{}", told.out);
-        for line in told.out.lines() {
-            assert!(line.chars().count() <= 80, "{line}");
-        }
+        assert_fits(told.out.lines());
     }
 }
 
 #[test]
 fn what_is_told_of_node_types_fits_80_columns() {
-    let listed = athermal(&[&"nodes"]).ended(0).out;
-    let kinds = listed
-        .lines()
-        .filter(|line| line.starts_with("  ") && !line.starts_with("   "));
-    let kinds: Vec<_> = kinds
-        .filter_map(|line| line.split_whitespace().next())
-        .collect();
+    let all = athermal(&[&"nodes"]).ended(0).out;
+    assert_fits(all.lines());
+    let kinds = listed(all.lines());
     assert!(kinds.contains(&"slope") && kinds.len() > 40, "{kinds:?}");
-    let told = kinds
-        .iter()
-        .map(|kind| athermal(&[&"nodes", kind]).ended(0).out);
-    for page in std::iter::once(listed.clone()).chain(told) {
+    for kind in kinds {
+        let page = athermal(&[&"nodes", &kind]).ended(0).out;
         // A table stays as it is: a formula in it cannot be broken.
-        for line in page.lines().filter(|line| !line.starts_with('|')) {
-            assert!(line.chars().count() <= 80, "{line}");
-        }
+        assert_fits(page.lines().filter(|line| !line.starts_with('|')));
     }
 }

@@ -10,7 +10,7 @@ mod simulated;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
 pub use program::{Finished, Scratch, athermal, athermal_fed, athermal_on};
-pub use regression::{coefficients, fitted, regression};
+pub use regression::{coefficients, fitted, numbers, regression};
 pub use simulated::simulated;
 
 use std::path::{Path, PathBuf};

@@ -8,6 +8,14 @@ use athermal::core::fit::{EstimatorFit, FitOptions, Outcome, fit};
 use athermal::core::node::Predictor;
 use athermal::core::recording::Table;
 
+/// The numbers of a table, line by line, without its header.
+pub fn numbers(text: &str) -> Vec<Vec<f64>> {
+    let lines = text.lines().skip(1);
+    lines
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect()
+}
+
 /// A graph in which one node, of the type and parameters given, predicts `y.y`; a row each second has the inputs `x`, then `y`.
 pub fn regression(inputs: &[impl Debug], node: &str) -> String {
     format!(
