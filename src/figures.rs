@@ -156,8 +156,13 @@ pub fn paragraph(label: &str, indent: usize, words: &str) -> String {
 #[must_use]
 pub fn page(text: &str) -> String {
     let stays = |line: &str| line.starts_with('|') || line.starts_with("    ");
+    // Code may have empty lines, and then goes on in the next block.
+    let mut in_code = false;
     let blocks = text.split("\n\n").map(|block| {
-        if block.starts_with("```") || block.lines().any(stays) {
+        let fences = block.lines().filter(|line| line.starts_with("```")).count();
+        let is_code = in_code || fences > 0;
+        in_code ^= fences % 2 == 1;
+        if is_code || block.lines().any(stays) {
             return format!("{block}\n");
         }
         let mut parts: Vec<(&str, String)> = Vec::new();
@@ -197,6 +202,15 @@ mod tests {
             [format!("- {}", words(15)), format!("  {}", words(5))]
         );
         assert!(lines[7].starts_with("| a | word") && lines[7].len() > 80);
+    }
+
+    #[test]
+    fn pages_keep_code_with_empty_lines() {
+        let code = "```toml\n[nodes.a]\n\n[nodes.b]\nahead = 0\n```";
+        assert_eq!(
+            page(&format!("{code}\n\none\nmore")),
+            format!("{code}\n\none more\n")
+        );
     }
 
     #[test]

@@ -140,7 +140,7 @@ impl Estimate {
         let entries = self.parts.iter().flat_map(|part| part.entries(gathers));
         self.feedback = match mode {
             Mode::OneStep => None,
-            mode => Feedback::new(mode, link, entries).map(Box::new),
+            mode => Feedback::new(mode, link, &entries.collect::<Vec<_>>()).map(Box::new),
         };
         if let Some(learning) = &mut self.learning {
             learning.predict_in(mode);

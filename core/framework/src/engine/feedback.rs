@@ -44,14 +44,9 @@ struct Truth {
 
 impl Feedback {
     /// None for an estimator that reads no past truth.
-    pub(crate) fn new(
-        mode: Mode,
-        link: &TruthLink,
-        regressors: impl Iterator<Item = Entry>,
-    ) -> Option<Self> {
-        let mut width = 0;
+    pub(crate) fn new(mode: Mode, link: &TruthLink, regressors: &[Entry]) -> Option<Self> {
         let past: Vec<Past> = regressors
-            .inspect(|_| width += 1)
+            .iter()
             .enumerate()
             .filter(|(_, entry)| entry.slot == link.slot)
             .map(|(place, entry)| Past {
@@ -67,10 +62,10 @@ impl Feedback {
             mode,
             step: Step::new(smallest + link.ahead),
             past,
-            pairing: Pairing::new(link, width + 1),
+            pairing: Pairing::new(link, regressors.len() + 1),
             truths: VecDeque::new(),
             deepest,
-            row: vec![0.0; width],
+            row: vec![0.0; regressors.len()],
         })
     }
 

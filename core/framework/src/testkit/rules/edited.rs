@@ -105,6 +105,7 @@ fn find(value: &Value, at: &str, places: &mut Vec<String>) {
         }
         Value::Object(table) => {
             for (key, value) in table {
+                let key = key.replace('~', "~0").replace('/', "~1");
                 find(value, &format!("{at}/{key}"), places);
             }
         }
