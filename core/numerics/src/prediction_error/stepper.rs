@@ -138,6 +138,11 @@ impl Stepper {
     /// `C(q) e` (Ansley 1979). Its gain is that of `C` as soon as the start is forgotten, and for a root on the unit circle,
     /// where it never is, that of a mean.
     fn take_innovation(&mut self, off: Option<f64>) {
+        let Some(off) = off else {
+            // It is taken for as it was foreseen.
+            self.shared.fill(0.0);
+            return self.pass(0.0, 0.0);
+        };
         let count = self.innovations.len();
         let c = &self.model.c;
         let mut variance = 1.0;
@@ -145,11 +150,6 @@ impl Stepper {
             *shared = product(c, &self.doubt[nth * count..]);
             variance += c[nth] * *shared;
         }
-        let Some(off) = off else {
-            // It is taken for as it was foreseen.
-            self.shared.fill(0.0);
-            return self.pass(0.0, 0.0);
-        };
         let newest = off / variance;
         for (of, shared) in self.innovations.iter_mut().zip(&self.shared) {
             *of += shared * newest;
