@@ -165,10 +165,9 @@ impl Stepper {
     fn pass(&mut self, newest: f64, doubt: f64) {
         push(&mut self.innovations, newest);
         let count = self.innovations.len();
-        for row in (1..count).rev() {
-            for column in (1..count).rev() {
-                self.doubt[row * count + column] = self.doubt[(row - 1) * count + column - 1];
-            }
+        // One row and one column further; what stands in the first of them is written anew.
+        if let Some(rest) = self.doubt.len().checked_sub(count + 1) {
+            self.doubt.copy_within(..rest, count + 1);
         }
         for nth in 1..count {
             self.doubt[nth] = self.shared[nth - 1];
