@@ -238,7 +238,7 @@ impl Predictor for KalmanPredictor {
             mistakes.push(Mistake::at("filter", message));
         }
         if !self.filter.can_restart(&self.at_large) {
-            let message = "`at_large` must have a finite mean and variance for the level, and for the trend where there is one";
+            let message = "`at_large` must have a finite mean and a finite variance of at least 0 for the level, and for the trend where there is one";
             mistakes.push(Mistake::at("at_large", message));
         }
         mistakes
