@@ -182,7 +182,8 @@ impl Errors {
             Ok(known) => known,
             Err(cold) => return cold,
         };
-        if known.squares.len() != self.squares.len() {
+        let voters = self.squares.len();
+        if known.squares.len() != voters || known.means.len() != voters {
             return Restored::cold("the number of voters differs");
         }
         match (known.memory, self.memory) {
