@@ -8,6 +8,8 @@ use super::Polynomials;
 ///
 /// Of a sample that is missing it takes what it had predicted for it, so that predictions several samples ahead are steps
 /// without one (Ljung 1999, section 3.2).
+///
+/// One that was read back has no scratch: it is for another to [`resume`](Self::resume) from, not to be stepped itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stepper {
