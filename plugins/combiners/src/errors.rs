@@ -126,17 +126,15 @@ impl Errors {
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
         let squares = &mut self.squares[voter];
         match self.memory {
-            Memory::Time(_) => squares.push_back((arrived, square)),
-            Memory::Truths(last) => {
-                let full = squares.len() >= last.truths;
-                if full {
-                    squares.pop_front();
-                }
+            Memory::Truths(last) if squares.len() >= last.truths => {
+                squares.pop_front();
                 squares.push_back((arrived, square));
-                if full {
-                    self.refresh(voter);
-                    return;
-                }
+                self.refresh(voter);
+            }
+            Memory::Time(_) | Memory::Truths(_) => {
+                squares.push_back((arrived, square));
+                self.sums[voter] += square;
+                self.means[voter] = Some(self.sums[voter] / squares.len() as f64);
             }
             Memory::HalfLife(fading) => {
                 let last = squares.pop_front();
@@ -146,11 +144,8 @@ impl Errors {
                 *count = *count * left + 1.0;
                 let mean = self.means[voter].unwrap_or(square);
                 self.means[voter] = Some(mean + (square - mean) / *count);
-                return;
             }
         }
-        self.sums[voter] += square;
-        self.means[voter] = Some(self.sums[voter] / self.squares[voter].len() as f64);
     }
 
     /// Forgets what arrived longer than the memory before `newest`.
@@ -187,7 +182,8 @@ impl Errors {
             Ok(known) => known,
             Err(cold) => return cold,
         };
-        if known.squares.len() != self.squares.len() {
+        let voters = self.squares.len();
+        if known.squares.len() != voters || known.means.len() != voters {
             return Restored::cold("the number of voters differs");
         }
         match (known.memory, self.memory) {

@@ -27,12 +27,12 @@ pub(crate) fn tell_columns<'a>(
     name: impl Fn(usize) -> &'a str,
     report: &mut TrainingReport,
 ) {
+    if gram.width() == 0 {
+        return;
+    }
     let all: Vec<usize> = (0..gram.width()).collect();
     let scales = Standardization::of(gram).scales;
-    let solved = LeastSquares::ridge(1.0).solve(gram, &all, &scales, None);
-    if let Ok(fit) = solved
-        && !all.is_empty()
-    {
+    if let Ok(fit) = LeastSquares::ridge(1.0).solve(gram, &all, &scales, None) {
         report.condition = Some(fit.condition);
         name_columns(&fit, name, report);
     }

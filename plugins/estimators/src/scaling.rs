@@ -49,7 +49,7 @@ pub(crate) fn scale_mistakes(
     {
         mistakes.push(Mistake::at(
             at,
-            format!("`{at}` has {scale} and must have values above 0"),
+            format!("`{at}` has {scale} and must have finite values above 0"),
         ));
     }
     mistakes

@@ -139,10 +139,21 @@ impl TryFrom<Saved> for Stacked {
 
     fn try_from(saved: Saved) -> Result<Self, NumericsError> {
         let voters = saved.regressors.len();
-        let found = saved.with_truth.len();
-        if voters > MOST || found != voters || saved.products.len() != voters * voters {
-            let expected = voters.min(MOST);
+        if voters > MOST {
+            let (expected, found) = (MOST, voters);
             return Err(NumericsError::Width { expected, found });
+        }
+        for (name, expected, found) in [
+            ("with_truth", voters, saved.with_truth.len()),
+            ("products", voters * voters, saved.products.len()),
+        ] {
+            if found != expected {
+                return Err(NumericsError::Length {
+                    name,
+                    expected,
+                    found,
+                });
+            }
         }
         let mut table = vec![0.0; voters << voters];
         for (set, weights) in table.chunks_exact_mut(voters.max(1)).enumerate() {

@@ -323,7 +323,7 @@ impl Kalman {
     }
 
     /// Whether level and trend can be started afresh from this: there is one pair of a mean and a variance for each of
-    /// them, and all are finite.
+    /// them, all are finite, and no variance is negative.
     #[must_use]
     pub fn can_restart(&self, known: &[(f64, f64)]) -> bool {
         let fine = |&(mean, variance): &(f64, f64)| {

@@ -44,7 +44,9 @@ pub(super) fn starts(
     let mut starts = Vec::new();
     for plant in plants {
         // Segments may be too short for the longer regressions, which are but a better start.
-        starts.extend(with_noise(&direct, &plant, &differenced).map(whole));
+        if orders.nc + orders.nd > 0 {
+            starts.extend(with_noise(&direct, &plant, &differenced).map(whole));
+        }
         if !filtered && orders.nc > 0 {
             starts.extend(hannan_rissanen(&direct, &differenced, penalty).map(whole));
         }
@@ -201,9 +203,6 @@ fn with_noise(
     samples: &Samples,
 ) -> Result<Polynomials, NumericsError> {
     let mut model = plant.clone();
-    if orders.nc + orders.nd == 0 {
-        return Ok(model);
-    }
     let white = Polynomials {
         c: Vec::new(),
         d: Vec::new(),

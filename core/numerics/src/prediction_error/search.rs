@@ -107,17 +107,13 @@ impl PredictionError {
         first: usize,
         radius: f64,
     ) -> Result<PredictionErrorFit, NumericsError> {
-        let mut best: Option<(f64, Polynomials)> = None;
-        for start in starts {
-            let found = self.objective(&start, samples, first);
-            if best.as_ref().is_none_or(|(least, _)| found < *least) {
-                best = Some((found, start));
-            }
-        }
-        let start = best
-            .filter(|(found, _)| found.is_finite())
-            .map(|(_, start)| start);
-        let start = start.ok_or(NumericsError::NotFinite)?;
+        let sums = starts
+            .into_iter()
+            .map(|start| (self.objective(&start, samples, first), start));
+        let best = sums
+            .filter(|(sum, _)| sum.is_finite())
+            .min_by(|(sum, _), (other, _)| sum.total_cmp(other));
+        let (_, start) = best.ok_or(NumericsError::NotFinite)?;
         let (model, steps, converged) = self.search(start, samples, first, radius);
         Ok(PredictionErrorFit {
             residual_sum_of_squares: sum_of_squares(&model, samples, first),

@@ -8,6 +8,8 @@ use super::Polynomials;
 ///
 /// Of a sample that is missing it takes what it had predicted for it, so that predictions several samples ahead are steps
 /// without one (Ljung 1999, section 3.2).
+///
+/// One that was read back has no scratch: it is for another to [`resume`](Self::resume) from, not to be stepped itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stepper {
@@ -138,6 +140,11 @@ impl Stepper {
     /// `C(q) e` (Ansley 1979). Its gain is that of `C` as soon as the start is forgotten, and for a root on the unit circle,
     /// where it never is, that of a mean.
     fn take_innovation(&mut self, off: Option<f64>) {
+        let Some(off) = off else {
+            // It is taken for as it was foreseen.
+            self.shared.fill(0.0);
+            return self.pass(0.0, 0.0);
+        };
         let count = self.innovations.len();
         let c = &self.model.c;
         let mut variance = 1.0;
@@ -145,11 +152,6 @@ impl Stepper {
             *shared = product(c, &self.doubt[nth * count..]);
             variance += c[nth] * *shared;
         }
-        let Some(off) = off else {
-            // It is taken for as it was foreseen.
-            self.shared.fill(0.0);
-            return self.pass(0.0, 0.0);
-        };
         let newest = off / variance;
         for (of, shared) in self.innovations.iter_mut().zip(&self.shared) {
             *of += shared * newest;
@@ -165,10 +167,9 @@ impl Stepper {
     fn pass(&mut self, newest: f64, doubt: f64) {
         push(&mut self.innovations, newest);
         let count = self.innovations.len();
-        for row in (1..count).rev() {
-            for column in (1..count).rev() {
-                self.doubt[row * count + column] = self.doubt[(row - 1) * count + column - 1];
-            }
+        // One row and one column further; what stands in the first of them is written anew.
+        if let Some(rest) = self.doubt.len().checked_sub(count + 1) {
+            self.doubt.copy_within(..rest, count + 1);
         }
         for nth in 1..count {
             self.doubt[nth] = self.shared[nth - 1];

@@ -50,37 +50,21 @@ impl Predictor for Identified {
         let mut mistakes = self.scaling.mistakes(width);
         let inputs = &self.model.inputs;
         mistakes.extend(Mistake::of_lengths(width, &[("inputs", inputs.len())]));
-        let mut check = |at: &str, found: String, fits: bool, allowed: &str| {
-            if !fits {
-                let message = format!("`{at}` is {found} and must be {allowed}");
+        let delays = inputs
+            .iter()
+            .map(|input| ("delay", input.delay, 0..=LARGEST));
+        let others = [
+            ("differences", self.model.differences, 0..=MOST_DIFFERENCES),
+            ("series", self.series, 1..=MOST_SERIES),
+        ];
+        for (at, found, allowed) in delays.chain(others) {
+            if !allowed.contains(&found) {
+                let (least, most) = allowed.into_inner();
+                let message = format!("`{at}` is {found} and must be {least} to {most}");
                 mistakes.push(Mistake::at(at, message));
             }
-        };
-        let delays = inputs.iter().map(|input| ("delay", input.delay, LARGEST));
-        let differences = ("differences", self.model.differences, MOST_DIFFERENCES);
-        for (at, found, most) in delays.chain([differences]) {
-            check(
-                at,
-                found.to_string(),
-                found <= most,
-                &format!("0 to {most}"),
-            );
         }
-        let step = self.step;
-        check(
-            "step",
-            step.to_string(),
-            step > Duration::ZERO,
-            "longer than nothing",
-        );
-        let series = self.series;
-        let allowed = format!("from 1 to {MOST_SERIES}");
-        check(
-            "series",
-            series.to_string(),
-            (1..=MOST_SERIES).contains(&series),
-            &allowed,
-        );
+        mistakes.extend(Mistake::unless_lasting("step", self.step));
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
         }

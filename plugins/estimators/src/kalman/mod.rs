@@ -237,8 +237,12 @@ impl Predictor for KalmanPredictor {
             let message = format!("`filter` has {known} coefficients and must have {width}");
             mistakes.push(Mistake::at("filter", message));
         }
+        if self.filter.is_diffuse() {
+            let message = "`filter` knows nothing of a state: `unknown` must be 0";
+            mistakes.push(Mistake::at("filter", message));
+        }
         if !self.filter.can_restart(&self.at_large) {
-            let message = "`at_large` must have a finite mean and variance for the level, and for the trend where there is one";
+            let message = "`at_large` must have a finite mean and a finite variance of at least 0 for the level, and for the trend where there is one";
             mistakes.push(Mistake::at("at_large", message));
         }
         mistakes
@@ -351,6 +355,9 @@ impl Learner for Following {
         };
         if known.scaling != self.known.scaling {
             return Restored::cold("its coefficients are for features on another scale");
+        }
+        if known.filter.is_diffuse() {
+            return Restored::cold("it knows nothing of a state");
         }
         if !self.known.filter.resume(&known.filter) {
             return Restored::cold("it has other states: a trend more or less, or other features");
