@@ -413,7 +413,7 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
         "how well the data determine",
         "what each sensor moves",
         "RMSE in nm/min of each day",
-        "how many times that the error is",
+        "how many days are needed",
         "signal to noise",
     ] {
         assert!(
