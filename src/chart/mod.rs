@@ -10,8 +10,8 @@ mod scale;
 mod svg;
 
 pub(crate) use colours::LINES;
-use colours::{UNSCALED, in_light};
 pub use colours::{COLOURS, STYLE};
+use colours::{UNSCALED, in_light};
 pub use plot::Plot;
 pub(crate) use svg::escaped;
 

@@ -19,8 +19,9 @@ const KNOWN: &str = "c6";
 const WINDOWS_SHOWN: f64 = 12.0;
 /// Errors of fits on fewer days are shown up to so many times that of fits on all others: whether they come near is asked.
 const RATIOS_SHOWN: f64 = 2.0;
-/// Impulses are shown whole unless the largest is so many times beyond nearly all others.
+/// Impulses are shown whole unless the largest is so many times beyond all but so many points of each line.
 const SPIKE: f64 = 10.0;
+const IN_SPIKES: usize = 4;
 
 /// A unit of time in which lengths up to the longest are short numbers: its name, and how many seconds it has.
 fn time_unit(longest_s: f64) -> (&'static str, &'static str, f64) {
@@ -191,22 +192,17 @@ fn windows(windows: &[&Windows]) -> Picture {
         let (x, y) = points(&shown(of));
         Points::line(nth, &of.truth, x, y)
     });
-    let own = windows.iter().enumerate().map(|(nth, of)| {
-        let widths = shown(of).into_iter();
-        let own: Vec<Width> = widths
-            .filter(|width| width.window_s == of.window_s)
-            .collect();
-        let (x, y) = points(&own);
-        Points {
-            mark: Mark::Dots,
-            ..Points::line(nth, "", x, y)
-        }
-    });
+    let mut own: Vec<f64> = windows.iter().map(|of| of.window_s / unit_s).collect();
+    own.dedup();
+    let own = match own[..] {
+        [one] => format!(", that of the graph is {}", (100.0 * one).round() / 100.0),
+        _ => String::new(),
+    };
     Picture {
         title: "Signal to noise of the drift against its window".to_owned(),
-        x_label: format!("window in {unit}; dots: as the graph has it"),
+        x_label: format!("window in {unit}{own}"),
         y_label: "signal to noise".to_owned(),
-        points: lines.chain(own).collect(),
+        points: lines.collect(),
         ..Picture::default()
     }
 }
@@ -357,12 +353,13 @@ pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
     }
 }
 
-/// Where nearly all of the lines lies, if that is far from all. An impulse makes a spike where a level enters, and beside that nothing
-/// would be seen.
+/// Where the lines lie but for a few points of each, if all lie far beyond. An impulse makes a spike where a level enters, and beside
+/// that nothing would be seen.
 fn most_of(lines: &[Points]) -> Option<(f64, f64)> {
     let values = lines.iter().flat_map(|line| &line.y);
     let mut sizes: Vec<f64> = values.map(|v| v.abs()).filter(|v| *v > 0.0).collect();
     sizes.sort_by(f64::total_cmp);
-    let size = sizes.get(sizes.len() * 95 / 100)?;
+    let most = sizes.len().checked_sub(1 + IN_SPIKES * lines.len())?;
+    let size = sizes[most];
     (*sizes.last()? > SPIKE * size).then_some((-1.1 * size, 1.1 * size))
 }

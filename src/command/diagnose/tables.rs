@@ -225,8 +225,8 @@ impl<'a> Tables<'a> {
         }
         let mut text = String::from(
             "how well the data determine each estimator: condition number of its regressors,\n\
-             and the largest variance inflation factor (VIF); beyond 10 the regressor is named:\n\
-             others tell nearly the same, and its coefficient means little by itself\n",
+             and the largest variance inflation factor (VIF); beyond 10 the regressor is\n\
+             named: others tell nearly the same, its coefficient means little by itself\n",
         );
         let rows: Vec<Vec<String>> = shown
             .iter()
