@@ -182,7 +182,21 @@ impl<'a> Tables<'a> {
                 if !come_back.is_empty() {
                     let _ = writeln!(text, "{step} what it predicts in the end, in {in_the_end}");
                     let total = |of: &Response| of.total.map_or("no end".to_owned(), number);
-                    text.push_str(&matrix("sensor", &columns, &cells(&come_back, total)));
+                    let mut rows = cells(&come_back, total);
+                    if come_back.len() > 1 {
+                        // What sensors that tell the same share among them means more than what each has of it.
+                        let together = of_node.iter().map(|of| {
+                            let names = |one: &&Response| {
+                                let mut all = come_back.iter();
+                                all.any(|other| other.sensor == one.sensor)
+                            };
+                            let totals = of.sensors.iter().filter(names).map(|of| of.total);
+                            let sum: Option<f64> = totals.sum();
+                            sum.map_or("no end".to_owned(), number)
+                        });
+                        rows.push(("all together".to_owned(), together.collect()));
+                    }
+                    text.push_str(&matrix("sensor", &columns, &rows));
                 }
                 if !last.is_empty() {
                     let _ = writeln!(text, "{step} what it predicts for good, in {unit}");
