@@ -48,6 +48,36 @@ impl PredictionVariance {
         }
         self.noise * (1.0 + leverage)
     }
+
+    /// The standard errors of the intercept, where there is one, and of the coefficients, in the order of the fit's columns:
+    /// without a penalty `s √(n⁻¹ + |Wx̄|²)` and `s |We_j|`; with one those of the posterior. NaN for a column that the rows
+    /// do not tell of.
+    #[must_use]
+    pub fn standard_errors(&self) -> Vec<f64> {
+        let mut squares = vec![0.0; self.width()];
+        let mut of_intercept = 1.0 / self.rows as f64;
+        let mut rest = self.root.as_slice();
+        for i in 0..squares.len() {
+            let (row, below) = rest.split_at((i + 1).min(rest.len()));
+            rest = below;
+            for (square, w) in squares.iter_mut().zip(row) {
+                *square += w * w;
+            }
+            let along: f64 = row.iter().zip(&self.centre).map(|(w, x)| w * x).sum();
+            of_intercept += along * along;
+        }
+        let intercept = (!self.centre.is_empty()).then_some(of_intercept);
+        let told = squares
+            .into_iter()
+            .map(|square| if square > 0.0 { square } else { f64::NAN });
+        let all = intercept.into_iter().chain(told);
+        all.map(|square| (self.noise * square).sqrt()).collect()
+    }
+
+    /// How many columns the triangle is of.
+    fn width(&self) -> usize {
+        (((8 * self.root.len() + 1) as f64).sqrt() as usize).saturating_sub(1) / 2
+    }
 }
 
 impl LeastSquares {

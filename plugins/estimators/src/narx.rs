@@ -2,8 +2,8 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Predictor, Regressor, Regressors, SelectionStep, Trained,
-    Trainer, TrainingError, TrainingReport, TrainingSetup, TruthLags,
+    Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
+    SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TruthLags,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
@@ -380,6 +380,33 @@ impl Predictor for NarxPredictor {
         let variables = self.terms.iter().flat_map(|term| &term.0);
         mistakes.extend(term_mistake(width, variables.copied()));
         mistakes
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        let of_data = |j: usize, z: f64| self.centres[j] + z * self.scales[j];
+        let term = |(term, b): (&Term, &f64)| {
+            let scale: f64 = term.0.iter().map(|&j| self.scales[j]).product();
+            let alone = term.0.len() == 1;
+            let factors = term.0.iter().map(|&j| Factor {
+                about: self.centres[j],
+                held: if alone {
+                    Factor::of(j).held
+                } else {
+                    (of_data(j, self.lowest[j]), of_data(j, self.highest[j]))
+                },
+                ..Factor::of(j)
+            });
+            athermal_core::node::Term::new(Of::Product(factors.collect()), b / scale)
+        };
+        let all = || self.terms.iter().zip(&self.coefficients);
+        let constants = all().filter(|(term, _)| term.0.is_empty());
+        let constant = constants.fold(self.mean, |sum, (_, b)| sum + b);
+        let constant = athermal_core::node::Term::new(Of::Constant, constant);
+        let products = all().filter(|(term, _)| !term.0.is_empty()).map(term);
+        Some(Coefficients {
+            terms: std::iter::once(constant).chain(products).collect(),
+            ..Coefficients::default()
+        })
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -1,7 +1,9 @@
 //! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
 
 use athermal_core::model::{number, numbers};
-use athermal_core::node::{Learner, Mistake, Predictor, Restored, State, TrainedRange};
+use athermal_core::node::{
+    Coefficients, Learner, Mistake, Predictor, Restored, State, TrainedRange,
+};
 use athermal_core::time::Instant;
 use athermal_numerics::{Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};
@@ -102,6 +104,27 @@ impl Frame {
     }
 }
 
+impl Frame {
+    /// The standard errors of the intercept and of the coefficients on the scale of the data; none where the recursion knows
+    /// nothing of them.
+    fn errors(&self, recursion: &Recursion) -> Option<Vec<f64>> {
+        let Recursion::Rls { rls, noise } = recursion else {
+            return None;
+        };
+        let width = self.scales.len();
+        let of_intercept = rls.spread(|i| match i < width {
+            true => -self.means[i] / self.scales[i],
+            false => 1.0,
+        });
+        let variances = rls.covariance().iter().step_by(width + 2);
+        let scaled = variances
+            .zip(&self.scales)
+            .map(|(variance, scale)| variance / (scale * scale));
+        let all = std::iter::once(of_intercept).chain(scaled);
+        Some(all.map(|variance| noise * variance.sqrt()).collect())
+    }
+}
+
 impl Recursion {
     /// What does not fit so many regressors.
     fn mistakes(&self, width: usize) -> Vec<Mistake> {
@@ -178,6 +201,12 @@ impl Predictor for OnlinePredictor {
 
     fn deviation(&self, regressors: &[f64]) -> f64 {
         self.frame.deviation(&self.recursion, regressors)
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        let errors = self.frame.errors(&self.recursion);
+        let (constant, values) = (self.intercept, &self.coefficients);
+        Some(Coefficients::linear(constant, values, errors.as_deref()))
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {

@@ -1,8 +1,8 @@
 //! The baseline "it goes on as it did".
 
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup, TruthLags,
+    Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressors, Term, Trained,
+    Trainer, TrainingError, TrainingReport, TrainingSetup, TruthLags,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,6 +62,13 @@ impl Predictor for Same {
 
     fn predict(&self, regressors: &[f64]) -> f64 {
         regressors[0]
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        Some(Coefficients {
+            terms: vec![Term::new(Of::Product(vec![Factor::of(0)]), 1.0)],
+            ..Coefficients::default()
+        })
     }
 }
 

@@ -2,8 +2,8 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Predictor, Regressor, Regressors, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup,
+    Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::Standardizer;
@@ -296,6 +296,24 @@ impl Predictor for PolynomialPredictor {
         let features = self.terms.iter().flat_map(|term| [Some(term.0), term.1]);
         mistakes.extend(term_mistake(width, features.flatten()));
         mistakes
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        let factor = |regressor: usize| Factor {
+            about: self.centres[regressor],
+            ..Factor::of(regressor)
+        };
+        let terms = self.terms.iter().zip(&self.coefficients).map(|(term, b)| {
+            let places: Vec<usize> = std::iter::once(term.0).chain(term.1).collect();
+            let scale: f64 = places.iter().map(|&place| self.scales[place]).product();
+            let factors = places.into_iter().map(factor).collect();
+            athermal_core::node::Term::new(Of::Product(factors), b / scale)
+        });
+        let constant = athermal_core::node::Term::new(Of::Constant, self.intercept);
+        Some(Coefficients {
+            terms: std::iter::once(constant).chain(terms).collect(),
+            ..Coefficients::default()
+        })
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {

@@ -2,8 +2,8 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Coefficients, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
@@ -317,5 +317,12 @@ impl Predictor for LinearPredictor {
     fn deviation(&self, regressors: &[f64]) -> f64 {
         let variance = self.variance.as_ref();
         variance.map_or(f64::NAN, |variance| variance.at(regressors).sqrt())
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        let errors = self.variance.as_ref();
+        let errors = errors.map(PredictionVariance::standard_errors);
+        let (constant, values) = (self.intercept, &self.coefficients);
+        Some(Coefficients::linear(constant, values, errors.as_deref()))
     }
 }

@@ -2,8 +2,8 @@
 
 use athermal_core::model::numbers;
 use athermal_core::node::{
-    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Coefficients, Estimator, Factor, InputPort, Of, Predictor, Regressors, Term, Trained, Trainer,
+    TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{GramBlocks, NumericsError, non_negative_least_squares};
@@ -197,6 +197,17 @@ impl Predictor for Stacked {
             .filter(|(_, vote)| !vote.is_nan())
             .map(|(weight, vote)| weight * vote)
             .sum()
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        let all = (1 << self.saved.regressors.len()) - 1;
+        let weights = self.weights(all).iter().enumerate();
+        let terms =
+            weights.map(|(voter, &weight)| Term::new(Of::Product(vec![Factor::of(voter)]), weight));
+        Some(Coefficients {
+            terms: terms.collect(),
+            ..Coefficients::default()
+        })
     }
 
     fn takes_absent(&self) -> bool {

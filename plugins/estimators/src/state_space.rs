@@ -267,6 +267,7 @@ impl Identify for StateSpace {
             residual_sum_of_squares: squares * scale * scale,
             rows,
             variance: squares * scale * scale / rows as f64,
+            errors: None,
             model: Polynomials {
                 a: equation.a,
                 inputs: inputs.collect(),

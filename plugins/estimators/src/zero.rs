@@ -1,8 +1,8 @@
 //! The baseline "nothing moves".
 
 use athermal_core::node::{
-    Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError, TrainingReport,
-    TrainingSetup,
+    Coefficients, Estimator, InputPort, Predictor, Regressors, Trained, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,10 @@ impl Predictor for Nothing {
 
     fn predict(&self, _regressors: &[f64]) -> f64 {
         0.0
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        Some(Coefficients::linear(0.0, &[], None))
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use super::{InputPort, Learner, Learns, Mistake, TrainedRange};
+use super::{Coefficients, InputPort, Learner, Learns, Mistake, TrainedRange};
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -365,6 +365,11 @@ pub trait Predictor: Any + Debug + Send + Sync {
     /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
     fn deviation(&self, _regressors: &[f64]) -> f64 {
         f64::NAN
+    }
+
+    /// What it consists of, for people; none for one that says nothing of it.
+    fn coefficients(&self) -> Option<Coefficients> {
+        None
     }
 
     /// What goes on learning from here; none for one that stays as it was fitted.

@@ -9,6 +9,7 @@
 //! purpose: they never see a truth before its time, because it is not theirs to read. A feature that learns from a truth before
 //! it runs has an [`Encoder`], and stays as it was fitted.
 
+mod coefficients;
 mod combiner;
 mod encoder;
 mod estimator;
@@ -20,6 +21,7 @@ mod reach;
 mod registry;
 mod state;
 
+pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
 pub use combiner::{Combine, Combiner, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;

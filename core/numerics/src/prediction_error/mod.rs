@@ -6,6 +6,7 @@
 mod criteria;
 mod initial;
 mod polynomials;
+mod precision;
 mod residuals;
 mod roots;
 mod search;
@@ -16,5 +17,6 @@ mod tests;
 pub use criteria::{Criterion, InformationCriteria};
 pub use polynomials::{InputOrders, Orders, Polynomials, Transfer};
 pub use residuals::Samples;
+pub use roots::Fading;
 pub use search::{PredictionError, PredictionErrorFit};
 pub use stepper::Stepper;

@@ -36,25 +36,12 @@ pub(super) fn reflected(polynomial: &[f64], radius: f64) -> Vec<f64> {
     if is_within(polynomial, radius) {
         return polynomial.to_vec();
     }
-    let n = polynomial.len();
-    let whole = polynomial.iter().all(|p| p.is_finite());
-    let companion = Mat::from_fn(n, n, |i, j| match (i, j) {
-        (0, j) => -polynomial[j],
-        (i, j) if i == j + 1 => 1.0,
-        _ => 0.0,
-    });
-    let roots = if whole {
-        companion.eigenvalues().ok()
-    } else {
-        None
-    };
-    let Some(roots) = roots else {
-        return vec![0.0; n];
+    let Some(roots) = roots(polynomial) else {
+        return vec![0.0; polynomial.len()];
     };
     // Multiplied out again, with an imaginary part that cancels.
     let mut product = vec![(1.0, 0.0)];
-    for root in roots {
-        let (mut re, mut im) = (root.re, root.im);
+    for (mut re, mut im) in roots {
         let square = re * re + im * im;
         if square > 1.0 {
             (re, im) = (re / square, im / square);
@@ -75,7 +62,55 @@ pub(super) fn reflected(polynomial: &[f64], radius: f64) -> Vec<f64> {
     if is_within(&reflected, radius) {
         reflected
     } else {
-        vec![0.0; n]
+        vec![0.0; polynomial.len()]
+    }
+}
+
+/// The roots, each as its real and its imaginary part; none where they cannot be found.
+fn roots(polynomial: &[f64]) -> Option<Vec<(f64, f64)>> {
+    let n = polynomial.len();
+    if !polynomial.iter().all(|p| p.is_finite()) {
+        return None;
+    }
+    let companion = Mat::from_fn(n, n, |i, j| match (i, j) {
+        (0, j) => -polynomial[j],
+        (i, j) if i == j + 1 => 1.0,
+        _ => 0.0,
+    });
+    let roots = companion.eigenvalues().ok()?;
+    Some(roots.iter().map(|root| (root.re, root.im)).collect())
+}
+
+/// How a filter `1/(1 + p₁ q⁻¹ + … + p_n q⁻ⁿ)` comes to rest, in steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fading {
+    /// In how many steps it does, but for 1/e of the way; infinite where it stays, negative where it grows.
+    pub time_constant: f64,
+    /// The steps of a swing, where there are two roots that swing together, or one that alternates.
+    pub period: Option<f64>,
+}
+
+impl Fading {
+    /// One for each real root and each pair of the polynomial without its leading 1, the slowest first.
+    #[must_use]
+    pub fn of(polynomial: &[f64]) -> Vec<Self> {
+        let roots = roots(polynomial).unwrap_or_default();
+        let upper = roots.into_iter().filter(|&(_, im)| im >= 0.0);
+        let mut fading: Vec<Self> = upper
+            .map(|(re, im)| Self {
+                time_constant: match re.hypot(im).ln() {
+                    // A root that rounding alone keeps off the unit circle.
+                    log if log.abs() < 1e-9 => f64::INFINITY,
+                    log => -1.0 / log,
+                },
+                period: (im > 0.0 || re < 0.0).then(|| std::f64::consts::TAU / im.atan2(re)),
+            })
+            .collect();
+        fading.sort_by(|a, b| {
+            let rate = |of: &Self| 1.0 / of.time_constant;
+            rate(a).total_cmp(&rate(b))
+        });
+        fading
     }
 }
 
@@ -90,6 +125,28 @@ mod tests {
         assert!(!is_stable(&[-1.0]) && !is_stable(&[-2.0, 0.9]) && !is_stable(&[f64::NAN]));
         // A pair of radius √0.8.
         assert!(is_within(&[-1.6, 0.8], 0.9) && !is_within(&[-1.6, 0.8], 0.89));
+    }
+
+    #[test]
+    fn a_filter_fades_as_its_roots_do() {
+        let root = |time_constant: f64| (-1.0 / time_constant).exp();
+        let (slow, fast) = (root(20.0), root(3.0));
+        let [first, second] = Fading::of(&[-slow - fast, slow * fast])[..] else {
+            panic!("two roots")
+        };
+        assert!((first.time_constant - 20.0).abs() < 1e-9 && first.period.is_none());
+        assert!((second.time_constant - 3.0).abs() < 1e-9 && second.period.is_none());
+        // A pair that takes 12 steps for a swing.
+        let (size, angle) = (root(8.0), std::f64::consts::TAU / 12.0);
+        let [pair] = Fading::of(&[-2.0 * size * angle.cos(), size * size])[..] else {
+            panic!("a pair is one")
+        };
+        assert!((pair.time_constant - 8.0).abs() < 1e-9);
+        assert!((pair.period.unwrap() - 12.0).abs() < 1e-9);
+        assert_eq!(Fading::of(&[-1.0])[0].time_constant, f64::INFINITY);
+        assert_eq!(Fading::of(&[0.5])[0].period, Some(2.0));
+        assert!(Fading::of(&[-1.1])[0].time_constant < 0.0);
+        assert!(Fading::of(&[]).is_empty() && Fading::of(&[f64::NAN]).is_empty());
     }
 
     #[test]

@@ -4,6 +4,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::initial::starts;
+use super::precision::standard_errors;
 use super::residuals::{counted_from, derivatives, sum_of_squares};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
@@ -39,6 +40,8 @@ impl Default for PredictionError {
 pub struct PredictionErrorFit {
     /// The model.
     pub model: Polynomials,
+    /// The standard error of each of its coefficients, where the samples determine all of them.
+    pub errors: Option<Polynomials>,
     /// Without the penalty.
     pub residual_sum_of_squares: f64,
     /// Residuals that were counted.
@@ -115,13 +118,17 @@ impl PredictionError {
             .min_by(|(sum, _), (other, _)| sum.total_cmp(other));
         let (_, start) = best.ok_or(NumericsError::NotFinite)?;
         let (model, steps, converged) = self.search(start, samples, first, radius);
-        Ok(PredictionErrorFit {
+        let mut fit = PredictionErrorFit {
             residual_sum_of_squares: sum_of_squares(&model, samples, first),
             model,
+            errors: None,
             rows: samples.counted(first),
             steps,
             converged,
-        })
+        };
+        let (hessian, _) = self.normal_equations(&fit.model, samples, first);
+        fit.errors = standard_errors(&fit.model, &hessian, fit.variance());
+        Ok(fit)
     }
 
     fn objective(&self, model: &Polynomials, samples: &Samples, first: usize) -> f64 {

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use athermal_core::model::numbers;
-use athermal_core::node::{Learner, Mistake, Predictor, Restored, State};
+use athermal_core::node::{Coefficients, Learner, Mistake, Predictor, Restored, State};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Polynomials, Stepper};
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,9 @@ pub(super) struct Identified {
     pub(super) scaling: Scaling,
     /// On scaled inputs, in the unit of the truth.
     pub(super) model: Polynomials,
+    /// The standard error of each coefficient, in its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) errors: Option<Polynomials>,
     pub(super) step: Duration,
     /// How many truths come within a step.
     pub(super) series: usize,
@@ -77,6 +80,10 @@ impl Predictor for Identified {
 
     fn deviation(&self, _regressors: &[f64]) -> f64 {
         self.deviations.last().copied().unwrap_or(f64::NAN)
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        Some(super::told::coefficients(self))
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {
@@ -423,6 +430,7 @@ mod tests {
                 differences: 0,
                 level: 0.0,
             },
+            errors: None,
             step,
             series: 1,
             deviations: vec![1.0],

@@ -2,6 +2,7 @@
 
 mod follow;
 mod per_input;
+mod told;
 mod train;
 
 use athermal_core::node::{Mistake, Regressors, Trainer, TrainingSetup};

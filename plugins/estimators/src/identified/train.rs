@@ -45,6 +45,8 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) model: Polynomials,
+    /// The standard errors of its coefficients, where they are known.
+    pub(crate) errors: Option<Polynomials>,
     pub(crate) residual_sum_of_squares: f64,
     pub(crate) rows: usize,
     /// The variance of an innovation.
@@ -192,6 +194,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 .map(|sum| (variance * sum).sqrt())
                 .collect(),
             model: stepper.model().clone(),
+            errors: found.errors,
             step: pace.step,
             series: pace.series,
         })
@@ -217,6 +220,9 @@ impl Identify for Asked {
         let spread = samples.spread();
         let mut fit = self.fit(&samples.divided(spread), spread, report)?;
         fit.model.rescale(spread);
+        if let Some(errors) = &mut fit.errors {
+            errors.rescale(spread);
+        }
         fit.residual_sum_of_squares *= spread * spread;
         if !fit.converged {
             report.notes.push(format!(
@@ -229,6 +235,7 @@ impl Identify for Asked {
             rows: fit.rows,
             variance: fit.variance(),
             model: fit.model,
+            errors: fit.errors,
         })
     }
 }

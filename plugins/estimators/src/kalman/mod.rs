@@ -1,8 +1,8 @@
 //! The estimator that follows a level and a trend while truths come in.
 
 use athermal_core::node::{
-    Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored, State,
-    Trainer, TrainingSetup,
+    Coefficients, Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored,
+    State, Trainer, TrainingSetup,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -12,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 mod fit;
+mod told;
 
 use crate::scaling::Scaling;
 use fit::KalmanTrainer;
@@ -254,6 +255,10 @@ impl Predictor for KalmanPredictor {
 
     fn deviation(&self, regressors: &[f64]) -> f64 {
         deviation(&self.filter, 0.0, self.scaling.of(regressors))
+    }
+
+    fn coefficients(&self) -> Option<Coefficients> {
+        Some(told::coefficients(self))
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {

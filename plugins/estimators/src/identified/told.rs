@@ -1,0 +1,68 @@
+//! Decides how an identified model tells its polynomials, on the scale of the data, and how they come to rest.
+
+use athermal_core::node::{Coefficients, Mode, Noise, Of, Predictor, Term};
+use athermal_numerics::Fading;
+
+use super::follow::Identified;
+
+pub(super) fn coefficients(of: &Identified) -> Coefficients {
+    let model = &of.model;
+    let mut told = Coefficients {
+        step: Some(of.step),
+        ..Coefficients::default()
+    };
+    // Noise that is integrated leaves no level.
+    if model.differences == 0 {
+        let at_rest = of.predict(&vec![0.0; of.regressors.len()]);
+        let error = match &of.errors {
+            // Where there are inputs, it is of another constant: that at their means.
+            Some(errors) if of.regressors.is_empty() => errors.level,
+            _ => f64::NAN,
+        };
+        told.terms
+            .push(Term::new(Of::Constant, at_rest).within(error));
+    }
+    let errors = of.errors.as_ref();
+    let step_s = of.step.secs();
+    let mut tell = |polynomial: char, input: Option<usize>, (values, errors): (&[f64], &[f64])| {
+        let (first, scale) = match (polynomial, input) {
+            ('B', Some(nth)) => (model.inputs[nth].delay, of.scaling.scales[nth]),
+            _ => (1, 1.0),
+        };
+        for (nth, value) in values.iter().enumerate() {
+            let steps = first + nth;
+            let of = Of::Power {
+                polynomial,
+                steps,
+                input,
+            };
+            let error = errors.get(nth).copied().unwrap_or(f64::NAN);
+            told.terms
+                .push(Term::new(of, value / scale).within(error / scale));
+        }
+        if matches!(polynomial, 'A' | 'D' | 'F') {
+            told.modes
+                .extend(Fading::of(values).iter().map(|fading| Mode {
+                    of: polynomial.to_string(),
+                    input,
+                    time_constant_s: fading.time_constant * step_s,
+                    period_s: fading.period.map(|period| period * step_s),
+                }));
+        }
+    };
+    tell('A', None, (&model.a, errors.map_or(&[], |of| &of.a)));
+    for (nth, input) in model.inputs.iter().enumerate() {
+        let errors = errors.and_then(|of| of.inputs.get(nth));
+        tell('B', Some(nth), (&input.b, errors.map_or(&[], |of| &of.b)));
+        tell('F', Some(nth), (&input.f, errors.map_or(&[], |of| &of.f)));
+    }
+    tell('C', None, (&model.c, errors.map_or(&[], |of| &of.c)));
+    tell('D', None, (&model.d, errors.map_or(&[], |of| &of.d)));
+    told.noises
+        .extend(of.deviations.first().map(|&deviation| Noise {
+            name: "e".to_owned(),
+            deviation,
+            per: None,
+        }));
+    told
+}

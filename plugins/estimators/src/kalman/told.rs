@@ -1,0 +1,51 @@
+//! Decides how a structural model tells its coefficients and noises, on the scale of the data.
+
+use athermal_core::node::{Coefficients, Mode, Noise, Predictor};
+use athermal_core::time::Duration;
+
+use super::KalmanPredictor;
+
+/// The time over which noises are told, in s.
+const PER_S: f64 = 3600.0;
+
+/// What a model at rest consists of. The level wanders, so that no constant has a standard error.
+pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
+    let (filter, scales) = (&of.filter, &of.scaling.scales);
+    let order = filter.state().len();
+    let moving = order - scales.len();
+    let states = filter.state()[moving..].iter().zip(scales);
+    let values: Vec<f64> = states.map(|(b, scale)| b / scale).collect();
+    let variances = filter.covariance().iter().step_by(order + 1).skip(moving);
+    let errors = variances.zip(scales);
+    let errors = errors.map(|(variance, scale)| variance.sqrt() / scale);
+    let errors: Vec<f64> = std::iter::once(f64::NAN).chain(errors).collect();
+    let model = filter.model();
+    let wandering = |name: &str, deviation: f64| Noise {
+        name: name.to_owned(),
+        deviation,
+        per: Duration::from_secs_f64(PER_S),
+    };
+    let mut noises = vec![
+        Noise {
+            per: None,
+            ..wandering("observation", model.observation.sqrt())
+        },
+        wandering("level", (model.level * PER_S).sqrt()),
+    ];
+    let trend = model.trend;
+    noises.extend(trend.map(|trend| wandering("trend", (trend * PER_S).sqrt() * PER_S)));
+    let returns = Mode {
+        of: "level".to_owned(),
+        input: None,
+        time_constant_s: 1.0 / model.returning,
+        period_s: None,
+    };
+    Coefficients {
+        noises,
+        modes: Some(returns)
+            .filter(|_| model.trend.is_none())
+            .into_iter()
+            .collect(),
+        ..Coefficients::linear(of.predict(&vec![0.0; scales.len()]), &values, Some(&errors))
+    }
+}
