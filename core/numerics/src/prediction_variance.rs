@@ -182,6 +182,24 @@ mod tests {
     }
 
     #[test]
+    fn standard_errors_equal_the_oracle_and_a_constant_column_has_none() {
+        let expected = oracle::own_table("prediction_variance/errors.csv").numbers();
+        for (alpha, column) in [(0.0, 0), (5.0, 1)] {
+            let (_, variance) = fitted(alpha, &[0, 1, 2, 3]);
+            let mut found = variance.standard_errors();
+            assert!(found.remove(3).is_nan());
+            assert_eq!(found.len(), expected.len());
+            for (found, expected) in found.iter().zip(&expected) {
+                let expected = expected[column];
+                assert!(
+                    (found - expected).abs() < 1e-9 * expected,
+                    "{found} instead of {expected} with a penalty of {alpha}"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn the_order_of_columns_changes_nothing() {
         let (_, one) = fitted(5.0, &[0, 1, 2, 3]);
         let (_, other) = fitted(5.0, &[3, 1, 0]);

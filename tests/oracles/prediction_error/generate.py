@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import sippy_unipi
 from scipy.optimize import least_squares, minimize_scalar
+from scipy.optimize._numdiff import approx_derivative
 from scipy.signal import lfilter, lfiltic
 from statsmodels.tsa.arima.model import ARIMA
 
@@ -75,7 +76,11 @@ def by_scipy(name):
 
     start = np.r_[[] if integrated else model["level"], *[model[key] for key in "abfcd"]].astype(float)
     found = least_squares(errors, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    return {"coefficients": found.x.tolist(), "sum_of_squares": 2 * found.cost, "rows": len(errors(found.x))}
+    rows = len(errors(found.x))
+    jacobian = approx_derivative(errors, found.x, method="3-point")
+    covariance = 2 * found.cost / (rows - len(start)) * np.linalg.inv(jacobian.T @ jacobian)
+    return {"coefficients": found.x.tolist(), "errors": np.sqrt(np.diag(covariance)).tolist(),
+            "sum_of_squares": 2 * found.cost, "rows": rows}
 
 
 def by_statsmodels(name, order):

@@ -1,7 +1,8 @@
 """Standard deviations of predictions: ordinary least squares by statsmodels, ridge by a Gaussian process of scikit-learn.
 
 python 3.11, numpy 2.3, statsmodels 0.15, scikit-learn 1.9. Run it in this folder; it is seeded and writes rows.csv (what is
-fitted) and expected.csv (where is predicted, and both deviations of an observation about its prediction).
+fitted), expected.csv (where is predicted, and both deviations of an observation about its prediction) and errors.csv (the standard
+errors of the intercept and of the coefficients).
 
 Ridge on standardised columns is the posterior mean under a prior of variance s²/alpha for each coefficient, so a Gaussian
 process with a linear kernel has the same predictions and tells their deviations. Its intercept is free, which adds s²/n.
@@ -36,9 +37,13 @@ mean_of_process, of_process = process.predict(at_z, return_std=True)
 assert np.allclose(mean_of_process + y.mean(), ridge.predict(at_z), atol=1e-8)
 penalised = np.sqrt(of_process**2 + noise + noise / n)
 
+covariance = noise * np.linalg.inv(z.T @ z + ALPHA * np.eye(3))
+errors = np.sqrt(np.r_[noise / n + (mean / scale) @ covariance @ (mean / scale), np.diag(covariance) / scale**2])
+
 for name, header, columns in (
     ("rows.csv", "x0,x1,x2,x3,y", np.column_stack([x, y])),
     ("expected.csv", "x0,x1,x2,x3,ordinary,ridge", np.column_stack([at, ordinary, penalised])),
+    ("errors.csv", "ordinary,ridge", np.column_stack([ols.bse, errors])),
 ):
     with open(name, "w") as out:
         print(header, file=out)

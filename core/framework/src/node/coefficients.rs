@@ -6,8 +6,8 @@ use crate::time::Duration;
 /// [`Predictor::coefficients`](super::Predictor::coefficients).
 ///
 /// Without polynomials the prediction is the sum of the terms, each its value times its factors. With them, and `q⁻¹` for a step
-/// back, it follows `A(q) (y − μ) = Σ B(q)/F(q) u + C(q)/D(q) e` (Ljung 1999, eq. 4.33), of which the constant `μ` is a term, and
-/// the 1 that `A`, `C`, `D` and `F` begin with is not.
+/// back, it follows `A(q) (y − μ) = Σ B(q)/F(q) u + C(q)/(D(q) (1 − q⁻¹)^d) e` (Ljung 1999, eq. 4.33), of which the constant `μ`
+/// is a term, and the 1 that `A`, `C`, `D` and `F` begin with is not.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Coefficients {
     /// The terms, in the order in which they are told.
@@ -16,6 +16,8 @@ pub struct Coefficients {
     pub noises: Vec<Noise>,
     /// How it comes to rest.
     pub modes: Vec<Mode>,
+    /// How often the noise is integrated.
+    pub differences: usize,
     /// How long a step is, where it has steps.
     pub step: Option<Duration>,
 }

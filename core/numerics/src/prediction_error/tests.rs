@@ -461,6 +461,22 @@ fn coefficients_equal_the_oracle_of_scipy() {
 }
 
 #[test]
+fn standard_errors_equal_the_oracle_of_scipy() {
+    let oracle = Oracle::read();
+    for (name, orders) in of_oracle() {
+        let found = oracle.fit(name, &orders).errors.unwrap().flat();
+        let expected = oracle.numbers(name, "scipy", "errors");
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!(
+                (found / expected - 1.0).abs() < 2e-3,
+                "{name}: {found}, not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
 fn coefficients_are_near_the_oracle_of_the_exact_likelihood() {
     let oracle = Oracle::read();
     for (name, orders) in [&of_oracle()[0], &of_oracle()[4], &of_oracle()[5]] {

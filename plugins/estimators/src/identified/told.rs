@@ -9,6 +9,7 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
     let model = &of.model;
     let mut told = Coefficients {
         step: Some(of.step),
+        differences: model.differences,
         ..Coefficients::default()
     };
     // Noise that is integrated leaves no level.

@@ -1,21 +1,34 @@
-//! `athermal show`: a graph as a plan, or as a picture.
+//! `athermal show`: a graph as a plan, or as a picture; a model by its coefficients.
+
+mod coefficients;
+mod tables;
 
 use std::path::PathBuf;
 
 use athermal::Model;
+use athermal::core::compile::Wanted;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::{Value, json};
 
+use super::evaluate::load_fitted;
 use crate::drawing::{Diagram, Flow, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
+use coefficients::Told;
 
-/// Show a graph: its plan, or a picture of it
+/// Show a graph: its plan, or a picture of it; show a model by its coefficients
+///
+/// Coefficients are in the units of the data, temperatures as K, with their standard errors where theory tells them: those of
+/// least squares; with a penalty those of the posterior of ridge, on which the port `deviation` stands too; of `rls` those that
+/// its memory leaves; of models that are identified by the prediction error those that its derivatives tell. They take the errors
+/// of rows for independent, and are too small where windows overlap. In products regressors count from their means. What follows
+/// its own past comes to rest in time constants; those of a state space are its eigenvalues.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal show graphs/die-tester.toml
   athermal show graphs/die-tester.toml --format svg > die-tester.svg
   athermal show graphs/die-tester.toml --format mermaid      for Markdown
+  athermal show model.json --format coefficients
   athermal show model.json --expand --format dot | dot -Tpdf -o graph.pdf")]
 pub struct Show {
     /// The graph, or a model
@@ -34,7 +47,9 @@ fn formats() -> PossibleValuesParser {
         PossibleValue::new("mermaid").help("A flowchart for Markdown and web pages"),
         PossibleValue::new("dot").help("A graph for Graphviz"),
         PossibleValue::new("svg").help("A picture that needs no other program"),
-        PossibleValue::new("json").help("Boxes and arrows for programs"),
+        PossibleValue::new("coefficients")
+            .help("What the fitted estimators of a model consist of: coefficients, noises, time constants"),
+        PossibleValue::new("json").help("Boxes and arrows for programs, and the coefficients of a model"),
     ])
 }
 
@@ -44,13 +59,18 @@ impl Show {
     /// # Errors
     /// When the graph has mistakes.
     pub fn run(&self, _terminal: &Terminal) -> Result<Answer, Failure> {
+        if self.format == "coefficients" {
+            let model = load_fitted(&self.graph, Wanted::default())?;
+            print(tables::text(&model, &coefficients::told(&model)).as_bytes())?;
+            return Ok(Answer::Fine);
+        }
         let model = Model::load(&self.graph)?;
         let drawn = || diagram(&model.plan, self.expand);
         let text = match self.format.as_str() {
             "mermaid" => mermaid::text(&drawn()),
             "dot" => dot::text(&drawn()),
             "svg" => svg::text(&drawn()),
-            "json" => format!("{:#}\n", facts(&drawn())),
+            "json" => format!("{:#}\n", facts(&drawn(), &coefficients::told(&model))),
             _ => plan::text(&model.plan, self.expand),
         };
         print(text.as_bytes())?;
@@ -58,7 +78,7 @@ impl Show {
     }
 }
 
-fn facts(diagram: &Diagram) -> Value {
+fn facts(diagram: &Diagram, told: &[Told]) -> Value {
     let boxes: Vec<Value> = diagram
         .boxes
         .iter()
@@ -79,5 +99,9 @@ fn facts(diagram: &Diagram) -> Value {
             json!({ "from": arrow.from, "to": arrow.to, "kind": kind })
         })
         .collect();
-    json!({ "name": diagram.name, "boxes": boxes, "arrows": arrows })
+    let mut facts = json!({ "name": diagram.name, "boxes": boxes, "arrows": arrows });
+    if !told.is_empty() {
+        facts["estimators"] = json!(told);
+    }
+    facts
 }

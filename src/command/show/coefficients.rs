@@ -1,0 +1,283 @@
+//! Decides what is told of the estimators of a model: what each coefficient is called, and which unit it has.
+
+use athermal::Model;
+use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
+use athermal::core::node::{Coefficients, Factor, Of, Predictor, Regressor, Term};
+use athermal::core::unit::Unit;
+use athermal_numerics::Fading;
+use serde::Serialize;
+
+/// The longest difference equation of which the modes are told, in steps.
+const LONGEST: i64 = 100;
+
+/// A fitted estimator.
+#[derive(Debug, Serialize)]
+pub(super) struct Told {
+    pub(super) node: String,
+    #[serde(rename = "type")]
+    pub(super) kind: &'static str,
+    pub(super) truth: String,
+    pub(super) unit: String,
+    /// None of a kind that tells nothing of them.
+    #[serde(flatten)]
+    pub(super) found: Option<Found>,
+}
+
+/// What it consists of.
+#[derive(Debug, Serialize)]
+pub(super) struct Found {
+    pub(super) coefficients: Vec<Coefficient>,
+    pub(super) noises: Vec<Noise>,
+    pub(super) modes: Vec<Mode>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) step_s: Option<f64>,
+    #[serde(skip_serializing_if = "is_zero")]
+    pub(super) differences: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_zero(value: &usize) -> bool {
+    *value == 0
+}
+
+/// A coefficient.
+#[derive(Debug, Serialize)]
+pub(super) struct Coefficient {
+    /// Of what: `constant`, or what it is multiplied by.
+    pub(super) name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) polynomial: Option<char>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) steps: Option<usize>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) factors: Vec<Multiplied>,
+    pub(super) value: f64,
+    pub(super) standard_error: Option<f64>,
+    /// Its unit is that of the truth per this one; none where it has no unit, and of a constant.
+    pub(super) per: Option<String>,
+}
+
+/// A regressor in a product, as the difference from a value.
+#[derive(Debug, Serialize)]
+pub(super) struct Multiplied {
+    pub(super) regressor: String,
+    pub(super) unit: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) about: Option<f64>,
+    /// The least and the largest value that counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) held: Option<(f64, f64)>,
+}
+
+/// A noise that a model takes for granted.
+#[derive(Debug, Serialize)]
+pub(super) struct Noise {
+    pub(super) name: String,
+    pub(super) deviation: f64,
+    pub(super) per_s: Option<f64>,
+}
+
+/// How a model comes to rest.
+#[derive(Debug, Serialize)]
+pub(super) struct Mode {
+    pub(super) of: String,
+    /// None where it does not come to rest; below 0 where it grows.
+    pub(super) time_constant_s: Option<f64>,
+    pub(super) period_s: Option<f64>,
+}
+
+/// Every fitted estimator of a model, in the order of the plan.
+pub(super) fn told(model: &Model) -> Vec<Told> {
+    let nodes = model.plan.nodes.iter();
+    let told = nodes.filter_map(|node| {
+        let predictor = model.fitted.get(&node.instance())?;
+        told_of(&model.plan, node, &**predictor)
+    });
+    told.collect()
+}
+
+fn told_of(plan: &Plan, node: &PlannedNode, predictor: &dyn Predictor) -> Option<Told> {
+    let PlannedRole::Estimator {
+        regressors, truth, ..
+    } = &node.role
+    else {
+        return None;
+    };
+    let channel = &plan.channels[truth.slot];
+    let used = predictor.uses().iter();
+    let used: Option<Vec<&Regressor>> = used
+        .map(|name| regressors.iter().find(|of| of.name == *name))
+        .collect();
+    let found = used.zip(predictor.coefficients()).map(|(used, mut found)| {
+        recur(&mut found, &used, truth.ahead.as_ns());
+        Names(&used).found(found)
+    });
+    Some(Told {
+        node: node.instance(),
+        kind: node.kind.name,
+        truth: channel.name.clone(),
+        unit: channel.channel.unit.difference().to_string(),
+        found,
+    })
+}
+
+/// Tells how a sum comes to rest that has past truths among its regressors: fed with its own predictions, it is a difference
+/// equation, whose step is the shortest time from such a truth to the one that is predicted.
+fn recur(found: &mut Coefficients, used: &[&Regressor], ahead_ns: i64) {
+    let mut lagged: Vec<(i64, f64)> = Vec::new();
+    for term in &found.terms {
+        match &term.of {
+            Of::Constant => {}
+            Of::Product(factors) => match factors[..] {
+                [factor] if factor == Factor::of(factor.regressor) => {
+                    let of = used[factor.regressor];
+                    if of.of_truth {
+                        lagged.push((of.lag.as_ns() + ahead_ns, term.value));
+                    }
+                }
+                _ => return,
+            },
+            Of::Power { .. } => return,
+        }
+    }
+    let step_ns = lagged.iter().map(|&(back, _)| back).min().unwrap_or(0);
+    let even = |&(back, _): &(i64, f64)| back % step_ns == 0 && back / step_ns <= LONGEST;
+    if step_ns <= 0 || !lagged.iter().all(even) {
+        return;
+    }
+    let longest = lagged.iter().map(|&(back, _)| back / step_ns).max();
+    let mut polynomial = vec![0.0; longest.map_or(0, |longest| longest as usize)];
+    for (back, value) in lagged {
+        polynomial[(back / step_ns) as usize - 1] -= value;
+    }
+    let step_s = step_ns as f64 / 1e9;
+    let modes = Fading::of(&polynomial).into_iter();
+    found
+        .modes
+        .extend(modes.map(|fading| athermal::core::node::Mode {
+            of: "past truths".to_owned(),
+            input: None,
+            time_constant_s: fading.time_constant * step_s,
+            period_s: fading.period.map(|period| period * step_s),
+        }));
+}
+
+/// The regressors that are used.
+struct Names<'a>(&'a [&'a Regressor]);
+
+impl Names<'_> {
+    fn found(&self, of: Coefficients) -> Found {
+        let noises = of.noises.into_iter().map(|noise| Noise {
+            name: noise.name,
+            deviation: noise.deviation,
+            per_s: noise.per.map(athermal::Duration::secs),
+        });
+        let modes = of.modes.into_iter().map(|mode| Mode {
+            of: match mode.input {
+                Some(input) => format!("{} {}", mode.of, self.0[input].name),
+                None => mode.of,
+            },
+            time_constant_s: Some(mode.time_constant_s).filter(|time| time.is_finite()),
+            period_s: mode.period_s,
+        });
+        Found {
+            coefficients: of.terms.iter().map(|term| self.coefficient(term)).collect(),
+            noises: noises.collect(),
+            modes: modes.collect(),
+            step_s: of.step.map(athermal::Duration::secs),
+            differences: of.differences,
+        }
+    }
+
+    fn coefficient(&self, term: &Term) -> Coefficient {
+        let plain = Coefficient {
+            name: "constant".to_owned(),
+            polynomial: None,
+            steps: None,
+            factors: Vec::new(),
+            value: term.value,
+            standard_error: term.error,
+            per: None,
+        };
+        match &term.of {
+            Of::Constant => plain,
+            Of::Product(factors) => {
+                let factors: Vec<_> = factors.iter().map(|factor| self.factor(factor)).collect();
+                let names: Vec<String> = powers(factors.iter().map(|of| &*of.regressor));
+                let units: Vec<String> = powers(factors.iter().map(|of| &*of.unit));
+                Coefficient {
+                    name: names.join(" × "),
+                    per: Some(units.join("·")),
+                    factors,
+                    ..plain
+                }
+            }
+            &Of::Power {
+                polynomial,
+                steps,
+                input,
+            } => {
+                let input = input.map(|input| self.0[input]);
+                let parts = [
+                    polynomial.to_string(),
+                    input.map_or_else(String::new, |of| of.name.clone()),
+                    back(steps),
+                ];
+                let parts: Vec<String> = parts.into_iter().filter(|of| !of.is_empty()).collect();
+                let has_unit = polynomial == 'B';
+                Coefficient {
+                    name: parts.join(" "),
+                    polynomial: Some(polynomial),
+                    steps: Some(steps),
+                    per: input.filter(|_| has_unit).map(unit),
+                    ..plain
+                }
+            }
+        }
+    }
+
+    fn factor(&self, factor: &Factor) -> Multiplied {
+        let of = self.0[factor.regressor];
+        let (least, largest) = factor.held;
+        Multiplied {
+            regressor: of.name.clone(),
+            unit: unit(of),
+            about: Some(factor.about).filter(|about| *about != 0.0),
+            held: (least.is_finite() || largest.is_finite()).then_some(factor.held),
+        }
+    }
+}
+
+/// The unit of a difference of its values.
+fn unit(of: &Regressor) -> String {
+    let unit = Unit::parse(&of.unit).map(|unit| unit.difference().to_string());
+    unit.unwrap_or_else(|_| of.unit.clone())
+}
+
+/// What comes several times in a row as a power.
+fn powers<'a>(all: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let all: Vec<&str> = all.collect();
+    let power = |of: &[&str]| match of.len() {
+        1 => of[0].to_owned(),
+        times if of[0].contains(['/', ' ']) => format!("({}){}", of[0], superscript(times)),
+        times => format!("{}{}", of[0], superscript(times)),
+    };
+    all.chunk_by(|a, b| a == b).map(power).collect()
+}
+
+/// So many steps back.
+fn back(steps: usize) -> String {
+    match steps {
+        0 => String::new(),
+        steps => format!("q⁻{}", superscript(steps)),
+    }
+}
+
+fn superscript(number: usize) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let digits = number.to_string();
+    digits
+        .bytes()
+        .map(|digit| DIGITS[usize::from(digit - b'0')])
+        .collect()
+}

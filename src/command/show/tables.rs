@@ -1,0 +1,249 @@
+//! Decides how the coefficients of a model look in text for people.
+
+use std::fmt::Write as _;
+
+use athermal::Model;
+
+use super::coefficients::{Coefficient, Found, Mode, Told};
+use crate::figures::{paragraph, table};
+
+/// The longest name that numbers stand beside; what is longer is told above them.
+const LONGEST_NAME: usize = 36;
+
+/// All that is told of a model.
+pub(super) fn text(model: &Model, told: &[Told]) -> String {
+    let mut text = String::new();
+    for of in told {
+        let found = of.found.as_ref();
+        text.push_str(&found.map_or_else(|| untold(of), |found| estimator(of, found)));
+        text.push('\n');
+    }
+    for node in model.unfitted() {
+        let _ = writeln!(text, "{node} could not be fitted\n");
+    }
+    let all = told.iter().filter_map(|of| of.found.as_ref());
+    let mut all = all.flat_map(|found| &found.coefficients);
+    if all.any(|of| of.standard_error.is_some()) {
+        text.push_str(
+            "std. error: as if the errors of rows were independent, so too small where\n\
+             windows overlap; with a penalty, the spread of the posterior\n",
+        );
+    } else if told.is_empty() {
+        text.push_str("nothing in the graph is fitted\n");
+    }
+    text
+}
+
+fn untold(of: &Told) -> String {
+    let Told {
+        node, kind, truth, ..
+    } = of;
+    format!("{node} ({kind} of {truth}): nodes of this type do not tell their coefficients\n")
+}
+
+fn estimator(of: &Told, found: &Found) -> String {
+    let Told {
+        node,
+        kind,
+        truth,
+        unit,
+        ..
+    } = of;
+    let mut text = format!("{node} ({kind} of {truth})\n");
+    if found.step_s.is_some() {
+        text.push_str(&paragraph("  ", 2, &equation(found)));
+    }
+    let mut rows = Vec::new();
+    for of in &found.coefficients {
+        let mut lines = name_lines(of);
+        let mut row = vec![lines.pop().unwrap_or_default()];
+        rows.extend(lines.into_iter().map(|line| vec![line]));
+        row.push(digits(of.value, 5));
+        row.push(of.standard_error.map_or("-".to_owned(), |it| digits(it, 3)));
+        row.push(of.per.clone().unwrap_or_default());
+        rows.push(row);
+    }
+    let header = ["  coefficient", unit, "std. error", "per"];
+    text.push_str(&table(&header, &rows));
+    text.push_str(&held(found));
+    if !found.noises.is_empty() {
+        let rows = found.noises.iter().map(|noise| {
+            let within = noise.per_s.map(|per| format!("in {}", time(per)));
+            vec![
+                format!("  {}", noise.name),
+                digits(noise.deviation, 4),
+                within.unwrap_or_default(),
+            ]
+        });
+        let header = ["  standard deviation of", unit, ""];
+        text.push_str(&table(&header, &rows.collect::<Vec<_>>()));
+    }
+    if !found.modes.is_empty() {
+        let rows = found.modes.iter().map(|mode| {
+            vec![
+                format!("  {}", mode.of),
+                fading(mode),
+                mode.period_s.map_or("-".to_owned(), time),
+            ]
+        });
+        let header = ["  comes to rest", "time constant", "period"];
+        text.push_str(&table(&header, &rows.collect::<Vec<_>>()));
+    }
+    text
+}
+
+/// The equation that the polynomials are of.
+fn equation(found: &Found) -> String {
+    let all = || found.coefficients.iter();
+    let has = |polynomial: char| all().any(|of| of.polynomial == Some(polynomial));
+    let has_constant = all().any(|of| of.polynomial.is_none());
+    let truth = match (has('A'), has_constant) {
+        (true, true) => "A(q) (y − constant)",
+        (true, false) => "A(q) y",
+        (false, true) => "y − constant",
+        (false, false) => "y",
+    };
+    let inputs = match (has('B'), has('F')) {
+        (true, true) => "Σ B(q)/F(q) u + ",
+        (true, false) => "Σ B(q) u + ",
+        (false, _) => "",
+    };
+    let c = if has('C') { "C(q)" } else { "1" };
+    let integrated = ["", "(1 − q⁻¹)", "(1 − q⁻¹)²"][found.differences.min(2)];
+    let d = if has('D') { "D(q)" } else { "" };
+    let noise = match (c, d, integrated) {
+        ("1", "", "") => "e".to_owned(),
+        (c, "", "") => format!("{c} e"),
+        (c, "", below) | (c, below, "") => format!("{c}/{below} e"),
+        (c, d, integrated) => format!("{c}/({d} {integrated}) e"),
+    };
+    let order = all().filter(|of| of.polynomial == Some('A')).count();
+    let order = match order {
+        0 => String::new(),
+        order => format!("; A is of order {order}"),
+    };
+    let step = time(found.step_s.unwrap_or(0.0));
+    format!("{truth} = {inputs}{noise}, q⁻¹ being a step of {step} back{order}")
+}
+
+/// The name in lines of which numbers stand beside the last.
+fn name_lines(of: &Coefficient) -> Vec<String> {
+    let short = |text: &str| text.chars().count() <= LONGEST_NAME;
+    if short(&of.name) {
+        return vec![format!("  {}", of.name)];
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for factor in of.name.split(" × ") {
+        let sign = if lines.is_empty() { "  " } else { "    × " };
+        lines.push(format!("{sign}{factor}"));
+    }
+    if lines.last().is_some_and(|last| !short(last)) {
+        lines.push(String::new());
+    }
+    lines
+}
+
+/// From where regressors in products count, and how far.
+fn held(found: &Found) -> String {
+    let factors = || found.coefficients.iter().flat_map(|of| &of.factors);
+    let mut named: Vec<&str> = Vec::new();
+    for factor in factors().filter(|of| of.about.is_some() || of.held.is_some()) {
+        if !named.contains(&&*factor.regressor) {
+            named.push(&factor.regressor);
+        }
+    }
+    if named.is_empty() {
+        return String::new();
+    }
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |it| digits(it, 5));
+    let ranges = factors().any(|of| of.held.is_some());
+    let rows = named.iter().map(|&name| {
+        let of = || factors().filter(|of| of.regressor == name);
+        let about = of().find_map(|of| of.about);
+        let unit = of().next().map_or("", |of| &*of.unit);
+        let mut row = vec![format!("  {name}"), number(about), unit.to_owned()];
+        if ranges {
+            let held = of().find_map(|of| of.held);
+            row.push(number(held.map(|(least, _)| least)));
+            row.push(number(held.map(|(_, largest)| largest)));
+        }
+        row
+    });
+    let header = ["  counted from its mean", "", "", "held from", "to"];
+    let columns = if ranges { 5 } else { 3 };
+    table(&header[..columns], &rows.collect::<Vec<_>>())
+}
+
+fn fading(mode: &Mode) -> String {
+    match mode.time_constant_s {
+        None => "stays".to_owned(),
+        Some(grows) if grows < 0.0 => format!("grows, {}", time(-grows)),
+        Some(fades) => time(fades),
+    }
+}
+
+/// A number to so many significant digits.
+fn digits(value: f64, count: usize) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        "0".to_owned()
+    } else if !(1e-4..1e6).contains(&size) {
+        format!("{value:.*e}", count - 1)
+    } else {
+        let before = size.log10().floor() as i32 + 1;
+        let after = usize::try_from(count as i32 - before).unwrap_or(0);
+        format!("{value:.after$}")
+    }
+}
+
+/// A time to three significant digits, in the unit in which it is read best.
+fn time(seconds: f64) -> String {
+    let (unit, length) = match seconds {
+        short if short < 1.0 => ("ms", 1e-3),
+        short if short < 120.0 => ("s", 1.0),
+        short if short < 3_600.0 => ("min", 60.0),
+        short if short < 172_800.0 => ("h", 3_600.0),
+        _ => ("d", 86_400.0),
+    };
+    let number = digits(seconds / length, 3);
+    let number = match number.contains('.') && !number.contains('e') {
+        true => number.trim_end_matches('0').trim_end_matches('.'),
+        false => &number,
+    };
+    format!("{number} {unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_type_that_does_not_tell_its_coefficients_is_said_to() {
+        let of = Told {
+            node: "model.Z".to_owned(),
+            kind: "my_node",
+            truth: "drift.Z".to_owned(),
+            unit: "nm/min".to_owned(),
+            found: None,
+        };
+        assert_eq!(
+            untold(&of),
+            "model.Z (my_node of drift.Z): nodes of this type do not tell their coefficients\n"
+        );
+    }
+
+    #[test]
+    fn numbers_keep_their_digits_and_times_the_unit_in_which_they_are_read_best() {
+        let told = [0.0, 12.345_678, -0.000_123_456, 1_234_567.0, 98_765.4].map(|it| digits(it, 5));
+        assert_eq!(told, ["0", "12.346", "-0.00012346", "1.2346e6", "98765"]);
+        let times = [0.0456, 90.0, 3_600.0, 7.65 * 60.0, 1e7].map(time);
+        assert_eq!(times, ["45.6 ms", "90 s", "1 h", "7.65 min", "116 d"]);
+        let mode = |time_constant_s| Mode {
+            of: "A".to_owned(),
+            time_constant_s,
+            period_s: None,
+        };
+        assert_eq!(fading(&mode(None)), "stays");
+        assert_eq!(fading(&mode(Some(-60.0))), "grows, 60 s");
+    }
+}
