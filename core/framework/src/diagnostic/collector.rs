@@ -101,6 +101,7 @@ pub struct Diagnostics {
     first: HashMap<(&'static str, Option<Place>), Known>,
     scope: Option<String>,
     errors: usize,
+    reported: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -153,16 +154,30 @@ impl Diagnostics {
 
     /// Takes over what another collector found.
     pub fn extend(&mut self, other: Self) {
-        for diagnostic in other.found {
+        self.extend_where(other, |_| true);
+    }
+
+    /// Takes over those that are wanted of what another collector found.
+    pub(crate) fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
+        for diagnostic in other.found.into_iter().filter(wanted) {
             if diagnostic.severity == Severity::Error {
                 self.errors += 1;
+                self.reported += 1;
             }
             self.found.push(diagnostic);
         }
     }
 
+    /// Number of errors as they were found: one that is found again, of another member or instance, counts again.
+    pub(crate) fn reported(&self) -> usize {
+        self.reported
+    }
+
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
         let (code, message) = (problem.code(), problem.message());
+        if problem.severity() == Severity::Error {
+            self.reported += 1;
+        }
         if let Some(known) = self.known.get_mut(&(code, place, message.clone())) {
             if context.is_some() && known.context != context {
                 known.context = context;

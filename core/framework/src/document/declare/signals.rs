@@ -2,8 +2,10 @@
 
 use super::names::distinct;
 use super::placeholder;
-use super::reading::{known_keys, length, missing, quantity, table, text, texts, wrong_type};
-use super::sets::{self, Sets};
+use super::reading::{
+    is_misspelt, known_keys, length, missing, quantity, table, text, texts, wrong_type,
+};
+use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::SignalDecl;
 use crate::document::problem::DocumentProblem;
@@ -29,7 +31,7 @@ pub(super) fn declare(
     };
     let mut declared = Vec::new();
     for (name, entry) in signals.iter() {
-        match signal(name, entry, sets, sample, broken, diagnostics) {
+        match signal(name, entry, sets, sample, diagnostics) {
             Some(signal) => declared.push(signal),
             None => broken.push(name.to_owned()),
         }
@@ -43,7 +45,6 @@ fn signal(
     entry: &Entry,
     sets: &Sets,
     sample: Option<Duration>,
-    broken: &[String],
     diagnostics: &mut Diagnostics,
 ) -> Option<SignalDecl> {
     let before = diagnostics.error_count();
@@ -52,6 +53,7 @@ fn signal(
     known_keys(keys, &KEYS, &what, diagnostics);
     let unit = match keys.get("unit") {
         Some(value) => unit(value, diagnostics),
+        None if is_misspelt(keys, "unit", &KEYS) => None,
         None => {
             missing(
                 &entry.value,
@@ -65,6 +67,7 @@ fn signal(
     };
     let channels = match keys.get("channels") {
         Some(value) => channels(value, &what, sets, diagnostics),
+        None if is_misspelt(keys, "channels", &KEYS) => None,
         None => {
             missing(
                 &entry.value,
@@ -76,11 +79,7 @@ fn signal(
             None
         }
     };
-    let of_broken = keys
-        .get("channels")
-        .and_then(Value::as_text)
-        .is_some_and(|set| broken.iter().any(|broken| broken == set));
-    let known = diagnostics.error_count() == before && !of_broken;
+    let known = diagnostics.error_count() == before;
     let column = match keys.get("column") {
         Some(value) => column(value, channels.as_deref(), &what, diagnostics),
         None => Some(format!("{{{CHANNEL}}}")),
@@ -131,7 +130,7 @@ fn channels(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(String, Place)>> {
     if let Some(set) = value.as_text() {
-        let members = sets::find(set, value.place, sets, diagnostics)?;
+        let members = sets.find(set, value.place, diagnostics)?;
         return Some(
             members
                 .iter()
