@@ -175,7 +175,7 @@ inputs.signal = ["one", "two:slope", "tow"]
 shown = "shown"
 both = ["one", "two:other.a"]
 "#;
-    let expected = [(9, "nothing"), (11, "window"), (20, "tow")];
+    let expected = [(9, "nothing"), (11, "window"), (17, "soon"), (20, "tow")];
     assert_told("command-line-modules", text, &expected);
 }
 
@@ -292,6 +292,42 @@ fn a_set_is_not_proposed_where_a_node_is_meant() {
     let told = athermal(&[&"check", &graph]).ended(2).told;
     assert!(told.contains("the graph has `temperature`"), "{told}");
     assert!(!told.contains("did you mean `axis`"), "{told}");
+}
+
+#[test]
+fn what_follows_from_a_mistake_is_not_told_beside_it() {
+    let text = r#"schema = 1
+[sets]
+axis = ["X"]
+[signals.temperature]
+unit = "C"
+channels = "axis"
+range = ["0 Cel", "50 Cel"]
+max_age = "1min"
+[modules.pair]
+inputs = ["from"]
+parameters = { window = "5mn" }
+outputs = { slope = "slope" }
+nodes.slope = { type = "slope", inputs.signal = "{form}", windows = ["{window}"], cld = 1 }
+[nodes.one]
+module = "pair"
+each = "axis"
+inputs.from = "temperature.{axes}"
+[outputs]
+one = "one"
+[[tests]]
+name = "a"
+on = "a.csv"
+expect = [{ of = "one", given_above = 0.5 }]
+"#;
+    let expected = [
+        (7, "which does not convert"),
+        (11, "mn"),
+        (13, "{form}"),
+        (13, "cld"),
+        (17, "{axes}"),
+    ];
+    assert_told("command-line-follows", text, &expected);
 }
 
 #[test]

@@ -64,7 +64,7 @@ impl Resolver<'_> {
             }
             Ok(Found::Broken) => None,
             Err(problem) => {
-                self.diagnostics.report(place, *problem);
+                self.diagnostics.report_unless_told(place, *problem);
                 None
             }
         }

@@ -119,10 +119,21 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
         };
         instances.push(read);
     }
-    let open = node.faulty.as_ref().map_or(&[][..], |faulty| &faulty.open);
-    diagnostics.extend_where(own, |mistake| {
-        mistake.place.is_none_or(|place| !open.contains(&place))
-    });
+    if let Some(faulty) = &node.faulty {
+        let follows: Vec<_> = own
+            .iter()
+            .filter_map(|mistake| Some((mistake.code, mistake.place?)))
+            .filter(|(code, place)| {
+                faulty.open.contains(place) || diagnostics.is_told(code, *place)
+            })
+            .collect();
+        diagnostics.extend_where(own, |mistake| {
+            let place = mistake.place;
+            place.is_none_or(|place| !follows.contains(&(mistake.code, place)))
+        });
+    } else {
+        diagnostics.extend_where(own, |_| true);
+    }
     ReadNode { kind, instances }
 }
 

@@ -123,6 +123,23 @@ impl Diagnostics {
         self.note(context, place.into(), &problem);
     }
 
+    /// Notes a problem unless another has been told at its place, from which it may follow.
+    pub(crate) fn report_unless_told(&mut self, place: Place, problem: impl Problem) {
+        if !self.is_told(problem.code(), place) {
+            self.report(place, problem);
+        }
+    }
+
+    /// Whether an error of another code, or the same one of no member, stands at a place.
+    pub(crate) fn is_told(&self, code: &str, place: Place) -> bool {
+        let errors = self
+            .found
+            .iter()
+            .filter(|of| of.severity == Severity::Error);
+        let mut there = errors.filter(|of| of.place == Some(place));
+        there.any(|of| of.code != code || of.context.is_none())
+    }
+
     /// Notes a problem of one member, e.g. `in node "thermal", member "Z1"`.
     ///
     /// The same problem at the same place is told once, with its first context and the number of the others.

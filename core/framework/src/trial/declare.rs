@@ -201,9 +201,13 @@ impl Declaring<'_> {
             Some(value) => self.list("expect", value, Self::expectation),
             None => Some(Vec::new()),
         };
+        let stated = table.get("expect");
         let is_misspelt = is_misspelt(table, "expect", &KEYS);
-        if expect.as_ref().is_some_and(Vec::is_empty) && !is_misspelt {
-            let place = table.get("expect").map_or(test.place, |value| value.place);
+        let nothing = stated.map_or(!is_misspelt, |list| {
+            list.as_list().is_some_and(<[Value]>::is_empty)
+        });
+        if nothing {
+            let place = stated.map_or(test.place, |value| value.place);
             let problem = TrialProblem::NothingExpected { what: "the test" };
             self.diagnostics.report(place, problem);
         }

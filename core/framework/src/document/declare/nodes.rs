@@ -40,13 +40,19 @@ pub(super) fn declare(
         // Inside a module, one place in a file stands for a node of each instance.
         let context = (!placed.around.is_empty()).then(|| format!("node `{}`", placed.name));
         let outer = diagnostics.scope(context);
-        let node = node(placed, sets, sample, &mut total, diagnostics);
+        let mut node = node(placed, sets, sample, &mut total, diagnostics);
         diagnostics.scope(outer);
+        // Inside a module that has mistakes, what stands there may not be what was meant.
+        if !placed.around.is_empty()
+            && expanded.faulty
+            && let Some(node) = &mut node
+        {
+            node.faulty.get_or_insert_default();
+        }
         if node.as_ref().is_none_or(|node| node.faulty.is_some()) {
             broken.push(placed.name.clone());
         }
-        // Inside a module that has mistakes, what stands there may not be what was meant.
-        declared.extend(node.filter(|_| placed.around.is_empty() || !expanded.faulty));
+        declared.extend(node);
     }
     declared
 }
@@ -341,7 +347,8 @@ fn check_placeholders(value: &Value, each: &Each<'_>, what: &str, diagnostics: &
                     known,
                     what: what.to_owned(),
                 };
-                diagnostics.report(value.place, problem);
+                // Around a module it may have been told already.
+                diagnostics.report_unless_told(value.place, problem);
             }
         }
         Data::List(values) => values

@@ -221,8 +221,25 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         return None;
     };
     // Both are read before either is given up, so that mistakes in both are told.
-    let (low, high) = (end(low, unit, diagnostics), end(high, unit, diagnostics));
-    let (low, high, unit) = (low?, high?, unit?);
+    let ends = (
+        quantity(low, "range", diagnostics).map(|of| (of, low.place)),
+        quantity(high, "range", diagnostics).map(|of| (of, high.place)),
+    );
+    let unit = unit?;
+    let foreign = [&ends.0, &ends.1].into_iter().flatten();
+    let foreign: Vec<_> = foreign
+        .filter(|(of, _)| of.in_unit(unit).is_none())
+        .collect();
+    if let Some((first, place)) = foreign.first() {
+        // Where neither converts, the unit of the signal is the one mistake.
+        let problem = DocumentProblem::RangeUnit {
+            found: first.unit.to_string(),
+            unit: unit.to_string(),
+        };
+        diagnostics.report(*place, problem);
+        return None;
+    }
+    let (low, high) = (ends.0?.0.in_unit(unit)?, ends.1?.0.in_unit(unit)?);
     if low < high {
         return Some((low, high));
     }
@@ -235,20 +252,6 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         },
     );
     None
-}
-
-fn end(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> Option<f64> {
-    let quantity = quantity(value, "range", diagnostics)?;
-    let unit = unit?;
-    let converted = quantity.in_unit(unit);
-    if converted.is_none() {
-        let problem = DocumentProblem::RangeUnit {
-            found: quantity.unit.to_string(),
-            unit: unit.to_string(),
-        };
-        diagnostics.report(value.place, problem);
-    }
-    converted
 }
 
 fn optional(
