@@ -1,8 +1,10 @@
 //! Decides which state-space model a record has.
 
+use std::ops::RangeInclusive;
+
 use faer::Mat;
 
-use super::lagged::{Lagged, Projected, power, pseudo_inverse, spectrum};
+use super::lagged::{Lagged, Projected, power, pseudo_inverse, spectrum, windows};
 use super::model::{product, spectral_radius};
 use super::{Record, StateSpace};
 use crate::NumericsError;
@@ -73,6 +75,21 @@ pub struct Identification {
 }
 
 impl Subspace {
+    /// The longest horizon among these that records with `width` inputs have enough windows for.
+    #[must_use]
+    pub fn longest(
+        horizons: RangeInclusive<usize>,
+        records: &[Record<'_>],
+        width: usize,
+    ) -> Option<usize> {
+        let found = |horizon: usize| -> usize {
+            let windows = records.iter().map(|record| windows(record, horizon));
+            windows.map(|windows| windows.len()).sum()
+        };
+        let mut longest = horizons.rev();
+        longest.find(|&horizon| found(horizon) >= needed(horizon, width))
+    }
+
     /// Identifies a model from records that have `width` inputs. Inputs and outputs should vary about 0 on one scale.
     ///
     /// # Errors
@@ -85,7 +102,7 @@ impl Subspace {
     ) -> Result<Identification, NumericsError> {
         self.check(records)?;
         let lagged = Lagged::of(records, width, self.horizon);
-        let needed = 2 * self.horizon * (width + 1);
+        let needed = needed(self.horizon, width);
         if lagged.windows < needed {
             return Err(NumericsError::TooFewStretches {
                 length: 2 * self.horizon,
@@ -211,6 +228,11 @@ impl Subspace {
         });
         Ok((values, scaled))
     }
+}
+
+/// The fewest windows that tell what so many inputs and the output do: twice as many as a past has values.
+fn needed(horizon: usize, width: usize) -> usize {
+    2 * horizon * (width + 1)
 }
 
 impl StateOrder {

@@ -1,5 +1,7 @@
 //! Decides what past and future of a record are, and sums their products; not what is made of them.
 
+use std::ops::Range;
+
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
 
@@ -10,6 +12,11 @@ use crate::NumericsError;
 const AT_ONCE: usize = 256;
 /// Directions in which a matrix is below this share of its largest have rounding in them and nothing else.
 const ROUNDING: f64 = 1e-13;
+
+/// Where the windows of twice the horizon begin that lie in a record.
+pub(super) fn windows(record: &Record<'_>, horizon: usize) -> Range<usize> {
+    0..(record.len() + 1).saturating_sub(2 * horizon)
+}
 
 /// The mean products of past inputs and outputs, future inputs and future outputs, in this order, over all windows.
 pub(super) struct Lagged {
@@ -25,7 +32,7 @@ impl Lagged {
         let order = 2 * horizon * (width + 1);
         let mut sum = Mat::<f64>::zeros(order, order);
         let mut rows: Vec<f64> = Vec::with_capacity(AT_ONCE * order);
-        let mut windows = 0;
+        let mut count = 0;
         let mut add = |rows: &mut Vec<f64>| {
             let block = MatRef::from_column_major_slice(rows, order, rows.len() / order);
             matmul(
@@ -39,14 +46,14 @@ impl Lagged {
             rows.clear();
         };
         for record in records {
-            for begin in 0..(record.len() + 1).saturating_sub(2 * horizon) {
+            for begin in windows(record, horizon) {
                 for half in [begin, begin + horizon] {
                     for at in half..half + horizon {
                         rows.extend_from_slice(record.input(at));
                     }
                     rows.extend_from_slice(&record.outputs[half..half + horizon]);
                 }
-                windows += 1;
+                count += 1;
                 if rows.len() == AT_ONCE * order {
                     add(&mut rows);
                 }
@@ -55,12 +62,12 @@ impl Lagged {
         if !rows.is_empty() {
             add(&mut rows);
         }
-        let count = windows.max(1) as f64;
+        let mean = count.max(1) as f64;
         Self {
-            products: Mat::from_fn(order, order, |i, j| sum[(i, j)] / count),
+            products: Mat::from_fn(order, order, |i, j| sum[(i, j)] / mean),
             horizon,
             width,
-            windows,
+            windows: count,
         }
     }
 
