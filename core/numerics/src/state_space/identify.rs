@@ -4,7 +4,9 @@ use std::ops::RangeInclusive;
 
 use faer::Mat;
 
-use super::lagged::{Lagged, Projected, power, pseudo_inverse, spectrum, windows};
+use super::lagged::{
+    Lagged, Projected, power, pseudo_inverse, pseudo_inverse_left, spectrum, windows,
+};
 use super::model::{product, spectral_radius};
 use super::{Record, StateSpace};
 use crate::NumericsError;
@@ -214,9 +216,13 @@ impl Subspace {
         let (squares, shown) = match self.weighting {
             Weighting::N4sid | Weighting::Moesp => spectrum(&told)?,
             Weighting::Cva => {
-                let weight = power(&projected.outputs_left, -0.5)?;
+                let least = projected.least_output;
+                let weight = power(&projected.outputs_left, -0.5, least)?;
                 let (squares, vectors) = spectrum(&(&weight * told * &weight))?;
-                (squares, power(&projected.outputs_left, 0.5)? * vectors)
+                (
+                    squares,
+                    power(&projected.outputs_left, 0.5, least)? * vectors,
+                )
             }
         };
         let values: Vec<f64> = squares.iter().map(|square| square.sqrt()).collect();
@@ -407,6 +413,7 @@ fn refine(
     });
     let mut own = Mat::<f64>::zeros(columns, columns);
     let mut with_output = Mat::<f64>::zeros(columns, 1);
+    let mut whole = Mat::<f64>::zeros(of_inputs, of_inputs);
     let mut total_own = Mat::<f64>::zeros(of_inputs, of_inputs);
     let mut total_with = Mat::<f64>::zeros(of_inputs, 1);
     for record in records {
@@ -454,12 +461,13 @@ fn refine(
         // The beginning is this record's own: it is taken out before records are summed.
         let begin = own.submatrix(of_inputs, of_inputs, order, order).to_owned();
         let across = own.submatrix(0, of_inputs, of_inputs, order) * pseudo_inverse(&begin)?;
+        whole += own.submatrix(0, 0, of_inputs, of_inputs);
         total_own += own.submatrix(0, 0, of_inputs, of_inputs)
             - &across * own.submatrix(of_inputs, 0, order, of_inputs);
         total_with +=
             with_output.subrows(0, of_inputs) - &across * with_output.subrows(of_inputs, order);
     }
-    let found = pseudo_inverse(&total_own)? * total_with;
+    let found = pseudo_inverse_left(&total_own, &whole)? * total_with;
     for j in 0..width {
         for i in 0..order {
             model.b[(i, j)] = found[(j * order + i, 0)];

@@ -12,6 +12,8 @@ use crate::NumericsError;
 const AT_ONCE: usize = 256;
 /// Directions in which a matrix is below this share of its largest have rounding in them and nothing else.
 const ROUNDING: f64 = 1e-13;
+/// The same of what is left of a matrix when others were taken out of it, as a share of the whole: half of all digits are lost.
+const LEFT: f64 = 1e-8;
 
 /// Where the windows of twice the horizon begin that lie in a record.
 pub(super) fn windows(record: &Record<'_>, horizon: usize) -> Range<usize> {
@@ -87,17 +89,21 @@ impl Lagged {
         let past = (0, self.past());
         let inputs = (self.past(), self.horizon * self.width);
         let outputs = (inputs.0 + inputs.1, self.horizon);
-        let inverse = pseudo_inverse(&self.part(inputs, inputs))?;
+        let of_inputs = self.part(inputs, inputs);
+        let inverse = pseudo_inverse_left(&of_inputs, &of_inputs)?;
         let left = |rows, columns| {
             let explained = self.part(rows, inputs) * &inverse * self.part(inputs, columns);
             self.part(rows, columns) - explained
         };
-        let past_left = left(past, past);
+        let (whole, past_left) = (self.part(past, past), left(past, past));
+        let of_outputs = self.part(outputs, outputs);
+        let largest = (0..self.horizon).map(|i| of_outputs[(i, i)]);
         Ok(Projected {
-            from_past: left(outputs, past) * pseudo_inverse(&past_left)?,
-            past: self.part(past, past),
+            from_past: left(outputs, past) * pseudo_inverse_left(&past_left, &whole)?,
+            past: whole,
             past_left,
             outputs_left: left(outputs, outputs),
+            least_output: LEFT * largest.fold(0.0, f64::max),
         })
     }
 }
@@ -108,6 +114,8 @@ pub(super) struct Projected {
     pub(super) past: Mat<f64>,
     pub(super) past_left: Mat<f64>,
     pub(super) outputs_left: Mat<f64>,
+    /// What is left of outputs in a direction in which there is more than rounding.
+    pub(super) least_output: f64,
 }
 
 /// Eigenvalues in falling order, none below 0, and the vectors that belong to them.
@@ -126,10 +134,14 @@ pub(super) fn spectrum(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), Numeri
     Ok((falling, turned))
 }
 
-/// A power of a symmetric matrix, directions of rounding left out.
-pub(super) fn power(matrix: &Mat<f64>, exponent: f64) -> Result<Mat<f64>, NumericsError> {
+/// A power of a symmetric matrix, directions in which it is not more than `least` left out.
+pub(super) fn power(
+    matrix: &Mat<f64>,
+    exponent: f64,
+    least: f64,
+) -> Result<Mat<f64>, NumericsError> {
     let (values, vectors) = spectrum(matrix)?;
-    let least = ROUNDING * values.first().copied().unwrap_or(0.0);
+    let least = least.max(ROUNDING * values.first().copied().unwrap_or(0.0));
     let order = values.len();
     let scaled = Mat::from_fn(order, order, |i, j| {
         if values[j] > least {
@@ -143,13 +155,26 @@ pub(super) fn power(matrix: &Mat<f64>, exponent: f64) -> Result<Mat<f64>, Numeri
 
 /// The pseudo-inverse of a symmetric matrix, its rows and columns on one scale.
 pub(super) fn pseudo_inverse(matrix: &Mat<f64>) -> Result<Mat<f64>, NumericsError> {
+    inverse(matrix, matrix, 0.0)
+}
+
+/// The same of what is left of a symmetric matrix when others were taken out of it.
+pub(super) fn pseudo_inverse_left(
+    left: &Mat<f64>,
+    whole: &Mat<f64>,
+) -> Result<Mat<f64>, NumericsError> {
+    inverse(left, whole, LEFT)
+}
+
+/// The pseudo-inverse on the scale of a matrix, directions in which it is not more than `least` there left out.
+fn inverse(matrix: &Mat<f64>, of: &Mat<f64>, least: f64) -> Result<Mat<f64>, NumericsError> {
     let order = matrix.nrows();
-    let inverse = |i: usize| {
-        let own = matrix[(i, i)];
+    let root = |i: usize| {
+        let own = of[(i, i)];
         if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 }
     };
-    let roots: Vec<f64> = (0..order).map(inverse).collect();
+    let roots: Vec<f64> = (0..order).map(root).collect();
     let scale =
         |matrix: &Mat<f64>| Mat::from_fn(order, order, |i, j| matrix[(i, j)] * roots[i] * roots[j]);
-    Ok(scale(&power(&scale(matrix), -1.0)?))
+    Ok(scale(&power(&scale(matrix), -1.0, least)?))
 }
