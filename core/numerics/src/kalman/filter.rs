@@ -373,7 +373,8 @@ impl Kalman {
             self.diffuse.clear();
             self.diffuse.resize(order * order, 0.0);
         }
-        let known = self.diffuse[state * order + state] == 0.0;
+        let own = &self.diffuse[state * order..][..order];
+        let known = own.iter().all(|&diffuse| diffuse == 0.0);
         for other in 0..order {
             for matrix in [&mut self.covariance, &mut self.diffuse] {
                 matrix[state * order + other] = 0.0;
@@ -382,7 +383,12 @@ impl Kalman {
         }
         self.diffuse[state * order + state] = 1.0;
         self.state[state] = 0.0;
-        self.unknown += usize::from(known);
+        if known {
+            self.unknown += 1;
+        } else {
+            // With it goes what had been observed of it together with others.
+            self.unknown = rank(self.diffuse.clone(), order);
+        }
     }
 
     /// What is expected `time` from now of the observation that has these regressors, given by their number; of no
@@ -438,6 +444,33 @@ pub(super) fn diagonal(values: &[f64]) -> Vec<f64> {
         matrix[i * order + i] = *value;
     }
     matrix
+}
+
+/// How many directions of a diffuse covariance, given row by row, are diffuse: pivots of its elimination, largest first, each
+/// state on its own scale.
+fn rank(mut matrix: Vec<f64>, order: usize) -> usize {
+    let scales: Vec<f64> = (0..order)
+        .map(|i| matrix[i * order + i].max(1.0).sqrt())
+        .collect();
+    for i in 0..order {
+        for j in 0..order {
+            matrix[i * order + j] /= scales[i] * scales[j];
+        }
+    }
+    for found in 0..order {
+        let own = |i: &usize| matrix[i * order + i];
+        let pivot = (0..order).max_by(|a, b| own(a).total_cmp(&own(b)));
+        let Some(pivot) = pivot.filter(|pivot| own(pivot) > NOTHING_NEW) else {
+            return found;
+        };
+        let row = matrix[pivot * order..][..order].to_vec();
+        for i in 0..order {
+            for j in 0..order {
+                matrix[i * order + j] -= row[i] * row[j] / row[pivot];
+            }
+        }
+    }
+    order
 }
 
 /// Adds `time` times the trend's row and column to those of the level.
