@@ -42,8 +42,8 @@ const LARGEST_PAST: usize = 1000;
 /// between two truths of a series counts as so many steps, rounded. Running, it is told each truth that the embargo
 /// lets through, takes for one that is missing what it had predicted, and for features that are missing the last ones.
 /// Where truths or rows are missing in the fit, windows end and begin again. A segment begins with its first truth, as
-/// if that and the features had always been what they are, and so does what comes after more than ten steps without
-/// features; with `learn = false` it stays at rest. The port `deviation`
+/// if that and the features had always been what they are, and so does what comes after more steps without
+/// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The port `deviation`
 /// is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs
 /// at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
