@@ -173,8 +173,8 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let standard = standard.standardization();
         let samples = self.samples(pace, &standard);
         let found = self.asked.identify(&samples, pace.series, report)?;
-        let truths: Vec<f64> = self.rows.iter().map(|row| row.truth).collect();
-        tell_rows(&self.names, &self.regressors, &truths, report);
+        let truths = self.rows.iter().map(|row| row.truth);
+        tell_rows(&self.names, &self.regressors, truths, report);
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
