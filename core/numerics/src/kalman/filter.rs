@@ -4,6 +4,7 @@
 use super::Structural;
 use crate::NumericsError;
 use crate::checks::{check_length, check_parameter};
+use crate::scratch::Scratch;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ pub struct Kalman {
     unknown: usize,
     /// Scratch.
     #[serde(skip)]
-    room: Vec<f64>,
+    room: Scratch,
 }
 
 /// A filter as it is read, before it is known whether its parts fit together.
@@ -71,7 +72,7 @@ impl TryFrom<Saved> for Kalman {
             covariance,
             diffuse,
             unknown,
-            room: vec![0.0; 2 * order],
+            room: Scratch(vec![0.0; 2 * order]),
         })
     }
 }
@@ -145,7 +146,7 @@ impl Kalman {
             covariance: covariance.to_vec(),
             diffuse: Vec::new(),
             unknown: 0,
-            room: vec![0.0; 2 * order],
+            room: Scratch(vec![0.0; 2 * order]),
         };
         for i in 0..order {
             if filter.covariance[i * order + i] == f64::INFINITY {
@@ -246,7 +247,7 @@ impl Kalman {
         {
             return Some(innovation);
         }
-        let (shared, _) = self.room.split_at_mut(order);
+        let (shared, _) = self.room.0.split_at_mut(order);
         let explained = product(&self.covariance, &self.model, x, shared);
         let variance = explained + self.model.observation / share;
         if !(variance > 0.0 && variance.is_finite()) {
@@ -408,7 +409,7 @@ impl Kalman {
     /// Takes an observation of something that nothing is known of; none where all that it tells of is known.
     fn learn_of_the_unknown(&mut self, x: &[f64], error: f64, share: f64) -> Option<Innovation> {
         let order = self.state.len();
-        let (of_diffuse, shared) = self.room.split_at_mut(order);
+        let (of_diffuse, shared) = self.room.0.split_at_mut(order);
         let variance = product(&self.diffuse, &self.model, x, of_diffuse);
         let most = 1.0 + x.iter().map(|x| x * x).sum::<f64>();
         if variance.is_nan() || variance <= NOTHING_NEW * most {

@@ -559,6 +559,17 @@ fn a_segment_that_ends_while_its_trend_is_unknown_leaves_the_next_as_much_to_tel
 }
 
 #[test]
+fn filters_that_know_the_same_are_equal_whatever_way_they_came() {
+    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+    filter.observe(&[0.5], 1.0);
+    let mut other = Kalman::diffuse(OWN, 1).unwrap();
+    assert!(other.resume(&filter));
+    assert_eq!(other, filter);
+    other.observe(&[0.5], 1.0);
+    assert_ne!(other, filter);
+}
+
+#[test]
 fn what_is_no_number_is_no_observation() {
     let mut filter = Kalman::diffuse(OWN, 1).unwrap();
     let before = filter.clone();
