@@ -3,8 +3,7 @@
 use std::ops::RangeInclusive;
 
 use athermal_core::node::{
-    Estimator, Forms, InputPort, Learns, Mistake, Regressors, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
+    Forms, InputPort, Mistake, Regressors, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{
@@ -13,7 +12,7 @@ use athermal_numerics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::identified::{Found, IdentifiedTrainer, Identify};
+use crate::identified::{Found, IdentifiedTrainer, Identify, identified};
 use crate::regression::told;
 
 /// The horizon, in steps, where it is not stated and rows allow it.
@@ -123,15 +122,19 @@ impl<'de> Deserialize<'de> for States {
     }
 }
 
-impl Estimator for StateSpace {
-    fn inputs() -> &'static [InputPort] {
-        const {
-            &[
-                InputPort::held("features", "what the prediction is made of").or_none(),
-                InputPort::truth("what is predicted"),
-                InputPort::freeze(),
-            ]
-        }
+identified!(
+    StateSpace,
+    "state_space",
+    [
+        InputPort::held("features", "what the prediction is made of").or_none(),
+        InputPort::truth("what is predicted")
+    ]
+);
+
+impl StateSpace {
+    /// It says itself what the kinds that are identified have in common.
+    fn asked(&self) -> &Self {
+        self
     }
 
     fn regressors(&self) -> Regressors {
@@ -163,22 +166,10 @@ impl Estimator for StateSpace {
         mistakes
     }
 
-    fn learns(&self) -> Learns {
-        Learns::UnlessTold
-    }
-
-    fn deviates(&self) -> bool {
-        true
-    }
-
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(IdentifiedTrainer::new(setup, self.clone()))
     }
-}
 
-athermal_core::register!(StateSpace, Estimator, "state_space");
-
-impl StateSpace {
     /// The horizons that may be taken: what is told of fewer steps than there are states does not tell them.
     fn horizons(&self) -> RangeInclusive<usize> {
         let states = match self.states {
