@@ -234,8 +234,12 @@ impl Gram {
         for (a, b) in self.sum.iter_mut().zip(&other.sum) {
             *a += sign * b;
         }
-        for (a, b) in self.cross.iter_mut().zip(&other.cross) {
-            *a += sign * b;
+        let order = self.width + 1;
+        let columns = self.cross.chunks_exact_mut(order);
+        for (j, (column, added)) in columns.zip(other.cross.chunks_exact(order)).enumerate() {
+            for (a, b) in column[j..].iter_mut().zip(&added[j..]) {
+                *a += sign * b;
+            }
         }
     }
 

@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::Mode;
 use super::gather::Gathered;
 use super::mode::Step;
+use super::recent_error::RecentError;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
@@ -233,100 +232,5 @@ impl Gate {
         }
         learner.learn(row, truth, arrived);
         Became::Learned
-    }
-}
-
-/// The mean square of the recent errors: the arithmetic mean of the first, an exponentially weighted one later.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub(crate) struct RecentError {
-    seen: u32,
-    mean_square: f64,
-    /// How many in a row have been too large.
-    #[serde(default)]
-    refused: u32,
-}
-
-impl RecentError {
-    /// How many errors weigh in.
-    const MEMORY: u32 = 50;
-    /// How many there must have been before one can be called too large.
-    const FIRST: u32 = 10;
-    /// How many in a row can be too large: after a long rest all of a machine that moves again would be for much longer.
-    const PATIENCE: u32 = 20;
-
-    /// Whether an error is below so many times the recent root mean square.
-    ///
-    /// One that is not counts as if it were as large as that, so that what has changed for good is learned after a few; when
-    /// as many as there is patience for have been, what was before is forgotten.
-    fn admits(&mut self, error: f64, multiple: f64) -> bool {
-        let square = error * error;
-        if !square.is_finite() {
-            return false;
-        }
-        if self.refused >= Self::PATIENCE {
-            *self = Self::default();
-        }
-        // Errors that were all 0, as of a machine at rest, say nothing of how large one may be.
-        let judged = self.seen >= Self::FIRST && self.mean_square > 0.0;
-        let most = if judged && multiple < f64::INFINITY {
-            multiple * multiple * self.mean_square
-        } else {
-            f64::INFINITY
-        };
-        self.seen = (self.seen + 1).min(Self::MEMORY);
-        self.mean_square += (square.min(most) - self.mean_square) / f64::from(self.seen);
-        let admitted = square <= most;
-        self.refused = if admitted { 0 } else { self.refused + 1 };
-        admitted
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_spike_is_held_off_and_a_lasting_change_is_let_in_after_a_few() {
-        let mut recent = RecentError::default();
-        for i in 0..200 {
-            assert!(recent.admits(if i % 2 == 0 { 1.0 } else { -1.0 }, 6.0));
-        }
-        assert!(!recent.admits(20.0, 6.0), "a spike");
-        assert!(recent.admits(1.0, 6.0));
-        assert!(!recent.admits(f64::NAN, 6.0) && !recent.admits(f64::INFINITY, 6.0));
-        let refused = (0..100).take_while(|_| !recent.admits(20.0, 6.0)).count();
-        assert!((1..10).contains(&refused), "{refused}");
-    }
-
-    #[test]
-    fn the_first_errors_are_let_in_whatever_they_are() {
-        let mut recent = RecentError::default();
-        for error in [1e-3, 1e3, 0.0, 5.0] {
-            assert!(recent.admits(error, 6.0));
-        }
-    }
-
-    #[test]
-    fn a_long_rest_does_not_make_outliers_of_what_follows_for_longer_than_a_few() {
-        let mut recent = RecentError::default();
-        for _ in 0..100 {
-            assert!(recent.admits(1.0, 6.0));
-        }
-        for _ in 0..5000 {
-            assert!(recent.admits(0.0, 6.0));
-        }
-        let refused = (0..1000).take_while(|_| !recent.admits(1.0, 6.0)).count();
-        assert_eq!(refused, RecentError::PATIENCE as usize);
-        assert!((0..100).all(|_| recent.admits(1.0, 6.0)));
-        assert!(!recent.admits(20.0, 6.0), "a spike after that");
-    }
-
-    #[test]
-    fn errors_that_were_all_zero_do_not_end_learning() {
-        let mut recent = RecentError::default();
-        for _ in 0..100 {
-            assert!(recent.admits(0.0, 6.0));
-        }
-        assert!(recent.admits(1.0, 6.0));
     }
 }

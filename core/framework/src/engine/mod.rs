@@ -14,6 +14,7 @@ mod keep;
 mod learning;
 mod mode;
 mod pairing;
+mod recent_error;
 mod revision;
 mod running;
 mod slots;

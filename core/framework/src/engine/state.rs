@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::blend::Blending;
 use super::history::History;
-use super::learning::RecentError;
+use super::recent_error::RecentError;
 use super::revision::fnv_1a;
 use super::withheld::LearningState;
 use crate::node::{Restored, State};

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::expect::rival_of;
 use super::expectation::{Check, Expectation, Rival, Tolerance};
-use super::run::Observed;
+use super::observed::Observed;
 use super::shape::as_difference;
 use crate::compile::Plan;
 use crate::quantity::Quantity;

@@ -7,6 +7,7 @@ mod declare;
 mod expect;
 mod expectation;
 mod judge;
+mod observed;
 mod problem;
 mod run;
 mod series;
