@@ -515,60 +515,6 @@ fn a_level_restarts_from_a_finite_pair_for_each_of_its_parts_only() {
     }
 }
 
-/// A level, a trend and a coefficient, followed in segments of so many rows, and whether all is known after each segment.
-fn known_after_segments(rows: usize, trend: Option<f64>) -> Vec<bool> {
-    let model = Structural { trend, ..OWN };
-    let mut filter = Kalman::diffuse(model, 1).unwrap();
-    let mut x = 0.5;
-    let segments = (0..6).map(|_| {
-        filter.forget_level();
-        for row in 0..rows {
-            if row > 0 {
-                filter.advance(1.0);
-            }
-            x = 3.7 * x * (1.0 - x);
-            filter.observe(&[x], 1.0 + x);
-        }
-        !filter.is_diffuse()
-    });
-    segments.collect()
-}
-
-#[test]
-fn a_coefficient_is_not_known_from_segments_that_are_too_short_for_level_and_trend() {
-    // A row tells the level, another one the trend, and only one more in the same segment the coefficient.
-    assert_eq!(known_after_segments(1, None), [false; 6]);
-    assert_eq!(known_after_segments(2, None), [true; 6]);
-    assert_eq!(known_after_segments(1, OWN.trend), [false; 6]);
-    assert_eq!(known_after_segments(2, OWN.trend), [false; 6]);
-    assert_eq!(known_after_segments(3, OWN.trend), [true; 6]);
-}
-
-#[test]
-fn a_segment_that_ends_while_its_trend_is_unknown_leaves_the_next_as_much_to_tell() {
-    let mut filter = Kalman::diffuse(OWN, 0).unwrap();
-    filter.observe(&[], 1.0);
-    // A row without an observation.
-    filter.advance(1.0);
-    filter.forget_level();
-    filter.observe(&[], 1.0);
-    assert!(filter.is_diffuse(), "the trend is not known");
-    filter.advance(1.0);
-    filter.observe(&[], 2.0);
-    assert!(!filter.is_diffuse());
-}
-
-#[test]
-fn filters_that_know_the_same_are_equal_whatever_way_they_came() {
-    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
-    filter.observe(&[0.5], 1.0);
-    let mut other = Kalman::diffuse(OWN, 1).unwrap();
-    assert!(other.resume(&filter));
-    assert_eq!(other, filter);
-    other.observe(&[0.5], 1.0);
-    assert_ne!(other, filter);
-}
-
 #[test]
 fn what_is_no_number_is_no_observation() {
     let mut filter = Kalman::diffuse(OWN, 1).unwrap();
