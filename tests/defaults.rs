@@ -188,7 +188,7 @@ fn recordings(recorded: Recorded, folder: &Path, scratch: &Scratch) -> [PathBuf;
 }
 
 /// The least share of the rows in which there is a truth that must be predicted.
-const LEAST: f64 = 0.5;
+const LEAST: f64 = 0.8;
 
 /// Each output that is worse than no model on data that it was not fitted on, and how much, or that is mostly absent.
 fn worse(machine: &Machine, kinds: &[&Kind], folder: &Path) -> Vec<String> {
