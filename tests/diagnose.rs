@@ -141,7 +141,7 @@ fn an_impulse_response_is_the_sum_of_the_frame_times_its_coefficients() {
 }
 
 #[test]
-fn an_answer_that_lasts_has_no_end() {
+fn an_answer_that_lasts_has_a_gain_and_no_sum() {
     let text = TWO_SENSORS.replace(
         "inputs.features = \"gradients\"",
         "inputs.features = \"temperature\"",
@@ -154,8 +154,35 @@ fn an_answer_that_lasts_has_no_end() {
     let [of] = &found[0].sensors[..] else {
         panic!("{found:?}")
     };
-    assert_eq!((of.total, of.settled_s), (None, None));
+    assert_eq!((of.total, of.settled_s), (None, Some(0.0)));
+    assert!(of.gain.is_some_and(|gain| (gain - 3.0).abs() < 1e-9));
     assert!(of.step.iter().all(|step| (step - 3.0).abs() < 1e-9));
+}
+
+#[test]
+fn an_estimator_that_reads_past_truths_answers_as_its_transfer_function() {
+    let text = TWO_SENSORS
+        .replace("type = \"linear\"", "type = \"arx\"\nlags = [\"10s\"]")
+        .replace("\"drift.z\"", "\"position.z\"")
+        .replace("\"gradients\"", "\"temperature\"");
+    let terms = [("temperature.a", 2.0), ("position.z lag 10s", 0.8)];
+    let model = model("transfer", &text, &[("thermal", linear(&terms, 0.0))]);
+    let table = wandering(600, |course, row| 1000.0 * course[row][0]);
+    let observation = observe(&model, &table).unwrap();
+    let found = response::responses(&model, &observation).unwrap();
+    let [of] = &found[0].sensors[..] else {
+        panic!("{found:?}")
+    };
+    // `y(t) = 0.8 y(t − 1) + 2 u(t)`, of which a step brings about `2 (1 − 0.8ⁿ) / (1 − 0.8)` by its n-th sample.
+    assert!(of.step.len() > 20, "{}", of.step.len());
+    for (nth, step) in (1..).zip(&of.step) {
+        let expected = 2.0 * (1.0 - 0.8_f64.powi(nth)) / (1.0 - 0.8);
+        assert!((step - expected).abs() < 1e-6, "{nth}: {step} {expected}");
+    }
+    assert!(of.gain.is_some_and(|gain| (gain - 10.0).abs() < 1e-3));
+    // Nine tenths have come when `0.8ⁿ` is a tenth, at the eleventh sample.
+    assert_eq!((of.total, of.settled_s), (None, Some(100.0)));
+    assert!(of.asymmetry < 1e-9, "{}", of.asymmetry);
 }
 
 #[test]
@@ -397,7 +424,7 @@ fn a_wider_window_lifts_a_drift_above_its_noise() {
 #[test]
 fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
     let scratch = Scratch::new("diagnose");
-    let week = simulated(&scratch, "log.csv", "die-tester", 2.5, 1);
+    let week = simulated(&scratch, "log.csv", "die-tester", 3.0, 1);
     let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
     athermal_on("fit", &graph("die-tester"), &week, &[&"-o", &model]).ended(0);
     let diagnosed =
@@ -413,7 +440,7 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
         "how well the data determine",
         "what each sensor moves",
         "RMSE in nm/min of each day",
-        "how many times that the error is",
+        "how many days are needed",
         "signal to noise",
     ] {
         assert!(

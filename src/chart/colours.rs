@@ -11,7 +11,11 @@ svg.chart{font:13px system-ui,sans-serif;fill:var(--ink)}\
 .chart .limit{stroke:var(--bad);stroke-dasharray:5 4;vector-effect:non-scaling-stroke}.chart .paper{fill:var(--paper)}\
 .chart .s1{fill:var(--s1)}.chart .s2{fill:var(--s2)}";
 
-/// The colours by name, for the root of a page and for pictures that stand alone.
+/// Widths of lines that are drawn in tenths of a unit, where they are scaled with what they belong to.
+pub(super) const UNSCALED: &str = "\
+.chart path[transform]{stroke-width:13;vector-effect:none}.chart path.dots[transform]{stroke-width:30}";
+
+/// The colours by name, for the root of a page.
 pub const COLOURS: &str = "\
 :root{--ink:#1b2430;--paper:#ffffff;--line:#9aa5b1;--grid:#e4e8ec;--muted:#5d6975;--bad:#b3261e;--good:#1b7f4b;\
 --c1:#5d6975;--c2:#0b62a8;--c3:#c2410c;--c4:#1b7f4b;--c5:#7b3fa0;--c6:#8a6d00;--s1:#fff3d6;--s2:#fbdcd8}\
@@ -23,11 +27,47 @@ pub const COLOURS: &str = "\
 /// The classes of several lines of one picture, in the order in which they are taken.
 pub(crate) const LINES: [&str; 6] = ["c2", "c3", "c4", "c5", "c6", "c1"];
 
-/// Red, green and blue of a light colour by its name, such as `c2`.
+/// The light colour of a name such as `c2`, as six hexadecimal digits.
+fn code(name: &str) -> Option<&'static str> {
+    let (_, after) = COLOURS.split_once(&format!("--{name}:#"))?;
+    after.get(..6)
+}
+
+/// A style with the light colours in place of their names.
+pub(super) fn in_light(style: &str) -> String {
+    let mut parts = style.split("var(--");
+    let mut light = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (name, after) = part.split_once(')').unwrap_or((part, ""));
+        light.push('#');
+        light.push_str(code(name).unwrap_or("000000"));
+        light.push_str(after);
+    }
+    light
+}
+
+/// Red, green and blue of a light colour by its name.
 #[cfg(feature = "png")]
 pub(super) fn light(name: &str) -> Option<[u8; 3]> {
-    let (_, after) = COLOURS.split_once(&format!("--{name}:#"))?;
-    let code = u32::from_str_radix(after.get(..6)?, 16).ok()?;
+    let code = u32::from_str_radix(code(name)?, 16).ok()?;
     let [_, red, green, blue] = code.to_be_bytes();
     Some([red, green, blue])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_style_in_light_names_every_colour_by_its_digits() {
+        assert_eq!(
+            in_light("a{fill:var(--ink)}b{stroke:var(--c2);x:1}"),
+            "a{fill:#1b2430}b{stroke:#0b62a8;x:1}"
+        );
+        let style = in_light(STYLE);
+        assert!(
+            !style.contains("var(") && !style.contains("#000000"),
+            "{style}"
+        );
+    }
 }

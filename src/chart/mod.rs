@@ -11,6 +11,7 @@ mod svg;
 
 pub(crate) use colours::LINES;
 pub use colours::{COLOURS, STYLE};
+use colours::{UNSCALED, in_light};
 pub use plot::Plot;
 pub(crate) use svg::escaped;
 
@@ -24,7 +25,7 @@ const TOP: f64 = 26.0;
 const ROW: f64 = 16.0;
 /// The width of a letter, about.
 const LETTER: f64 = 7.4;
-const BOTTOM: f64 = 30.0;
+const BOTTOM: f64 = 36.0;
 /// Stretches of x of which the extremes are kept.
 const BUCKETS: usize = 1500;
 
@@ -174,11 +175,13 @@ impl Chart<'_> {
         self.scene().map_or_else(String::new, |scene| scene.svg())
     }
 
-    /// The picture as an SVG file of its own.
+    /// The picture as an SVG file of its own, in the light colours: editors and typesetters know neither variables nor lines that keep
+    /// their width when they are scaled.
     #[must_use]
     pub fn file(&self) -> String {
         let style = format!(
-            "><style>{COLOURS}{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>"
+            "><style>{}{UNSCALED}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>",
+            in_light(STYLE)
         );
         self.svg().replacen('>', &style, 1)
     }

@@ -217,13 +217,13 @@ mod tests {
     fn a_line_has_its_colour_where_it_runs_and_paper_beside_it() {
         let (x, y) = ([0.0, 1.0, 2.0], [1.0, 1.0, 1.0]);
         let chart = Chart {
-            height: 126.0,
+            height: 132.0,
             layers: vec![Layer::line(&x, &y, "c2", "one")],
             y_range: Some((0.0, 2.0)),
             ..Chart::default()
         };
         let picture = Pixmap::decode_png(&chart.png().unwrap()).unwrap();
-        assert_eq!((picture.width(), picture.height()), (1800, 252));
+        assert_eq!((picture.width(), picture.height()), (1800, 264));
         // The frame is 70 high and begins at 26, so its middle is at 61, which is the dot 122.
         let dot = |x, y| {
             let dot = picture.pixel(x, y).unwrap();

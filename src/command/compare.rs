@@ -202,7 +202,7 @@ fn describe(comparison: &Comparison) -> String {
                 format!("{mark}{}", or_dash(*rmse))
             });
         let indent = if several { "  " } else { "" };
-        let label = format!("{indent}{}", row.node);
+        let label = format!("{indent}{} ({})", row.node, row.kind);
         rows.push((label, cells.collect()));
     }
     text.push_str(&matrix("", &columns, &rows));

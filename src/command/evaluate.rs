@@ -21,7 +21,9 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
 ///
-/// Fit is the share of the truth's spread that is told, 1 − √(SSE / Σ (y − ȳ)²), as identification has it.
+/// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
+/// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is the share of the truth's spread that is told,
+/// 1 − √(SSE / Σ (y − ȳ)²), as identification has it.
 ///
 /// Where predictions have intervals (bounds, as of `conformal`, or a standard deviation, of which 1.645 to either side are
 /// to cover nine tenths), a second table tells which share of the truths they cover, how wide they are on average, and
@@ -29,7 +31,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 ///
 /// `--mode` tells how far the model reaches by itself: one step from measured past truths, several steps with its own
 /// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
-/// stay as they were measured, and so do the weights of votes.
+/// stay as they were measured, and so do the weights of votes. Standard deviations in a free run are those of one step, so
+/// that they cover less.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \

@@ -195,7 +195,10 @@ fn tell_orders(text: &mut String, orders: &OrderTable) {
             format!("{:.2}", tried.aic),
             format!("{:.2}", tried.aicc),
             format!("{:.2}", tried.bic),
-            number(tried.fpe),
+            match tried.fpe {
+                small if small < 0.1 => format!("{small:.3e}"),
+                large => number(large),
+            },
         ];
         if chosen {
             cells.push(format!(
@@ -232,7 +235,7 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     );
     let dropped = [
         (fit.dropped.outside_limits, "outside the limits"),
-        (fit.dropped.without_run, "without a run before"),
+        (fit.dropped.without_run, "too early to be predicted"),
         (fit.dropped.incomplete, "incomplete"),
     ];
     let dropped: Vec<_> = dropped
@@ -262,6 +265,10 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
             "not".to_owned()
         };
         tell_step(&mut text, &nth, step, (width, candidates));
+    }
+    if let Some(next) = report.refused.as_ref().filter(|_| !candidates) {
+        let would = format!("{} would make it R² {:.4}", next.label(), next.score);
+        text.push_str(&paragraph("  no more:", 6, &would));
     }
     if let Some(orders) = &report.orders {
         tell_orders(&mut text, orders);

@@ -16,6 +16,8 @@ use serde::Serialize;
 
 use super::observation::Observation;
 
+/// Fits on fewer days are enough when their error is at most so many times that of fits on all others.
+pub const ENOUGH: f64 = 1.05;
 /// Days of which each is left out once, at most: each costs a fit.
 pub const MOST_DAYS: usize = 60;
 /// How many fits on as many days, from different places of the recording, make a point of the learning curve.

@@ -30,6 +30,8 @@ pub struct Lags {
     pub truth: String,
     /// The prediction whose residuals are meant.
     pub prediction: String,
+    /// How far ahead of what was known it predicts, in s.
+    pub ahead_s: f64,
     /// The lags in s; at a positive one the truth follows the feature.
     pub lag_s: Vec<f64>,
     /// Every feature, in the order of the graph.
@@ -146,6 +148,7 @@ pub fn lags(
             Some(Lags {
                 truth: plan.channels[truth.slot].name.clone(),
                 prediction: plan.channels[main.slot].name.clone(),
+                ahead_s: main.ahead.secs(),
                 lag_s: lag_s.clone(),
                 features: features.collect(),
             })

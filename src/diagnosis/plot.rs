@@ -1,7 +1,7 @@
 //! Decides which pictures a diagnosis has, and how correlations and responses are shown wherever they are; how a picture is drawn
 //! is decided by [`crate::chart`].
 
-use super::day::{CurvePoint, DayScore, Days};
+use super::day::{CurvePoint, DayScore, Days, ENOUGH};
 use super::lag::{Correlogram, FeatureLags, Lags};
 use super::residual::Residuals;
 use super::response::{Response, Responses};
@@ -13,8 +13,28 @@ use crate::chart::{Chart, LINES, Layer, Mark, Plot};
 const MOST_FEATURES: usize = 4;
 /// The colour of bounds.
 const BOUND: &str = "c1";
+/// The colour of the lag from which on features were known.
+const KNOWN: &str = "c6";
 /// Windows are shown up to so many times that of the graph.
 const WINDOWS_SHOWN: f64 = 12.0;
+/// Errors of fits on fewer days are shown up to so many times that of fits on all others: whether they come near is asked.
+const RATIOS_SHOWN: f64 = 2.0;
+/// Impulses are shown whole unless the largest is so many times beyond all but so many points of each line.
+const SPIKE: f64 = 10.0;
+const IN_SPIKES: usize = 4;
+
+/// A unit of time in which lengths up to the longest are short numbers: its name, and how many seconds it has.
+fn time_unit(longest_s: f64) -> (&'static str, &'static str, f64) {
+    match longest_s {
+        short if short < 120.0 => ("seconds", "s", 1.0),
+        long if long >= 10.0 * 3600.0 => ("hours", "h", 3600.0),
+        _ => ("minutes", "min", 60.0),
+    }
+}
+
+fn longest(times_s: &[f64]) -> f64 {
+    times_s.iter().map(|time| time.abs()).fold(0.0, f64::max)
+}
 
 /// Points to be drawn, with their own numbers.
 struct Points {
@@ -54,9 +74,10 @@ impl Points {
 #[derive(Default)]
 pub(crate) struct Picture {
     title: String,
-    x_label: &'static str,
+    x_label: String,
     y_label: String,
     y_range: Option<(f64, f64)>,
+    limits: Vec<f64>,
     points: Vec<Points>,
 }
 
@@ -71,9 +92,10 @@ impl Picture {
         });
         Chart {
             title: self.title.clone(),
-            x_label: self.x_label,
+            x_label: &self.x_label,
             y_label: self.y_label.clone(),
             y_range: self.y_range,
+            limits: self.limits.clone(),
             height: 340.0,
             layers: layers.collect(),
             ..Chart::default()
@@ -100,9 +122,7 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
     }
     for of in diagnosis.lags.iter().filter(|of| is_main(&of.prediction)) {
         add(format!("lags-{}", of.truth), with_truth(of));
-        let left = format!("what {} leaves of {}", of.prediction, of.truth);
-        let left = lags(of, &left, |feature| &feature.residual);
-        add(format!("lags-residual-{}", of.truth), left);
+        add(format!("lags-residual-{}", of.truth), with_residual(of));
     }
     for of in diagnosis
         .responses
@@ -112,7 +132,7 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
         add(format!("impulse-{}", of.node), response(of, true));
         add(format!("step-{}", of.node), response(of, false));
     }
-    if let Some(days) = &diagnosis.days {
+    if let Some(days) = diagnosis.days.as_ref().filter(|of| of.curve.len() > 1) {
         add("days".to_owned(), learning(&main, days));
     }
     let is_shown = |of: &&Windows| main.iter().any(|main| main.truth == of.truth);
@@ -134,28 +154,53 @@ fn learning(main: &[&Main], days: &Days) -> Picture {
         let y = days.curve.iter().map(score).collect();
         Points::line(nth, &main.prediction, x.clone(), y)
     });
+    let points: Vec<Points> = curve.collect();
+    let ratios = points.iter().flat_map(|of| &of.y).filter(|y| !y.is_nan());
+    let (low, high) = ratios.fold((1.0, ENOUGH), |(low, high), &y| {
+        (f64::min(low, y), f64::max(high, y))
+    });
+    let cut = if high > RATIOS_SHOWN {
+        ", cut at 2"
+    } else {
+        ""
+    };
+    let most = days.count - 1;
     Picture {
-        title: "Error of fits on some days over that of fits on all others".to_owned(),
-        x_label: "days",
-        y_label: "times the error of all others".to_owned(),
-        points: curve.collect(),
-        ..Picture::default()
+        title: format!("Error of fits on some days over that of fits on {most}"),
+        x_label: "days that a fit has seen; dashed: 5 % worse than all".to_owned(),
+        y_label: format!("RMSE, 1 being that of a fit on {most} days{cut}"),
+        y_range: Some((low - 0.05, high.min(RATIOS_SHOWN) + 0.02)),
+        limits: vec![ENOUGH],
+        points,
     }
 }
 
 fn windows(windows: &[&Windows]) -> Picture {
-    let lines = windows.iter().enumerate().map(|(nth, of)| {
+    let shown = |of: &Windows| -> Vec<Width> {
         let shown = |width: &&Width| {
             width.window_s <= WINDOWS_SHOWN * of.window_s && width.ratio.is_finite()
         };
-        let shown: Vec<_> = of.widths.iter().filter(shown).collect();
-        let x = shown.iter().map(|width| width.window_s / 60.0).collect();
-        let y = shown.iter().map(|width| width.ratio).collect();
+        of.widths.iter().filter(shown).cloned().collect()
+    };
+    let all = windows.iter().flat_map(|of| shown(of));
+    let (unit, _, unit_s) = time_unit(all.map(|of| of.window_s).fold(0.0, f64::max));
+    let points = |widths: &[Width]| -> (Vec<f64>, Vec<f64>) {
+        let each = widths.iter();
+        each.map(|of| (of.window_s / unit_s, of.ratio)).unzip()
+    };
+    let lines = windows.iter().enumerate().map(|(nth, of)| {
+        let (x, y) = points(&shown(of));
         Points::line(nth, &of.truth, x, y)
     });
+    let mut own: Vec<f64> = windows.iter().map(|of| of.window_s / unit_s).collect();
+    own.dedup();
+    let own = match own[..] {
+        [one] => format!(", that of the graph is {}", (100.0 * one).round() / 100.0),
+        _ => String::new(),
+    };
     Picture {
         title: "Signal to noise of the drift against its window".to_owned(),
-        x_label: "window in minutes",
+        x_label: format!("window in {unit}{own}"),
         y_label: "signal to noise".to_owned(),
         points: lines.collect(),
         ..Picture::default()
@@ -163,10 +208,13 @@ fn windows(windows: &[&Windows]) -> Picture {
 }
 
 fn autocorrelation(of: &Residuals) -> Picture {
-    let lags = 1..=of.autocorrelation.len();
-    let x: Vec<f64> = lags.map(|lag| lag as f64 * of.spacing_s / 60.0).collect();
+    let count = of.autocorrelation.len();
+    let (unit, _, unit_s) = time_unit(count as f64 * of.spacing_s);
+    let x: Vec<f64> = (1..=count)
+        .map(|lag| lag as f64 * of.spacing_s / unit_s)
+        .collect();
     // The bounds reach past the bars to either side, or half of the outer ones would be cut off.
-    let ends = [0.4, of.bound.len() as f64 + 0.6].map(|lag| lag * of.spacing_s / 60.0);
+    let ends = [0.4, of.bound.len() as f64 + 0.6].map(|lag| lag * of.spacing_s / unit_s);
     let around = |inner: &[f64], first: f64, last: f64| -> Vec<f64> {
         let inner = inner.iter().copied();
         std::iter::once(first).chain(inner).chain([last]).collect()
@@ -188,11 +236,11 @@ fn autocorrelation(of: &Residuals) -> Picture {
         label: String::new(),
         mark: Mark::Bars,
     };
-    let (above, below) = (bound(1.0, "95 % of white series"), bound(-1.0, ""));
+    let (above, below) = (bound(1.0, "95 % of a white series"), bound(-1.0, ""));
     Picture {
         title: format!("Autocorrelation of the residuals of {}", of.prediction),
-        x_label: "lag in minutes",
-        y_label: of.prediction.clone(),
+        x_label: format!("lag in {unit}"),
+        y_label: format!("autocorrelation of what {} leaves", of.prediction),
         points: vec![bars, above, below],
         ..Picture::default()
     }
@@ -203,9 +251,31 @@ pub(crate) fn with_truth(of: &Lags) -> Picture {
     lags(of, &of.truth, |feature| &feature.truth)
 }
 
+/// How features go with what is left of a truth, and from which lag on they were known when it was predicted.
+fn with_residual(of: &Lags) -> Picture {
+    let left = format!("what {} leaves of {}", of.prediction, of.truth);
+    let mut picture = lags(of, &left, |feature| &feature.residual);
+    let (_, _, unit_s) = time_unit(longest(&of.lag_s));
+    let all = picture.points.iter().flat_map(|of| &of.y);
+    let (low, high) = all
+        .filter(|y| !y.is_nan())
+        .fold((0.0, 0.0), |(low, high), &y| {
+            (f64::min(low, y), f64::max(high, y))
+        });
+    picture.points.push(Points {
+        x: vec![of.ahead_s / unit_s; 2],
+        y: vec![low, high],
+        class: KNOWN,
+        label: "known from here on".to_owned(),
+        mark: Mark::Line,
+    });
+    picture
+}
+
 /// Of each sensor the feature that says most.
 fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Picture {
-    let x: Vec<f64> = of.lag_s.iter().map(|lag| lag / 60.0).collect();
+    let (unit, _, unit_s) = time_unit(longest(&of.lag_s));
+    let x: Vec<f64> = of.lag_s.iter().map(|lag| lag / unit_s).collect();
     let mut shown: Vec<&FeatureLags> = Vec::new();
     let sensor = |name: &str| name.split('@').next().unwrap_or_default().to_owned();
     for feature in of.features.iter().filter(|of| !side(of).best.is_nan()) {
@@ -225,11 +295,11 @@ fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Pictu
         lines.map(|(nth, of)| Points::line(nth, short(&of.feature), x.clone(), side(of).r.clone()));
     let mut points: Vec<Points> = lines.collect();
     let widest = shown.iter().map(|of| side(of).error).fold(0.0, f64::max);
-    points.extend(Points::bounds(&x, 3.0 * widest, "3 σ"));
+    points.extend(Points::bounds(&x, 3.0 * widest, "±3 σ of chance"));
     Picture {
         title: format!("Correlation of features with {title}"),
-        x_label: "minutes that it follows the feature",
-        y_label: "r".to_owned(),
+        x_label: format!("{unit} by which {} follows the feature", of.truth),
+        y_label: format!("r with {title}"),
         points,
         ..Picture::default()
     }
@@ -245,36 +315,51 @@ pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
     let mut largest: Vec<&Response> = of.sensors.iter().collect();
     largest.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
     largest.truncate(LINES.len());
+    let times = largest.iter().flat_map(|of| &of.time_s).copied();
+    let (times_are, short_unit, unit_s) = time_unit(times.fold(0.0, f64::max));
     let lines = largest.iter().enumerate().map(|(nth, sensor)| {
-        let x = sensor.time_s.iter().map(|time| time / 60.0).collect();
+        let x = sensor.time_s.iter().map(|time| time / unit_s).collect();
         let y = if impulse {
-            &sensor.impulse
+            let per_unit = sensor.impulse.iter().map(|y| y * unit_s / 60.0);
+            per_unit.collect()
         } else {
-            &sensor.step
+            sensor.step.clone()
         };
-        Points::line(nth, short(&sensor.sensor), x, y.clone())
+        Points::line(nth, short(&sensor.sensor), x, y)
     });
     let lines: Vec<Points> = lines.collect();
     let of_unit = of.sensors.first().map_or("", |of| of.sensor_unit.as_str());
     let (what, unit) = if impulse {
-        ("Impulse", format!("{} per {of_unit}·min", of.unit))
+        ("Impulse", format!("{} per {of_unit}·{short_unit}", of.unit))
     } else {
         ("Step", format!("{} per {of_unit}", of.unit))
     };
+    let y_range = impulse.then(|| most_of(&lines)).flatten();
+    let cut = if y_range.is_some() {
+        ", spikes cut"
+    } else {
+        ""
+    };
     Picture {
         title: format!("{what} response of {}", of.node),
-        x_label: "minutes after the change",
-        y_label: unit,
-        y_range: impulse.then(|| most_of(&lines)).flatten(),
+        x_label: format!(
+            "{times_are} after the {}",
+            if impulse { "impulse" } else { "step" }
+        ),
+        y_label: format!("{}: {unit}{cut}", of.node),
+        y_range,
         points: lines,
+        ..Picture::default()
     }
 }
 
-/// Where nearly all of the lines lies. An impulse makes a spike in every slope that it enters, and beside that nothing would be seen.
+/// Where the lines lie but for a few points of each, if all lie far beyond. An impulse makes a spike where a level enters, and beside
+/// that nothing would be seen.
 fn most_of(lines: &[Points]) -> Option<(f64, f64)> {
     let values = lines.iter().flat_map(|line| &line.y);
     let mut sizes: Vec<f64> = values.map(|v| v.abs()).filter(|v| *v > 0.0).collect();
     sizes.sort_by(f64::total_cmp);
-    let size = sizes.get(sizes.len() * 95 / 100)?;
-    Some((-1.1 * size, 1.1 * size))
+    let most = sizes.len().checked_sub(1 + IN_SPIKES * lines.len())?;
+    let size = sizes[most];
+    (*sizes.last()? > SPIKE * size).then_some((-1.1 * size, 1.1 * size))
 }

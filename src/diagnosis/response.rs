@@ -3,12 +3,14 @@
 //! The impulse response of a linear estimator is `Γ = Σ c_k e_k`, its coefficients times what each feature makes of an impulse
 //! (Mandelli, Dankwart and Napoli, section 3.2). It is found by asking the graph itself: all sensors rest at their means, one of
 //! them steps, and the engine runs. So it holds for whatever features a graph has, lags and other frames included, and for an
-//! estimator that is not linear it is the answer to a change of one standard deviation.
+//! estimator that is not linear it is the answer to a change of one standard deviation. Estimators that read or follow past
+//! truths run freely, on their own predictions: truths that rest while a sensor steps would tell them that nothing has happened,
+//! and what is asked for is the transfer function of the model, not of a predictor that is contradicted.
 
 use std::sync::Arc;
 
 use athermal_core::compile::{Plan, PlannedRole};
-use athermal_core::engine::{Engine, EngineError};
+use athermal_core::engine::{Engine, EngineError, Mode};
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
 use athermal_core::time::{Duration, Instant};
@@ -21,8 +23,13 @@ use super::of_truths;
 const MOST_INSTANTS: i64 = 2_000;
 /// A step response below this share of the largest of its estimator is none.
 const NOTHING: f64 = 1e-9;
-/// A step response that ends above this share of its largest value has not come to an end.
+/// A step response that ends above this share of its largest value has not come back to nothing.
 const LASTS: f64 = 0.01;
+/// The last of a step response is shown as long as it is further than this share of its largest value from where it ends.
+const SHOWN: f64 = 1e-3;
+/// A step response is at rest when it has changed by less than this share of its largest value within [`QUIET`] ticks.
+const AT_REST: f64 = 1e-6;
+const QUIET: usize = 50;
 /// The share of an answer that must have come for it to have settled.
 const SETTLED: f64 = 0.9;
 
@@ -53,13 +60,17 @@ pub struct Response {
     /// What is predicted at each time after an impulse of one unit times one minute, in the unit of the truth.
     pub impulse: Vec<f64>,
     /// The sum of the step response over time, in the unit of the truth times minutes: of a drift per minute, how far a step of
-    /// one unit moves the axis in the end. None where the step response does not come to an end.
+    /// one unit moves the axis in the end. None where the step response does not come back to nothing.
     pub total: Option<f64>,
+    /// Where the step response comes to rest, in the unit of the truth: the static gain. None where it comes back to nothing, and
+    /// where it does not come to rest.
+    pub gain: Option<f64>,
     /// The time in s at which the step response is largest in size.
     pub peak_s: f64,
     /// The step response there.
     pub peak: f64,
-    /// The time in s from which on the sum stays within a tenth of its total; none where it does not.
+    /// The time in s from which on the sum stays within a tenth of its total, or the step response within a tenth of its gain; none
+    /// where there is neither.
     pub settled_s: Option<f64>,
     /// By how much the answers to a step up and a step down differ, as a share of their size: 0 for a linear estimator.
     pub asymmetry: f64,
@@ -97,9 +108,8 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
             spread if spread > 0.0 => spread,
             _ => continue,
         };
-        let up = probe.run(&slots, source, size)?;
-        let down = probe.run(&slots, source, -size)?;
-        for (nth, (up, down)) in up.iter().zip(&down).enumerate() {
+        let answers = probe.run(&slots, source, size)?;
+        for (nth, [up, down]) in answers.iter().enumerate() {
             let ahead = plan.channels[slots[nth]].channel.ahead;
             let answer = Answer { up, down, size };
             if let Some(response) = answer.response(plan, source, ahead, probe.step) {
@@ -113,7 +123,11 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         let truth = truth.map(|slot| &plan.channels[slot]);
         let largest = sensors.iter().map(|of| of.peak.abs()).fold(0.0, f64::max);
         sensors.retain(|of| of.peak.abs() > NOTHING * largest);
-        let last = |of: &Response| of.step.iter().rposition(|y| y.abs() > NOTHING * largest);
+        let last = |of: &Response| {
+            let end = of.gain.unwrap_or(0.0);
+            let far = |y: &f64| (y - end).abs() > SHOWN * of.peak.abs();
+            of.step.iter().rposition(far)
+        };
         let last = sensors.iter().filter_map(last).max().unwrap_or(0);
         sensors.iter_mut().for_each(|of| of.end_after(last + 2));
         Responses {
@@ -132,7 +146,7 @@ struct Probe<'a> {
     /// The mean of every measured channel.
     rest: Vec<f64>,
     step: Duration,
-    /// Ticks at rest, and after the step.
+    /// Ticks at rest, and at least so many after the step.
     ticks: (i64, i64),
 }
 
@@ -156,31 +170,59 @@ impl<'a> Probe<'a> {
         })
     }
 
-    /// How slots change from the instant on at which a source steps by `size`, tick by tick; NaN where there is no value.
-    fn run(&self, slots: &[usize], source: usize, size: f64) -> Result<Vec<Vec<f64>>, EngineError> {
-        let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
-        // Nothing has been measured that could be learned from.
-        engine.freeze(true);
-        let mut samples = self.rest.clone();
-        let mut before = vec![f64::NAN; slots.len()];
-        let mut found = vec![Vec::new(); slots.len()];
+    /// How slots change from the instant on at which a source steps up and down by `size`, tick by tick, against a run in which it
+    /// rests; NaN where there is no value.
+    fn run(
+        &self,
+        slots: &[usize],
+        source: usize,
+        size: f64,
+    ) -> Result<Vec<[Vec<f64>; 2]>, EngineError> {
+        let mut engines = Vec::new();
+        for _ in 0..3 {
+            let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
+            // Nothing has been measured that could be learned from.
+            engine.freeze(true);
+            engine.predict_in(Mode::FreeRun);
+            engines.push(engine);
+        }
+        let mut found = vec![[Vec::new(), Vec::new()]; slots.len()];
         let (resting, answering) = self.ticks;
-        for tick in 0..resting + answering {
-            if tick == resting {
-                samples[source] += size;
-            }
-            engine.step(Instant::from_ns(tick * self.step.as_ns()), &samples)?;
-            for (nth, &slot) in slots.iter().enumerate() {
-                let value = engine.value(slot);
-                if tick < resting {
-                    before[nth] = value;
-                } else {
-                    found[nth].push(value - before[nth]);
+        for tick in 0..resting + MOST_INSTANTS {
+            for (engine, sign) in engines.iter_mut().zip([0.0, 1.0, -1.0]) {
+                let mut samples = self.rest.clone();
+                if tick >= resting {
+                    samples[source] += sign * size;
                 }
+                engine.step(Instant::from_ns(tick * self.step.as_ns()), &samples)?;
+            }
+            if tick < resting {
+                continue;
+            }
+            let [at_rest, up, down] = &engines[..] else {
+                break;
+            };
+            for (&slot, answers) in slots.iter().zip(&mut found) {
+                for (engine, answer) in [up, down].into_iter().zip(answers) {
+                    answer.push(engine.value(slot) - at_rest.value(slot));
+                }
+            }
+            if tick >= resting + answering && found.iter().flatten().all(|of| is_at_rest(of)) {
+                break;
             }
         }
         Ok(found)
     }
+}
+
+/// Whether an answer has not changed of late; one that is no number never will.
+fn is_at_rest(answer: &[f64]) -> bool {
+    let Some(before) = answer.len().checked_sub(QUIET + 1) else {
+        return false;
+    };
+    let largest = answer.iter().map(|y| y.abs()).fold(0.0, f64::max);
+    let (was, is) = (answer[before], answer[answer.len() - 1]);
+    is.is_nan() || (is - was).abs() <= AT_REST * largest
 }
 
 /// What a slot did after a step up and a step down.
@@ -208,7 +250,7 @@ impl Answer<'_> {
         let asymmetric = asymmetric.fold(0.0, f64::max);
         let largest = (0..step.len()).max_by(|&a, &b| step[a].abs().total_cmp(&step[b].abs()))?;
         let peak = step[largest];
-        if step.iter().any(|value| value.is_nan()) || peak == 0.0 {
+        if !step.iter().all(|value| value.is_finite()) || peak == 0.0 {
             return None;
         }
         let minutes = every.secs() / 60.0;
@@ -228,17 +270,27 @@ impl Answer<'_> {
             })
             .collect();
         let total = *sums.last()?;
-        let ends = step.last()?.abs() <= LASTS * peak.abs();
-        let outside = |sum: &f64| (sum - total).abs() > (1.0 - SETTLED) * total.abs();
-        let settled = sums.iter().rposition(outside).map_or(0, |last| last + 1);
+        let end = *step.last()?;
+        let near = |value: f64, of: f64| (value - of).abs() <= (1.0 - SETTLED) * of.abs();
+        let comes_back = end.abs() <= LASTS * peak.abs();
+        // One that ran to the last instant that there is may be on its way still.
+        let quarter = step[step.len() - step.len().div_ceil(4)];
+        let lasts = !comes_back && (end - quarter).abs() <= LASTS * peak.abs();
+        let outside = if comes_back {
+            sums.iter().rposition(|&sum| !near(sum, total))
+        } else {
+            step.iter().rposition(|&value| !near(value, end))
+        };
+        let settled = outside.map_or(0, |last| last + 1);
         Some(Response {
             sensor: plan.sources[source].name.clone(),
             sensor_unit: plan.channels[source].channel.unit.difference().to_string(),
             impulse: impulse.collect(),
-            total: ends.then_some(total),
+            total: comes_back.then_some(total),
+            gain: lasts.then_some(end),
             peak_s: time_s[largest],
             peak,
-            settled_s: time_s.get(settled).copied().filter(|_| ends),
+            settled_s: time_s.get(settled).copied().filter(|_| comes_back || lasts),
             asymmetry: asymmetric / peak.abs(),
             time_s,
             step,

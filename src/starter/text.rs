@@ -212,7 +212,11 @@ impl Writer<'_> {
         for (width_s, ratios) in shown {
             let told: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
             let mark = if *width_s == self.choice.drift_s {
-                "  <- chosen"
+                if self.choice.enough {
+                    "  <- chosen: the narrowest with 2 on half of them"
+                } else {
+                    "  <- chosen: the highest, though below 2"
+                }
             } else {
                 ""
             };

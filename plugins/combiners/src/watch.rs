@@ -16,7 +16,7 @@ use crate::mean::mean;
 /// smallest or largest value (Page 1954; Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins
 /// anew. It takes the errors for independent; those of truths that overlap are not, so let it take one in a while with `every`.
 ///
-/// The port `reason` says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
+/// The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
 /// `hold`. Of several predictions the mean is watched.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -24,7 +24,8 @@ pub struct PageHinkley {
     /// What is watched.
     #[serde(default)]
     pub watch: Watched,
-    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more.
+    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more. They should span all
+    /// that the machine usually does, such as a day: where they were taken at rest, its next change of set point is an alarm.
     #[serde(default = "thirty")]
     #[schemars(range(min = 2))]
     pub first: u64,
@@ -56,7 +57,7 @@ pub struct PageHinkley {
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///
-/// The port `reason` says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
+/// The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
 /// `hold`. Of several predictions the mean is watched.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -64,7 +65,8 @@ pub struct Adwin {
     /// What is watched.
     #[serde(default)]
     pub watch: Watched,
-    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more.
+    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more. They should span all
+    /// that the machine usually does, such as a day: where they were taken at rest, its next change of set point is an alarm.
     #[serde(default = "thirty")]
     #[schemars(range(min = 2))]
     pub first: u64,

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use athermal::Duration;
-use athermal::diagnosis::day::{CurvePoint, DayScore, Days};
+use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 use athermal::diagnosis::lag::{Correlogram, FeatureLags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::Residuals;
@@ -18,8 +18,8 @@ const FEATURES: usize = 3;
 const SAYS_SOMETHING: f64 = 3.0;
 /// A variance inflation beyond which a coefficient means little by itself (Marquardt 1970).
 const INFLATED: f64 = 10.0;
-/// Fits on fewer days are enough when their error is at most so many times that of fits on all others.
-const ENOUGH: f64 = 1.05;
+/// By how much answers to a step up and down differ at least where it is worth a word.
+const BENT: f64 = 0.005;
 
 /// The tables of a diagnosis, of the predictions asked for.
 pub struct Tables<'a> {
@@ -128,8 +128,8 @@ impl<'a> Tables<'a> {
         }
         format!(
             "largest correlation of features with the truth, with the lag by which it\n\
-             follows them; and beyond 3 σ with what is left of it, at lags at which they\n\
-             were known when it was predicted\n{}",
+             follows them, and σ, which chance alone would give; and beyond 3 σ with what is\n\
+             left of it, at lags at which they were known when it was predicted\n{}",
             table(&["", "r", "lag", "σ"], &rows)
         )
     }
@@ -168,21 +168,58 @@ impl<'a> Tables<'a> {
                 };
                 sensors.iter().map(row).collect()
             };
-            let in_the_end = in_the_end(&of_node[0].unit);
+            let unit = &of_node[0].unit;
+            let in_the_end = in_the_end(unit);
+            let has = |of: &Response, kind: fn(&Response) -> Option<f64>| {
+                let mut all = of_node.iter().flat_map(|node| &node.sensors);
+                all.any(|other| other.sensor == of.sensor && kind(other).is_some())
+            };
             for alike in grouped(sensors.iter().copied(), |of| of.sensor_unit.clone()) {
-                let _ = writeln!(
-                    text,
-                    "{node}: how far a step of 1 {} moves what it predicts in the end, in {in_the_end}",
-                    alike[0].sensor_unit
-                );
-                let total = |of: &Response| of.total.map_or("no end".to_owned(), number);
-                text.push_str(&matrix("sensor", &columns, &cells(&alike, total)));
+                let step = format!("{node}: how far a step of 1 {} moves", alike[0].sensor_unit);
+                let (come_back, last): (Vec<_>, Vec<_>) = alike
+                    .into_iter()
+                    .partition(|of| has(of, |of| of.total) || !has(of, |of| of.gain));
+                if !come_back.is_empty() {
+                    let _ = writeln!(text, "{step} what it predicts in the end, in {in_the_end}");
+                    let total = |of: &Response| of.total.map_or("no end".to_owned(), number);
+                    let mut rows = cells(&come_back, total);
+                    if come_back.len() > 1 {
+                        // What sensors that tell the same share among them means more than what each has of it.
+                        let together = of_node.iter().map(|of| {
+                            let names = |one: &&Response| {
+                                let mut all = come_back.iter();
+                                all.any(|other| other.sensor == one.sensor)
+                            };
+                            let totals = of.sensors.iter().filter(names).map(|of| of.total);
+                            let sum: Option<f64> = totals.sum();
+                            sum.map_or("no end".to_owned(), number)
+                        });
+                        rows.push(("all together".to_owned(), together.collect()));
+                    }
+                    text.push_str(&matrix("sensor", &columns, &rows));
+                }
+                if !last.is_empty() {
+                    let _ = writeln!(text, "{step} what it predicts for good, in {unit}");
+                    let gain = |of: &Response| of.gain.map_or("no end".to_owned(), number);
+                    text.push_str(&matrix("sensor", &columns, &cells(&last, gain)));
+                }
             }
-            let _ = writeln!(text, "{node}: time until nine tenths of that have come");
-            let settled = |of: &Response| of.settled_s.map_or("no end".to_owned(), seconds);
-            text.push_str(&matrix("sensor", &columns, &cells(&sensors, settled)));
+            let all = of_node.iter().flat_map(|of| &of.sensors);
+            let longest = all.filter_map(|of| of.settled_s).fold(0.0, f64::max);
+            let in_minutes = longest >= 120.0;
+            let _ = writeln!(
+                text,
+                "{node}: time until nine tenths of that have come, in {}",
+                if in_minutes { "min" } else { "s" }
+            );
+            let in_unit: fn(&Response) -> String = if in_minutes {
+                |of| times(of.settled_s, 60.0)
+            } else {
+                |of| times(of.settled_s, 1.0)
+            };
+            text.push_str(&matrix("sensor", &columns, &cells(&sensors, in_unit)));
             let bent = of_node.iter().flat_map(|of| &of.sensors);
-            if bent.clone().any(|of| of.asymmetry > 1e-6) {
+            if bent.clone().any(|of| of.asymmetry >= BENT) {
                 let largest = bent.map(|of| of.asymmetry).fold(0.0, f64::max);
                 let _ = writeln!(
                     text,
@@ -202,7 +239,8 @@ impl<'a> Tables<'a> {
         }
         let mut text = String::from(
             "how well the data determine each estimator: condition number of its regressors,\n\
-             and the largest variance inflation factor\n",
+             and the largest variance inflation factor (VIF); beyond 10 the regressor is\n\
+             named: others tell nearly the same, its coefficient means little by itself\n",
         );
         let rows: Vec<Vec<String>> = shown
             .iter()
@@ -353,7 +391,10 @@ fn residuals(shown: &[&Residuals]) -> String {
                 largest,
                 of.bound.first().map_or("-".into(), |b| format!("±{b:.2}")),
                 or_dash(of.ljung_box),
-                of.p_value.map_or("-".to_owned(), |p| format!("{p:.3}")),
+                of.p_value.map_or("-".to_owned(), |p| match p {
+                    p if p < 0.0005 => "<0.001".to_owned(),
+                    p => format!("{p:.3}"),
+                }),
                 verdict.to_owned(),
             ]
         })
@@ -371,9 +412,11 @@ fn residuals(shown: &[&Residuals]) -> String {
     ];
     format!(
         "residuals: measured less predicted in {}, of which n are {} apart, so that\n\
-         neither windows nor horizons overlap; Q of Ljung and Box\n{}",
+         neither windows nor horizons overlap; their largest autocorrelation beside the\n\
+         95 % of white ones; Q of Ljung and Box over {} lags\n{}",
         first.unit,
         seconds(first.spacing_s),
+        first.autocorrelation.len(),
         table(&header, &rows)
     )
 }
@@ -403,24 +446,36 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
     };
     let last_far = days.curve.iter().rposition(|point| !near(point));
     let enough = days.curve.get(last_far.map_or(0, |last| last + 1));
+    let most = days.count - 1;
     let verdict = match enough.map_or(days.count, |point| point.days) {
-        1 => "1 day is enough to come within 5 %".to_owned(),
-        enough if enough + 1 < days.count => {
-            format!("{enough} days are enough to come within 5 %")
+        _ if most == 1 => "two are too few to tell",
+        enough if enough < most => {
+            let plural = if enough == 1 { " is" } else { "s are" };
+            &format!("{enough} day{plural} enough to come within 5 % of {most}")
         }
-        _ => "more days may still make it better".to_owned(),
+        _ => "more days may still make it better",
     };
     let of_day = if days.day_s == 86_400.0 {
         String::new()
     } else {
         format!(" of {}", seconds(days.day_s))
     };
+    let curve = match most {
+        1 => String::new(),
+        _ => matrix("fitted on", &shown, &curve),
+    };
     format!(
         "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
-         how many times that the error is of a fit on so many days that follow each\n\
-         other, on the same days: {verdict}\n{}",
+         how many days are needed: {verdict}\n{}",
         matrix("left out", &shown, &left_out),
-        matrix("fitted on", &shown, &curve)
+        if curve.is_empty() {
+            curve
+        } else {
+            format!(
+                "RMSE of fits on so many days in a row, 1 being that of fits on {most} days, on the\n\
+                 same days, which no fit has seen\n{curve}"
+            )
+        }
     )
 }
 
@@ -468,6 +523,11 @@ fn axis_of(channel: &str) -> String {
 fn in_the_end(unit: &str) -> String {
     unit.strip_suffix("/min")
         .map_or_else(|| format!("{unit}·min"), str::to_owned)
+}
+
+/// A length of time as a number of units of so many seconds.
+fn times(length_s: Option<f64>, unit_s: f64) -> String {
+    length_s.map_or("no end".to_owned(), |length| number(length / unit_s))
 }
 
 /// A length of time, to the second where it is longer than a minute.
