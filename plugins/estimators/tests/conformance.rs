@@ -1,7 +1,7 @@
 //! Every kind of this crate through the rules that every node keeps.
 
 use athermal_core::conformance;
-use athermal_core::testkit::{Case, assert_every_kind_conforms};
+use athermal_core::testkit::{Case, Rule, assert_every_kind_conforms};
 use athermal_estimators::{
     Ar, Arimax, Arma, Armax, Arx, Bj, ElasticNet, Huber, Kalman, Lasso, Linear, Narx, Oe,
     Persistence, Polynomial, Rls, Stack, StateSpace, Zero,
@@ -267,7 +267,10 @@ conformance!(
         "#
     )
     .input("features", 2, "K"),
-    Case::new(r#"ahead = "1min""#),
+    Case::new(r#"ahead = "1min""#).except(
+        Rule::Units,
+        "filters of several features that bring nothing about leave a valley in which rounding says where the search ends",
+    ),
 );
 
 conformance!(
