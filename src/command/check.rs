@@ -1,8 +1,8 @@
 //! `athermal check`: looks for mistakes in graph files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use athermal::core::compile::{Wanted, compile};
+use athermal::core::compile::{Plan, Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk};
 use athermal::core::trial;
@@ -27,6 +27,25 @@ pub struct Check {
     strict: bool,
 }
 
+/// The plan of a graph whose tests have no mistake either; `None` after any, all of which are told.
+fn plan_of(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) -> Option<Plan> {
+    let graph = document::load(path, &Disk, sources, diagnostics)
+        .and_then(|read| document::declare(read, diagnostics))?;
+    let Some(plan) = compile(&graph, Wanted::default(), diagnostics) else {
+        trial::mistakes(&graph, &Disk, sources, diagnostics);
+        return None;
+    };
+    trial::declare(&graph, &plan, &Disk, sources, diagnostics)?;
+    Some(plan)
+}
+
+/// The number of mistakes in the tests of a graph that has no others.
+pub(super) fn mistakes_in_tests(path: &Path) -> usize {
+    let mut diagnostics = Diagnostics::new();
+    plan_of(path, &mut Sources::new(), &mut diagnostics);
+    diagnostics.error_count()
+}
+
 impl Check {
     /// Checks the files.
     ///
@@ -38,13 +57,7 @@ impl Check {
         for path in &self.graphs {
             let before = diagnostics.error_count();
             let mut of_file = Diagnostics::new();
-            let graph = document::load(path, &Disk, &mut sources, &mut of_file)
-                .and_then(|read| document::declare(read, &mut of_file));
-            let plan = graph.and_then(|graph| {
-                let plan = compile(&graph, Wanted::default(), &mut of_file)?;
-                trial::declare(&graph, &plan, &Disk, &mut sources, &mut of_file)?;
-                Some(plan)
-            });
+            let plan = plan_of(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
             if let Some(plan) = plan.filter(|_| diagnostics.error_count() == before) {
                 fine.push((path, plan));

@@ -11,6 +11,7 @@ use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
 
+use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use crate::figures::{count, number, paragraph, table};
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -51,6 +52,7 @@ impl Fit {
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let mut model = Model::load(&self.graph)?;
+        self.doubt_tests(terminal);
         let defaults = FitOptions::default();
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
@@ -75,6 +77,25 @@ impl Fit {
             .iter()
             .any(|fit| matches!(fit.outcome, Outcome::Failed(_)));
         Ok(if failed { Answer::No } else { Answer::Fine })
+    }
+
+    /// Tells of mistakes in the tests of a graph file. They take nothing from the fit, and those of a file that is extended may
+    /// not be the user's to mend; but nobody should find them only when the model is in use.
+    fn doubt_tests(&self, terminal: &Terminal) {
+        if self.graph.extension().is_none_or(|kind| kind != "toml") {
+            return;
+        }
+        let (of, path) = (mistakes_in_tests(&self.graph), self.graph.display());
+        if of > 0 {
+            let mistakes = if of == 1 {
+                "a mistake".to_owned()
+            } else {
+                format!("{of} mistakes")
+            };
+            terminal.warning(format_args!(
+                "the tests of {path} have {mistakes}, which the fit does without: see `athermal check {path}`"
+            ));
+        }
     }
 
     fn tell(&self, terminal: &Terminal, report: &FitReport) {

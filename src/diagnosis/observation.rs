@@ -127,10 +127,23 @@ pub fn is_asked(prediction: &str, of: &[String]) -> bool {
 pub(super) fn main_prediction(plan: &Plan, truth: &TruthTrace, of: &[String]) -> Option<usize> {
     let out = |slot: usize| plan.outputs.iter().any(|output| output.slot == slot);
     let asked = |nth: &usize| is_asked(&plan.channels[truth.predictions[*nth].slot].name, of);
-    let mut meant: Vec<usize> = (0..truth.predictions.len()).filter(asked).collect();
-    if meant.is_empty() {
-        meant = (0..truth.predictions.len()).collect();
+    let all = 0..truth.predictions.len();
+    let any_asked = all.clone().any(|nth| asked(&nth));
+    let mut meant = all.filter(|nth| !any_asked || asked(nth));
+    let last = meant.clone().next_back();
+    meant.find(|&nth| out(truth.predictions[nth].slot)).or(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_called;
+
+    #[test]
+    fn a_prediction_goes_by_its_channel_its_node_and_its_axis() {
+        for name in ["vote.Z1", "vote", "Z1"] {
+            assert!(is_called("vote.Z1", name));
+        }
+        assert!(!is_called("vote.Z1", "Z"));
+        assert!(is_called("vote", "vote"));
     }
-    let first = meant.iter().find(|&&nth| out(truth.predictions[nth].slot));
-    first.or(meant.last()).copied()
 }

@@ -175,6 +175,222 @@ inputs.signal = ["one", "two:slope", "tow"]
 shown = "shown"
 both = ["one", "two:other.a"]
 "#;
-    let expected = [(9, "nothing"), (11, "window"), (20, "tow")];
+    let expected = [(9, "nothing"), (11, "window"), (17, "soon"), (20, "tow")];
     assert_told("command-line-modules", text, &expected);
+}
+
+/// Signals, and slopes of them, to which nodes with mistakes are added.
+const SOUND: &str = r#"schema = 1
+[sets]
+axis = ["X", "Y"]
+[signals.temperature]
+unit = "Cel"
+channels = ["a", "b"]
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = "axis"
+max_age = "1min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+[outputs]
+predicted = "thermal"
+"#;
+
+#[test]
+fn a_parameter_that_cannot_be_read_hides_nothing_else_of_its_node() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "linear"
+each = "axis"
+inputs.feature = "temperatur"
+inputs.truth = "drift.*"
+ahead = 5
+solver = { type = "ridge", alpha = -1.0 }
+[nodes.vote]
+type = "page_hinkley"
+inputs.voters = "thermal"
+inputs.truth = "drift.Z"
+first = 1
+threshold = "much"
+[nodes.back]
+type = "delay"
+inputs.signal = "back"
+delay = "soon"
+"#;
+    let expected = [
+        (21, "no input `feature`"),
+        (21, "no node or signal `temperatur`"),
+        (22, "one channel"),
+        (23, "ahead"),
+        (24, "alpha"),
+        (28, "no channel that matches `Z`"),
+        (30, "threshold"),
+        (34, "soon"),
+    ];
+    assert_told("command-line-unreadable", &text, &expected);
+}
+
+#[test]
+fn a_set_that_is_not_known_hides_nothing_of_the_nodes_that_use_it() {
+    let nodes = r#"[nodes.thermal]
+type = "linear"
+each = "axs"
+inputs.features = ["temperatur", "{axis}"]
+inputs.truth = "drift.{axis}"
+ahead = 5
+label = "{axis}"
+[nodes.fast]
+type = "slope"
+each = "axis"
+inputs.signals = "position.{axis}"
+windows = "{axis}"
+seletion = 3
+"#;
+    let expected = [
+        (20, "no set \"axs\""),
+        (21, "temperatur"),
+        (23, "ahead"),
+        (24, "no key \"label\""),
+        (28, "no input `signals`"),
+        (29, "windows"),
+        (30, "seletion"),
+    ];
+    let text = SOUND.to_owned() + nodes;
+    assert_told("command-line-unknown-set", &text, &expected);
+    // Of a faulty set it is not known what its members would have been.
+    let text = text.replace("[\"X\", \"Y\"]", "[\"X\", 2]");
+    let expected = [&[(3, "number 2")], &expected[..5], &expected[6..]].concat();
+    assert_told("command-line-faulty-set", &text, &expected);
+    for set in ["[set]\naxis =", "[sets]\n\"ax is\" ="] {
+        let text = SOUND.replace("[sets]\naxis =", set)
+            + "[nodes.thermal]\ntype = \"zero\"\neach = \"axis\"\ninputs.truth = \"drift.{axis}\"\nahead = \"0s\"\n\
+               [nodes.near]\ntype = \"pick\"\ninputs.signal = \"axi\"\n";
+        let section = if set.starts_with("[set]") {
+            (2, "no key \"set\"")
+        } else {
+            (3, "ax is")
+        };
+        let told = told("command-line-set-section", &text);
+        assert_eq!(told.len(), 2, "{told:#?}");
+        assert!(
+            told[0].0 == section.0 && told[0].1.contains(section.1),
+            "{told:#?}"
+        );
+        assert!(told[1].0 == 25, "{told:#?}");
+    }
+}
+
+#[test]
+fn a_set_is_not_proposed_where_a_node_is_meant() {
+    let text = SOUND.replace("[sets]", "[set]")
+        + "[nodes.thermal]\ntype = \"pick\"\ninputs.signal = \"axi\"\n";
+    let scratch = Scratch::new("command-line-proposed");
+    let graph = scratch.file("wrong.toml", &text);
+    let told = athermal(&[&"check", &graph]).ended(2).told;
+    assert!(told.contains("the graph has `temperature`"), "{told}");
+    assert!(!told.contains("did you mean `axis`"), "{told}");
+}
+
+#[test]
+fn what_follows_from_a_mistake_is_not_told_beside_it() {
+    let text = r#"schema = 1
+[sets]
+axis = ["X"]
+[signals.temperature]
+unit = "C"
+channels = "axis"
+range = ["0 Cel", "50 Cel"]
+max_age = "1min"
+[modules.pair]
+inputs = ["from"]
+parameters = { window = "5mn" }
+outputs = { slope = "slope" }
+nodes.slope = { type = "slope", inputs.signal = "{form}", windows = ["{window}"], cld = 1 }
+[nodes.one]
+module = "pair"
+each = "axis"
+inputs.from = "temperature.{axes}"
+[outputs]
+one = "one"
+[[tests]]
+name = "a"
+on = "a.csv"
+expect = [{ of = "one", given_above = 0.5 }]
+"#;
+    let expected = [
+        (7, "which does not convert"),
+        (11, "mn"),
+        (13, "{form}"),
+        (13, "cld"),
+        (17, "{axes}"),
+    ];
+    assert_told("command-line-follows", text, &expected);
+}
+
+#[test]
+fn mistakes_in_tests_are_told_together_with_those_of_the_graph() {
+    let tests = r#"[nodes.thermal]
+type = "zero"
+inputs.truth = "drft.X"
+ahead = "0s"
+[[tests]]
+name = "a"
+inputs = { "temperature.a" = { ramp = "1 K/s" } }
+expects = []
+[[tests]]
+name = "a"
+on = { simulate = "die-testr", days = 1 }
+faults = [{ channel = "temperature.a", kind = "stick" }]
+expect = [{ of = "thermal", rmse_below = "-1 nm" }]
+"#;
+    let expected = [
+        (20, "drft"),
+        (25, "no key \"expects\""),
+        (27, "\"a\""),
+        (28, "die-testr"),
+        (29, "stick"),
+        (30, "rmse_below"),
+    ];
+    assert_told("command-line-tests", &(SOUND.to_owned() + tests), &expected);
+}
+
+#[test]
+fn a_file_without_schema_is_looked_through_all_the_same() {
+    let text = WRONG.replace("schema = 1\n", "");
+    let told = told("command-line-schema", &text);
+    assert_eq!(told.len(), 6, "{told:#?}");
+    assert!(told[0].1.contains("schema"), "{told:#?}");
+}
+
+#[test]
+fn a_fit_does_without_the_tests_of_a_graph_and_says_so() {
+    let scratch = Scratch::new("command-line-fit-tests");
+    let text = SOUND.to_owned()
+        + "[nodes.thermal]\ntype = \"linear\"\ninputs.features = \"temperature\"\ninputs.truth = \"drift.X\"\nahead = \"0s\"\n";
+    let mut rows = "time_s,a,b,X,Y\n".to_owned();
+    for row in 0..200 {
+        let t = f64::from(row) * 10.0;
+        let (a, b) = ((t / 300.0).sin(), (t / 700.0).cos());
+        rows += &format!("{t},{},{},{},{}\n", 20.0 + a, 20.0 + b, 50.0 * a, 70.0 * b);
+    }
+    let data = scratch.file("data.csv", &rows);
+    let fitted = |name: &str, text: &str| {
+        let graph = scratch.file(name, text);
+        let model = scratch.path("model.json");
+        athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model])
+            .ended(0)
+            .told
+    };
+    assert!(!fitted("sound.toml", &text).contains("the tests of"));
+    let wrong = text + "[[tests]]\nname = \"a\"\nexpcts = []\n";
+    let told = fitted("wrong.toml", &wrong);
+    assert!(
+        told.contains("the tests of")
+            && told.contains("2 mistakes")
+            && told.contains("athermal check"),
+        "{told}"
+    );
 }

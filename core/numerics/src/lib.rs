@@ -46,6 +46,7 @@ mod prediction_variance;
 mod rls;
 mod scaler;
 mod score;
+mod scratch;
 mod selection;
 mod sgd;
 mod state_space;

@@ -75,6 +75,19 @@ impl Fit {
             whole,
             "as many for each step of the sequence",
         );
+        let scales = self.inputs.iter().map(|scale| ("inputs", scale));
+        for (at, scale) in scales.chain([("truth", &self.truth)]) {
+            let Scale { mean, deviation } = *scale;
+            if !mean.is_finite() {
+                let message = format!("a `mean` is {mean} and must be finite");
+                mistakes.push(Mistake::at(at, message));
+            }
+            // So that NaN fails.
+            if !(deviation > 0.0 && deviation.is_finite()) {
+                let message = format!("a `deviation` is {deviation} and must be above 0 and finite");
+                mistakes.push(Mistake::at(at, message));
+            }
+        }
         mistakes
     }
 
@@ -101,5 +114,34 @@ impl Fit {
     pub(crate) fn encode(&self, row: &[f64], code: &mut [f64; MOST_UNITS]) {
         let units = self.network.units();
         code[..units].copy_from_slice(self.remember(row).hidden(units));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_by_which_nothing_can_be_divided_are_mistakes() {
+        let fit = |inputs: Scale, truth: Scale| Fit {
+            uses: vec!["a lag 0s".to_owned()],
+            inputs: vec![inputs],
+            truth,
+            network: Network::random(1, 2, 1),
+        };
+        let scale = |mean, deviation| Scale { mean, deviation };
+        let fine = scale(3.0, 0.5);
+        assert_eq!(fit(fine, fine).mistakes(), []);
+        for wrong in [
+            scale(0.0, 0.0),
+            scale(0.0, -1.0),
+            scale(0.0, f64::NAN),
+            scale(f64::INFINITY, 1.0),
+        ] {
+            for (fit, at) in [(fit(wrong, fine), "inputs"), (fit(fine, wrong), "truth")] {
+                let mistakes = fit.mistakes();
+                assert!(mistakes.len() == 1 && mistakes[0].at == at, "{mistakes:?}");
+            }
+        }
     }
 }

@@ -307,8 +307,11 @@ struct Seen<D> {
     mean_square: f64,
     /// When the last truth was taken.
     taken: Option<Instant>,
-    /// The last alarm: when, and whether the mean had gone up.
+    /// The last alarm: when it became known, and whether the mean had gone up.
     alarm: Option<(Instant, bool)>,
+    /// The alarm of a truth that has just been handed over.
+    #[serde(default)]
+    found: Option<bool>,
     /// Up to when truths have been handed over.
     newest: Option<Instant>,
 }
@@ -329,6 +332,7 @@ impl<D: Detector> Watching<D> {
                 mean_square: 0.0,
                 taken: None,
                 alarm: None,
+                found: None,
                 newest: None,
             },
         }
@@ -342,7 +346,7 @@ impl<D: Detector> Watching<D> {
             ..
         } = &self.seen;
         match (alarm, newest) {
-            (Some((at, up)), Some(newest)) if *newest < *at + self.hold => {
+            (Some((at, up)), Some(newest)) if newest == at || *newest < *at + self.hold => {
                 if *up {
                     reason::UP
                 } else {
@@ -388,12 +392,17 @@ where
             Watched::Size => relative.abs(),
         };
         if let Some(change) = seen.detector.push(value) {
-            seen.alarm = Some((arrived, change == MeanChange::Up));
+            seen.found = Some(change == MeanChange::Up);
         }
     }
 
     fn advance(&mut self, newest: Instant) {
-        self.seen.newest = Some(newest);
+        let seen = &mut self.seen;
+        seen.newest = Some(newest);
+        // A truth is handed over at the tick after it arrived, or later.
+        if let Some(up) = seen.found.take() {
+            seen.alarm = Some((newest, up));
+        }
     }
 
     fn segment(&mut self, shift: Duration) {
@@ -464,6 +473,32 @@ mod tests {
                 let alarm = said.iter().position(|&said| said == reason).unwrap();
                 assert!((200..260).contains(&alarm), "{alarm}");
                 assert!(said[alarm..alarm + 60].iter().all(|&said| said == reason));
+            }
+        }
+    }
+
+    #[test]
+    fn an_alarm_is_told_at_the_tick_at_which_it_becomes_known_however_short_its_hold() {
+        for hold in [0, 60] {
+            let hold = Duration::from_ns(hold * 1_000_000_000);
+            let test = PageHinkley {
+                hold,
+                ..page_hinkley()
+            };
+            let window = Adwin { hold, ..adwin() };
+            for mut node in [test.build(1), window.build(1)] {
+                let mut said = Vec::new();
+                for nth in 0..400_i64 {
+                    let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+                    let gone = if nth < 200 { 0.0 } else { 4.0 };
+                    node.observe(Votes(&[7.0]), 7.0 + sign + gone, s(60 * nth));
+                    node.advance(s(60 * (nth + 1)));
+                    said.push(node.reason(Votes(&[7.0])));
+                }
+                let alarm = said.iter().position(|&said| said == reason::UP);
+                let alarm = alarm.expect("the alarm shows");
+                assert!((200..260).contains(&alarm), "{alarm}");
+                assert_eq!(said[alarm + 1], reason::NONE);
             }
         }
     }

@@ -5,7 +5,7 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::identified::{Asked, PerInput, identified};
+use crate::identified::{Asked, Differences, PerInput, identified};
 use crate::order::Order;
 
 /// ARMAX whose noise is integrated: it has no level to return to, so that an offset that comes to stay is followed.
@@ -15,14 +15,17 @@ use crate::order::Order;
 /// steps with exact derivatives, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C`
 /// stay inside the unit circle.
 ///
+/// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is told
+/// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 tell the order).
+///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
 /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
 /// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
 /// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it is told each
 /// truth that the embargo lets through and predicts as many steps ahead of the newest as there are. Where truths or rows
 /// are missing in the fit, the filters start again. A segment begins with its first truth, as if that and the features
-/// had always been what they are, and so does what comes after more than ten steps without features, or as many more as the
-/// model reaches back; with `learn = false` it stays at rest. The port `deviation` is the standard deviation
+/// had always been what they are, and so does what comes after more steps without features than ten, or than the model
+/// reaches back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard deviation
 /// of the truth about its prediction. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -42,10 +45,10 @@ pub struct Arimax {
     /// with one for each.
     #[serde(default = "PerInput::none")]
     pub nk: PerInput,
-    /// How often the noise is integrated, 0 to 2.
-    #[serde(default = "crate::identified::one")]
+    /// How often the noise is integrated, 0 to 2; without it once or not at all, whichever the figure of `order` finds better.
+    #[serde(default)]
     #[schemars(range(min = 0, max = 2))]
-    pub differences: usize,
+    pub differences: Option<usize>,
     /// The penalty on the coefficients of standardised features, at least 0, as in ridge.
     #[serde(default = "crate::identified::penalty")]
     #[schemars(range(min = 0.0))]
@@ -65,7 +68,9 @@ impl Arimax {
             nb: Some(self.nb.clone()),
             nc: Some(self.nc),
             nk: Some(self.nk.clone()),
-            differences: self.differences,
+            differences: self
+                .differences
+                .map_or(Differences::Told, Differences::Given),
             penalty: self.penalty,
             every: self.every,
             order: self.order,
@@ -82,3 +87,78 @@ identified!(
         InputPort::truth("what is predicted, and followed")
     ]
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identified::Identify;
+    use athermal_core::node::TrainingReport;
+    use athermal_numerics::Samples;
+
+    /// How often the noise is integrated of what an input brings about, beside noise of which each value keeps so much of the
+    /// last one; and what was compared.
+    fn told(kept: f64, order: Option<Order>) -> (usize, Vec<String>) {
+        let mut state = 7_u64;
+        let mut random = || {
+            let sum: f64 = (0..12)
+                .map(|_| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    (state >> 11) as f64 / (1_u64 << 53) as f64
+                })
+                .sum();
+            sum - 6.0
+        };
+        let mut samples = Samples::new(1);
+        samples.segment();
+        let mut noise = 0.0;
+        for _ in 0..600 {
+            let input = random();
+            noise = kept * noise + random();
+            samples.push([input], 2.0 * input + noise + 0.5 * random());
+        }
+        let asked = Asked {
+            na: Some(0),
+            nb: Some(PerInput::one()),
+            nc: Some(1),
+            nk: Some(PerInput::none()),
+            differences: Differences::Told,
+            order,
+            places: vec![0],
+            features: 1,
+            ..Asked::default()
+        };
+        let mut report = TrainingReport::default();
+        let found = asked.identify(&samples, 1, &mut report).unwrap();
+        let tried = report.orders.unwrap().tried.into_iter();
+        (
+            found.model.differences,
+            tried.map(|one| one.order).collect(),
+        )
+    }
+
+    #[test]
+    fn noise_that_wanders_is_integrated_and_noise_that_has_a_level_is_not() {
+        let (wandering, tried) = told(1.0, None);
+        assert_eq!((wandering, told(0.3, None).0), (1, 0));
+        assert_eq!(tried, ["differences 0", "differences 1"]);
+    }
+
+    #[test]
+    fn each_order_is_compared_with_and_without_integrated_noise() {
+        let order = Order {
+            nb: Some(crate::order::OrderRange { from: 0, to: 1 }),
+            ..Order::default()
+        };
+        let (wandering, tried) = told(1.0, Some(order));
+        assert_eq!(wandering, 1);
+        let expected = [
+            "nb 0, differences 0",
+            "nb 0, differences 1",
+            "nb 1, differences 0",
+            "nb 1, differences 1",
+        ];
+        assert_eq!(tried, expected);
+    }
+}

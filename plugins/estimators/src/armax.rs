@@ -20,8 +20,8 @@ use crate::order::Order;
 /// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it is told each
 /// truth that the embargo lets through and predicts as many steps ahead of the newest as there are. Where truths or rows
 /// are missing in the fit, the filters start again. A segment begins with its first truth, as if that and the features
-/// had always been what they are, and so does what comes after more than ten steps without features, or as many more as the
-/// model reaches back; with `learn = false` it stays at rest. The port `deviation` is the standard deviation
+/// had always been what they are, and so does what comes after more steps without features than ten, or than the model
+/// reaches back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard deviation
 /// of the truth about its prediction. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -42,12 +42,12 @@ pub(crate) fn tell_columns<'a>(
 pub(crate) fn tell_rows(
     names: &[String],
     rows: &[f64],
-    truths: &[f64],
+    truths: impl Iterator<Item = f64>,
     report: &mut TrainingReport,
 ) {
     let mut gram = Gram::new(names.len());
     for (row, truth) in rows.chunks_exact(names.len().max(1)).zip(truths) {
-        gram.push(row, *truth);
+        gram.push(row, truth);
     }
     tell_columns(&gram, |column| &names[column], report);
 }

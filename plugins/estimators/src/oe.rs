@@ -21,8 +21,8 @@ use crate::order::Order;
 /// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it goes on by
 /// the features alone. Where truths or rows are missing in the fit, the filters start again. A segment begins at rest, as
 /// if the features had always been what they are first, until the first truth says where the filters are: each has its
-/// share of what that differs by, which dies away. So does what comes after more than ten steps without features, or as
-/// many more as the model reaches back. With `learn = false` it stays at rest. The port `deviation` is the
+/// share of what that differs by, which dies away. So does what comes after more steps without features than ten, or
+/// than the model reaches back where that is more. With `learn = false` it stays at rest. The port `deviation` is the
 /// standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs at every
 /// tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

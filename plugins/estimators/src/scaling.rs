@@ -30,7 +30,12 @@ impl Scaling {
 
     /// What is wrong with it for so many regressors.
     pub(crate) fn mistakes(&self, width: usize) -> Vec<Mistake> {
-        scale_mistakes(width, ("means", &self.means), ("scales", &self.scales))
+        let mut mistakes = scale_mistakes(width, ("means", &self.means), ("scales", &self.scales));
+        if !self.truth.is_finite() {
+            let message = format!("`truth` is {} and must be finite", self.truth);
+            mistakes.push(Mistake::at("truth", message));
+        }
+        mistakes
     }
 }
 
@@ -42,6 +47,11 @@ pub(crate) fn scale_mistakes(
 ) -> Vec<Mistake> {
     let lists = [(means.0, means.1.len()), (scales.0, scales.1.len())];
     let mut mistakes = Mistake::of_lengths(width, &lists);
+    let (at, means) = means;
+    if let Some(mean) = means.iter().find(|mean| !mean.is_finite()) {
+        let message = format!("`{at}` has {mean} and must have finite values");
+        mistakes.push(Mistake::at(at, message));
+    }
     let (at, scales) = scales;
     if let Some(scale) = scales
         .iter()
@@ -63,4 +73,34 @@ pub(crate) fn term_mistake(
     let place = places.find(|&place| place >= width)?;
     let message = format!("`terms` names regressor {place} and there are {width}, from 0 on");
     Some(Mistake::at("terms", message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_scales_and_a_truth_that_are_no_numbers_are_told_each() {
+        let fine = Scaling {
+            means: vec![0.0, -3.0],
+            scales: vec![1.0, 0.5],
+            truth: 2.0,
+        };
+        assert_eq!(fine.mistakes(2), []);
+        for value in [f64::NAN, f64::INFINITY] {
+            let wrong = Scaling {
+                means: vec![0.0, value],
+                scales: vec![value, 1.0],
+                truth: value,
+            };
+            let mistakes = wrong.mistakes(2);
+            let told: Vec<&str> = mistakes.iter().map(|mistake| &*mistake.message).collect();
+            let expected = [
+                format!("`means` has {value} and must have finite values"),
+                format!("`scales` has {value} and must have finite values above 0"),
+                format!("`truth` is {value} and must be finite"),
+            ];
+            assert_eq!(told, expected);
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! The estimator whose states are told from the past.
 
+use std::ops::RangeInclusive;
+
 use athermal_core::node::{
-    Estimator, Forms, InputPort, Learns, Mistake, Regressors, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
+    Forms, InputPort, Mistake, Regressors, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{
@@ -11,10 +12,12 @@ use athermal_numerics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::identified::{Found, IdentifiedTrainer, Identify};
+use crate::identified::{Found, IdentifiedTrainer, Identify, identified};
 use crate::regression::told;
 
-/// The longest horizon, in steps.
+/// The horizon, in steps, where it is not stated and rows allow it.
+const USUAL: usize = 10;
+/// The longest horizon.
 const LONGEST: usize = 100;
 /// The most states.
 const MOST_STATES: usize = 20;
@@ -38,8 +41,8 @@ const LARGEST_PAST: usize = 1000;
 /// between two truths of a series counts as so many steps, rounded. Running, it is told each truth that the embargo
 /// lets through, takes for one that is missing what it had predicted, and for features that are missing the last ones.
 /// Where truths or rows are missing in the fit, windows end and begin again. A segment begins with its first truth, as
-/// if that and the features had always been what they are, and so does what comes after more than ten steps without
-/// features; with `learn = false` it stays at rest. The port `deviation`
+/// if that and the features had always been what they are, and so does what comes after more steps without
+/// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The port `deviation`
 /// is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs
 /// at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,10 +52,11 @@ pub struct StateSpace {
     /// `{ by = "threshold", share = 0.25 }`.
     #[serde(default)]
     pub states: States,
-    /// How many steps past and future have each, 2 to 100; as many as there are states where that is more.
-    #[serde(default = "ten")]
+    /// How many steps past and future have each, 2 to 100; as many as there are states where that is more. Without it ten, or
+    /// fewer where rows without a gap would not make twice as many windows of both as a past has values.
+    #[serde(default)]
     #[schemars(range(min = 2, max = 100))]
-    pub horizon: usize,
+    pub horizon: Option<usize>,
     /// How future truths are weighed before their singular values are told.
     #[serde(default)]
     pub weighting: Weighting,
@@ -99,10 +103,6 @@ pub enum Weighting {
     Cva,
 }
 
-fn ten() -> usize {
-    10
-}
-
 fn quarter() -> f64 {
     0.25
 }
@@ -122,15 +122,19 @@ impl<'de> Deserialize<'de> for States {
     }
 }
 
-impl Estimator for StateSpace {
-    fn inputs() -> &'static [InputPort] {
-        const {
-            &[
-                InputPort::held("features", "what the prediction is made of").or_none(),
-                InputPort::truth("what is predicted"),
-                InputPort::freeze(),
-            ]
-        }
+identified!(
+    StateSpace,
+    "state_space",
+    [
+        InputPort::held("features", "what the prediction is made of").or_none(),
+        InputPort::truth("what is predicted")
+    ]
+);
+
+impl StateSpace {
+    /// It says itself what the kinds that are identified have in common.
+    fn asked(&self) -> &Self {
+        self
     }
 
     fn regressors(&self) -> Regressors {
@@ -143,8 +147,8 @@ impl Estimator for StateSpace {
 
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
-        if !(2..=LONGEST).contains(&self.horizon) {
-            let message = format!("`horizon` is {} and must be 2 to {LONGEST}", self.horizon);
+        if let Some(horizon) = self.horizon.filter(|of| !(2..=LONGEST).contains(of)) {
+            let message = format!("`horizon` is {horizon} and must be 2 to {LONGEST}");
             mistakes.push(Mistake::at("horizon", message));
         }
         match self.states {
@@ -162,33 +166,23 @@ impl Estimator for StateSpace {
         mistakes
     }
 
-    fn learns(&self) -> Learns {
-        Learns::UnlessTold
-    }
-
-    fn deviates(&self) -> bool {
-        true
-    }
-
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(IdentifiedTrainer::new(setup, self.clone()))
     }
-}
 
-athermal_core::register!(StateSpace, Estimator, "state_space");
-
-impl StateSpace {
-    /// The horizon: what is told of fewer steps than there are states does not tell them.
-    fn reach(&self) -> usize {
-        match self.states {
-            States::Given(states) => self.horizon.max(states),
-            States::Told(_) => self.horizon,
-        }
+    /// The horizons that may be taken: what is told of fewer steps than there are states does not tell them.
+    fn horizons(&self) -> RangeInclusive<usize> {
+        let states = match self.states {
+            States::Given(states) => states,
+            States::Told(_) => 0,
+        };
+        let shortest = self.horizon.unwrap_or(2).max(states);
+        shortest..=self.horizon.unwrap_or(USUAL).max(shortest)
     }
 
-    fn subspace(&self, series: usize) -> Subspace {
+    fn subspace(&self, horizon: usize, series: usize) -> Subspace {
         Subspace {
-            horizon: self.reach(),
+            horizon,
             weighting: match self.weighting {
                 Weighting::N4sid => athermal_numerics::Weighting::N4sid,
                 Weighting::Moesp => athermal_numerics::Weighting::Moesp,
@@ -212,12 +206,12 @@ impl Identify for StateSpace {
     }
 
     fn misfit(&self, inputs: usize) -> Option<String> {
-        let past = self.reach() * (inputs + 1);
+        let shortest = *self.horizons().start();
+        let past = shortest * (inputs + 1);
         (past > LARGEST_PAST).then(|| {
             format!(
-                "{inputs} features over a `horizon` of {} steps make a past of {past} values, and at most {LARGEST_PAST} are \
-                 fitted: name fewer features, or give a shorter horizon",
-                self.reach()
+                "{inputs} features over a `horizon` of {shortest} steps make a past of {past} values, and at most \
+                 {LARGEST_PAST} are fitted: name fewer features, or give a shorter horizon"
             )
         })
     }
@@ -247,14 +241,27 @@ impl Identify for StateSpace {
                 outputs,
             })
             .collect();
-        let found = self.subspace(series).identify(&records, samples.width());
+        let width = samples.width();
+        let (shortest, longest) = self.horizons().into_inner();
+        let longest = longest.min(LARGEST_PAST / (width + 1));
+        let horizon = Subspace::longest(shortest..=longest, &records, width).unwrap_or(shortest);
+        let found = self.subspace(horizon, series).identify(&records, width);
         let found = found.map_err(|error| match error {
             NumericsError::TooFewStretches { .. } => TrainingError::Unsolvable {
-                reason: format!("{error}; a shorter `horizon` needs fewer and shorter ones"),
+                reason: if horizon > 2 {
+                    format!("{error}; a shorter `horizon` needs fewer and shorter ones")
+                } else {
+                    format!("{error}; fewer features need fewer of them")
+                },
             },
             error => told(error),
         })?;
         report.notes.push(note(&found));
+        if horizon < USUAL && self.horizon.is_none() {
+            report.notes.push(format!(
+                "a horizon of {horizon} steps: rows without a gap are too short for a longer one"
+            ));
+        }
         let (squares, rows) = found.errors;
         let equation = found.model.difference_equation();
         let inputs = equation.b.iter().map(|b| Transfer {
@@ -297,4 +304,64 @@ fn note(found: &athermal_numerics::Identification) -> String {
         "{states} state{plural}, from the singular values {}{stabilised}",
         values.join(", ")
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a fit with the defaults tells of so many stretches of 24 samples, of an output that follows the first of nine inputs.
+    fn told(stretches: usize, horizon: Option<usize>) -> Result<Vec<String>, TrainingError> {
+        let mut state = 7_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let mut samples = Samples::new(9);
+        for _ in 0..stretches {
+            samples.segment();
+            let mut output = 0.0;
+            for _ in 0..24 {
+                let inputs: [f64; 9] = std::array::from_fn(|_| random());
+                output = 0.8 * output + inputs[0] + 0.1 * random();
+                samples.push(inputs, output);
+            }
+        }
+        let asked = StateSpace {
+            states: States::default(),
+            horizon,
+            weighting: Weighting::default(),
+            every: None,
+        };
+        let mut report = TrainingReport::default();
+        asked.identify(&samples, 1, &mut report)?;
+        Ok(report.notes)
+    }
+
+    #[test]
+    fn the_horizon_is_shorter_where_rows_without_a_gap_are_and_the_report_says_so() {
+        // Windows of 14 samples are 11 in each of 16 stretches: 7 steps of 10 values need 140, 8 steps 160 of the 144 there are.
+        let notes = told(16, None).unwrap();
+        assert!(
+            notes
+                .iter()
+                .any(|note| note.starts_with("a horizon of 7 steps")),
+            "{notes:?}"
+        );
+        let notes = told(60, None).unwrap();
+        assert!(
+            !notes.iter().any(|note| note.contains("horizon")),
+            "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn a_horizon_that_is_stated_is_kept_and_one_that_no_row_allows_is_refused() {
+        let stated = told(16, Some(10)).unwrap_err().to_string();
+        assert!(stated.contains("a shorter `horizon` needs"), "{stated}");
+        let told = told(1, None).unwrap_err().to_string();
+        assert!(told.contains("fewer features need fewer"), "{told}");
+    }
 }

@@ -1,4 +1,5 @@
-//! Features in a running graph against tables made with pandas and scipy, see `tests/oracles/windows/generate.py`.
+//! Features in a running graph against tables made with pandas and scipy, see `tests/oracles/windows/generate.py`, and with HiGHS,
+//! see `tests/oracles/minimum_difference/generate.py`.
 
 #![allow(clippy::unwrap_used)]
 
@@ -54,8 +55,12 @@ impl Bench {
 
 /// Rows of a table as text, without the header.
 fn table(file: &str) -> Vec<Vec<String>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles/windows");
-    let text = std::fs::read_to_string(folder.join(file)).unwrap();
+    rows_of(&format!("windows/{file}"))
+}
+
+fn rows_of(path: &str) -> Vec<Vec<String>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles");
+    let text = std::fs::read_to_string(folder.join(path)).unwrap();
     let row = |line: &str| line.split(',').map(str::to_owned).collect();
     text.lines().skip(1).map(row).collect()
 }
@@ -258,6 +263,27 @@ fn oracle_of_minimum_differences() {
             0.0,
         );
     }
+}
+
+#[test]
+fn oracle_of_minimum_differences_as_an_integer_program() {
+    let rows = rows_of("minimum_difference/cases.csv");
+    let (mut compared, mut kept_back) = (0, 0);
+    for case in rows.chunk_by(|row, next| row[0] == next[0]) {
+        let least = &case[0][1];
+        let node = format!("type = \"minimum_difference\"\ndifference = \"{least} mm\"\n");
+        let mut bench = Bench::new(&node, &["signal"]);
+        for (nth, row) in case.iter().enumerate() {
+            let (sample, kept) = (number(&row[2]), number(&row[3]));
+            bench.tick(&[nth as f64, sample, f64::NAN]);
+            if !sample.is_nan() {
+                assert_eq!(bench.output("signal.y"), kept, "{row:?}");
+                compared += 1;
+                kept_back += usize::from(sample != kept);
+            }
+        }
+    }
+    assert!(compared > 600 && kept_back > 300, "{compared}, {kept_back}");
 }
 
 #[test]

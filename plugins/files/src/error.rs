@@ -115,10 +115,10 @@ pub enum FileError {
     TimeNotAfter {
         /// The row.
         place: Place,
-        /// Its time, in nanoseconds.
-        time_ns: i64,
-        /// The newest time before it, in nanoseconds.
-        previous_ns: i64,
+        /// Its time, as the file gives it.
+        time: String,
+        /// The newest time before it.
+        previous: String,
     },
     /// A row with more or fewer cells than the header.
     CellCount {
@@ -239,11 +239,11 @@ impl fmt::Display for FileError {
             }
             Self::TimeNotAfter {
                 place,
-                time_ns,
-                previous_ns,
+                time,
+                previous,
             } => write!(
                 f,
-                "{place}: the time {time_ns} ns is not after {previous_ns} ns; the row was left out"
+                "{place}: the time `{time}` is not after `{previous}`; the row was left out"
             ),
             Self::CellCount {
                 place,

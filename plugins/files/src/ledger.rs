@@ -1,6 +1,6 @@
 //! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
 
-use crate::{FileError, Place};
+use crate::{FileError, Place, TimeForm};
 
 /// What a reader met on its way; complete once the reader has come to the end.
 #[derive(Debug, Clone, Default)]
@@ -50,13 +50,13 @@ impl Ledger {
     }
 
     /// Whether the row at this instant can be used: strictly after the one before.
-    pub fn accepts(&mut self, time_ns: i64, place: impl FnOnce() -> Place) -> bool {
+    pub fn accepts(&mut self, time_ns: i64, form: TimeForm, place: impl FnOnce() -> Place) -> bool {
         match self.last_ns {
             Some(previous_ns) if time_ns <= previous_ns => {
                 self.report.refused_time.add(|| FileError::TimeNotAfter {
                     place: place(),
-                    time_ns,
-                    previous_ns,
+                    time: form.text(time_ns),
+                    previous: form.text(previous_ns),
                 });
                 false
             }

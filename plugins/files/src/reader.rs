@@ -132,7 +132,7 @@ fn next<C: Cells>(
 ) -> Result<bool, FileError> {
     while rows.advance(ledger)? {
         if let Some(time_ns) = read_time(rows, layout, ledger, &mut row.time_text)?
-            && ledger.accepts(time_ns, || rows.place())
+            && ledger.accepts(time_ns, layout.time.form, || rows.place())
         {
             row.time_ns = time_ns;
             read_values(rows, layout, ledger, &mut row.values)?;
@@ -243,7 +243,7 @@ mod tests {
         assert_eq!(refused.count, 2);
         assert_eq!(
             refused.first.as_ref().unwrap().to_string(),
-            "f.csv:4: the time 10000000000 ns is not after 10000000000 ns; the row was left out"
+            "f.csv:4: the time `10` is not after `10`; the row was left out"
         );
     }
 

@@ -543,18 +543,7 @@ fn seconds(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use athermal::diagnosis::is_called;
-
     use super::*;
-
-    #[test]
-    fn a_prediction_goes_by_its_channel_its_node_and_its_axis() {
-        for name in ["vote.Z1", "vote", "Z1"] {
-            assert!(is_called("vote.Z1", name));
-        }
-        assert!(!is_called("vote.Z1", "Z"));
-        assert!(is_called("vote", "vote"));
-    }
 
     #[test]
     fn a_drift_per_minute_ends_as_a_length() {

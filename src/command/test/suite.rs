@@ -44,7 +44,10 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
         let read = document::load(path, &Disk, &mut sources, &mut of_file);
         let graph = read.and_then(|read| document::declare(read, &mut of_file));
         let planned = graph.and_then(|graph| {
-            let mut plan = compile(&graph, Wanted::default(), &mut of_file)?;
+            let Some(mut plan) = compile(&graph, Wanted::default(), &mut of_file) else {
+                trial::mistakes(&graph, &Disk, &mut sources, &mut of_file);
+                return None;
+            };
             let trials = trial::declare(&graph, &plan, &Disk, &mut sources, &mut of_file)?;
             trial::observe(&mut plan, &trials);
             Some((plan, trials))

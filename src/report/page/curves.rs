@@ -17,6 +17,7 @@ impl Curves {
         Chart {
             width: 460.0,
             height: 250.0,
+            limits: vec![0.0],
             ..self.picture.chart()
         }
     }

@@ -1,6 +1,6 @@
 """Statistics over trailing windows, lags, differences, a regular clock, first-order lags, arithmetic and the Hampel filter, by pandas
 and scipy, of a series with irregular times, absent values and spikes. Writes input.csv and one table for each kind of node. No
-library has the minimum difference, which is told from its definition."""
+library has the minimum difference, which is told from its definition; ../minimum_difference has it from a solver."""
 
 from pathlib import Path
 

@@ -34,13 +34,13 @@ impl Resolver<'_> {
             }
         }
         let (port, voters) = voters?;
-        let truth = truth?;
-        let state = state?;
         let Some(&first) = voters.first() else {
             self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
         let mut agree = sound & self.votes_agree(instance, port.name, &voters);
+        let truth = truth?;
+        let state = state?;
         let ahead = self.channels[first].channel.ahead;
         let link: Option<TruthLink> = match truth {
             Some(truth) => {

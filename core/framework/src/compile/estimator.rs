@@ -49,12 +49,23 @@ impl Resolver<'_> {
                 _ => features = self.slots(instance, port).map(|slots| (Some(*port), slots)),
             }
         }
-        let (truth_port, truth) = truth?;
-        let link = self.link(instance, truth, ahead?)?;
-        let beside = estimator.mistakes_beside(&self.channels[truth].channel.unit);
+        let mut beside = Vec::new();
+        let mut link = None;
+        if let Some((_, truth)) = truth {
+            beside = estimator.mistakes_beside(&self.channels[truth].channel.unit);
+            link = ahead.and_then(|ahead| self.link(instance, truth, ahead));
+        }
         let sound = sound && beside.is_empty();
         self.mistakes(instance, beside);
-        let (features_port, features) = features?;
+        let (Some((truth_port, truth)), Some(link), Some((features_port, features))) =
+            (truth, link, features)
+        else {
+            if let Some((_, truth)) = truth {
+                self.limits(instance, truth);
+            }
+            self.learning(instance, estimator);
+            return None;
+        };
         let wanted = estimator.regressors();
 
         let mut gathers = Vec::new();
@@ -86,7 +97,10 @@ impl Resolver<'_> {
                     lag,
                     link,
                 });
-                gathers.push(self.gather(instance, &port, &features, &[lag], unit.as_ref())?);
+                match self.gather(instance, &port, &features, &[lag], unit.as_ref()) {
+                    Some(gather) => gathers.push(gather),
+                    None => whole = false,
+                }
             }
         }
         let lags = match wanted.truth_lags {
@@ -105,20 +119,18 @@ impl Resolver<'_> {
             behind.push((truth, lag));
         }
         if !lags.is_empty() {
-            gathers.push(self.gather(instance, &truth_port, &[truth], &lags, None)?);
+            match self.gather(instance, &truth_port, &[truth], &lags, None) {
+                Some(gather) => gathers.push(gather),
+                None => whole = false,
+            }
         }
         if regressors.is_empty() && !wanted.every_tick {
             // An optional input that was left out, and nothing in its place.
             let port = features_port.unwrap_or(truth_port);
-            let problem = CompileProblem::MissingInput {
-                kind: instance.kind.name,
-                input: port.name,
-                summary: port.summary,
-            };
-            self.diagnostics.report(instance.node.place, problem);
+            self.missing_input(instance, &port);
             whole = false;
         }
-        let training = self.limits(instance, &link);
+        let training = self.limits(instance, link.slot);
         let learning = self.learning(instance, estimator);
         if !whole {
             return None;
@@ -313,10 +325,10 @@ impl Resolver<'_> {
     pub(super) fn limits(
         &mut self,
         instance: &Instance<'_>,
-        link: &TruthLink,
+        truth: usize,
     ) -> Option<TrainingLimits> {
         let Limits { below, above } = instance.read.estimator.train.abs_truth.clone();
-        let unit = self.channels[link.slot].channel.unit.clone();
+        let unit = self.channels[truth].channel.unit.clone();
         let mut whole = true;
         let mut size = |limit: Option<Quantity>, default: f64, key: &str| match limit {
             None => default,

@@ -84,7 +84,7 @@ impl Resolver<'_> {
     ) -> Option<PlannedFit> {
         let ahead = self.horizon(instance)?;
         let truth = self.link(instance, truth, ahead)?;
-        let training = self.limits(instance, &truth)?;
+        let training = self.limits(instance, truth.slot)?;
         let mut regressors = Vec::new();
         for (port, slots) in ports.iter().filter(|(port, _)| port.read != Read::Truth) {
             let unit = Self::port_unit(port);

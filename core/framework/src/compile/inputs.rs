@@ -1,14 +1,13 @@
 //! Decides which slots the inputs of a node name, how old a held value may be, and what is converted on the way.
 
 use super::conversion;
-use super::instance::{Instance, context};
+use super::instance::{Declared, Instance};
 use super::plan::{Conversion, Entry, Gather};
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use super::scope::Found;
 use crate::channel::Channel;
-use crate::diagnostic::Place;
-use crate::document::{InstanceDecl, NodeDecl};
+use crate::diagnostic::{Place, nearest};
 use crate::node::{InputPort, Inputs, Read};
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -17,19 +16,14 @@ impl Resolver<'_> {
     /// Looks up what an input refers to: slots in order, none for an optional input left out.
     pub(crate) fn slots(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         port: &InputPort,
     ) -> Option<Vec<usize>> {
         let Some(input) = instance.input(port.name) else {
             if port.optional {
                 return Some(Vec::new());
             }
-            let problem = CompileProblem::MissingInput {
-                kind: instance.kind.name,
-                input: port.name,
-                summary: port.summary,
-            };
-            self.diagnostics.report(instance.node.place, problem);
+            self.missing_input(instance, port);
             return None;
         };
         let mut slots = Vec::new();
@@ -43,15 +37,23 @@ impl Resolver<'_> {
         whole.then_some(slots)
     }
 
-    /// Looks up what a node refers to that is broken for other reasons.
-    pub(super) fn references(&mut self, node: &NodeDecl, instance: &InstanceDecl) {
-        let outer = self.diagnostics.scope(Some(context(node, instance)));
-        for input in &instance.inputs {
-            for (text, place) in &input.references {
-                self.look_up(text, *place);
-            }
+    /// Tells that an input is missing, unless it is there under a name that is told to be none.
+    pub(super) fn missing_input(&mut self, instance: &Declared<'_>, port: &InputPort) {
+        let ports = (instance.kind.inputs)();
+        let names = || ports.iter().map(|port| port.name);
+        let meant = |given: &str| {
+            let strange = names().all(|name| name != given);
+            strange && nearest(given, names()) == Some(port.name)
+        };
+        if instance.decl.inputs.iter().any(|input| meant(&input.port)) {
+            return;
         }
-        self.diagnostics.scope(outer);
+        let problem = CompileProblem::MissingInput {
+            kind: instance.kind.name,
+            input: port.name,
+            summary: port.summary,
+        };
+        self.diagnostics.report(instance.node.place, problem);
     }
 
     pub(super) fn look_up(&mut self, text: &str, place: Place) -> Option<Vec<usize>> {
@@ -62,7 +64,7 @@ impl Resolver<'_> {
             }
             Ok(Found::Broken) => None,
             Err(problem) => {
-                self.diagnostics.report(place, *problem);
+                self.diagnostics.report_unless_told(place, *problem);
                 None
             }
         }
@@ -77,7 +79,7 @@ impl Resolver<'_> {
     /// The one of these slots; where there are several or none, that is told.
     pub(super) fn one_of(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         port: &InputPort,
         slots: &[usize],
     ) -> Option<usize> {
@@ -91,7 +93,7 @@ impl Resolver<'_> {
     /// Tells that an input takes another number of channels than it is given.
     pub(super) fn wrong_count(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         input: &'static str,
         slots: &[usize],
         expected: &'static str,
@@ -214,7 +216,7 @@ impl Resolver<'_> {
     /// The channels of slots, as kinds see them.
     pub(crate) fn inputs(
         &self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         ports: Vec<(InputPort, Vec<usize>)>,
     ) -> Inputs {
         let channels = |port: InputPort, slots: Vec<usize>| {

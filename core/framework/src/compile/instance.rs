@@ -1,5 +1,6 @@
 //! Decides what each node of a file says: its kind looked up, its parameters read, and where in the file each of them stands.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -12,17 +13,39 @@ use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table,
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds};
 use crate::quantity::Quantity;
 use crate::time::Duration;
+
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
     pub(super) kind: Option<&'static Kind>,
-    pub(super) instances: Vec<Option<ReadInstance>>,
+    pub(super) instances: Vec<ReadParts>,
+}
+
+/// What could be read of one instance; nothing where a mistake has been told.
+#[derive(Clone, Default)]
+pub(crate) struct ReadParts {
+    /// The specification.
+    pub(super) spec: Option<Arc<dyn NodeSpec>>,
+    /// The keys that the framework reads itself.
+    pub(super) estimator: Option<EstimatorKeys>,
 }
 
 /// The specification of one instance, with the keys that the framework reads itself.
-#[derive(Clone)]
 pub(crate) struct ReadInstance {
     pub(crate) spec: Arc<dyn NodeSpec>,
     pub(crate) estimator: EstimatorKeys,
+}
+
+impl ReadParts {
+    fn is_whole(&self) -> bool {
+        self.spec.is_some() && self.estimator.is_some()
+    }
+
+    pub(super) fn whole(&self) -> Option<ReadInstance> {
+        Some(ReadInstance {
+            spec: self.spec.clone()?,
+            estimator: self.estimator.clone()?,
+        })
+    }
 }
 
 /// What the framework reads of an estimator's table.
@@ -58,13 +81,16 @@ pub(crate) struct Limits {
 impl ReadNode {
     /// Whether the node takes its inputs for later ticks only.
     pub(crate) fn closes_loops(&self) -> bool {
-        self.instances
-            .iter()
-            .flatten()
-            .any(|instance| match instance.spec.role() {
-                Role::Feature(feature) => feature.closes_loops(),
-                _ => false,
-            })
+        let mut specs = self.instances.iter().filter_map(|read| read.spec.as_ref());
+        specs.any(|spec| match spec.role() {
+            Role::Feature(feature) => feature.closes_loops(),
+            _ => false,
+        })
+    }
+
+    /// Whether it is known of all instances what they are.
+    pub(crate) fn is_known(&self) -> bool {
+        self.kind.is_some() && self.instances.iter().all(|read| read.spec.is_some())
     }
 }
 
@@ -78,37 +104,57 @@ pub(crate) fn read_kinds(graph: &GraphFile, diagnostics: &mut Diagnostics) -> Ve
 }
 
 fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
-    let kind = match kinds().get(node.kind.as_str()).map(Vec::as_slice) {
-        Some([kind]) => Some(*kind),
-        Some(several) => {
-            let packages = several.iter().map(|kind| kind.package).collect();
-            let problem = CompileProblem::KindTwice {
-                kind: node.kind.clone(),
-                packages,
-            };
-            diagnostics.report(node.kind_place, problem);
-            None
-        }
-        None => {
-            let problem = CompileProblem::UnknownKind {
-                kind: node.kind.clone(),
-                known: kinds().keys().copied().collect(),
-            };
-            diagnostics.report(node.kind_place, problem);
-            None
-        }
-    };
-    let mut instances: Vec<Option<ReadInstance>> = Vec::with_capacity(node.instances.len());
+    let kind = (node.kind.as_ref()).and_then(|(name, place)| find(name, *place, diagnostics));
+    let mut own = Diagnostics::new();
+    let mut instances: Vec<ReadParts> = Vec::with_capacity(node.instances.len());
     for (nth, instance) in node.instances.iter().enumerate() {
         // Members whose parameters do not name them share one table, and so one specification.
         let before = nth.checked_sub(1).map(|before| &node.instances[before]);
-        let read = match (before, instances.last()) {
-            (Some(before), Some(Some(read))) if is_shared(before, instance) => Some(read.clone()),
-            _ => kind.and_then(|kind| read_instance(kind, node, instance, diagnostics)),
+        let read = match (before, instances.last(), kind) {
+            (Some(before), Some(read), _) if read.is_whole() && is_shared(before, instance) => {
+                read.clone()
+            }
+            (.., Some(kind)) => read_instance(kind, node, instance, &mut own),
+            (.., None) => ReadParts::default(),
         };
         instances.push(read);
     }
+    if let Some(faulty) = &node.faulty {
+        let follows: Vec<_> = own
+            .iter()
+            .filter_map(|mistake| Some((mistake.code, mistake.place?)))
+            .filter(|(code, place)| {
+                faulty.open.contains(place) || diagnostics.is_told(code, *place)
+            })
+            .collect();
+        diagnostics.extend_where(own, |mistake| {
+            let place = mistake.place;
+            place.is_none_or(|place| !follows.contains(&(mistake.code, place)))
+        });
+    } else {
+        diagnostics.extend_where(own, |_| true);
+    }
     ReadNode { kind, instances }
+}
+
+/// The kind of a name; `None` when an error about it has been told.
+fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'static Kind> {
+    match kinds().get(name).map(Vec::as_slice) {
+        Some([kind]) => return Some(*kind),
+        Some(several) => {
+            let packages = several.iter().map(|kind| kind.package).collect();
+            let kind = name.to_owned();
+            diagnostics.report(place, CompileProblem::KindTwice { kind, packages });
+        }
+        None => {
+            let problem = CompileProblem::UnknownKind {
+                kind: name.to_owned(),
+                known: kinds().keys().copied().collect(),
+            };
+            diagnostics.report(place, problem);
+        }
+    }
+    None
 }
 
 fn is_shared(a: &InstanceDecl, b: &InstanceDecl) -> bool {
@@ -123,7 +169,7 @@ fn read_instance(
     node: &NodeDecl,
     instance: &InstanceDecl,
     diagnostics: &mut Diagnostics,
-) -> Option<ReadInstance> {
+) -> ReadParts {
     let mut parameters = instance.parameters.clone();
     let mut framework = Value {
         place: parameters.place,
@@ -144,10 +190,10 @@ fn read_instance(
     diagnostics.within(context, |diagnostics| {
         let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
         let spec = (kind.read)(&parameters, diagnostics);
-        Some(ReadInstance {
-            spec: Arc::from(spec?),
-            estimator: estimator?,
-        })
+        ReadParts {
+            spec: spec.map(Arc::from),
+            estimator,
+        }
     })
 }
 
@@ -159,15 +205,28 @@ pub(super) fn context(node: &NodeDecl, instance: &InstanceDecl) -> String {
     }
 }
 
-/// One instance on its way into the plan.
-pub(crate) struct Instance<'a> {
+/// One instance as it is declared, of a kind that there is.
+pub(crate) struct Declared<'a> {
     pub(crate) node: &'a NodeDecl,
     pub(crate) decl: &'a InstanceDecl,
     pub(crate) kind: &'static Kind,
+}
+
+/// One instance on its way into the plan.
+pub(crate) struct Instance<'a> {
+    pub(crate) declared: Declared<'a>,
     pub(crate) read: ReadInstance,
 }
 
-impl Instance<'_> {
+impl<'a> Deref for Instance<'a> {
+    type Target = Declared<'a>;
+
+    fn deref(&self) -> &Declared<'a> {
+        &self.declared
+    }
+}
+
+impl Declared<'_> {
     /// The place of an input, or of the node where the input is not given.
     pub(crate) fn input_place(&self, port: &str) -> Place {
         self.input(port)

@@ -53,7 +53,7 @@ impl<'de> Deserialize<'de> for Learn {
 }
 
 impl LearnLimits {
-    fn mistakes(self) -> Vec<Mistake> {
+    pub(super) fn mistakes(self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         let Self { outliers, margin } = self;
         if outliers.is_nan() || outliers <= 1.0 {

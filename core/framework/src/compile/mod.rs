@@ -19,6 +19,7 @@ mod resolver;
 mod scope;
 mod slot_set;
 mod steps;
+mod survey;
 
 pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,

@@ -47,6 +47,11 @@ pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diag
     for component in loops(&edges) {
         let path = path(&edges, &component);
         order.looping.extend(path.iter().copied());
+        // Whether one of them closes the loop is not known of a node with mistakes.
+        order.looping.extend(component.iter().map(|n| n.index()));
+        if !component.iter().all(|node| read[node.index()].is_known()) {
+            continue;
+        }
         let names = path
             .iter()
             .chain(&path[..1])
@@ -56,7 +61,6 @@ pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diag
             graph.nodes[path[0]].place,
             CompileProblem::Cycle { path: names },
         );
-        order.looping.extend(component.iter().map(|n| n.index()));
     }
     order.nodes = sorted(&edges, &order.looping);
     order

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use indexmap::IndexSet;
 
-use super::instance::{Instance, ReadNode, context};
+use super::instance::{Declared, Instance, ReadNode, context};
 use super::leak::Suspect;
 use super::order::Order;
 use super::plan::{
@@ -73,6 +73,9 @@ impl<'g> Resolver<'g> {
         for name in &self.graph.broken {
             self.scopes.get_mut(name).broken = true;
         }
+        for name in &self.graph.elsewhere {
+            self.scopes.hide(name);
+        }
         for &node in &order.looping {
             self.scopes.get_mut(&self.graph.nodes[node].name).broken = true;
         }
@@ -80,21 +83,20 @@ impl<'g> Resolver<'g> {
         for &position in &order.nodes {
             let node = &self.graph.nodes[position];
             let closes = order.closing.contains(&position);
-            for (instance, decl) in read[position].instances.iter().zip(&node.instances) {
-                let (Some(kind), Some(read)) = (read[position].kind, instance) else {
-                    self.scopes.get_mut(&node.name).broken = true;
-                    self.references(node, decl);
-                    continue;
-                };
-                let instance = Instance {
-                    node,
-                    decl,
-                    kind,
-                    read: read.clone(),
-                };
-                let before = self.nodes.len();
+            for (parts, decl) in read[position].instances.iter().zip(&node.instances) {
                 let context = context(node, decl);
                 let outer = self.diagnostics.scope(Some(context));
+                let kind = read[position].kind;
+                let whole = parts.whole().filter(|_| node.faulty.is_none());
+                let (Some(kind), Some(read)) = (kind, whole) else {
+                    self.scopes.get_mut(&node.name).broken = true;
+                    self.survey(node, decl, kind, parts);
+                    self.diagnostics.scope(outer);
+                    continue;
+                };
+                let declared = Declared { node, decl, kind };
+                let instance = Instance { declared, read };
+                let before = self.nodes.len();
                 if self.instance(&instance, closes).is_none() {
                     self.scopes.get_mut(&node.name).broken = true;
                 }
@@ -102,6 +104,14 @@ impl<'g> Resolver<'g> {
                 if closes && self.nodes.len() > before {
                     closing.push((before, instance));
                 }
+            }
+        }
+        for &position in &order.looping {
+            let node = &self.graph.nodes[position];
+            for (parts, decl) in read[position].instances.iter().zip(&node.instances) {
+                let outer = self.diagnostics.scope(Some(context(node, decl)));
+                self.survey(node, decl, read[position].kind, parts);
+                self.diagnostics.scope(outer);
             }
         }
         let has_loops = !closing.is_empty();
@@ -154,18 +164,7 @@ impl<'g> Resolver<'g> {
 
     /// Resolves one instance; `None` when an error about it has been told.
     fn instance(&mut self, instance: &Instance<'_>, closes: bool) -> Option<()> {
-        let ports = (instance.kind.inputs)();
-        for input in &instance.decl.inputs {
-            if !ports.iter().any(|port| port.name == input.port) {
-                let known = ports.iter().map(|port| port.name).collect();
-                let problem = CompileProblem::UnknownInput {
-                    kind: instance.kind.name,
-                    input: input.port.clone(),
-                    known,
-                };
-                self.diagnostics.report(input.place, problem);
-            }
-        }
+        self.known_inputs(instance);
         let spec = Arc::clone(&instance.read.spec);
         match spec.role() {
             Role::Feature(feature) => self.feature(instance, feature, closes),
@@ -174,7 +173,7 @@ impl<'g> Resolver<'g> {
         }
     }
 
-    pub(crate) fn mistakes(&mut self, instance: &Instance<'_>, mistakes: Vec<Mistake>) {
+    pub(crate) fn mistakes(&mut self, instance: &Declared<'_>, mistakes: Vec<Mistake>) {
         for mistake in mistakes {
             let place = instance.place_of(&mistake);
             let problem = CompileProblem::Parameter {

@@ -18,6 +18,8 @@ pub(crate) struct Scope {
     pub(crate) ports: IndexMap<&'static str, IndexMap<String, usize>>,
     /// Set when an error has been told of it, so that references to it say nothing more.
     pub(crate) broken: bool,
+    /// Set when it is no node or signal, so that nobody is told to refer to it.
+    hidden: bool,
 }
 
 /// The outcome of looking a reference up.
@@ -47,6 +49,19 @@ impl Scopes {
         &mut self.scopes[name]
     }
 
+    /// Lets references to a name say nothing, where nothing else has it.
+    pub(crate) fn hide(&mut self, name: &str) {
+        if !self.scopes.contains_key(name) {
+            let scope = self.get_mut(name);
+            (scope.broken, scope.hidden) = (true, true);
+        }
+    }
+
+    fn shown(&self) -> impl Iterator<Item = &str> {
+        let shown = self.scopes.iter().filter(|(_, scope)| !scope.hidden);
+        shown.map(|(name, _)| name.as_str())
+    }
+
     pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
         let reference = Reference::parse(text);
         if reference.is_member() {
@@ -64,7 +79,7 @@ impl Scopes {
             }
             return Err(Box::new(CompileProblem::UnknownNode {
                 node: reference.node.to_owned(),
-                known: outermost(self.scopes.keys().map(String::as_str)),
+                known: outermost(self.shown()),
             }));
         };
         if scope.broken {

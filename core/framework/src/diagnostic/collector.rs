@@ -101,6 +101,7 @@ pub struct Diagnostics {
     first: HashMap<(&'static str, Option<Place>), Known>,
     scope: Option<String>,
     errors: usize,
+    reported: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -120,6 +121,23 @@ impl Diagnostics {
     pub fn report(&mut self, place: impl Into<Option<Place>>, problem: impl Problem) {
         let context = self.scope.clone();
         self.note(context, place.into(), &problem);
+    }
+
+    /// Notes a problem unless another has been told at its place, from which it may follow.
+    pub(crate) fn report_unless_told(&mut self, place: Place, problem: impl Problem) {
+        if !self.is_told(problem.code(), place) {
+            self.report(place, problem);
+        }
+    }
+
+    /// Whether an error of another code, or the same one of no member, stands at a place.
+    pub(crate) fn is_told(&self, code: &str, place: Place) -> bool {
+        let errors = self
+            .found
+            .iter()
+            .filter(|of| of.severity == Severity::Error);
+        let mut there = errors.filter(|of| of.place == Some(place));
+        there.any(|of| of.code != code || of.context.is_none())
     }
 
     /// Notes a problem of one member, e.g. `in node "thermal", member "Z1"`.
@@ -153,16 +171,30 @@ impl Diagnostics {
 
     /// Takes over what another collector found.
     pub fn extend(&mut self, other: Self) {
-        for diagnostic in other.found {
+        self.extend_where(other, |_| true);
+    }
+
+    /// Takes over those that are wanted of what another collector found.
+    pub(crate) fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
+        for diagnostic in other.found.into_iter().filter(wanted) {
             if diagnostic.severity == Severity::Error {
                 self.errors += 1;
+                self.reported += 1;
             }
             self.found.push(diagnostic);
         }
     }
 
+    /// Number of errors as they were found: one that is found again, of another member or instance, counts again.
+    pub(crate) fn reported(&self) -> usize {
+        self.reported
+    }
+
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
         let (code, message) = (problem.code(), problem.message());
+        if problem.severity() == Severity::Error {
+            self.reported += 1;
+        }
         if let Some(known) = self.known.get_mut(&(code, place, message.clone())) {
             if context.is_some() && known.context != context {
                 known.context = context;

@@ -27,6 +27,8 @@ pub struct GraphFile {
     pub nodes: Vec<NodeDecl>,
     /// Names that stand for nothing because of mistakes that have been told, so that references to them say no more.
     pub broken: Vec<String>,
+    /// The same of what stands in a section that there is not.
+    pub elsewhere: Vec<String>,
     /// What comes out, in the order of the file.
     pub outputs: Vec<OutputDecl>,
     /// The list under `[[tests]]`, as it stands.
@@ -121,14 +123,21 @@ pub struct NodeDecl {
     pub name: String,
     /// Where it is declared.
     pub place: Place,
-    /// Its `type`.
-    pub kind: String,
-    /// Where the type stands.
-    pub kind_place: Place,
+    /// Its `type`, and where that stands; none where a mistake in it has been told.
+    pub kind: Option<(String, Place)>,
     /// The sets of its `each`, in order.
     pub each: Vec<String>,
     /// One per member, or one without `each`.
     pub instances: Vec<InstanceDecl>,
+    /// What is left open by mistakes that have been told; none where there are none.
+    pub faulty: Option<Faulty>,
+}
+
+/// A node with mistakes, of which others can be looked for in what is sure.
+#[derive(Debug, Clone, Default)]
+pub struct Faulty {
+    /// Where texts stand that say nothing yet: their members or samples are not known.
+    pub open: Vec<Place>,
 }
 
 /// One instance of a node.

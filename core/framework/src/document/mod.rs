@@ -14,7 +14,7 @@ mod toml_text;
 mod tree;
 
 pub use declare::declare;
-pub(crate) use declare::{TIME_UNITS, known_keys};
+pub(crate) use declare::{TIME_UNITS, is_misspelt, known_keys};
 pub use decode::decode;
 pub(crate) use decode::decode_advised;
 pub use graph_file::{

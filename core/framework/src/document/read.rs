@@ -75,18 +75,12 @@ pub struct Document {
     pub root: SourceId,
     /// The merged tree: a table without `extends`.
     pub tree: Value,
-    /// A mistake is reported already that leaves the tree readable, so that more can be found in it.
-    pub(super) faulty: bool,
 }
 
 impl Document {
     /// A tree that comes from elsewhere than files, e.g. from a model.
     pub fn new(root: SourceId, tree: Value) -> Self {
-        Document {
-            root,
-            tree,
-            faulty: false,
-        }
+        Document { root, tree }
     }
 }
 
@@ -123,7 +117,6 @@ pub fn load_text(
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
 ) -> Option<Document> {
-    let before = diagnostics.error_count();
     let mut chain = Chain {
         reader,
         sources,
@@ -139,11 +132,7 @@ pub fn load_text(
         Place::new(root, 0, 0),
         Data::Table(table.filter(|_| !broken)?),
     );
-    Some(Document {
-        root,
-        tree,
-        faulty: diagnostics.error_count() > before,
-    })
+    Some(Document { root, tree })
 }
 
 struct Chain<'a> {

@@ -47,9 +47,9 @@ impl fmt::Display for EngineError {
         match self {
             Self::NotAfter { time, last } => write!(
                 f,
-                "the tick at {} ns is not after the last one at {} ns: ticks must come in the order of time",
-                time.as_ns(),
-                last.as_ns()
+                "the tick at {} s is not after the last one at {} s: ticks must come in the order of time",
+                time.as_ns() as f64 / 1e9,
+                last.as_ns() as f64 / 1e9
             ),
             Self::WrongWidth { found, expected } => {
                 write!(

@@ -83,25 +83,16 @@ impl Gathered {
             whole &= there;
             same &= stamp == first;
         }
-        match gather.read {
-            Read::Fresh if !all_ran => {
-                whole = false;
-                for (to, &written) in self.values.iter_mut().zip(written) {
-                    if written != tick {
-                        *to = UNCHANGED;
-                    }
-                }
+        let some_hidden = match gather.read {
+            Read::Fresh => !all_ran,
+            Read::Held | Read::Truth => old,
+        };
+        if some_hidden {
+            whole = false;
+            let from = written.iter().zip(&self.stamps).zip(&gather.entries);
+            for (value, ((&written, &stamp), entry)) in self.values.iter_mut().zip(from) {
+                *value = seen(*value, gather.read, written == tick, now - stamp, entry);
             }
-            Read::Held | Read::Truth if old => {
-                whole = false;
-                let from = self.stamps.iter().zip(&gather.entries);
-                for (to, (&stamp, entry)) in self.values.iter_mut().zip(from) {
-                    if !to.is_nan() && now - stamp > entry.max_age {
-                        *to = ABSENT;
-                    }
-                }
-            }
-            _ => {}
         }
         self.fresh = fresh;
         self.together = (whole && same).then_some(first);
@@ -125,11 +116,7 @@ impl Gathered {
             let (value, stamp) = (slots.values[entry.slot], slots.stamps[entry.slot]);
             let (there, ran) = (!value.is_nan(), slots.ran(entry.slot));
             self.fresh |= ran && there;
-            self.values[i] = match gather.read {
-                Read::Fresh if !ran => UNCHANGED,
-                Read::Held | Read::Truth if there && now - stamp > entry.max_age => ABSENT,
-                _ => value,
-            };
+            self.values[i] = seen(value, gather.read, ran, now - stamp, entry);
             self.stamps[i] = stamp;
         }
     }
@@ -151,7 +138,7 @@ impl Gathered {
         self.stamps[i] = stamp + entry.lag;
         // A value that is converted is read afresh, lest it be converted twice.
         self.until[i] = if gather.conversions.is_empty() {
-            history.stays(now, entry.max_age, *cursor) + entry.lag
+            history.stays(at, now, entry.max_age, *cursor) + entry.lag
         } else {
             now
         };
@@ -182,6 +169,15 @@ impl Gathered {
         self.forget_places();
         self.fresh = false;
         self.together = None;
+    }
+}
+
+/// What a reader sees of a slot: only what is new, or what is young enough.
+fn seen(value: f64, read: Read, ran: bool, age: Duration, entry: &Entry) -> f64 {
+    match read {
+        Read::Fresh if !ran => UNCHANGED,
+        Read::Held | Read::Truth if !value.is_nan() && age > entry.max_age => ABSENT,
+        _ => value,
     }
 }
 

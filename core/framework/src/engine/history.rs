@@ -67,15 +67,26 @@ impl History {
         }
     }
 
-    /// From which instant on the answer that a cursor has just been given may be another, when nothing more is written down for
-    /// instants before `unwritten`.
-    pub(super) fn stays(&self, unwritten: Instant, max_age: Duration, cursor: Cursor) -> Instant {
+    /// From which instant on the answer that a cursor has just been given for `at` may be another, when nothing more is written
+    /// down for instants before `unwritten`.
+    pub(super) fn stays(
+        &self,
+        at: Instant,
+        unwritten: Instant,
+        max_age: Duration,
+        cursor: Cursor,
+    ) -> Instant {
         let Some(past) = cursor.checked_sub(1).and_then(|last| self.entry(last)) else {
             // Before the first value the stamp is the instant asked for, and what is written down first turns absent into cold.
             return Instant::MIN;
         };
         let next = self.entry(cursor).map_or(unwritten, |next| next.at);
-        next.min(past.stamp + max_age + Duration::from_ns(1))
+        let old = past.stamp + max_age + Duration::from_ns(1);
+        if past.value.is_nan() || at >= old {
+            next
+        } else {
+            next.min(old)
+        }
     }
 
     /// Goes on from another history of the same channel, keeping what it reached back further.
@@ -153,17 +164,18 @@ mod tests {
         let mut past = History::new(lag);
         let (mut always, mut seldom) = (0, 0);
         let (mut kept, mut until, mut asked) = ((f64::NAN, Instant::MIN), Instant::MIN, 0);
-        let ticks = 2000;
-        for t in 0..ticks {
+        let mut pushed = 0;
+        for t in 0..2000 {
             let now = s(t);
             let expected = past.at(now - lag, max_age, &mut always);
             if now >= until {
                 kept = past.at(now - lag, max_age, &mut seldom);
-                until = past.stays(now, max_age, seldom) + lag;
+                until = past.stays(now - lag, now, max_age, seldom) + lag;
                 asked += 1;
             }
             assert_eq!(kept.0.to_bits(), expected.0.to_bits(), "at {t} s");
             assert_eq!(kept.1, expected.1, "at {t} s");
+            pushed += i64::from(matches!(t % 97, 0 | 7 | 20 | 50 | 60 | 90));
             match t % 97 {
                 0 | 7 | 50 | 90 => past.push(now, t as f64, now),
                 60 => past.push(now, t as f64, now - d(10)),
@@ -171,7 +183,11 @@ mod tests {
                 _ => {}
             }
         }
-        assert!(asked < ticks, "{asked}");
+        // Twice for each value, when it is there and when it is too old, and at every tick before the first.
+        assert!(
+            asked < 2 * pushed + lag.as_ns() / 1_000_000_000 + 2,
+            "{asked}"
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::FaultKind;
+use crate::time::Duration;
 use crate::unit::Unit;
 
 /// Why faults cannot be applied.
@@ -89,8 +90,10 @@ impl fmt::Display for FaultError {
                 for_ns,
             } => write!(
                 f,
-                "fault {}: from {from_ns} ns for {for_ns} ns; the start must not be negative and the length must be above 0",
-                fault + 1
+                "fault {}: from {} for {}; the start must not be negative and the length must be above 0",
+                fault + 1,
+                Duration::from_ns(*from_ns),
+                Duration::from_ns(*for_ns)
             ),
             Self::Size { fault, kind, size } => {
                 let allowed = if *kind == FaultKind::Noise {

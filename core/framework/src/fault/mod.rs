@@ -282,7 +282,7 @@ mod tests {
                     for_ns: 0,
                     ..sound.clone()
                 },
-                "fault 1: from 3600000000000 ns for 0 ns; the start must not be negative and the length must be above 0",
+                "fault 1: from 1h for 0s; the start must not be negative and the length must be above 0",
             ),
             (
                 Fault {

@@ -184,8 +184,8 @@ where
         let found = Unexpected::Signed(number);
         match (self.plain.whole, u64::try_from(number)) {
             (Some(_), Ok(number)) => self.visit_u64(number),
-            (Some(_), Err(_)) => Err(E::invalid_value(found, &self)),
-            (None, _) => self.plain.number(number as f64, found),
+            (Some(_), Err(_)) if self.plain.number.is_none() => Err(E::invalid_value(found, &self)),
+            _ => self.plain.number(number as f64, found),
         }
     }
 
@@ -256,6 +256,14 @@ mod tests {
         assert_eq!(numbers("-1").unwrap(), Any::Number(-1.0));
         assert_eq!(numbers("1").unwrap(), Any::Number(1.0));
         assert_eq!(numbers("0.5").unwrap(), Any::Number(0.5));
+        let both = |json| {
+            let forms = Forms::new("what fits")
+                .whole(Any::Whole)
+                .number(Any::Number);
+            forms.read(&mut serde_json::Deserializer::from_str(json))
+        };
+        assert_eq!(both("1").unwrap(), Any::Whole(1));
+        assert_eq!(both("-1").unwrap(), Any::Number(-1.0));
     }
 
     #[test]

@@ -153,7 +153,8 @@ impl Mistake {
     #[must_use]
     pub fn unless_lasting(at: &str, length: impl Into<Option<Duration>>) -> Option<Self> {
         let length = length.into().filter(|length| *length <= Duration::ZERO)?;
-        let name = at.rsplit('.').next().unwrap_or(at);
+        let mut names = at.rsplit('.').filter(|name| name.parse::<usize>().is_err());
+        let name = names.next().unwrap_or(at);
         let message = format!("`{name}` is {length} and must be longer than nothing");
         Some(Self::at(at, message))
     }

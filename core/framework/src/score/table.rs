@@ -40,7 +40,7 @@ pub struct Score {
     pub kind: &'static str,
     /// What it predicts.
     pub truth: String,
-    /// The unit of the truth and of all errors.
+    /// The unit of all errors: that of the truth, or K where that is a temperature.
     pub unit: String,
     /// Its horizon in seconds.
     pub ahead_s: f64,
@@ -166,7 +166,7 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                 node: node.name.clone(),
                 kind: node.kind.name,
                 truth: of.name.clone(),
-                unit: of.channel.unit.to_string(),
+                unit: of.channel.unit.difference().to_string(),
                 ahead_s: prediction.ahead.secs(),
                 n,
                 rmse: root_mean_square(errors()),

@@ -14,7 +14,8 @@ use super::table::SimulationTable;
 use crate::compile::{Plan, PlannedRole};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{
-    Data, DocumentProblem, FileReader, GraphFile, Table, Value, decode, known_keys, unreadable,
+    Data, DocumentProblem, FileReader, GraphFile, Table, Value, decode, is_misspelt, known_keys,
+    unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
 use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine};
@@ -53,6 +54,26 @@ pub enum On {
 pub fn declare(
     graph: &GraphFile,
     plan: &Plan,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<Vec<Trial>> {
+    read(graph, Some(plan), reader, sources, diagnostics)
+}
+
+/// Tells what is wrong with the tests of a graph that has other mistakes, as far as it shows without a plan.
+pub fn mistakes(
+    graph: &GraphFile,
+    reader: &dyn FileReader,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) {
+    read(graph, None, reader, sources, diagnostics);
+}
+
+fn read(
+    graph: &GraphFile,
+    plan: Option<&Plan>,
     reader: &dyn FileReader,
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
@@ -127,7 +148,8 @@ type Schedules = BTreeMap<(PathBuf, &'static str), Option<Schedule>>;
 
 /// Reads one test; what it expects is read in a file of its own.
 pub(super) struct Declaring<'a> {
-    pub(super) plan: &'a Plan,
+    /// The graph; none where it has mistakes, so that nothing can be said of its channels.
+    pub(super) plan: Option<&'a Plan>,
     reader: &'a dyn FileReader,
     sources: &'a mut Sources,
     schedules: &'a mut Schedules,
@@ -145,6 +167,7 @@ impl Declaring<'_> {
                 }
                 value.as_text()
             }
+            None if is_misspelt(table, "name", &KEYS) => None,
             None => {
                 let problem = DocumentProblem::MissingKey {
                     key: "name".to_owned(),
@@ -164,6 +187,7 @@ impl Declaring<'_> {
                 self.diagnostics.report(on.key, problem);
                 None
             }
+            (None, None) if is_misspelt(table, "inputs", &KEYS) => None,
             (None, None) => {
                 self.diagnostics.report(test.place, TrialProblem::NoData);
                 None
@@ -177,8 +201,13 @@ impl Declaring<'_> {
             Some(value) => self.list("expect", value, Self::expectation),
             None => Some(Vec::new()),
         };
-        if expect.as_ref().is_some_and(Vec::is_empty) {
-            let place = table.get("expect").map_or(test.place, |value| value.place);
+        let stated = table.get("expect");
+        let is_misspelt = is_misspelt(table, "expect", &KEYS);
+        let nothing = stated.map_or(!is_misspelt, |list| {
+            list.as_list().is_some_and(<[Value]>::is_empty)
+        });
+        if nothing {
+            let place = stated.map_or(test.place, |value| value.place);
             let problem = TrialProblem::NothingExpected { what: "the test" };
             self.diagnostics.report(place, problem);
         }
@@ -246,32 +275,8 @@ impl Declaring<'_> {
                 return None;
             }
         };
-        let channels = known.machine.channels();
-        let measures = |name: &str| channels.iter().find(|channel| channel.reference() == name);
-        let needed = self.plan.sources.iter().filter(|source| !source.optional);
-        let missing: Vec<String> = needed
-            .filter(|source| measures(&source.name).is_none())
-            .map(|source| source.name.clone())
-            .collect();
-        if !missing.is_empty() {
-            let problem = TrialProblem::MachineLacks {
-                machine: known.machine.name(),
-                channels: missing,
-                has: channels.iter().map(|channel| channel.reference()).collect(),
-            };
-            self.diagnostics.report(place, problem);
-        }
-        for (source, planned) in self.plan.sources.iter().zip(&self.plan.channels) {
-            let unit = measures(&source.name).and_then(|channel| Unit::parse(channel.unit).ok());
-            if let Some(unit) = unit.filter(|unit| !unit.measures_same(&planned.channel.unit)) {
-                let problem = TrialProblem::Units {
-                    key: "simulate",
-                    found: unit,
-                    channel: source.name.clone(),
-                    expected: planned.channel.unit.clone(),
-                };
-                self.diagnostics.report(place, problem);
-            }
+        if let Some(plan) = self.plan {
+            self.measured_by(known.machine, plan, place);
         }
         if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
             let found = table.days.to_string();
@@ -287,6 +292,37 @@ impl Declaring<'_> {
             seed: table.seed,
             schedule,
         }))
+    }
+
+    /// Whether a machine measures what the graph reads, in units that convert.
+    fn measured_by(&mut self, machine: &dyn Machine, plan: &Plan, place: Place) {
+        let channels = machine.channels();
+        let measures = |name: &str| channels.iter().find(|channel| channel.reference() == name);
+        let needed = plan.sources.iter().filter(|source| !source.optional);
+        let missing: Vec<String> = needed
+            .filter(|source| measures(&source.name).is_none())
+            .map(|source| source.name.clone())
+            .collect();
+        if !missing.is_empty() {
+            let problem = TrialProblem::MachineLacks {
+                machine: machine.name(),
+                channels: missing,
+                has: channels.iter().map(|channel| channel.reference()).collect(),
+            };
+            self.diagnostics.report(place, problem);
+        }
+        for (source, planned) in plan.sources.iter().zip(&plan.channels) {
+            let unit = measures(&source.name).and_then(|channel| Unit::parse(channel.unit).ok());
+            if let Some(unit) = unit.filter(|unit| !unit.measures_same(&planned.channel.unit)) {
+                let problem = TrialProblem::Units {
+                    key: "simulate",
+                    found: unit,
+                    channel: source.name.clone(),
+                    expected: planned.channel.unit.clone(),
+                };
+                self.diagnostics.report(place, problem);
+            }
+        }
     }
 
     /// A schedule from its file, in which its mistakes are told.
@@ -306,6 +342,7 @@ impl Declaring<'_> {
                     reason,
                 };
                 self.diagnostics.report(place, problem);
+                self.schedules.insert(known, None);
                 return None;
             }
         };
@@ -335,18 +372,19 @@ impl Declaring<'_> {
         if table.is_empty() {
             self.diagnostics.report(value.place, TrialProblem::NoData);
         }
+        let plan = self.plan?;
         for (reference, entry) in table.iter() {
             let Some(slots) = self.measured(reference, entry.key) else {
                 continue;
             };
             for slot in slots {
                 if channels.iter().any(|(taken, _)| *taken == slot) {
-                    let channel = self.plan.sources[slot].name.clone();
+                    let channel = plan.sources[slot].name.clone();
                     let problem = TrialProblem::ChannelTwice { channel };
                     self.diagnostics.report(entry.key, problem);
                     continue;
                 }
-                let planned = &self.plan.channels[slot];
+                let planned = &plan.channels[slot];
                 let series = shape::read(
                     &entry.value,
                     &planned.name,
@@ -375,10 +413,11 @@ impl Declaring<'_> {
             };
             self.diagnostics.report(place_of(value, "size"), problem);
         }
+        let plan = self.plan?;
         let slots = self.measured(&spec.channel, place_of(value, "channel"))?;
         let one = |slot: usize| {
-            let name = self.plan.sources[slot].name.as_str();
-            let unit = &self.plan.channels[slot].channel.unit;
+            let name = plan.sources[slot].name.as_str();
+            let unit = &plan.channels[slot].channel.unit;
             let named = FaultSpec {
                 channel: name.to_owned(),
                 ..spec.clone()
@@ -408,16 +447,17 @@ impl Declaring<'_> {
     }
 
     pub(super) fn channels(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
-        look_up(self.plan, reference)
+        look_up(self.plan?, reference)
             .map_err(|problem| self.diagnostics.report(place, problem))
             .ok()
     }
 
     fn measured(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
-        match look_up_measured(self.plan, reference) {
+        let plan = self.plan?;
+        match look_up_measured(plan, reference) {
             Ok(Ok(slots)) => Some(slots),
             Ok(Err(channel)) => {
-                let known = self.plan.sources.iter().map(|source| source.name.clone());
+                let known = plan.sources.iter().map(|source| source.name.clone());
                 let problem = TrialProblem::NotMeasured {
                     channel,
                     known: known.collect(),

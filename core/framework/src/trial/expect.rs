@@ -22,8 +22,9 @@ impl Declaring<'_> {
             let problem = TrialProblem::NothingExpected { what };
             self.diagnostics.report(value.place, problem);
         }
+        let plan = self.plan?;
         for &slot in &slots {
-            self.check_channel(value, &table, &checks, slot);
+            self.check_channel(value, &table, &checks, (plan, slot));
         }
         Some(Expectation {
             slots,
@@ -180,8 +181,14 @@ impl Declaring<'_> {
     }
 
     /// What a channel must be for the checks to make sense.
-    fn check_channel(&mut self, value: &Value, table: &ExpectTable, checks: &[Check], slot: usize) {
-        let planned = &self.plan.channels[slot];
+    fn check_channel(
+        &mut self,
+        value: &Value,
+        table: &ExpectTable,
+        checks: &[Check],
+        (plan, slot): (&Plan, usize),
+    ) {
+        let planned = &plan.channels[slot];
         let (unit, name) = (&planned.channel.unit, &planned.name);
         let truth = planned.predicts;
         let prediction_keys = checks.iter().filter(|check| check.is_of_predictions());
@@ -208,13 +215,13 @@ impl Declaring<'_> {
                     quantities.push(("between", low, unit.clone()));
                     quantities.push(("between", high, unit.clone()));
                 }
-                Check::Beats(rivals) => self.check_rivals(value, rivals, slot),
+                Check::Beats(rivals) => self.check_rivals(value, rivals, plan, slot),
                 Check::R2Above(_) | Check::ValidAbove(_) | Check::GivenAbove(_) | Check::Absent => {
                 }
             }
         }
         if let (Some(limit), Some(truth)) = (&table.abs_truth_below, truth) {
-            let unit = self.plan.channels[truth].channel.unit.clone();
+            let unit = plan.channels[truth].channel.unit.clone();
             quantities.push(("abs_truth_below", limit, unit));
         }
         for (key, quantity, unit) in quantities {
@@ -230,18 +237,18 @@ impl Declaring<'_> {
         }
     }
 
-    fn check_rivals(&mut self, value: &Value, rivals: &[Rival], slot: usize) {
-        let Some(truth) = self.plan.channels[slot].predicts else {
+    fn check_rivals(&mut self, value: &Value, rivals: &[Rival], plan: &Plan, slot: usize) {
+        let Some(truth) = plan.channels[slot].predicts else {
             return;
         };
         for rival in rivals {
             if let Rival::Channels(name, slots) = rival
-                && rival_of(self.plan, slot, slots).is_none()
+                && rival_of(plan, slot, slots).is_none()
             {
                 let problem = TrialProblem::NoRival {
                     rival: name.clone(),
-                    channel: self.plan.channels[slot].name.clone(),
-                    truth: self.plan.channels[truth].name.clone(),
+                    channel: plan.channels[slot].name.clone(),
+                    truth: plan.channels[truth].name.clone(),
                 };
                 self.diagnostics.report(place_of(value, "beats"), problem);
             }

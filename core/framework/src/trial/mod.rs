@@ -15,7 +15,7 @@ mod shape;
 mod table;
 
 pub use data::{DataSet, Simulation};
-pub use declare::{On, Trial, declare, observe};
+pub use declare::{On, Trial, declare, mistakes, observe};
 pub use expectation::{Check, Expectation, Period, Rival, Tolerance};
 pub use judge::{Finding, Wanted};
 pub use problem::TrialProblem;

@@ -4,6 +4,7 @@
 use super::Structural;
 use crate::NumericsError;
 use crate::checks::{check_length, check_parameter};
+use crate::scratch::Scratch;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ pub struct Kalman {
     unknown: usize,
     /// Scratch.
     #[serde(skip)]
-    room: Vec<f64>,
+    room: Scratch,
 }
 
 /// A filter as it is read, before it is known whether its parts fit together.
@@ -71,7 +72,7 @@ impl TryFrom<Saved> for Kalman {
             covariance,
             diffuse,
             unknown,
-            room: vec![0.0; 2 * order],
+            room: Scratch(vec![0.0; 2 * order]),
         })
     }
 }
@@ -145,7 +146,7 @@ impl Kalman {
             covariance: covariance.to_vec(),
             diffuse: Vec::new(),
             unknown: 0,
-            room: vec![0.0; 2 * order],
+            room: Scratch(vec![0.0; 2 * order]),
         };
         for i in 0..order {
             if filter.covariance[i * order + i] == f64::INFINITY {
@@ -246,7 +247,7 @@ impl Kalman {
         {
             return Some(innovation);
         }
-        let (shared, _) = self.room.split_at_mut(order);
+        let (shared, _) = self.room.0.split_at_mut(order);
         let explained = product(&self.covariance, &self.model, x, shared);
         let variance = explained + self.model.observation / share;
         if !(variance > 0.0 && variance.is_finite()) {
@@ -373,7 +374,8 @@ impl Kalman {
             self.diffuse.clear();
             self.diffuse.resize(order * order, 0.0);
         }
-        let known = self.diffuse[state * order + state] == 0.0;
+        let own = &self.diffuse[state * order..][..order];
+        let known = own.iter().all(|&diffuse| diffuse == 0.0);
         for other in 0..order {
             for matrix in [&mut self.covariance, &mut self.diffuse] {
                 matrix[state * order + other] = 0.0;
@@ -382,7 +384,12 @@ impl Kalman {
         }
         self.diffuse[state * order + state] = 1.0;
         self.state[state] = 0.0;
-        self.unknown += usize::from(known);
+        if known {
+            self.unknown += 1;
+        } else {
+            // With it goes what had been observed of it together with others.
+            self.unknown = rank(self.diffuse.clone(), order);
+        }
     }
 
     /// What is expected `time` from now of the observation that has these regressors, given by their number; of no
@@ -402,7 +409,7 @@ impl Kalman {
     /// Takes an observation of something that nothing is known of; none where all that it tells of is known.
     fn learn_of_the_unknown(&mut self, x: &[f64], error: f64, share: f64) -> Option<Innovation> {
         let order = self.state.len();
-        let (of_diffuse, shared) = self.room.split_at_mut(order);
+        let (of_diffuse, shared) = self.room.0.split_at_mut(order);
         let variance = product(&self.diffuse, &self.model, x, of_diffuse);
         let most = 1.0 + x.iter().map(|x| x * x).sum::<f64>();
         if variance.is_nan() || variance <= NOTHING_NEW * most {
@@ -440,6 +447,33 @@ pub(super) fn diagonal(values: &[f64]) -> Vec<f64> {
     matrix
 }
 
+/// How many directions of a diffuse covariance, given row by row, are diffuse: pivots of its elimination, largest first, each
+/// state on its own scale.
+fn rank(mut matrix: Vec<f64>, order: usize) -> usize {
+    let scales: Vec<f64> = (0..order)
+        .map(|i| matrix[i * order + i].max(1.0).sqrt())
+        .collect();
+    for i in 0..order {
+        for j in 0..order {
+            matrix[i * order + j] /= scales[i] * scales[j];
+        }
+    }
+    for found in 0..order {
+        let own = |i: &usize| matrix[i * order + i];
+        let pivot = (0..order).max_by(|a, b| own(a).total_cmp(&own(b)));
+        let Some(pivot) = pivot.filter(|pivot| own(pivot) > NOTHING_NEW) else {
+            return found;
+        };
+        let row = matrix[pivot * order..][..order].to_vec();
+        for i in 0..order {
+            for j in 0..order {
+                matrix[i * order + j] -= row[i] * row[j] / row[pivot];
+            }
+        }
+    }
+    order
+}
+
 /// Adds `time` times the trend's row and column to those of the level.
 #[inline]
 fn carry(matrix: &mut [f64], order: usize, time: f64) {
@@ -470,4 +504,72 @@ fn product(matrix: &[f64], model: &Structural, x: &[f64], to: &mut [f64]) -> f64
     }
     let terms = to[moving..].iter().zip(x);
     terms.fold(to[0], |sum, (value, x)| sum + value * x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Passage;
+    use super::*;
+
+    const OWN: Structural = Structural {
+        observation: 0.09,
+        level: 0.01,
+        trend: Some(0.0001),
+        returning: 0.0,
+        passage: Passage::Steps,
+    };
+
+    /// A level, a trend and a coefficient, followed in segments of so many rows, and whether all is known after each segment.
+    fn known_after_segments(rows: usize, trend: Option<f64>) -> Vec<bool> {
+        let model = Structural { trend, ..OWN };
+        let mut filter = Kalman::diffuse(model, 1).unwrap();
+        let mut x = 0.5;
+        let segments = (0..6).map(|_| {
+            filter.forget_level();
+            for row in 0..rows {
+                if row > 0 {
+                    filter.advance(1.0);
+                }
+                x = 3.7 * x * (1.0 - x);
+                filter.observe(&[x], 1.0 + x);
+            }
+            !filter.is_diffuse()
+        });
+        segments.collect()
+    }
+
+    #[test]
+    fn a_coefficient_is_not_known_from_segments_that_are_too_short_for_level_and_trend() {
+        // A row tells the level, another one the trend, and only one more in the same segment the coefficient.
+        assert_eq!(known_after_segments(1, None), [false; 6]);
+        assert_eq!(known_after_segments(2, None), [true; 6]);
+        assert_eq!(known_after_segments(1, OWN.trend), [false; 6]);
+        assert_eq!(known_after_segments(2, OWN.trend), [false; 6]);
+        assert_eq!(known_after_segments(3, OWN.trend), [true; 6]);
+    }
+
+    #[test]
+    fn a_segment_that_ends_while_its_trend_is_unknown_leaves_the_next_as_much_to_tell() {
+        let mut filter = Kalman::diffuse(OWN, 0).unwrap();
+        filter.observe(&[], 1.0);
+        // A row without an observation.
+        filter.advance(1.0);
+        filter.forget_level();
+        filter.observe(&[], 1.0);
+        assert!(filter.is_diffuse(), "the trend is not known");
+        filter.advance(1.0);
+        filter.observe(&[], 2.0);
+        assert!(!filter.is_diffuse());
+    }
+
+    #[test]
+    fn filters_that_know_the_same_are_equal_whatever_way_they_came() {
+        let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+        filter.observe(&[0.5], 1.0);
+        let mut other = Kalman::diffuse(OWN, 1).unwrap();
+        assert!(other.resume(&filter));
+        assert_eq!(other, filter);
+        other.observe(&[0.5], 1.0);
+        assert_ne!(other, filter);
+    }
 }

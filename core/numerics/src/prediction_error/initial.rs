@@ -35,9 +35,14 @@ pub(super) fn starts(
         let given = POLES
             .iter()
             .map(|&pole| one_pole(&direct, &differenced, penalty, pole));
-        std::iter::once(searched)
+        let (found, failed): (Vec<_>, Vec<_>) = std::iter::once(searched)
             .chain(given)
-            .collect::<Result<Vec<_>, _>>()?
+            .partition(Result::is_ok);
+        if found.is_empty() {
+            failed.into_iter().collect::<Result<Vec<_>, _>>()?
+        } else {
+            found.into_iter().flatten().collect()
+        }
     } else {
         vec![regression(&direct, &differenced, penalty, 0)?]
     };
@@ -287,11 +292,11 @@ fn steiglitz_mcbride(
         }
         model.level = level_left(&model, samples);
         let sum = sum_of_squares(&model, samples, 0);
-        if best.as_ref().is_none_or(|(least, _)| sum < *least) {
+        if sum.is_finite() && best.as_ref().is_none_or(|(least, _)| sum < *least) {
             best = Some((sum, model));
         }
         let moved = before.iter().zip(&shared).map(|(a, b)| (a - b).abs());
-        if moved.fold(0.0, f64::max) < 1e-9 {
+        if moved.into_iter().all(|by| by < 1e-9) {
             break;
         }
     }

@@ -151,12 +151,14 @@ impl PredictionError {
         for step in 0..self.most_steps {
             let (hessian, gradient) = self.normal_equations(&model, samples, first);
             let flat = model.flat();
+            let mut solvable = false;
             loop {
                 let tried = descend(&hessian, &gradient, &damping).map(|change| {
                     let moved: Vec<f64> =
                         flat.iter().zip(&change).map(|(at, by)| at - by).collect();
                     model.with(&moved)
                 });
+                solvable |= tried.is_some();
                 // What would become unstable is held back alone: the others go on, and find the best beside it.
                 let unstable = tried.as_ref().map(|tried| tried.unstable(radius));
                 let unstable = unstable.filter(|of| of.contains(&true));
@@ -179,7 +181,7 @@ impl PredictionError {
                     }
                 }
                 if damping.iter().all(|of| *of > MOST_DAMPING) {
-                    return (model, step, true);
+                    return (model, step, solvable);
                 }
             }
         }
@@ -243,4 +245,32 @@ fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<
     let solved = scaled.llt(Side::Lower).ok()?.solve(&right);
     let step: Vec<f64> = (0..count).map(|i| solved[(i, 0)] / scales[i]).collect();
     step.iter().all(|by| by.is_finite()).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::InputOrders;
+
+    #[test]
+    fn a_search_of_which_no_step_can_be_solved_has_not_converged() {
+        // The squares of the input are no numbers.
+        let mut samples = Samples::new(1);
+        for sample in 0..20 {
+            let sign = if sample % 3 == 0 { 1.0 } else { -1.0 };
+            samples.push([sign * 1e200], sign);
+        }
+        let input = InputOrders {
+            nb: 1,
+            nf: 0,
+            nk: 0,
+        };
+        let start = Polynomials::zero(&Orders {
+            inputs: vec![input],
+            ..Orders::default()
+        });
+        let search = PredictionError::default();
+        let (model, steps, converged) = search.search(start.clone(), &samples, 0, 0.9);
+        assert_eq!((model, steps, converged), (start, 0, false));
+    }
 }

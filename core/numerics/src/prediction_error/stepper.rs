@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Polynomials;
+use crate::scratch::Scratch;
 
 /// A model, followed sample by sample. Nothing is allocated once it is built.
 ///
@@ -23,7 +24,7 @@ pub struct Stepper {
     doubt: Vec<f64>,
     /// `P c` of this doubt `P`, while it is worked out.
     #[serde(skip)]
-    shared: Vec<f64>,
+    shared: Scratch,
     inputs: Vec<PastInput>,
 }
 
@@ -50,7 +51,7 @@ impl Stepper {
             noise: vec![0.0; whitening.len()],
             innovations: vec![0.0; model.c.len()],
             doubt: vec![0.0; model.c.len() * model.c.len()],
-            shared: vec![0.0; model.c.len()],
+            shared: Scratch(vec![0.0; model.c.len()]),
             inputs: inputs.collect(),
             whitening,
             model,
@@ -140,27 +141,51 @@ impl Stepper {
     /// `C(q) e` (Ansley 1979). Its gain is that of `C` as soon as the start is forgotten, and for a root on the unit circle,
     /// where it never is, that of a mean.
     fn take_innovation(&mut self, off: Option<f64>) {
+        if self.is_sure() {
+            return push(&mut self.innovations, off.unwrap_or(0.0));
+        }
         let Some(off) = off else {
             // It is taken for as it was foreseen.
-            self.shared.fill(0.0);
+            self.shared.0.fill(0.0);
             return self.pass(0.0, 0.0);
         };
         let count = self.innovations.len();
         let c = &self.model.c;
+        let shared = &mut self.shared.0;
         let mut variance = 1.0;
-        for (nth, shared) in self.shared.iter_mut().enumerate() {
+        for (nth, shared) in shared.iter_mut().enumerate() {
             *shared = product(c, &self.doubt[nth * count..]);
             variance += c[nth] * *shared;
         }
         let newest = off / variance;
-        for (of, shared) in self.innovations.iter_mut().zip(&self.shared) {
+        for (of, shared) in self.innovations.iter_mut().zip(&*shared) {
             *of += shared * newest;
         }
         for (nth, doubt) in self.doubt.iter_mut().enumerate() {
-            *doubt -= self.shared[nth / count] * self.shared[nth % count] / variance;
+            *doubt -= shared[nth / count] * shared[nth % count] / variance;
         }
-        self.shared.iter_mut().for_each(|of| *of /= -variance);
+        shared.iter_mut().for_each(|of| *of /= -variance);
         self.pass(newest, 1.0 - 1.0 / variance);
+        let mut own = self.doubt.iter().step_by(count + 1);
+        if own.all(|&own| own < 4.0 * f64::EPSILON) {
+            self.doubt.fill(0.0);
+        }
+    }
+
+    /// Whether no innovation is in doubt.
+    fn is_sure(&self) -> bool {
+        let count = self.innovations.len();
+        let mut own = self.doubt.iter().step_by(count + 1);
+        own.all(|&own| own == 0.0)
+    }
+
+    /// By how much the variance of what is predicted of the next sample is larger than that of an innovation, in the latter:
+    /// more than 0 after a start, until what was not foreseen before it counts no more (Ansley 1979).
+    #[must_use]
+    pub fn doubt(&self) -> f64 {
+        let c = &self.model.c;
+        let rows = self.doubt.chunks_exact(c.len().max(1));
+        rows.zip(c).map(|(row, own)| own * product(c, row)).sum()
     }
 
     /// Puts an innovation before those of the past, with what it is in doubt by itself and together with each of them.
@@ -172,8 +197,8 @@ impl Stepper {
             self.doubt.copy_within(..rest, count + 1);
         }
         for nth in 1..count {
-            self.doubt[nth] = self.shared[nth - 1];
-            self.doubt[nth * count] = self.shared[nth - 1];
+            self.doubt[nth] = self.shared.0[nth - 1];
+            self.doubt[nth * count] = self.shared.0[nth - 1];
         }
         if let Some(own) = self.doubt.first_mut() {
             *own = doubt;

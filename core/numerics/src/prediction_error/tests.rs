@@ -529,3 +529,46 @@ fn transfer_functions_are_near_the_oracle_of_another_search() {
         );
     }
 }
+
+#[test]
+fn right_after_a_start_predictions_of_a_moving_average_are_less_sure_by_what_came_before_it() {
+    let c = 0.8;
+    let mut stepper = Stepper::new(Polynomials {
+        c: vec![c],
+        ..Polynomials::zero(&Orders {
+            nc: 1,
+            ..Orders::default()
+        })
+    });
+    stepper.settle_on(1.0);
+    // The variances of the innovations algorithm (Brockwell and Davis 1991, example 5.2.1).
+    let mut variance = 1.0 + c * c;
+    for _ in 0..20 {
+        assert!((1.0 + stepper.doubt() - variance).abs() < 1e-12);
+        stepper.step(|_| 0.0, Some(0.3));
+        variance = 1.0 + c * c - c * c / variance;
+    }
+    for _ in 0..200 {
+        stepper.step(|_| 0.0, Some(0.3));
+    }
+    assert_eq!(stepper.doubt(), 0.0);
+}
+
+#[test]
+fn steppers_that_are_where_another_is_are_equal_whatever_way_they_came() {
+    let model = Polynomials {
+        c: vec![0.5, 0.2],
+        ..Polynomials::zero(&Orders {
+            nc: 2,
+            ..Orders::default()
+        })
+    };
+    let mut stepper = Stepper::new(model.clone());
+    stepper.settle_on(1.0);
+    stepper.step(|_| 0.0, Some(0.3));
+    let mut other = Stepper::new(model);
+    other.take(&stepper);
+    assert_eq!(other, stepper);
+    other.step(|_| 0.0, Some(0.3));
+    assert_ne!(other, stepper);
+}

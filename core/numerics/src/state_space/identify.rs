@@ -1,8 +1,12 @@
 //! Decides which state-space model a record has.
 
+use std::ops::RangeInclusive;
+
 use faer::Mat;
 
-use super::lagged::{Lagged, Projected, power, pseudo_inverse, spectrum};
+use super::lagged::{
+    Lagged, Projected, power, pseudo_inverse, pseudo_inverse_left, spectrum, windows,
+};
 use super::model::{product, spectral_radius};
 use super::{Record, StateSpace};
 use crate::NumericsError;
@@ -73,6 +77,21 @@ pub struct Identification {
 }
 
 impl Subspace {
+    /// The longest horizon among these that records with `width` inputs have enough windows for.
+    #[must_use]
+    pub fn longest(
+        horizons: RangeInclusive<usize>,
+        records: &[Record<'_>],
+        width: usize,
+    ) -> Option<usize> {
+        let found = |horizon: usize| -> usize {
+            let windows = records.iter().map(|record| windows(record, horizon));
+            windows.map(|windows| windows.len()).sum()
+        };
+        let mut longest = horizons.rev();
+        longest.find(|&horizon| found(horizon) >= needed(horizon, width))
+    }
+
     /// Identifies a model from records that have `width` inputs. Inputs and outputs should vary about 0 on one scale.
     ///
     /// # Errors
@@ -85,7 +104,7 @@ impl Subspace {
     ) -> Result<Identification, NumericsError> {
         self.check(records)?;
         let lagged = Lagged::of(records, width, self.horizon);
-        let needed = 2 * self.horizon * (width + 1);
+        let needed = needed(self.horizon, width);
         if lagged.windows < needed {
             return Err(NumericsError::TooFewStretches {
                 length: 2 * self.horizon,
@@ -197,9 +216,13 @@ impl Subspace {
         let (squares, shown) = match self.weighting {
             Weighting::N4sid | Weighting::Moesp => spectrum(&told)?,
             Weighting::Cva => {
-                let weight = power(&projected.outputs_left, -0.5)?;
+                let least = projected.least_output;
+                let weight = power(&projected.outputs_left, -0.5, least)?;
                 let (squares, vectors) = spectrum(&(&weight * told * &weight))?;
-                (squares, power(&projected.outputs_left, 0.5)? * vectors)
+                (
+                    squares,
+                    power(&projected.outputs_left, 0.5, least)? * vectors,
+                )
             }
         };
         let values: Vec<f64> = squares.iter().map(|square| square.sqrt()).collect();
@@ -211,6 +234,11 @@ impl Subspace {
         });
         Ok((values, scaled))
     }
+}
+
+/// The fewest windows that tell what so many inputs and the output do: twice as many as a past has values.
+fn needed(horizon: usize, width: usize) -> usize {
+    2 * horizon * (width + 1)
 }
 
 impl StateOrder {
@@ -385,6 +413,7 @@ fn refine(
     });
     let mut own = Mat::<f64>::zeros(columns, columns);
     let mut with_output = Mat::<f64>::zeros(columns, 1);
+    let mut whole = Mat::<f64>::zeros(of_inputs, of_inputs);
     let mut total_own = Mat::<f64>::zeros(of_inputs, of_inputs);
     let mut total_with = Mat::<f64>::zeros(of_inputs, 1);
     for record in records {
@@ -432,12 +461,13 @@ fn refine(
         // The beginning is this record's own: it is taken out before records are summed.
         let begin = own.submatrix(of_inputs, of_inputs, order, order).to_owned();
         let across = own.submatrix(0, of_inputs, of_inputs, order) * pseudo_inverse(&begin)?;
+        whole += own.submatrix(0, 0, of_inputs, of_inputs);
         total_own += own.submatrix(0, 0, of_inputs, of_inputs)
             - &across * own.submatrix(of_inputs, 0, order, of_inputs);
         total_with +=
             with_output.subrows(0, of_inputs) - &across * with_output.subrows(of_inputs, order);
     }
-    let found = pseudo_inverse(&total_own)? * total_with;
+    let found = pseudo_inverse_left(&total_own, &whole)? * total_with;
     for j in 0..width {
         for i in 0..order {
             model.b[(i, j)] = found[(j * order + i, 0)];

@@ -1,5 +1,7 @@
 //! Decides what past and future of a record are, and sums their products; not what is made of them.
 
+use std::ops::Range;
+
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
 
@@ -10,6 +12,13 @@ use crate::NumericsError;
 const AT_ONCE: usize = 256;
 /// Directions in which a matrix is below this share of its largest have rounding in them and nothing else.
 const ROUNDING: f64 = 1e-13;
+/// The same of what is left of a matrix when others were taken out of it, as a share of the whole: half of all digits are lost.
+const LEFT: f64 = 1e-8;
+
+/// Where the windows of twice the horizon begin that lie in a record.
+pub(super) fn windows(record: &Record<'_>, horizon: usize) -> Range<usize> {
+    0..(record.len() + 1).saturating_sub(2 * horizon)
+}
 
 /// The mean products of past inputs and outputs, future inputs and future outputs, in this order, over all windows.
 pub(super) struct Lagged {
@@ -25,7 +34,7 @@ impl Lagged {
         let order = 2 * horizon * (width + 1);
         let mut sum = Mat::<f64>::zeros(order, order);
         let mut rows: Vec<f64> = Vec::with_capacity(AT_ONCE * order);
-        let mut windows = 0;
+        let mut count = 0;
         let mut add = |rows: &mut Vec<f64>| {
             let block = MatRef::from_column_major_slice(rows, order, rows.len() / order);
             matmul(
@@ -39,14 +48,14 @@ impl Lagged {
             rows.clear();
         };
         for record in records {
-            for begin in 0..(record.len() + 1).saturating_sub(2 * horizon) {
+            for begin in windows(record, horizon) {
                 for half in [begin, begin + horizon] {
                     for at in half..half + horizon {
                         rows.extend_from_slice(record.input(at));
                     }
                     rows.extend_from_slice(&record.outputs[half..half + horizon]);
                 }
-                windows += 1;
+                count += 1;
                 if rows.len() == AT_ONCE * order {
                     add(&mut rows);
                 }
@@ -55,12 +64,12 @@ impl Lagged {
         if !rows.is_empty() {
             add(&mut rows);
         }
-        let count = windows.max(1) as f64;
+        let mean = count.max(1) as f64;
         Self {
-            products: Mat::from_fn(order, order, |i, j| sum[(i, j)] / count),
+            products: Mat::from_fn(order, order, |i, j| sum[(i, j)] / mean),
             horizon,
             width,
-            windows,
+            windows: count,
         }
     }
 
@@ -80,17 +89,21 @@ impl Lagged {
         let past = (0, self.past());
         let inputs = (self.past(), self.horizon * self.width);
         let outputs = (inputs.0 + inputs.1, self.horizon);
-        let inverse = pseudo_inverse(&self.part(inputs, inputs))?;
+        let of_inputs = self.part(inputs, inputs);
+        let inverse = pseudo_inverse_left(&of_inputs, &of_inputs)?;
         let left = |rows, columns| {
             let explained = self.part(rows, inputs) * &inverse * self.part(inputs, columns);
             self.part(rows, columns) - explained
         };
-        let past_left = left(past, past);
+        let (whole, past_left) = (self.part(past, past), left(past, past));
+        let of_outputs = self.part(outputs, outputs);
+        let largest = (0..self.horizon).map(|i| of_outputs[(i, i)]);
         Ok(Projected {
-            from_past: left(outputs, past) * pseudo_inverse(&past_left)?,
-            past: self.part(past, past),
+            from_past: left(outputs, past) * pseudo_inverse_left(&past_left, &whole)?,
+            past: whole,
             past_left,
             outputs_left: left(outputs, outputs),
+            least_output: LEFT * largest.fold(0.0, f64::max),
         })
     }
 }
@@ -101,6 +114,8 @@ pub(super) struct Projected {
     pub(super) past: Mat<f64>,
     pub(super) past_left: Mat<f64>,
     pub(super) outputs_left: Mat<f64>,
+    /// What is left of outputs in a direction in which there is more than rounding.
+    pub(super) least_output: f64,
 }
 
 /// Eigenvalues in falling order, none below 0, and the vectors that belong to them.
@@ -119,10 +134,14 @@ pub(super) fn spectrum(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), Numeri
     Ok((falling, turned))
 }
 
-/// A power of a symmetric matrix, directions of rounding left out.
-pub(super) fn power(matrix: &Mat<f64>, exponent: f64) -> Result<Mat<f64>, NumericsError> {
+/// A power of a symmetric matrix, directions in which it is not more than `least` left out.
+pub(super) fn power(
+    matrix: &Mat<f64>,
+    exponent: f64,
+    least: f64,
+) -> Result<Mat<f64>, NumericsError> {
     let (values, vectors) = spectrum(matrix)?;
-    let least = ROUNDING * values.first().copied().unwrap_or(0.0);
+    let least = least.max(ROUNDING * values.first().copied().unwrap_or(0.0));
     let order = values.len();
     let scaled = Mat::from_fn(order, order, |i, j| {
         if values[j] > least {
@@ -136,13 +155,26 @@ pub(super) fn power(matrix: &Mat<f64>, exponent: f64) -> Result<Mat<f64>, Numeri
 
 /// The pseudo-inverse of a symmetric matrix, its rows and columns on one scale.
 pub(super) fn pseudo_inverse(matrix: &Mat<f64>) -> Result<Mat<f64>, NumericsError> {
+    inverse(matrix, matrix, 0.0)
+}
+
+/// The same of what is left of a symmetric matrix when others were taken out of it.
+pub(super) fn pseudo_inverse_left(
+    left: &Mat<f64>,
+    whole: &Mat<f64>,
+) -> Result<Mat<f64>, NumericsError> {
+    inverse(left, whole, LEFT)
+}
+
+/// The pseudo-inverse on the scale of a matrix, directions in which it is not more than `least` there left out.
+fn inverse(matrix: &Mat<f64>, of: &Mat<f64>, least: f64) -> Result<Mat<f64>, NumericsError> {
     let order = matrix.nrows();
-    let inverse = |i: usize| {
-        let own = matrix[(i, i)];
+    let root = |i: usize| {
+        let own = of[(i, i)];
         if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 }
     };
-    let roots: Vec<f64> = (0..order).map(inverse).collect();
+    let roots: Vec<f64> = (0..order).map(root).collect();
     let scale =
         |matrix: &Mat<f64>| Mat::from_fn(order, order, |i, j| matrix[(i, j)] * roots[i] * roots[j]);
-    Ok(scale(&power(&scale(matrix), -1.0)?))
+    Ok(scale(&power(&scale(matrix), -1.0, least)?))
 }

@@ -285,3 +285,36 @@ fn wrong_requests_are_refused() {
     };
     assert!(PLAIN.identify(&[still], 2).is_err());
 }
+
+/// A record whose first input is the last output, as far as so much noise lets it be, its second the mean of the last two.
+fn fed_back(noise: f64) -> (Vec<f64>, Vec<f64>) {
+    let (driven, _, _) = scaled();
+    let mut outputs = vec![0.0, 0.0];
+    let mut inputs = vec![0.0; 4];
+    for random in driven.chunks_exact(2) {
+        let (last, before) = (outputs[outputs.len() - 1], outputs[outputs.len() - 2]);
+        outputs.push(0.3 * last + random[1]);
+        inputs.extend([last + noise * random[0], (last + before) / 2.0]);
+    }
+    (inputs, outputs)
+}
+
+#[test]
+fn canonical_correlations_are_1_at_most_where_an_input_is_the_last_output() {
+    for noise in [0.0, 1e-9, 1e-7, 1e-5, 1e-3] {
+        let (inputs, outputs) = fed_back(noise);
+        let record = Record {
+            inputs: &inputs,
+            outputs: &outputs,
+        };
+        let how = Subspace {
+            weighting: Weighting::Cva,
+            order: StateOrder::Threshold(0.25),
+            refined: true,
+            ..PLAIN
+        };
+        let found = how.identify(&[record], 2).unwrap();
+        let values = found.singular_values;
+        assert!(values[0] < 1.0 + 1e-4, "{noise}: {values:?}");
+    }
+}

@@ -325,7 +325,14 @@ impl Learner for Following {
         };
         let last = self.deviations.len().saturating_sub(1);
         let nth = usize::try_from(steps - 1).unwrap_or(usize::MAX).min(last);
-        self.deviations.get(nth).copied().unwrap_or(f64::NAN)
+        let of = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
+        // The first is that of an innovation.
+        let doubt = if followed.told > 0 {
+            followed.stepper.doubt()
+        } else {
+            0.0
+        };
+        (of(nth).powi(2) + doubt * of(0).powi(2)).sqrt()
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
@@ -452,6 +459,29 @@ mod tests {
             predicted
         });
         predicted.collect()
+    }
+
+    #[test]
+    fn right_after_a_start_the_deviation_is_larger_by_what_was_not_foreseen_before_it() {
+        let step = Duration::from_ns(1_000_000_000);
+        let mut model = identified(step);
+        model.model.c = vec![0.5];
+        model.deviations = vec![2.0, 3.0];
+        let mut learner = Following::new(&model);
+        let mut deviations = Vec::new();
+        for nth in 0..60 {
+            let of = Instant::from_ns(0) + part(step, nth, 1);
+            learner.run(&[1.0], of, of - step);
+            deviations.push(learner.deviation(&[1.0], of));
+            learner.learn(&[1.0], 0.0, of);
+        }
+        // Of nothing it knows least; then the innovation before the first truth counts by half.
+        assert_eq!(deviations[..2], [3.0, 2.0 * f64::sqrt(1.25)]);
+        assert!(
+            deviations[1..].is_sorted_by(|a, b| a >= b),
+            "{deviations:?}"
+        );
+        assert_eq!(deviations[59], 2.0);
     }
 
     #[test]

@@ -59,6 +59,29 @@ pub(crate) fn penalty() -> f64 {
     1.0
 }
 
+/// How often the noise is integrated.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) enum Differences {
+    /// It has a level to return to.
+    #[default]
+    None,
+    /// So often.
+    Given(usize),
+    /// Once or not at all, whichever is worth more.
+    Told,
+}
+
+impl Differences {
+    /// What is compared.
+    fn tried(self) -> std::ops::RangeInclusive<usize> {
+        match self {
+            Self::None => 0..=0,
+            Self::Given(differences) => differences..=differences,
+            Self::Told => 0..=1,
+        }
+    }
+}
+
 /// What a kind asks for, in the letters of Ljung (1999), chapter 4; those that it does not have are none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Asked {
@@ -68,7 +91,7 @@ pub(crate) struct Asked {
     pub(crate) nd: Option<usize>,
     pub(crate) nf: Option<PerInput>,
     pub(crate) nk: Option<PerInput>,
-    pub(crate) differences: usize,
+    pub(crate) differences: Differences,
     pub(crate) penalty: f64,
     pub(crate) every: Option<Duration>,
     pub(crate) order: Option<Order>,
@@ -112,12 +135,13 @@ impl Asked {
             let orders = orders.iter().flat_map(PerInput::each);
             orders.for_each(|order| check(name, order));
         }
-        if self.differences > MOST_DIFFERENCES {
-            let message = format!(
-                "`differences` is {} and must be 0 to {MOST_DIFFERENCES}",
-                self.differences
-            );
-            mistakes.push(Mistake::at("differences", message));
+        match self.differences {
+            Differences::Given(differences) if differences > MOST_DIFFERENCES => {
+                let message =
+                    format!("`differences` is {differences} and must be 0 to {MOST_DIFFERENCES}");
+                mistakes.push(Mistake::at("differences", message));
+            }
+            _ => {}
         }
         if !(self.penalty >= 0.0 && self.penalty.is_finite()) {
             let message = format!("`penalty` is {} and must be 0 or more", self.penalty);
@@ -152,8 +176,8 @@ impl Asked {
         ]
     }
 
-    /// The orders of a model, the open ones as in `chosen`.
-    fn orders(&self, chosen: &[usize; 6]) -> Orders {
+    /// The orders of a model, the open ones as in `chosen`, its noise integrated so often.
+    fn orders(&self, chosen: &[usize; 6], differences: usize) -> Orders {
         let open = self.order.as_ref().map_or([false; 6], Order::open);
         let of = |orders: &Option<PerInput>, letter: usize, nth: usize| match orders {
             Some(orders) if !open[letter] => orders.of(nth),
@@ -172,7 +196,7 @@ impl Asked {
                 .collect(),
             nc: chosen[2],
             nd: chosen[3],
-            differences: self.differences,
+            differences,
         }
     }
 

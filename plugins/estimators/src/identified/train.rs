@@ -7,8 +7,8 @@ use athermal_numerics::{
     Standardization, Standardizer, Stepper,
 };
 
-use super::Asked;
 use super::follow::{Identified, MOST_SERIES};
+use super::{Asked, Differences};
 use crate::conditioning::tell_rows;
 use crate::regression::told;
 use crate::scaling::Scaling;
@@ -175,8 +175,8 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let standard = standard.standardization();
         let samples = self.samples(pace, &standard);
         let found = self.asked.identify(&samples, pace.series, report)?;
-        let truths: Vec<f64> = self.rows.iter().map(|row| row.truth).collect();
-        tell_rows(&self.names, &self.regressors, &truths, report);
+        let truths = self.rows.iter().map(|row| row.truth);
+        tell_rows(&self.names, &self.regressors, truths, report);
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
@@ -254,36 +254,50 @@ impl Asked {
                 most_steps: most.clamp(20, 100),
             }
         };
-        let Some(order) = self.order else {
-            let orders = self.orders(&self.given());
-            return search(&orders).fit(&orders, samples, 0).map_err(told);
-        };
-        let candidates = order.combinations(self.given());
-        let orders: Vec<_> = candidates.iter().map(|one| self.orders(one)).collect();
-        let first = orders
-            .iter()
-            .map(athermal_numerics::Orders::first)
-            .max()
-            .unwrap_or(0);
+        // By default no order is open.
+        let order = self.order.unwrap_or_default();
+        let mut candidates = Vec::new();
+        for one in order.combinations(self.given()) {
+            let tried = self.differences.tried();
+            candidates.extend(tried.map(|differences| (one, self.orders(&one, differences))));
+        }
+        if let [(_, orders)] = &candidates[..]
+            && self.order.is_none()
+        {
+            return search(orders).fit(orders, samples, 0).map_err(told);
+        }
+        let firsts = candidates.iter().map(|(_, orders)| orders.first());
+        let first = firsts.max().unwrap_or(0);
         let mut tried = Vec::new();
         let mut fits = Vec::new();
         let mut failed = None;
-        for (candidate, orders) in candidates.iter().zip(&orders) {
-            match search(orders).fit(orders, samples, first) {
+        for (candidate, orders) in candidates {
+            match search(&orders).fit(&orders, samples, first) {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     let coefficients = orders.coefficients();
                     let figures = InformationCriteria::of(fit.rows, coefficients, squares);
-                    tried.push((*candidate, coefficients, figures));
+                    tried.push((candidate, coefficients, figures));
                     fits.push(fit);
                 }
                 Err(error) => failed = Some(error),
             }
         }
-        let Some((best, table)) = order.best(samples.counted(first), &tried) else {
+        let Some((best, mut table)) = order.best(samples.counted(first), &tried) else {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
+        if let Differences::Told = self.differences {
+            for (told, fit) in table.tried.iter_mut().zip(&fits) {
+                let differences = format!("differences {}", fit.model.differences);
+                let orders = (!told.order.is_empty()).then_some(&*told.order);
+                told.order = orders
+                    .into_iter()
+                    .chain([&*differences])
+                    .collect::<Vec<_>>()
+                    .join(", ");
+            }
+        }
         report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
     }

@@ -140,7 +140,7 @@ impl KalmanTrainer {
                 "the rows do not determine all coefficients; with a `penalty` above 0 they need not",
             ));
         }
-        tell_rows(&self.names, &scaled, &truths, report);
+        tell_rows(&self.names, &scaled, truths.iter().copied(), report);
         self.tell(&followed, report);
         let mut filter = followed.filter;
         filter.restart_level(&followed.at_large);

@@ -17,8 +17,8 @@ use super::problem::DocumentProblem;
 use super::read::Document;
 use super::tree::{Data, Table};
 use crate::diagnostic::Diagnostics;
-pub(crate) use reading::known_keys;
 use reading::text;
+pub(crate) use reading::{is_misspelt, known_keys};
 pub(crate) use time_base::UNITS as TIME_UNITS;
 
 const SECTIONS: [&str; 14] = [
@@ -64,13 +64,13 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     known_keys(root, &known, "a graph file", diagnostics);
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
-    let mut broken = Vec::new();
     // Whoever refers to what stands in a section that is none has been told of the section.
     let strange = root.iter().filter(|(key, _)| !known.contains(key));
     let below = strange.filter_map(|(_, section)| section.value.as_table());
-    broken.extend(below.flat_map(Table::keys).map(str::to_owned));
+    let elsewhere: Vec<String> = below.flat_map(Table::keys).map(str::to_owned).collect();
+    let mut broken = Vec::new();
     let shared = names::check(root, &mut broken, diagnostics);
-    let sets = sets::declare(root.get("sets"), &mut broken, diagnostics);
+    let sets = sets::declare(root.get("sets"), &elsewhere, diagnostics);
     let time = time_base::declare(root.get("time"), diagnostics);
     let sample = time.sample();
     let signals = root.get("signals");
@@ -104,17 +104,18 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         .collect();
     let mut naming = NAMING.iter().filter_map(|section| root.get(section));
     let whole = naming.all(|section| section.as_table().is_some());
-    if document.faulty || expanded.cut || !whole {
+    if expanded.cut || !whole {
         return None;
     }
     Some(GraphFile {
         name,
         description,
-        sets,
+        sets: sets.members,
         time,
         signals,
         nodes,
         broken,
+        elsewhere,
         outputs,
         tests,
         deployment,

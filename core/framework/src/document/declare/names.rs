@@ -20,9 +20,8 @@ pub(super) fn check(
             continue;
         };
         for (name, entry) in table.iter() {
-            let before = diagnostics.error_count();
             name_rule(name, entry.key, role, false, diagnostics);
-            if diagnostics.error_count() > before {
+            if !is_name(name, false) && role != "set" {
                 broken.extend(name.split(['.', ':']).next().map(str::to_owned));
             }
             if let Some(&(first_role, first)) = taken.get(name) {
@@ -55,11 +54,7 @@ pub(super) fn name_rule(
     digit_first: bool,
     diagnostics: &mut Diagnostics,
 ) {
-    let mut characters = name.chars();
-    let first = characters
-        .next()
-        .is_some_and(|c| c.is_alphabetic() || digit_first && c.is_ascii_digit());
-    if !(first && characters.all(|c| c.is_alphanumeric() || c == '_' || c == '-')) {
+    if !is_name(name, digit_first) {
         diagnostics.report(
             place,
             DocumentProblem::BadName {
@@ -69,6 +64,14 @@ pub(super) fn name_rule(
             },
         );
     }
+}
+
+/// Whether something may be called so.
+pub(super) fn is_name(name: &str, digit_first: bool) -> bool {
+    let mut characters = name.chars();
+    let first = characters.next();
+    first.is_some_and(|c| c.is_alphabetic() || digit_first && c.is_ascii_digit())
+        && characters.all(|c| c.is_alphanumeric() || c == '_' || c == '-')
 }
 
 /// The same for a list of members or channels, of which none may stand twice.

@@ -2,10 +2,12 @@
 
 use super::modules::{Expanded, Placed};
 use super::placeholder;
-use super::reading::{in_samples, known_keys, length, missing, one_or_more, samples, table, text};
-use super::sets::{self, Sets};
-use crate::diagnostic::Diagnostics;
-use crate::document::graph_file::{InputDecl, InstanceDecl, NodeDecl};
+use super::reading::{
+    in_samples, is_misspelt, known_keys, length, missing, one_or_more, samples, table, text,
+};
+use super::sets::Sets;
+use crate::diagnostic::{Diagnostics, Place};
+use crate::document::graph_file::{Faulty, InputDecl, InstanceDecl, NodeDecl};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
 use crate::time::Duration;
@@ -38,18 +40,19 @@ pub(super) fn declare(
         // Inside a module, one place in a file stands for a node of each instance.
         let context = (!placed.around.is_empty()).then(|| format!("node `{}`", placed.name));
         let outer = diagnostics.scope(context);
-        let before = diagnostics.error_count();
-        match node(placed, sets, sample, &mut total, diagnostics) {
-            Some(node)
-                if diagnostics.error_count() == before
-                    && (placed.around.is_empty() || !expanded.faulty)
-                    && !node.each.iter().any(|set| broken.contains(set)) =>
-            {
-                declared.push(node);
-            }
-            _ => broken.push(placed.name.clone()),
-        }
+        let mut node = node(placed, sets, sample, &mut total, diagnostics);
         diagnostics.scope(outer);
+        // Inside a module that has mistakes, what stands there may not be what was meant.
+        if !placed.around.is_empty()
+            && expanded.faulty
+            && let Some(node) = &mut node
+        {
+            node.faulty.get_or_insert_default();
+        }
+        if node.as_ref().is_none_or(|node| node.faulty.is_some()) {
+            broken.push(placed.name.clone());
+        }
+        declared.extend(node);
     }
     declared
 }
@@ -66,6 +69,7 @@ fn node(
         entry,
         around,
     } = placed;
+    let before = diagnostics.reported();
     let keys = table(&entry.value, name, diagnostics)?;
     let what = format!("node \"{name}\"");
     let kind = match keys.get("type") {
@@ -81,10 +85,10 @@ fn node(
             None
         }
     };
-    let own = each(keys, sets, diagnostics);
-    let each = own.map(|own| around_and_own(placed, own, sets));
-    if let Some(each) = &each {
-        check_placeholders(&entry.value, each, &what, diagnostics);
+    let own = own_each(keys, sets, diagnostics);
+    let each = around_and_own(placed, own.sets, sets);
+    if own.known {
+        check_placeholders(&entry.value, &each, &what, diagnostics);
     }
     let inputs = match keys.get("inputs") {
         Some(value) => inputs(value, &what, sample, diagnostics),
@@ -92,29 +96,39 @@ fn node(
     };
     let mut parameters = Value::new(entry.value.place, Data::Table(own_parameters(keys)));
     convert_samples(&mut parameters, sample, diagnostics);
-    let (kind, kind_place) = kind?;
-    let each = each?;
-    let members = room_for(
-        name,
-        entry,
-        &each,
-        &parameters,
-        inputs.len(),
-        total,
-        diagnostics,
-    )?;
-    let instances = members
-        .into_iter()
-        .map(|member| InstanceDecl {
-            inputs: inputs
-                .iter()
-                .map(|input| filled_input(input, &member.pairs))
-                .collect(),
-            parameters: filled(&parameters, &member.pairs),
-            scopes: scopes(placed, &member),
-            member: (!each.is_empty()).then_some(member.name),
-        })
-        .collect();
+    let members = if own.sound {
+        let count = inputs.len();
+        room_for(name, entry, &each, &parameters, count, total, diagnostics)
+    } else {
+        None
+    };
+    let faulty = (members.is_none() || diagnostics.reported() > before).then(|| {
+        let mut open = Vec::new();
+        open_texts(&parameters, &mut open);
+        Faulty { open }
+    });
+    let inputs_of = |pairs: &[(&str, &str)]| {
+        let inputs = inputs.iter().map(|input| filled_input(input, pairs));
+        inputs.collect()
+    };
+    let instances = match members {
+        Some(members) => members
+            .into_iter()
+            .map(|member| InstanceDecl {
+                inputs: inputs_of(&member.pairs),
+                parameters: filled(&parameters, &member.pairs),
+                scopes: scopes(placed, &member),
+                member: (!each.is_empty()).then_some(member.name),
+            })
+            .collect(),
+        // Without its members, a node is looked through as if it had none.
+        None => vec![InstanceDecl {
+            inputs: inputs_of(&[]),
+            parameters,
+            scopes: Vec::new(),
+            member: None,
+        }],
+    };
     let each = around
         .iter()
         .flat_map(|around| &around.each)
@@ -129,19 +143,19 @@ fn node(
         name: name.clone(),
         place: entry.key,
         kind,
-        kind_place,
         each,
         instances,
+        faulty,
     })
 }
 
 /// Placeholders and the members that they stand for.
-type Each<'a> = Vec<(String, &'a [String])>;
+pub(super) type Each<'a> = Vec<(String, &'a [String])>;
 
 /// The sets of the modules around a node, then those of its own `each`.
 fn around_and_own<'a>(placed: &Placed, own: Each<'a>, sets: &'a Sets) -> Each<'a> {
     let around = placed.around.iter().flat_map(|around| {
-        let members = |set: &String| Some((around.placeholder(set), sets.get(set)?.as_slice()));
+        let members = |set: &String| Some((around.placeholder(set), sets.sound(set)?));
         around.each.iter().filter_map(members)
     });
     around.chain(own).collect()
@@ -168,44 +182,50 @@ fn scopes(placed: &Placed, member: &Member<'_>) -> Vec<(String, Option<String>)>
     scopes
 }
 
-/// The names of the sets of a node's own `each`; `None` after a mistake.
-pub(super) fn own_sets(
-    keys: &Table,
-    sets: &Sets,
-    diagnostics: &mut Diagnostics,
-) -> Option<Vec<String>> {
-    let each = each(keys, sets, diagnostics)?;
-    Some(each.into_iter().map(|(set, _)| set).collect())
+/// What a node's own `each` names.
+pub(super) struct OwnEach<'a> {
+    /// The sets with their members, as far as they are known.
+    pub(super) sets: Each<'a>,
+    /// Whether all members are known.
+    pub(super) sound: bool,
+    /// Whether the names are those of sets, if not of sound ones.
+    pub(super) known: bool,
 }
 
-/// The sets of `each` with their members; `None` after a mistake.
-fn each<'a>(keys: &Table, sets: &'a Sets, diagnostics: &mut Diagnostics) -> Option<Each<'a>> {
-    let Some(value) = keys.get("each") else {
-        return Some(Vec::new());
+/// Reads `each`.
+pub(super) fn own_each<'a>(
+    keys: &Table,
+    sets: &'a Sets,
+    diagnostics: &mut Diagnostics,
+) -> OwnEach<'a> {
+    let mut own = OwnEach {
+        sets: Vec::new(),
+        sound: true,
+        known: true,
     };
-    let names = one_or_more(value, "each", "`each`", diagnostics)?;
-    let mut each: Each<'_> = Vec::new();
-    let mut clean = true;
-    for (name, place) in &names {
-        match (
-            sets.get_key_value(name),
-            sets::find(name, *place, sets, diagnostics),
-        ) {
-            (Some((name, _)), Some(_)) if each.iter().any(|(taken, _)| taken == name) => {
-                let problem = DocumentProblem::DuplicateName {
-                    role: "set",
-                    name: name.clone(),
-                    first_role: "set",
-                    first: None,
-                };
-                diagnostics.report(*place, problem);
-                clean = false;
-            }
-            (Some((name, _)), Some(members)) => each.push((name.clone(), members)),
-            _ => clean = false,
+    let Some(value) = keys.get("each") else {
+        return own;
+    };
+    let before = diagnostics.reported();
+    let names = one_or_more(value, "each", "`each`", diagnostics).unwrap_or_default();
+    for (name, place) in names {
+        let members = sets.find(&name, place, diagnostics);
+        own.sound &= members.is_some();
+        if own.sets.iter().any(|(taken, _)| *taken == name) {
+            let problem = DocumentProblem::DuplicateName {
+                role: "set",
+                name,
+                first_role: "set",
+                first: None,
+            };
+            diagnostics.report(place, problem);
+        } else {
+            own.sets.push((name, members.unwrap_or_default()));
         }
     }
-    clean.then_some(each)
+    own.known = diagnostics.reported() == before;
+    own.sound &= own.known;
+    own
 }
 
 /// One member of the product of all sets of `each`.
@@ -327,7 +347,8 @@ fn check_placeholders(value: &Value, each: &Each<'_>, what: &str, diagnostics: &
                     known,
                     what: what.to_owned(),
                 };
-                diagnostics.report(value.place, problem);
+                // Around a module it may have been told already.
+                diagnostics.report_unless_told(value.place, problem);
             }
         }
         Data::List(values) => values
@@ -351,47 +372,42 @@ fn inputs(
     };
     ports
         .iter()
-        .filter_map(|(port, entry)| input(port, entry, what, sample, diagnostics))
+        .map(|(port, entry)| input(port, entry, what, sample, diagnostics))
         .collect()
 }
 
+/// An input; one that does not say readably what it reads is there all the same, and reads nothing.
 fn input(
     port: &str,
     entry: &Entry,
     what: &str,
     sample: Option<Duration>,
     diagnostics: &mut Diagnostics,
-) -> Option<InputDecl> {
+) -> InputDecl {
     let input = format!("input \"{port}\" of {what}");
     let (from, max_age) = match &entry.value.data {
         Data::Table(keys) => {
-            known_keys(keys, &["from", "max_age"], &input, diagnostics);
+            let known = ["from", "max_age"];
+            known_keys(keys, &known, &input, diagnostics);
             let max_age = keys.get("max_age").and_then(|value| {
                 Some((length(value, "max_age", sample, diagnostics)?, value.place))
             });
-            match keys.get("from") {
-                Some(from) => (from, max_age),
-                None => {
-                    missing(
-                        &entry.value,
-                        "from",
-                        &input,
-                        Some("name what it reads, e.g. from = \"gradients\""),
-                        diagnostics,
-                    );
-                    return None;
-                }
+            let from = keys.get("from");
+            if from.is_none() && !is_misspelt(keys, "from", &known) {
+                let advice = "name what it reads, e.g. from = \"gradients\"";
+                missing(&entry.value, "from", &input, Some(advice), diagnostics);
             }
+            (from, max_age)
         }
-        _ => (&entry.value, None),
+        _ => (Some(&entry.value), None),
     };
-    let references = one_or_more(from, port, &input, diagnostics)?;
-    Some(InputDecl {
+    let references = from.and_then(|from| one_or_more(from, port, &input, diagnostics));
+    InputDecl {
         port: port.to_owned(),
         place: entry.key,
-        references,
+        references: references.unwrap_or_default(),
         max_age,
-    })
+    }
 }
 
 fn own_parameters(keys: &Table) -> Table {
@@ -445,10 +461,13 @@ pub(super) fn convert_samples_but(
 }
 
 fn filled_input(input: &InputDecl, members: &[(&str, &str)]) -> InputDecl {
-    let references = input
+    let filled = input
         .references
         .iter()
-        .map(|(text, place)| (placeholder::fill(text, members), *place))
+        .map(|(text, place)| (placeholder::fill(text, members), *place));
+    // Of a placeholder that stands for nothing has been told.
+    let references = filled
+        .filter(|(text, _)| placeholder::names(text).next().is_none())
         .collect();
     InputDecl {
         port: input.port.clone(),
@@ -485,6 +504,18 @@ fn filled(value: &Value, members: &[(&str, &str)]) -> Value {
         scalar => scalar.clone(),
     };
     Value::new(value.place, data)
+}
+
+/// The places of texts that still hold a placeholder or a number of samples.
+fn open_texts(value: &Value, open: &mut Vec<Place>) {
+    match &value.data {
+        Data::Text(_) if has_placeholders(value) || has_samples(value) => open.push(value.place),
+        Data::List(values) => values.iter().for_each(|value| open_texts(value, open)),
+        Data::Table(table) => table
+            .iter()
+            .for_each(|(_, entry)| open_texts(&entry.value, open)),
+        _ => {}
+    }
 }
 
 fn has_placeholders(value: &Value) -> bool {

@@ -1,7 +1,7 @@
 //! `[outputs]`: what comes out, and how it passes from an old graph to a new one; references are left to the compiler.
 
 use super::placeholder;
-use super::reading::{known_keys, missing, one_or_more, quantity, table};
+use super::reading::{is_misspelt, known_keys, missing, one_or_more, quantity, table};
 use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::OutputDecl;
 use crate::document::problem::DocumentProblem;
@@ -21,12 +21,14 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
     let what = format!("output \"{name}\"");
     let (from, blend) = match &entry.value.data {
         Data::Table(keys) => {
-            known_keys(keys, &["from", "blend"], &what, diagnostics);
+            let known = ["from", "blend"];
+            known_keys(keys, &known, &what, diagnostics);
             let blend = keys
                 .get("blend")
                 .and_then(|value| quantity(value, "blend", diagnostics));
             match keys.get("from") {
                 Some(from) => (from, blend),
+                None if is_misspelt(keys, "from", &known) => return None,
                 None => {
                     missing(
                         &entry.value,

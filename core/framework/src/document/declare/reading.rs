@@ -1,6 +1,6 @@
 //! How single values of a section are read and refused; what they are for is decided by the sections.
 
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, nearest};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Table, Value};
 use crate::quantity::Quantity;
@@ -19,6 +19,12 @@ pub(crate) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics:
             },
         );
     }
+}
+
+/// Whether a key that is missing is there under a name that [`known_keys`] tells to be none.
+pub(crate) fn is_misspelt(table: &Table, key: &str, known: &[&str]) -> bool {
+    let mut strange = table.keys().filter(|given| !known.contains(given));
+    strange.any(|given| nearest(given, known.iter().copied()) == Some(key))
 }
 
 pub(super) fn wrong_type(value: &Value, key: &str, expected: &str, diagnostics: &mut Diagnostics) {

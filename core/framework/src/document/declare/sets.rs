@@ -1,27 +1,38 @@
 //! The members of each set; where sets are used is decided by signals and nodes.
 
+use std::collections::HashSet;
+
 use indexmap::{IndexMap, IndexSet};
 
-use super::names::distinct;
+use super::names::{distinct, is_name};
 use super::reading::{table, texts};
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, nearest};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::Value;
 
-pub(super) type Sets = IndexMap<String, Vec<String>>;
+/// The sets of a graph.
+pub(super) struct Sets {
+    /// The members of each.
+    pub(super) members: IndexMap<String, Vec<String>>,
+    /// Those with mistakes that have been told: nobody is told that they do not exist.
+    broken: HashSet<String>,
+}
 
+/// Reads the section `[sets]`; what stands `elsewhere`, in a section that is none, may be a set as well.
 pub(super) fn declare(
     sets: Option<&Value>,
-    broken: &mut Vec<String>,
+    elsewhere: &[String],
     diagnostics: &mut Diagnostics,
 ) -> Sets {
-    let mut declared = Sets::new();
+    let mut declared = Sets {
+        members: IndexMap::new(),
+        broken: elsewhere.iter().cloned().collect(),
+    };
     let Some(sets) = sets.and_then(|sets| table(sets, "sets", diagnostics)) else {
         return declared;
     };
     for (name, entry) in sets.iter() {
         let before = diagnostics.error_count();
-        // A set with a mistake in it is known all the same, so that its users are not told that it does not exist.
         let members = texts(&entry.value, name, "a list of names", diagnostics).unwrap_or_default();
         if entry.value.as_list().is_some_and(<[Value]>::is_empty) {
             diagnostics.report(
@@ -32,33 +43,46 @@ pub(super) fn declare(
             );
         }
         distinct(&members, "member", diagnostics);
-        if diagnostics.error_count() > before {
-            broken.push(name.to_owned());
+        if diagnostics.error_count() > before || !is_name(name, false) {
+            declared.broken.insert(name.to_owned());
         }
         // Of those that stand twice one, lest every user of the set is told of it.
         let members: IndexSet<_> = members.into_iter().map(|(member, _)| member).collect();
-        declared.insert(name.to_owned(), members.into_iter().collect());
+        let members = members.into_iter().collect();
+        declared.members.insert(name.to_owned(), members);
     }
     declared
 }
 
-/// The set called `name`, or a report of what there is.
-pub(super) fn find<'a>(
-    name: &str,
-    place: Place,
-    sets: &'a Sets,
-    diagnostics: &mut Diagnostics,
-) -> Option<&'a [String]> {
-    let found = sets.get(name);
-    if found.is_none() {
-        let known = sets.keys().cloned().collect();
-        diagnostics.report(
-            place,
-            DocumentProblem::UnknownSet {
-                name: name.to_owned(),
-                known,
-            },
-        );
+impl Sets {
+    /// The members of a set without mistakes.
+    pub(super) fn sound(&self, name: &str) -> Option<&[String]> {
+        let sound = self.members.get(name).map(Vec::as_slice);
+        sound.filter(|_| !self.broken.contains(name))
     }
-    found.map(Vec::as_slice)
+
+    /// The members of a set; `None` where they are not known, which has then been told.
+    pub(super) fn find(
+        &self,
+        name: &str,
+        place: Place,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<&[String]> {
+        if !self.members.contains_key(name) && !self.is_misspelt(name) {
+            let problem = DocumentProblem::UnknownSet {
+                name: name.to_owned(),
+                known: self.members.keys().cloned().collect(),
+            };
+            diagnostics.report(place, problem);
+        }
+        self.sound(name)
+    }
+
+    /// Whether a name that no set has is the right one of a set with mistakes.
+    pub(super) fn is_misspelt(&self, name: &str) -> bool {
+        let known = self.members.keys().chain(&self.broken);
+        let near = nearest(name, known.map(String::as_str));
+        self.broken.contains(name)
+            || near.is_some_and(|near| self.broken.contains(near) && !is_name(near, false))
+    }
 }

@@ -2,8 +2,10 @@
 
 use super::names::distinct;
 use super::placeholder;
-use super::reading::{known_keys, length, missing, quantity, table, text, texts, wrong_type};
-use super::sets::{self, Sets};
+use super::reading::{
+    is_misspelt, known_keys, length, missing, quantity, table, text, texts, wrong_type,
+};
+use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::SignalDecl;
 use crate::document::problem::DocumentProblem;
@@ -29,7 +31,7 @@ pub(super) fn declare(
     };
     let mut declared = Vec::new();
     for (name, entry) in signals.iter() {
-        match signal(name, entry, sets, sample, broken, diagnostics) {
+        match signal(name, entry, sets, sample, diagnostics) {
             Some(signal) => declared.push(signal),
             None => broken.push(name.to_owned()),
         }
@@ -43,7 +45,6 @@ fn signal(
     entry: &Entry,
     sets: &Sets,
     sample: Option<Duration>,
-    broken: &[String],
     diagnostics: &mut Diagnostics,
 ) -> Option<SignalDecl> {
     let before = diagnostics.error_count();
@@ -52,6 +53,7 @@ fn signal(
     known_keys(keys, &KEYS, &what, diagnostics);
     let unit = match keys.get("unit") {
         Some(value) => unit(value, diagnostics),
+        None if is_misspelt(keys, "unit", &KEYS) => None,
         None => {
             missing(
                 &entry.value,
@@ -65,6 +67,7 @@ fn signal(
     };
     let channels = match keys.get("channels") {
         Some(value) => channels(value, &what, sets, diagnostics),
+        None if is_misspelt(keys, "channels", &KEYS) => None,
         None => {
             missing(
                 &entry.value,
@@ -76,11 +79,7 @@ fn signal(
             None
         }
     };
-    let of_broken = keys
-        .get("channels")
-        .and_then(Value::as_text)
-        .is_some_and(|set| broken.iter().any(|broken| broken == set));
-    let known = diagnostics.error_count() == before && !of_broken;
+    let known = diagnostics.error_count() == before;
     let column = match keys.get("column") {
         Some(value) => column(value, channels.as_deref(), &what, diagnostics),
         None => Some(format!("{{{CHANNEL}}}")),
@@ -131,7 +130,7 @@ fn channels(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(String, Place)>> {
     if let Some(set) = value.as_text() {
-        let members = sets::find(set, value.place, sets, diagnostics)?;
+        let members = sets.find(set, value.place, diagnostics)?;
         return Some(
             members
                 .iter()
@@ -222,8 +221,25 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         return None;
     };
     // Both are read before either is given up, so that mistakes in both are told.
-    let (low, high) = (end(low, unit, diagnostics), end(high, unit, diagnostics));
-    let (low, high, unit) = (low?, high?, unit?);
+    let ends = (
+        quantity(low, "range", diagnostics).map(|of| (of, low.place)),
+        quantity(high, "range", diagnostics).map(|of| (of, high.place)),
+    );
+    let unit = unit?;
+    let foreign = [&ends.0, &ends.1].into_iter().flatten();
+    let foreign: Vec<_> = foreign
+        .filter(|(of, _)| of.in_unit(unit).is_none())
+        .collect();
+    if let Some((first, place)) = foreign.first() {
+        // Where neither converts, the unit of the signal is the one mistake.
+        let problem = DocumentProblem::RangeUnit {
+            found: first.unit.to_string(),
+            unit: unit.to_string(),
+        };
+        diagnostics.report(*place, problem);
+        return None;
+    }
+    let (low, high) = (ends.0?.0.in_unit(unit)?, ends.1?.0.in_unit(unit)?);
     if low < high {
         return Some((low, high));
     }
@@ -236,20 +252,6 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         },
     );
     None
-}
-
-fn end(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> Option<f64> {
-    let quantity = quantity(value, "range", diagnostics)?;
-    let unit = unit?;
-    let converted = quantity.in_unit(unit);
-    if converted.is_none() {
-        let problem = DocumentProblem::RangeUnit {
-            found: quantity.unit.to_string(),
-            unit: unit.to_string(),
-        };
-        diagnostics.report(value.place, problem);
-    }
-    converted
 }
 
 fn optional(

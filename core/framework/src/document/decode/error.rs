@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::de::{self, Expected, Unexpected};
 
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, nearest};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Value};
 use crate::quantity::Quantity;
@@ -38,6 +38,16 @@ impl Mistake {
             DocumentProblem::MissingKey { key, .. } => Some(key),
             _ => None,
         }
+    }
+
+    /// Whether it is an unknown key that another finds missing under its right name.
+    pub(super) fn is_meant_for(&self, missing: &Self) -> bool {
+        let (DocumentProblem::UnknownKey { key, known, .. }, Some(wanted), Some((_, table))) =
+            (&self.problem, missing.missing_key(), self.path.split_last())
+        else {
+            return false;
+        };
+        table == missing.path && nearest(key, known.iter().map(String::as_str)) == Some(wanted)
     }
 
     /// The same, with what to write where a key of the whole table is missing.

@@ -38,6 +38,7 @@ pub(crate) fn decode_advised<T: DeserializeOwned>(
 ) -> Option<T> {
     let mut repair: Option<Repair> = None;
     let mut clean = true;
+    let mut strange: Vec<Mistake> = Vec::new();
     // Each turn takes at least one value out of the tree; the limit only bounds the time that a hopeless file takes.
     for _ in 0..200 {
         let (result, unknown) = attempt::<T>(repair.as_ref().map_or(value, Repair::tree));
@@ -46,7 +47,8 @@ pub(crate) fn decode_advised<T: DeserializeOwned>(
             let repair = repair.get_or_insert_with(|| Repair::of(value));
             for mistake in unknown {
                 repair.take_out(&mistake.path);
-                mistake.report(what, diagnostics);
+                mistake.clone().report(what, diagnostics);
+                strange.push(mistake);
             }
         }
         let mistake = match result {
@@ -55,7 +57,8 @@ pub(crate) fn decode_advised<T: DeserializeOwned>(
         };
         clean = false;
         let repair = repair.get_or_insert_with(|| Repair::of(value));
-        if !repair.explains(&mistake) {
+        let is_misspelt = strange.iter().any(|given| given.is_meant_for(&mistake));
+        if !repair.explains(&mistake) && !is_misspelt {
             mistake.clone().advised(advice).report(what, diagnostics);
         }
         let goes_on = match mistake.missing_key() {

@@ -27,16 +27,24 @@ pub(super) fn edited(subject: &Subject<'_>) -> Result<(), String> {
         &format!("/fitted/{NODE}"),
         &mut places,
     );
-    for place in places {
+    for place in &places {
         for (edit, what) in EDITS {
             let mut model = model.clone();
-            if model.pointer_mut(&place).is_some_and(edit) {
+            if model.pointer_mut(place).is_some_and(edit) {
                 tried(|| runs(subject, &model))
                     .map_err(|found| format!("with {what} {place}, {found}"))?;
             }
         }
     }
-    Ok(())
+    // Lists whose lengths are held against each other are all empty only where none is forgotten.
+    let mut hollow = model.clone();
+    for place in &places {
+        // Of lists within lists, the outer one is emptied first.
+        if let Some(list) = hollow.pointer_mut(place).and_then(Value::as_array_mut) {
+            list.clear();
+        }
+    }
+    tried(|| runs(subject, &hollow)).map_err(|found| format!("with every list empty, {found}"))
 }
 
 /// What may have been done to a list or number; false where it cannot be done to this one.

@@ -37,9 +37,9 @@ use std::sync::Arc;
 
 use indexmap::IndexMap;
 
-use super::nodes::{MOST_INSTANCES, MOST_VALUES, own_sets, weight};
+use super::nodes::{MOST_INSTANCES, MOST_VALUES, own_each, weight};
 use super::placeholder;
-use super::reading::{known_keys, missing, table, text};
+use super::reading::{is_misspelt, known_keys, missing, table, text};
 use super::sets::Sets;
 use crate::diagnostic::Diagnostics;
 use crate::document::problem::DocumentProblem;
@@ -97,7 +97,7 @@ pub(super) fn expand(
     broken: &mut Vec<String>,
     diagnostics: &mut Diagnostics,
 ) -> Expanded {
-    let before = diagnostics.error_count();
+    let before = diagnostics.reported();
     check(root.get("modules"), diagnostics);
     let mut expanded = Expanded {
         nodes: Vec::new(),
@@ -127,6 +127,7 @@ pub(super) fn expand(
         values: 0,
         path: Vec::new(),
         full: false,
+        faulty: false,
     };
     for (name, entry) in nodes.iter() {
         if has_modules {
@@ -135,6 +136,7 @@ pub(super) fn expand(
             expansion.place(name, entry.clone(), &level);
         }
     }
+    expanded.faulty = expansion.faulty || expansion.diagnostics.reported() > before;
     if has_modules {
         if let Some(outputs) = &mut expanded.outputs {
             expansion.outputs(outputs, &level);
@@ -145,8 +147,8 @@ pub(super) fn expand(
     }
     expanded.cut = expansion.full;
     expanded.nodes = expansion.placed;
-    expanded.faulty = diagnostics.error_count() > before;
-    if expanded.faulty {
+    // An output that names no port of an instance leaves its nodes as they were meant.
+    if expanded.faulty || diagnostics.reported() > before {
         let instances = nodes.iter().filter(|(_, entry)| is_instance(entry));
         broken.extend(instances.map(|(name, _)| name.to_owned()));
     }
@@ -204,6 +206,8 @@ struct Expansion<'a> {
     path: Vec<(String, *const Value)>,
     /// Set when the limit was told, so that nothing more is expanded.
     full: bool,
+    /// Set when an instance could not be expanded, since what it refers to has mistakes.
+    faulty: bool,
 }
 
 impl Expansion<'_> {
@@ -290,11 +294,15 @@ impl Expansion<'_> {
         let Some(module) = Module::read(module_name, found, &mut Diagnostics::new()) else {
             return;
         };
-        let Some(each) = own_sets(keys, self.sets, self.diagnostics) else {
+        let each = own_each(keys, self.sets, self.diagnostics);
+        self.faulty |= !each.sound;
+        if !each.known {
             return;
-        };
-        let around = self.around(name, each, level);
-        let Some(given) = self.given(name, entry, keys, &module, &around, level) else {
+        }
+        let names = each.sets.into_iter().map(|(set, _)| set);
+        let around = self.around(name, names.collect(), level);
+        let given = self.given(name, entry, keys, &module, &around, level);
+        let Some(given) = given.filter(|_| each.sound) else {
             return;
         };
         let mut modules = level.modules[..=sight].to_vec();
@@ -347,6 +355,7 @@ impl Expansion<'_> {
             .chain(module.parameter_names())
             .collect();
         known_keys(keys, &known, &what, self.diagnostics);
+        let misspelt = |parameter: &str| is_misspelt(keys, parameter, &known);
         let mut whole = true;
         let mut inputs = IndexMap::new();
         let empty = Table::new();
@@ -354,10 +363,10 @@ impl Expansion<'_> {
             Some(value) => table(value, "inputs", self.diagnostics)?,
             None => &empty,
         };
-        let known: Vec<&str> = module.inputs.iter().map(String::as_str).collect();
+        let ports: Vec<&str> = module.inputs.iter().map(String::as_str).collect();
         known_keys(
             wired,
-            &known,
+            &ports,
             &format!("`inputs` of {what}"),
             self.diagnostics,
         );
@@ -367,6 +376,7 @@ impl Expansion<'_> {
                     let value = self.input(value, level);
                     inputs.insert(input.clone(), self.outward(value, around, &what));
                 }
+                None if is_misspelt(wired, input, &ports) => whole = false,
                 None => {
                     whole = false;
                     let advice = format!("wire it, e.g. inputs.{input} = \"…\"");
@@ -390,6 +400,7 @@ impl Expansion<'_> {
                     parameters.insert(parameter.to_owned(), value);
                 }
                 None if parameters.contains_key(parameter) => {}
+                None if misspelt(parameter) => whole = false,
                 None => {
                     whole = false;
                     missing(&entry.value, parameter, &what, None, self.diagnostics);

@@ -75,14 +75,6 @@ inputs.x = { form = "p" }
     assert_eq!(
         rendered(&files),
         r#"
-error[A007]: input "x" of node "n" needs the key "from"
- --> a.toml:4:12
-  |
-4 | inputs.x = { form = "p" }
-  |            ^^^^^^^^^^^^^^ "from" is missing
-  |
-  = help: name what it reads, e.g. from = "gradients"
-
 error[A006]: input "x" of node "n" has no key "form"
  --> a.toml:4:14
   |

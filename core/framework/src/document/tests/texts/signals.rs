@@ -358,6 +358,8 @@ error[A022]: the range is in "K", which does not convert to the signal's unit "n
   |
 5 | range = ["0 K", "5 um"]
   |          ^^^^^ does not convert to nm
+  |
+  = help: write it in nm, or correct the signal's unit
 "#
     );
 }

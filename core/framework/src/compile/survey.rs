@@ -1,0 +1,84 @@
+//! Decides what is told of an instance that cannot be resolved, since mistakes in it have been told: all that is wrong with the rest.
+
+use super::instance::{Declared, ReadParts};
+use super::learning::Learn;
+use super::problem::CompileProblem;
+use super::resolver::Resolver;
+use crate::document::{InstanceDecl, NodeDecl};
+use crate::node::{InputPort, Kind, Read, Role};
+
+impl Resolver<'_> {
+    /// Looks through an instance of which nobody will read anything.
+    pub(super) fn survey(
+        &mut self,
+        node: &NodeDecl,
+        decl: &InstanceDecl,
+        kind: Option<&'static Kind>,
+        parts: &ReadParts,
+    ) {
+        let Some(kind) = kind else {
+            for (text, place) in decl.inputs.iter().flat_map(|input| &input.references) {
+                self.look_up(text, *place);
+            }
+            return;
+        };
+        let declared = Declared { node, decl, kind };
+        self.known_inputs(&declared);
+        let ports = self.wired(&declared);
+        if let Some(Learn::Within(limits)) = parts.estimator.as_ref().and_then(|keys| keys.learn) {
+            self.mistakes(&declared, limits.mistakes());
+        }
+        let mistakes = match parts.spec.as_ref().map(|spec| spec.role()) {
+            Some(Role::Feature(feature)) if !feature.closes_loops() => ports
+                .and_then(|ports| feature.outputs(&self.inputs(&declared, ports)).err())
+                .unwrap_or_default(),
+            Some(Role::Estimator(estimator)) => estimator.mistakes(),
+            Some(Role::Combiner(combiner)) => combiner.mistakes(),
+            Some(Role::Feature(_)) | None => Vec::new(),
+        };
+        self.mistakes(&declared, mistakes);
+    }
+
+    /// What each input port reads, where all of it is known; whatever is wrong with it is told.
+    fn wired(&mut self, declared: &Declared<'_>) -> Option<Vec<(InputPort, Vec<usize>)>> {
+        // Inputs that cannot be read at all are not missing.
+        if declared.node.faulty.is_some() && declared.decl.inputs.is_empty() {
+            return None;
+        }
+        let mut ports = Vec::new();
+        let mut whole = true;
+        for port in (declared.kind.inputs)() {
+            let slots = self.slots(declared, port).unwrap_or_default();
+            let takes_one = port.read == Read::Truth || port.name == "state";
+            if takes_one && slots.len() > 1 {
+                self.one_of(declared, port, &slots);
+            }
+            whole &= !slots.is_empty() || port.optional && declared.input(port.name).is_none();
+            ports.push((*port, slots));
+        }
+        whole.then_some(ports)
+    }
+
+    /// Tells of inputs that the kind does not have.
+    pub(super) fn known_inputs(&mut self, declared: &Declared<'_>) {
+        let ports = (declared.kind.inputs)();
+        let strange = |port: &str| !ports.iter().any(|known| known.name == port);
+        for input in declared
+            .decl
+            .inputs
+            .iter()
+            .filter(|input| strange(&input.port))
+        {
+            let problem = CompileProblem::UnknownInput {
+                kind: declared.kind.name,
+                input: input.port.clone(),
+                known: ports.iter().map(|port| port.name).collect(),
+            };
+            self.diagnostics.report(input.place, problem);
+            // What it reads is looked at all the same.
+            for (text, place) in &input.references {
+                self.look_up(text, *place);
+            }
+        }
+    }
+}
