@@ -48,10 +48,7 @@ const NODES: [(&str, &str); 15] = [
         "type = \"arx\"\nlags = [\"1min\", \"2min\"]\nfeature_lags = [\"0s\", \"2min\"]",
     ),
     ("ar", "type = \"ar\"\nlags = [\"1min\", \"2min\"]"),
-    (
-        "polynomial",
-        "type = \"polynomial\"\nselection = { method = \"none\" }",
-    ),
+    ("polynomial", "type = \"polynomial\""),
     (
         "narx",
         "type = \"narx\"\nlags = [\"1min\"]\ntolerance = 1e-7",
@@ -69,13 +66,11 @@ fn graph() -> String {
             "stack" => "inputs.voters = [\"ols\", \"ar\"]",
             _ => "inputs.features = [\"temperature\", \"heater\"]",
         };
-        let ahead = if name == "stack" {
-            ""
-        } else {
-            "ahead = \"0s\""
-        };
         let truth = "inputs.truth = \"position.Z\"";
-        let _ = writeln!(text, "[nodes.{name}]\n{node}\n{inputs}\n{truth}\n{ahead}");
+        let _ = writeln!(
+            text,
+            "[nodes.{name}]\n{node}\n{inputs}\n{truth}\nahead = \"0s\""
+        );
     }
     text.push_str("[outputs]\n");
     for (name, _) in NODES {
@@ -153,7 +148,7 @@ fn predictions_follow_from_the_coefficients_that_are_shown() {
     let scratch = Scratch::new("coefficients-round-trip");
     let (model, data) = model(&scratch);
     let shown = show(&model, "json").ended(0).json();
-    let run = athermal(&[&"run", &model, &"--data", &data]).ended(0);
+    let run = athermal(&[&"run", &model, &"-i", &data]).ended(0);
     let mut lines = run.out.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let told: Vec<BTreeMap<&str, f64>> = lines
@@ -176,7 +171,7 @@ fn predictions_follow_from_the_coefficients_that_are_shown() {
             continue;
         }
         for (nth, told) in told.iter().enumerate().skip(10) {
-            let expected = told[node];
+            let expected = told[&*format!("{node}.Z")];
             let value = |name: &str| {
                 let (channel, lag) = name.split_once(" lag ").unwrap_or((name, "0min"));
                 let back: usize = lag

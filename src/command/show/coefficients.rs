@@ -2,7 +2,7 @@
 
 use athermal::Model;
 use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
-use athermal::core::node::{Coefficients, Factor, Of, Predictor, Regressor, Term};
+use athermal::core::node::{Coefficients, Factor, Mode, Noise, Of, Predictor, Regressor, Term};
 use athermal::core::unit::Unit;
 use athermal_numerics::Fading;
 use serde::Serialize;
@@ -67,23 +67,6 @@ pub(super) struct Multiplied {
     /// The least and the largest value that counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) held: Option<(f64, f64)>,
-}
-
-/// A noise that a model takes for granted.
-#[derive(Debug, Serialize)]
-pub(super) struct Noise {
-    pub(super) name: String,
-    pub(super) deviation: f64,
-    pub(super) per_s: Option<f64>,
-}
-
-/// How a model comes to rest.
-#[derive(Debug, Serialize)]
-pub(super) struct Mode {
-    pub(super) of: String,
-    /// None where it does not come to rest; below 0 where it grows.
-    pub(super) time_constant_s: Option<f64>,
-    pub(super) period_s: Option<f64>,
 }
 
 /// Every fitted estimator of a model, in the order of the plan.
@@ -152,14 +135,11 @@ fn recur(found: &mut Coefficients, used: &[&Regressor], ahead_ns: i64) {
     }
     let step_s = step_ns as f64 / 1e9;
     let modes = Fading::of(&polynomial).into_iter();
-    found
-        .modes
-        .extend(modes.map(|fading| athermal::core::node::Mode {
-            of: "past truths".to_owned(),
-            input: None,
-            time_constant_s: fading.time_constant * step_s,
-            period_s: fading.period.map(|period| period * step_s),
-        }));
+    found.modes.extend(modes.map(|fading| Mode {
+        of: "past truths".to_owned(),
+        time_constant_s: fading.time_constant * step_s,
+        period_s: fading.period.map(|period| period * step_s),
+    }));
 }
 
 /// The regressors that are used.
@@ -167,23 +147,10 @@ struct Names<'a>(&'a [&'a Regressor]);
 
 impl Names<'_> {
     fn found(&self, of: Coefficients) -> Found {
-        let noises = of.noises.into_iter().map(|noise| Noise {
-            name: noise.name,
-            deviation: noise.deviation,
-            per_s: noise.per.map(athermal::Duration::secs),
-        });
-        let modes = of.modes.into_iter().map(|mode| Mode {
-            of: match mode.input {
-                Some(input) => format!("{} {}", mode.of, self.0[input].name),
-                None => mode.of,
-            },
-            time_constant_s: Some(mode.time_constant_s).filter(|time| time.is_finite()),
-            period_s: mode.period_s,
-        });
         Found {
             coefficients: of.terms.iter().map(|term| self.coefficient(term)).collect(),
-            noises: noises.collect(),
-            modes: modes.collect(),
+            noises: of.noises,
+            modes: of.modes,
             step_s: of.step.map(athermal::Duration::secs),
             differences: of.differences,
         }

@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use athermal::Model;
+use athermal::core::node::Mode;
+use athermal::{Duration, Model};
 
-use super::coefficients::{Coefficient, Found, Mode, Told};
-use crate::figures::{paragraph, table};
+use super::coefficients::{Found, Told};
+use crate::figures::{length, paragraph, table};
 
 /// The longest name that numbers stand beside; what is longer is told above them.
 const LONGEST_NAME: usize = 36;
@@ -53,22 +54,21 @@ fn estimator(of: &Told, found: &Found) -> String {
     if found.step_s.is_some() {
         text.push_str(&paragraph("  ", 2, &equation(found)));
     }
-    let mut rows = Vec::new();
-    for of in &found.coefficients {
-        let mut lines = name_lines(of);
-        let mut row = vec![lines.pop().unwrap_or_default()];
-        rows.extend(lines.into_iter().map(|line| vec![line]));
-        row.push(digits(of.value, 5));
-        row.push(of.standard_error.map_or("-".to_owned(), |it| digits(it, 3)));
-        row.push(of.per.clone().unwrap_or_default());
-        rows.push(row);
-    }
+    let rows = found.coefficients.iter().map(|of| {
+        let error = of.standard_error.map_or("-".to_owned(), |it| digits(it, 3));
+        let cells = [
+            digits(of.value, 5),
+            error,
+            of.per.clone().unwrap_or_default(),
+        ];
+        (of.name.as_str(), cells.to_vec())
+    });
     let header = ["  coefficient", unit, "std. error", "per"];
-    text.push_str(&table(&header, &rows));
+    text.push_str(&named(&header, rows));
     text.push_str(&held(found));
     if !found.noises.is_empty() {
         let rows = found.noises.iter().map(|noise| {
-            let within = noise.per_s.map(|per| format!("in {}", time(per)));
+            let within = noise.per_s.map(|per| format!("in {}", stated(per)));
             vec![
                 format!("  {}", noise.name),
                 digits(noise.deviation, 4),
@@ -80,14 +80,11 @@ fn estimator(of: &Told, found: &Found) -> String {
     }
     if !found.modes.is_empty() {
         let rows = found.modes.iter().map(|mode| {
-            vec![
-                format!("  {}", mode.of),
-                fading(mode),
-                mode.period_s.map_or("-".to_owned(), time),
-            ]
+            let period = mode.period_s.map_or("-".to_owned(), time);
+            (mode.of.as_str(), vec![fading(mode), period])
         });
         let header = ["  comes to rest", "time constant", "period"];
-        text.push_str(&table(&header, &rows.collect::<Vec<_>>()));
+        text.push_str(&named(&header, rows));
     }
     text
 }
@@ -122,18 +119,34 @@ fn equation(found: &Found) -> String {
         0 => String::new(),
         order => format!("; A is of order {order}"),
     };
-    let step = time(found.step_s.unwrap_or(0.0));
+    let step = stated(found.step_s.unwrap_or(0.0));
     format!("{truth} = {inputs}{noise}, q⁻¹ being a step of {step} back{order}")
 }
 
+/// A table whose names may be long: those that are stand above their numbers, so that the others are not held apart from theirs.
+fn named<'a>(header: &[&str], rows: impl Iterator<Item = (&'a str, Vec<String>)>) -> String {
+    let (mut above, mut lines) = (vec![String::new()], Vec::new());
+    for (name, cells) in rows {
+        let mut names = name_lines(name);
+        let beside = names.pop().unwrap_or_default();
+        above.push(names.iter().map(|line| format!("{line}\n")).collect());
+        lines.push(std::iter::once(beside).chain(cells).collect());
+    }
+    let table = table(header, &lines);
+    let lines = above.iter().zip(table.lines());
+    lines
+        .map(|(above, line)| format!("{above}{line}\n"))
+        .collect()
+}
+
 /// The name in lines of which numbers stand beside the last.
-fn name_lines(of: &Coefficient) -> Vec<String> {
+fn name_lines(name: &str) -> Vec<String> {
     let short = |text: &str| text.chars().count() <= LONGEST_NAME;
-    if short(&of.name) {
-        return vec![format!("  {}", of.name)];
+    if short(name) {
+        return vec![format!("  {name}")];
     }
     let mut lines: Vec<String> = Vec::new();
-    for factor in of.name.split(" × ") {
+    for factor in name.split(" × ") {
         let sign = if lines.is_empty() { "  " } else { "    × " };
         lines.push(format!("{sign}{factor}"));
     }
@@ -146,39 +159,39 @@ fn name_lines(of: &Coefficient) -> Vec<String> {
 /// From where regressors in products count, and how far.
 fn held(found: &Found) -> String {
     let factors = || found.coefficients.iter().flat_map(|of| &of.factors);
-    let mut named: Vec<&str> = Vec::new();
+    let mut regressors: Vec<&str> = Vec::new();
     for factor in factors().filter(|of| of.about.is_some() || of.held.is_some()) {
-        if !named.contains(&&*factor.regressor) {
-            named.push(&factor.regressor);
+        if !regressors.contains(&&*factor.regressor) {
+            regressors.push(&factor.regressor);
         }
     }
-    if named.is_empty() {
+    if regressors.is_empty() {
         return String::new();
     }
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |it| digits(it, 5));
     let ranges = factors().any(|of| of.held.is_some());
-    let rows = named.iter().map(|&name| {
+    let rows = regressors.iter().map(|&name| {
         let of = || factors().filter(|of| of.regressor == name);
         let about = of().find_map(|of| of.about);
         let unit = of().next().map_or("", |of| &*of.unit);
-        let mut row = vec![format!("  {name}"), number(about), unit.to_owned()];
+        let mut row = vec![number(about), unit.to_owned()];
         if ranges {
             let held = of().find_map(|of| of.held);
             row.push(number(held.map(|(least, _)| least)));
             row.push(number(held.map(|(_, largest)| largest)));
         }
-        row
+        (name, row)
     });
     let header = ["  counted from its mean", "", "", "held from", "to"];
     let columns = if ranges { 5 } else { 3 };
-    table(&header[..columns], &rows.collect::<Vec<_>>())
+    named(&header[..columns], rows)
 }
 
 fn fading(mode: &Mode) -> String {
     match mode.time_constant_s {
-        None => "stays".to_owned(),
-        Some(grows) if grows < 0.0 => format!("grows, {}", time(-grows)),
-        Some(fades) => time(fades),
+        stays if stays.is_infinite() => "stays".to_owned(),
+        grows if grows < 0.0 => format!("grows, {}", time(-grows)),
+        fades => time(fades),
     }
 }
 
@@ -194,6 +207,11 @@ fn digits(value: f64, count: usize) -> String {
         let after = usize::try_from(count as i32 - before).unwrap_or(0);
         format!("{value:.after$}")
     }
+}
+
+/// A time as a graph file states it.
+fn stated(seconds: f64) -> String {
+    Duration::from_secs_f64(seconds).map_or_else(|| time(seconds), length)
 }
 
 /// A time to three significant digits, in the unit in which it is read best.
@@ -238,12 +256,12 @@ mod tests {
         assert_eq!(told, ["0", "12.346", "-0.00012346", "1.2346e6", "98765"]);
         let times = [0.0456, 90.0, 3_600.0, 7.65 * 60.0, 1e7].map(time);
         assert_eq!(times, ["45.6 ms", "90 s", "1 h", "7.65 min", "116 d"]);
-        let mode = |time_constant_s| Mode {
+        let mode = |time_constant_s: f64| Mode {
             of: "A".to_owned(),
             time_constant_s,
             period_s: None,
         };
-        assert_eq!(fading(&mode(None)), "stays");
-        assert_eq!(fading(&mode(Some(-60.0))), "grows, 60 s");
+        assert_eq!(fading(&mode(f64::INFINITY)), "stays");
+        assert_eq!(fading(&mode(-60.0)), "grows, 60 s");
     }
 }

@@ -1,5 +1,7 @@
 //! Decides in which words a fitted estimator tells what it consists of; which units they are in is decided by its rows.
 
+use serde::Serialize;
+
 use crate::time::Duration;
 
 /// What a fitted estimator consists of, in the units of the rows that it was fitted on: see
@@ -122,24 +124,23 @@ impl Factor {
 }
 
 /// A noise, in the words in which a graph gives it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Noise {
     /// Its name: `level`.
     pub name: String,
     /// Its standard deviation, in the unit of the truth.
     pub deviation: f64,
-    /// The time in which that adds up, where it does.
-    pub per: Option<Duration>,
+    /// The time in s in which that adds up, where it does.
+    pub per_s: Option<f64>,
 }
 
 /// One of the ways in which a model comes to rest.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mode {
-    /// What comes to rest: the polynomial that it is a root of, such as `A`, or a state.
+    /// What comes to rest: the polynomial that it is a root of and its input, or a state: `A`, `F temperature.room`, `level`.
     pub of: String,
-    /// The regressor that is the input of that polynomial, by its place among those used.
-    pub input: Option<usize>,
-    /// The time in s in which it comes to rest, but for 1/e of the way; infinite or negative where it does not.
+    /// The time in s in which it comes to rest, but for 1/e of the way; infinite (null in JSON) where it stays, negative where it
+    /// grows.
     pub time_constant_s: f64,
     /// The period in s with which it swings, where it does.
     pub period_s: Option<f64>,

@@ -44,8 +44,10 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
         if matches!(polynomial, 'A' | 'D' | 'F') {
             told.modes
                 .extend(Fading::of(values).iter().map(|fading| Mode {
-                    of: polynomial.to_string(),
-                    input,
+                    of: match input {
+                        Some(nth) => format!("{polynomial} {}", of.regressors[nth]),
+                        None => polynomial.to_string(),
+                    },
                     time_constant_s: fading.time_constant * step_s,
                     period_s: fading.period.map(|period| period * step_s),
                 }));
@@ -63,7 +65,7 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
         .extend(of.deviations.first().map(|&deviation| Noise {
             name: "e".to_owned(),
             deviation,
-            per: None,
+            per_s: None,
         }));
     told
 }

@@ -1,7 +1,6 @@
 //! Decides how a structural model tells its coefficients and noises, on the scale of the data.
 
 use athermal_core::node::{Coefficients, Mode, Noise, Predictor};
-use athermal_core::time::Duration;
 
 use super::KalmanPredictor;
 
@@ -23,11 +22,11 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
     let wandering = |name: &str, deviation: f64| Noise {
         name: name.to_owned(),
         deviation,
-        per: Duration::from_secs_f64(PER_S),
+        per_s: Some(PER_S),
     };
     let mut noises = vec![
         Noise {
-            per: None,
+            per_s: None,
             ..wandering("observation", model.observation.sqrt())
         },
         wandering("level", (model.level * PER_S).sqrt()),
@@ -36,7 +35,6 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
     noises.extend(trend.map(|trend| wandering("trend", (trend * PER_S).sqrt() * PER_S)));
     let returns = Mode {
         of: "level".to_owned(),
-        input: None,
         time_constant_s: 1.0 / model.returning,
         period_s: None,
     };
