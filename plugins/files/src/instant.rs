@@ -27,7 +27,9 @@ impl TimeForm {
     pub(crate) fn text(self, time_ns: i64) -> String {
         match self {
             Self::Numbers { ns_per_unit: unit } | Self::Samples { step_ns: unit } => {
-                (time_ns as f64 / unit as f64).to_string()
+                // All nanoseconds of an epoch are more than a number of 64 bits can tell.
+                let (whole, rest) = (time_ns / unit, time_ns % unit);
+                (whole as f64 + rest as f64 / unit as f64).to_string()
             }
             Self::Rfc3339 => Timestamp::from_nanosecond(time_ns.into())
                 .map_or_else(|_| format!("{time_ns} ns"), |time| time.to_string()),
