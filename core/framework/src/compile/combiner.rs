@@ -3,11 +3,10 @@
 use super::conversion::{factor, mismatch};
 use super::estimator::{self, DEVIATION};
 use super::instance::Instance;
-use super::leak::Suspect;
 use super::plan::{Beside, PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
-use super::resolver::Resolver;
+use super::resolver::{Resolver, Suspect};
 use crate::channel::Channel;
 use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;

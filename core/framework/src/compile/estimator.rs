@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use super::instance::{Instance, Limits};
-use super::leak::Suspect;
+use super::instance::Instance;
+use super::keys::Limits;
 use super::learning;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
-use super::resolver::Resolver;
+use super::resolver::{Resolver, Suspect};
 use crate::channel::Channel;
 use crate::diagnostic::Place;
 use crate::node::{Estimator, FREEZE, OutputPort, Regressor, Role, TruthLags};

@@ -1,10 +1,9 @@
 //! Decides what a feature of a graph is given and what it gives.
 
 use super::instance::Instance;
-use super::leak::Suspect;
 use super::plan::{PlannedFit, PlannedRole};
 use super::provenance::Provenance;
-use super::resolver::Resolver;
+use super::resolver::{Resolver, Suspect};
 use crate::node::{Feature, InputPort, Read};
 use crate::time::Duration;
 

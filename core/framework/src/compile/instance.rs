@@ -3,16 +3,11 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::Deserialize;
-
-use super::learning::Learn;
+use super::keys::EstimatorKeys;
 use super::problem::CompileProblem;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds};
-use crate::quantity::Quantity;
-use crate::time::Duration;
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -46,36 +41,6 @@ impl ReadParts {
             estimator: self.estimator.clone()?,
         })
     }
-}
-
-/// What the framework reads of an estimator's table.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct EstimatorKeys {
-    /// How far ahead of now the truth is predicted: `"5min"` is a forecast, `"0s"` a virtual sensor.
-    pub(crate) ahead: Option<Duration>,
-    /// Which truths it is fitted on.
-    pub(crate) train: Train,
-    /// Whether it goes on learning while it runs: `true`, or a table of limits.
-    pub(crate) learn: Option<Learn>,
-}
-
-/// Which rows an estimator is trained on.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct Train {
-    /// Those whose absolute value is within these limits.
-    pub(crate) abs_truth: Limits,
-}
-
-/// Limits of an absolute value.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct Limits {
-    /// Only those below.
-    pub(crate) below: Option<Quantity>,
-    /// Only those at or above.
-    pub(crate) above: Option<Quantity>,
 }
 
 impl ReadNode {

@@ -5,23 +5,9 @@
 use super::plan::{PlannedNode, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{Provenance, leaks};
-use super::resolver::Resolver;
-use crate::diagnostic::Place;
+use super::resolver::{Resolver, Suspect};
 use crate::node::Role;
 use crate::time::Duration;
-
-/// Features of an estimator that are still to be looked at.
-#[derive(Debug)]
-pub(super) struct Suspect {
-    pub(super) place: Place,
-    pub(super) context: String,
-    /// The slots that are read.
-    pub(super) features: Vec<usize>,
-    /// The lag at which they are read.
-    pub(super) lag: Duration,
-    /// The truth that is predicted.
-    pub(super) link: TruthLink,
-}
 
 impl Resolver<'_> {
     /// Reports every feature that leaks.

@@ -1,74 +1,14 @@
 //! Decides whether an estimator goes on learning while it runs, and what it never learns from.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer};
-
 use super::instance::Instance;
+use super::keys::{Learn, LearnLimits};
 use super::plan::PlannedLearning;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use crate::channel::Channel;
-use crate::node::{Estimator, FREEZE, Forms, InputPort, Learns, Mistake, OutputPort};
+use crate::node::{Estimator, FREEZE, InputPort, Learns, Mistake, OutputPort};
 use crate::time::Duration;
 use crate::unit::Unit;
-
-/// The key `learn` of an estimator.
-#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
-#[schemars(untagged)]
-pub(crate) enum Learn {
-    /// Whether it goes on learning while it runs.
-    Switch(bool),
-    /// It does, within these limits.
-    Within(LearnLimits),
-}
-
-/// What is not learned from.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct LearnLimits {
-    /// Truths that miss their prediction by more than this multiple of the recent root mean square error, above 1.
-    #[schemars(extend("exclusiveMinimum" = 1.0))]
-    pub(crate) outliers: f64,
-    /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width.
-    #[schemars(range(min = 0.0))]
-    pub(crate) margin: f64,
-}
-
-impl Default for LearnLimits {
-    fn default() -> Self {
-        Self {
-            outliers: 6.0,
-            margin: 0.0,
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for Learn {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Forms::new("true, false or a table of limits")
-            .truth(Self::Switch)
-            .table(Self::Within)
-            .read(deserializer)
-    }
-}
-
-impl LearnLimits {
-    pub(super) fn mistakes(self) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        let Self { outliers, margin } = self;
-        if outliers.is_nan() || outliers <= 1.0 {
-            let message = format!("`outliers` is {outliers} and must be above 1");
-            let mistake = Mistake::at("learn.outliers", message);
-            mistakes.push(mistake.help("4 to 10 keeps spikes out; inf lets everything in"));
-        }
-        if margin.is_nan() || margin < 0.0 {
-            let message = format!("`margin` is {margin} and must be 0 or more");
-            let mistake = Mistake::at("learn.margin", message);
-            mistakes.push(mistake.help("0 is the range of the fit itself, inf any"));
-        }
-        mistakes
-    }
-}
 
 impl Resolver<'_> {
     /// Whether an estimator learns while it runs, and how; `None` when an error about it has been told.

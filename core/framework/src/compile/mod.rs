@@ -8,6 +8,7 @@ mod estimator;
 mod feature;
 mod inputs;
 mod instance;
+mod keys;
 mod leak;
 mod learning;
 mod order;
@@ -24,7 +25,7 @@ mod survey;
 pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
-pub(crate) use instance::EstimatorKeys;
+pub(crate) use keys::EstimatorKeys;
 pub(crate) use plan::Rows;
 pub use plan::{
     Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,

@@ -7,10 +7,9 @@ use std::sync::Arc;
 use indexmap::IndexSet;
 
 use super::instance::{Declared, Instance, ReadNode, context};
-use super::leak::Suspect;
 use super::order::Order;
 use super::plan::{
-    Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel,
+    Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, TruthLink,
 };
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
@@ -18,7 +17,7 @@ use super::scope::Scopes;
 use super::slot_set::SlotSet;
 use super::{Wanted, steps};
 use crate::channel::Channel;
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostics, Place};
 use crate::document::GraphFile;
 use crate::node::{Mistake, OutputPort, Role};
 use crate::time::Duration;
@@ -46,6 +45,19 @@ pub(crate) struct Resolver<'g> {
     pub(super) suspects: Vec<Suspect>,
     /// Slots that somebody refers to.
     pub(super) read: SlotSet,
+}
+
+/// Features of an estimator that are still to be looked at.
+#[derive(Debug)]
+pub(super) struct Suspect {
+    pub(super) place: Place,
+    pub(super) context: String,
+    /// The slots that are read.
+    pub(super) features: Vec<usize>,
+    /// The lag at which they are read.
+    pub(super) lag: Duration,
+    /// The truth that is predicted.
+    pub(super) link: TruthLink,
 }
 
 impl<'g> Resolver<'g> {

@@ -1,7 +1,7 @@
 //! Decides what is told of an instance that cannot be resolved, since mistakes in it have been told: all that is wrong with the rest.
 
 use super::instance::{Declared, ReadParts};
-use super::learning::Learn;
+use super::keys::Learn;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use crate::document::{InstanceDecl, NodeDecl};

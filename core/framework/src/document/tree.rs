@@ -144,6 +144,12 @@ impl Value {
         Value { place, data }
     }
 
+    /// Where the value of a key stands; the value itself, where it is no table or has no such key.
+    pub fn place_of(&self, key: &str) -> Place {
+        let value = self.as_table().and_then(|keys| keys.get(key));
+        value.map_or(self.place, |value| value.place)
+    }
+
     /// The text, if it is one.
     pub fn as_text(&self) -> Option<&str> {
         match &self.data {

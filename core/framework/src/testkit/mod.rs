@@ -50,6 +50,7 @@ mod fixture;
 mod rule;
 mod rules;
 mod samples;
+mod tried;
 mod verdict;
 
 pub use bench::Bench;

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::rules::{self, Subject};
+use super::tried::tried;
 use super::{Case, Examined, Rule};
 use crate::node::{Kind, NodeSpec, kinds};
 
@@ -72,20 +72,6 @@ fn broken_in(rule: Rule, case: Option<&Case>, found: String) -> Broken {
         case: case.map(|case| case.parameters.clone()),
         found,
     }
-}
-
-/// What a check finds; a panic in it is a finding too.
-pub(super) fn tried<T>(check: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(check)).unwrap_or_else(|panic| {
-        let said = panic
-            .downcast_ref::<String>()
-            .map(String::as_str)
-            .or_else(|| panic.downcast_ref::<&str>().copied());
-        Err(format!(
-            "it panics: {}",
-            said.unwrap_or("without a message")
-        ))
-    })
 }
 
 /// Fails with all that is wrong, if anything is; [`conformance!`](crate::conformance) makes use of it.

@@ -267,7 +267,7 @@ impl Declaring<'_> {
     fn simulation(&mut self, key: &'static str, value: &Value) -> Option<DataSet> {
         let what = format!("\"{key}\"");
         let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
-        let place = place_of(value, "simulate");
+        let place = value.place_of("simulate");
         let known = match machine(&table.simulate) {
             Ok(known) => known,
             Err(unknown) => {
@@ -283,7 +283,7 @@ impl Declaring<'_> {
             self.range(value, "days", found, "above 0 and at most 3653");
         }
         let schedule = match &table.schedule {
-            Some(path) => Some(self.schedule(path, place_of(value, "schedule"), known.machine)?),
+            Some(path) => Some(self.schedule(path, value.place_of("schedule"), known.machine)?),
             None => None,
         };
         Some(DataSet::Simulated(Simulation {
@@ -411,10 +411,10 @@ impl Declaring<'_> {
                 with: "kind",
                 excluded: true,
             };
-            self.diagnostics.report(place_of(value, "size"), problem);
+            self.diagnostics.report(value.place_of("size"), problem);
         }
         let plan = self.plan?;
-        let slots = self.measured(&spec.channel, place_of(value, "channel"))?;
+        let slots = self.measured(&spec.channel, value.place_of("channel"))?;
         let one = |slot: usize| {
             let name = plan.sources[slot].name.as_str();
             let unit = &plan.channels[slot].channel.unit;
@@ -441,7 +441,7 @@ impl Declaring<'_> {
         made.map_err(|error| {
             let key = if spec.size.is_some() { "size" } else { "kind" };
             let problem = TrialProblem::Fault(error);
-            self.diagnostics.report(place_of(value, key), problem);
+            self.diagnostics.report(value.place_of(key), problem);
         })
         .ok()
     }
@@ -484,14 +484,8 @@ impl Declaring<'_> {
             found,
             allowed,
         };
-        self.diagnostics.report(place_of(value, key), problem);
+        self.diagnostics.report(value.place_of(key), problem);
     }
-}
-
-/// Where the value of a key stands, or the table without it.
-pub(super) fn place_of(table: &Value, key: &str) -> Place {
-    let value = table.as_table().and_then(|keys| keys.get(key));
-    value.map_or(table.place, |value| value.place)
 }
 
 fn unknown_machine(unknown: UnknownMachine) -> TrialProblem {

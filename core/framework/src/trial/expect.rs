@@ -1,6 +1,6 @@
 //! Decides what an entry of `expect` means: keys that need or exclude each other, channels looked up, units checked.
 
-use super::declare::{Declaring, place_of};
+use super::declare::Declaring;
 use super::expectation::{Check, Expectation, Period, Rival, Tolerance};
 use super::problem::TrialProblem;
 use super::table::{ExpectTable, Within};
@@ -15,7 +15,7 @@ impl Declaring<'_> {
     pub(super) fn expectation(&mut self, value: &Value) -> Option<Expectation> {
         let table = decode::<ExpectTable>(value, "the expectation", self.diagnostics)?;
         self.check_keys(value, &table);
-        let slots = self.channels(&table.of, place_of(value, "of"))?;
+        let slots = self.channels(&table.of, value.place_of("of"))?;
         let checks = self.checks(value, &table);
         if checks.is_empty() {
             let what = "the expectation";
@@ -126,7 +126,7 @@ impl Declaring<'_> {
                 with,
                 excluded,
             };
-            self.diagnostics.report(place_of(value, key), problem);
+            self.diagnostics.report(value.place_of(key), problem);
         }
         if table.absent == Some(false) {
             let found = "false".to_owned();
@@ -197,7 +197,7 @@ impl Declaring<'_> {
         if let Some(key) = first.filter(|_| truth.is_none()) {
             let channel = name.clone();
             let problem = TrialProblem::NotAPrediction { key, channel };
-            self.diagnostics.report(place_of(value, key), problem);
+            self.diagnostics.report(value.place_of(key), problem);
         }
         let mut quantities: Vec<(&'static str, &Quantity, Unit)> = Vec::new();
         for check in checks {
@@ -232,7 +232,7 @@ impl Declaring<'_> {
                     channel: name.clone(),
                     expected: unit,
                 };
-                self.diagnostics.report(place_of(value, key), problem);
+                self.diagnostics.report(value.place_of(key), problem);
             }
         }
     }
@@ -250,7 +250,7 @@ impl Declaring<'_> {
                     channel: plan.channels[slot].name.clone(),
                     truth: plan.channels[truth].name.clone(),
                 };
-                self.diagnostics.report(place_of(value, "beats"), problem);
+                self.diagnostics.report(value.place_of("beats"), problem);
             }
         }
     }

@@ -1,6 +1,5 @@
 //! Decides how made-up measurements are written: which keys go together, and quantities in the unit of the channel.
 
-use super::declare::place_of;
 use super::problem::TrialProblem;
 use super::series::{Curve, Series, Shape};
 use super::table::{InputTable, Sample};
@@ -192,7 +191,7 @@ impl Shaping<'_> {
                 channel: self.channel.to_owned(),
                 expected: unit.clone(),
             };
-            self.diagnostics.report(place_of(self.value, key), problem);
+            self.diagnostics.report(self.value.place_of(key), problem);
             0.0
         })
     }
@@ -203,7 +202,7 @@ impl Shaping<'_> {
             with,
             excluded,
         };
-        self.diagnostics.report(place_of(self.value, key), problem);
+        self.diagnostics.report(self.value.place_of(key), problem);
     }
 
     fn range(&mut self, key: &'static str, found: String, allowed: &'static str) {
@@ -212,7 +211,7 @@ impl Shaping<'_> {
             found,
             allowed,
         };
-        self.diagnostics.report(place_of(self.value, key), problem);
+        self.diagnostics.report(self.value.place_of(key), problem);
     }
 }
 

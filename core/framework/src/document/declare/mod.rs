@@ -1,5 +1,6 @@
 //! From the merged tree to declarations: which sections there are and in which order they are read; each section has a file of its own.
 
+mod each;
 mod modules;
 mod names;
 mod nodes;

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::super::compared::course;
 use super::super::fixture::NODE;
-use super::super::verdict::tried;
+use super::super::tried::tried;
 use super::Subject;
 use super::fitting::text_of;
 use crate::model::Model;

@@ -37,7 +37,7 @@ use std::sync::Arc;
 
 use indexmap::IndexMap;
 
-use super::nodes::{MOST_INSTANCES, MOST_VALUES, own_each, weight};
+use super::each::{MOST_INSTANCES, MOST_VALUES, own_each, weight};
 use super::placeholder;
 use super::reading::{is_misspelt, known_keys, missing, table, text};
 use super::sets::Sets;

@@ -1,0 +1,96 @@
+//! Decides which keys of an estimator's table the framework reads itself, and what they may be; not what is made of them.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer};
+
+use crate::node::{Forms, Mistake};
+use crate::quantity::Quantity;
+use crate::time::Duration;
+
+/// What the framework reads of an estimator's table.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct EstimatorKeys {
+    /// How far ahead of now the truth is predicted: `"5min"` is a forecast, `"0s"` a virtual sensor.
+    pub(crate) ahead: Option<Duration>,
+    /// Which truths it is fitted on.
+    pub(crate) train: Train,
+    /// Whether it goes on learning while it runs: `true`, or a table of limits.
+    pub(crate) learn: Option<Learn>,
+}
+
+/// Which rows an estimator is trained on.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Train {
+    /// Those whose absolute value is within these limits.
+    pub(crate) abs_truth: Limits,
+}
+
+/// Limits of an absolute value.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Limits {
+    /// Only those below.
+    pub(crate) below: Option<Quantity>,
+    /// Only those at or above.
+    pub(crate) above: Option<Quantity>,
+}
+
+/// The key `learn` of an estimator.
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[schemars(untagged)]
+pub(crate) enum Learn {
+    /// Whether it goes on learning while it runs.
+    Switch(bool),
+    /// It does, within these limits.
+    Within(LearnLimits),
+}
+
+/// What is not learned from.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct LearnLimits {
+    /// Truths that miss their prediction by more than this multiple of the recent root mean square error, above 1.
+    #[schemars(extend("exclusiveMinimum" = 1.0))]
+    pub(crate) outliers: f64,
+    /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width.
+    #[schemars(range(min = 0.0))]
+    pub(crate) margin: f64,
+}
+
+impl Default for LearnLimits {
+    fn default() -> Self {
+        Self {
+            outliers: 6.0,
+            margin: 0.0,
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Learn {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Forms::new("true, false or a table of limits")
+            .truth(Self::Switch)
+            .table(Self::Within)
+            .read(deserializer)
+    }
+}
+
+impl LearnLimits {
+    pub(super) fn mistakes(self) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        let Self { outliers, margin } = self;
+        if outliers.is_nan() || outliers <= 1.0 {
+            let message = format!("`outliers` is {outliers} and must be above 1");
+            let mistake = Mistake::at("learn.outliers", message);
+            mistakes.push(mistake.help("4 to 10 keeps spikes out; inf lets everything in"));
+        }
+        if margin.is_nan() || margin < 0.0 {
+            let message = format!("`margin` is {margin} and must be 0 or more");
+            let mistake = Mistake::at("learn.margin", message);
+            mistakes.push(mistake.help("0 is the range of the fit itself, inf any"));
+        }
+        mistakes
+    }
+}
