@@ -68,6 +68,7 @@ impl Predictor for Identified {
             }
         }
         mistakes.extend(Mistake::unless_lasting("step", self.step));
+        mistakes.extend(super::told::mistakes(self));
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
         }

@@ -1,9 +1,29 @@
 //! Decides how an identified model tells its polynomials, on the scale of the data, and how they come to rest.
 
-use athermal_core::node::{Coefficients, Mode, Noise, Of, Predictor, Term};
+use athermal_core::node::{Coefficients, Mistake, Mode, Noise, Of, Predictor, Term};
 use athermal_numerics::Fading;
 
 use super::follow::Identified;
+
+/// Standard errors that do not belong to the coefficients.
+pub(super) fn mistakes(of: &Identified) -> Vec<Mistake> {
+    let (model, Some(errors)) = (&of.model, &of.errors) else {
+        return Vec::new();
+    };
+    let mut mistakes = Vec::new();
+    let mut check = |name: &str, wanted: usize, found: usize| {
+        mistakes.extend(Mistake::of_lengths(wanted, &[(name, found)]));
+    };
+    check("errors.inputs", model.inputs.len(), errors.inputs.len());
+    check("errors.a", model.a.len(), errors.a.len());
+    check("errors.c", model.c.len(), errors.c.len());
+    check("errors.d", model.d.len(), errors.d.len());
+    for (input, errors) in model.inputs.iter().zip(&errors.inputs) {
+        check("errors.inputs.b", input.b.len(), errors.b.len());
+        check("errors.inputs.f", input.f.len(), errors.f.len());
+    }
+    mistakes
+}
 
 pub(super) fn coefficients(of: &Identified) -> Coefficients {
     let model = &of.model;
