@@ -1,7 +1,23 @@
-//! A cell as a value: a number, no value, or neither. Not what follows from a cell that is neither.
+//! A cell as a value: a number, no value, or neither; a value as a cell. Not what follows from a cell that is neither.
+
+use crate::ledger::Ledger;
+use crate::{FileError, Place};
 
 /// Longest number with a decimal comma that is looked at; the longest exact double in decimal stays below it.
 const COMMA_CELL: usize = 1100;
+
+/// Cells of the current row, whatever the format.
+pub(crate) trait Cells {
+    /// Goes to the next whole row; false at the end.
+    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError>;
+    /// The cell of the time column.
+    fn time(&self) -> &[u8];
+    /// The cell of a channel of the layout; empty if there is none.
+    fn channel(&self, index: usize) -> &[u8];
+    /// Whether `1,5` is a number.
+    fn decimal_comma(&self) -> bool;
+    fn place(&self) -> Place;
+}
 
 /// The value of a cell, `NaN` for "no value" (empty, `NaN`, `null` in any case); `None` when it is neither.
 ///
@@ -51,6 +67,19 @@ pub(crate) fn trim(cell: &[u8]) -> &[u8] {
     match cell {
         [b'"', inner @ .., b'"'] => inner.trim_ascii(),
         _ => cell,
+    }
+}
+
+/// The text of a number; empty for no value.
+pub(crate) fn text_of(value: f64, number: &mut zmij::Buffer) -> &str {
+    if value.is_finite() {
+        number.format_finite(value)
+    } else if value.is_nan() {
+        ""
+    } else if value > 0.0 {
+        "inf"
+    } else {
+        "-inf"
     }
 }
 

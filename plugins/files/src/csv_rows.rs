@@ -2,10 +2,10 @@
 
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
+use crate::cell::Cells;
 use crate::columns;
 use crate::ledger::Ledger;
 use crate::lines::{LONGEST_ROW, Lines};
-use crate::reader::Cells;
 use crate::{FileError, Layout, Place};
 
 /// The rows of a CSV file.

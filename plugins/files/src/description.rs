@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
+use crate::cell::Cells;
 use crate::csv_rows::CsvRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
-use crate::reader::Cells;
 use crate::{FileError, Format};
 
 /// The columns of a file and the texts of its first rows.

@@ -2,7 +2,8 @@
 
 use std::io::{self, BufWriter, Write};
 
-use crate::writer::{BUFFER, text_of};
+use crate::cell::text_of;
+use crate::lines::BUFFER;
 
 /// A stream of JSON objects with the same keys, one per line.
 pub(crate) struct JsonObjects {

@@ -7,10 +7,10 @@ use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
 use serde_json::Deserializer;
 use serde_json::value::RawValue;
 
+use crate::cell::Cells;
 use crate::columns;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
-use crate::reader::Cells;
 use crate::{FileError, Layout, Place};
 
 /// The rows of a JSON lines file.

@@ -11,7 +11,8 @@ use crate::{FileError, Format, Place};
 /// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
 pub(crate) const LONGEST_ROW: usize = 1 << 20;
 
-const BUFFER: usize = 64 * 1024;
+/// Bytes read ahead, or held back when writing, at most.
+pub(crate) const BUFFER: usize = 64 * 1024;
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// A stream cut into lines.

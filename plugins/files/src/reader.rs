@@ -3,13 +3,13 @@
 use std::io::Read;
 use std::path::Path;
 
-use crate::cell;
+use crate::cell::{self, Cells};
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
 use crate::json_rows::JsonRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
-use crate::{FileError, Format, Layout, Place, Report};
+use crate::{FileError, Format, Layout, Report};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -41,19 +41,6 @@ pub struct Reader {
     rows: Rows,
     layout: Layout,
     ledger: Ledger,
-}
-
-/// Cells of the current row, whatever the format.
-pub(crate) trait Cells {
-    /// Goes to the next whole row; false at the end.
-    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError>;
-    /// The cell of the time column.
-    fn time(&self) -> &[u8];
-    /// The cell of a channel of the layout; empty if there is none.
-    fn channel(&self, index: usize) -> &[u8];
-    /// Whether `1,5` is a number.
-    fn decimal_comma(&self) -> bool;
-    fn place(&self) -> Place;
 }
 
 enum Rows {

@@ -5,11 +5,10 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::cell::text_of;
 use crate::json_objects::JsonObjects;
+use crate::lines::BUFFER;
 use crate::{FileError, Format};
-
-/// Bytes held back at most.
-pub(crate) const BUFFER: usize = 64 * 1024;
 
 /// When a row leaves the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -220,19 +219,6 @@ fn io_error(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,
         other => io::Error::other(format!("{other:?}")),
-    }
-}
-
-/// The text of a number; empty for no value.
-pub(crate) fn text_of(value: f64, number: &mut zmij::Buffer) -> &str {
-    if value.is_finite() {
-        number.format_finite(value)
-    } else if value.is_nan() {
-        ""
-    } else if value > 0.0 {
-        "inf"
-    } else {
-        "-inf"
     }
 }
 

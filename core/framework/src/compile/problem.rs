@@ -355,9 +355,16 @@ impl Problem for CompileProblem {
             }
             Self::UnknownNode { node, known } => or_known(node, known, "the graph has"),
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
-            Self::UnknownChannel { channel, known, .. } => {
-                or_known(channel, known, "its channels are")
-            }
+            Self::UnknownChannel {
+                node,
+                channel,
+                known,
+            } => match channel.split_once(':') {
+                Some((channel, port)) => {
+                    format!("a port stands behind the node: `{node}:{port}.{channel}`")
+                }
+                None => or_known(channel, known, "its channels are"),
+            },
             Self::UnknownInput { input, known, .. } => or_known(input, known, "its inputs are"),
             Self::MissingInput { input, summary, .. } => {
                 format!("add `inputs.{input} = \"…\"`: {summary}")

@@ -480,6 +480,12 @@ impl Problem for DocumentProblem {
                     None
                 }
             }
+            Self::WrongType {
+                expected, found, ..
+            } if expected.starts_with("a list") => {
+                let text = found.strip_prefix("the text ")?;
+                Some(format!("a list stands in brackets, e.g. [{text}]"))
+            }
             Self::UnknownChoice { found, choices, .. } => {
                 suggestion(found, choices, "the choices are")
             }
