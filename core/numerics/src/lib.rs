@@ -27,6 +27,7 @@ mod active_set;
 mod blocks;
 mod change;
 mod checks;
+mod cholesky;
 mod collinearity;
 mod correlation;
 mod elastic_net;

@@ -1,8 +1,8 @@
 //! Normal equations in scaled columns. Decides how they are set up, brought to a unit diagonal and solved, and how near to
 //! singular they are; does not decide what is done then.
 
+use crate::cholesky::inverse_of_factor;
 use crate::orthogonal::Triangle;
-use crate::prediction_variance::inverse_of_factor;
 use crate::{Gram, NumericsError, Rows};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};

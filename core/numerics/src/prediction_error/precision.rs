@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::Polynomials;
-use crate::prediction_variance::inverse_of_factor;
+use crate::cholesky::inverse_of_factor;
 
 /// The standard errors of all coefficients, each in the place of its coefficient: `s √((JᵀJ)⁻¹)_ii` with the Jacobian `J` of the
 /// residuals and their variance `s²` (Ljung 1999, eq. 9.17 and 9.18); with a penalty those of the posterior, as in ridge. None
