@@ -84,7 +84,8 @@ impl Fit {
             }
             // So that NaN fails.
             if !(deviation > 0.0 && deviation.is_finite()) {
-                let message = format!("a `deviation` is {deviation} and must be above 0 and finite");
+                let message =
+                    format!("a `deviation` is {deviation} and must be above 0 and finite");
                 mistakes.push(Mistake::at(at, message));
             }
         }
