@@ -299,7 +299,10 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         facts.push(format!("in-sample RMSE {} {}", number(rmse), fit.unit));
     }
     if let Some(condition) = report.condition {
-        facts.push(format!("condition number {}", number(condition)));
+        facts.push(format!(
+            "condition number of the regressors {}",
+            number(condition)
+        ));
     }
     if fit.streamed {
         facts.push("rows streamed".to_owned());

@@ -84,7 +84,7 @@ type Key = (i64, i64, String);
 impl Entry<'_> {
     fn key(&self) -> Key {
         let channel = &self.contender.plan.channels[self.truth.slot].channel;
-        let unit = channel.unit.to_string();
+        let unit = channel.unit.difference().to_string();
         (self.of.ahead.as_ns(), channel.span.as_ns(), unit)
     }
 

@@ -94,7 +94,7 @@ pub fn diagnose(
         Some(Main {
             truth: channel.name.clone(),
             name: channel.channel.name.clone(),
-            unit: channel.channel.unit.to_string(),
+            unit: channel.channel.unit.difference().to_string(),
             prediction: plan.channels[of.slot].name.clone(),
         })
     });

@@ -132,7 +132,7 @@ impl Collecting<'_> {
         let truth = &model.plan.channels[self.truth].channel;
         Design {
             node: node.instance(),
-            unit: truth.unit.to_string(),
+            unit: truth.unit.difference().to_string(),
             rows: gram.count(),
             condition: found.as_ref().map_or(f64::NAN, |of| of.condition),
             regressors: self

@@ -93,7 +93,7 @@ fn of_prediction(
     Residuals {
         prediction: plan.channels[of.slot].name.clone(),
         truth: truth.name.clone(),
-        unit: truth.channel.unit.to_string(),
+        unit: truth.channel.unit.difference().to_string(),
         count,
         rms: (present.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt(),
         mean: present.iter().sum::<f64>() / count as f64,

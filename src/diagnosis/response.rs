@@ -133,7 +133,7 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         Responses {
             node: node.instance(),
             truth: truth.map_or_else(String::new, |of| of.name.clone()),
-            unit: truth.map_or_else(String::new, |of| of.channel.unit.to_string()),
+            unit: truth.map_or_else(String::new, |of| of.channel.unit.difference().to_string()),
             sensors,
         }
     });

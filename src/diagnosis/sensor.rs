@@ -85,7 +85,7 @@ fn contribution(
     (moves > 0.0).then(|| Contribution {
         sensor: plan.sources[source].name.clone(),
         prediction: slot.name.clone(),
-        unit: slot.channel.unit.to_string(),
+        unit: slot.channel.unit.difference().to_string(),
         moves,
         rmse: rms(both.iter().map(|(y, a, _)| (y - a).powi(2)).sum()),
         rmse_at_rest: rms(both.iter().map(|(y, _, b)| (y - b).powi(2)).sum()),
