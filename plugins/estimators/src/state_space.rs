@@ -258,9 +258,14 @@ impl Identify for StateSpace {
         })?;
         report.notes.push(note(&found));
         if horizon < USUAL && self.horizon.is_none() {
-            report.notes.push(format!(
-                "a horizon of {horizon} steps: rows without a gap are too short for a longer one"
-            ));
+            let reason = if horizon < longest {
+                "rows without a gap are too short for a longer one"
+            } else {
+                "with so many features a longer one makes too long a past"
+            };
+            report
+                .notes
+                .push(format!("a horizon of {horizon} steps: {reason}"));
         }
         let (squares, rows) = found.errors;
         let equation = found.model.difference_equation();
