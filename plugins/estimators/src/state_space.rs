@@ -248,10 +248,12 @@ impl Identify for StateSpace {
         let found = self.subspace(horizon, series).identify(&records, width);
         let found = found.map_err(|error| match error {
             NumericsError::TooFewStretches { .. } => TrainingError::Unsolvable {
-                reason: if horizon > 2 {
-                    format!("{error}; a shorter `horizon` needs fewer and shorter ones")
-                } else {
-                    format!("{error}; fewer features need fewer of them")
+                reason: match self.states {
+                    _ if horizon <= 2 => format!("{error}; fewer features need fewer of them"),
+                    States::Given(states) if states == horizon => format!(
+                        "{error}; fewer `states` allow a shorter horizon, which needs fewer and shorter ones"
+                    ),
+                    _ => format!("{error}; a shorter `horizon` needs fewer and shorter ones"),
                 },
             },
             error => told(error),
