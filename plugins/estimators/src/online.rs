@@ -102,9 +102,7 @@ impl Frame {
         });
         noise * (1.0 + spread).sqrt()
     }
-}
 
-impl Frame {
     /// The standard errors of the intercept and of the coefficients on the scale of the data; none where the recursion knows
     /// nothing of them.
     fn errors(&self, recursion: &Recursion) -> Option<Vec<f64>> {
@@ -112,9 +110,12 @@ impl Frame {
             return None;
         };
         let width = self.scales.len();
-        let of_intercept = rls.spread(|i| match i < width {
-            true => -self.means[i] / self.scales[i],
-            false => 1.0,
+        let of_intercept = rls.spread(|i| {
+            if i < width {
+                -self.means[i] / self.scales[i]
+            } else {
+                1.0
+            }
         });
         let variances = rls.covariance().iter().step_by(width + 2);
         let scaled = variances

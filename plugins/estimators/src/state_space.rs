@@ -248,19 +248,26 @@ impl Identify for StateSpace {
         let found = self.subspace(horizon, series).identify(&records, width);
         let found = found.map_err(|error| match error {
             NumericsError::TooFewStretches { .. } => TrainingError::Unsolvable {
-                reason: if horizon > 2 {
-                    format!("{error}; a shorter `horizon` needs fewer and shorter ones")
-                } else {
-                    format!("{error}; fewer features need fewer of them")
+                reason: match self.states {
+                    _ if horizon <= 2 => format!("{error}; fewer features need fewer of them"),
+                    States::Given(states) if states == horizon => format!(
+                        "{error}; fewer `states` allow a shorter horizon, which needs fewer and shorter ones"
+                    ),
+                    _ => format!("{error}; a shorter `horizon` needs fewer and shorter ones"),
                 },
             },
             error => told(error),
         })?;
         report.notes.push(note(&found));
         if horizon < USUAL && self.horizon.is_none() {
-            report.notes.push(format!(
-                "a horizon of {horizon} steps: rows without a gap are too short for a longer one"
-            ));
+            let reason = if horizon < longest {
+                "rows without a gap are too short for a longer one"
+            } else {
+                "with so many features a longer one makes too long a past"
+            };
+            report
+                .notes
+                .push(format!("a horizon of {horizon} steps: {reason}"));
         }
         let (squares, rows) = found.errors;
         let equation = found.model.difference_equation();
