@@ -71,6 +71,12 @@ pub(crate) fn read_kinds(graph: &GraphFile, diagnostics: &mut Diagnostics) -> Ve
 fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
     let kind = (node.kind.as_ref()).and_then(|(name, place)| find(name, *place, diagnostics));
     let mut own = Diagnostics::new();
+    // Instances of a module share places: a mistake in all of them is told once only where it is told beside the others.
+    let told = if node.faulty.is_some() {
+        &mut own
+    } else {
+        &mut *diagnostics
+    };
     let mut instances: Vec<ReadParts> = Vec::with_capacity(node.instances.len());
     for (nth, instance) in node.instances.iter().enumerate() {
         // Members whose parameters do not name them share one table, and so one specification.
@@ -79,7 +85,7 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
             (Some(before), Some(read), _) if read.is_whole() && is_shared(before, instance) => {
                 read.clone()
             }
-            (.., Some(kind)) => read_instance(kind, node, instance, &mut own),
+            (.., Some(kind)) => read_instance(kind, node, instance, told),
             (.., None) => ReadParts::default(),
         };
         instances.push(read);
@@ -96,8 +102,6 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
             let place = mistake.place;
             place.is_none_or(|place| !follows.contains(&(mistake.code, place)))
         });
-    } else {
-        diagnostics.extend_where(own, |_| true);
     }
     ReadNode { kind, instances }
 }

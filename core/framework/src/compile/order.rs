@@ -45,13 +45,12 @@ pub(crate) fn order(graph: &GraphFile, read: &[ReadNode], diagnostics: &mut Diag
         });
     }
     for component in loops(&edges) {
-        let path = path(&edges, &component);
-        order.looping.extend(path.iter().copied());
-        // Whether one of them closes the loop is not known of a node with mistakes.
         order.looping.extend(component.iter().map(|n| n.index()));
+        // Whether one of them closes the loop is not known of a node with mistakes.
         if !component.iter().all(|node| read[node.index()].is_known()) {
             continue;
         }
+        let path = path(&edges, &component);
         let names = path
             .iter()
             .chain(&path[..1])

@@ -159,6 +159,7 @@ pub(super) struct Declaring<'a> {
 impl Declaring<'_> {
     fn trial(&mut self, test: &Value, table: &Table) -> Option<Trial> {
         known_keys(table, &KEYS, "a test", self.diagnostics);
+        let misspelt = |key: &str| is_misspelt(table, key, &KEYS);
         let name = match table.get("name") {
             Some(value) => {
                 if value.as_text().is_none() {
@@ -167,7 +168,7 @@ impl Declaring<'_> {
                 }
                 value.as_text()
             }
-            None if is_misspelt(table, "name", &KEYS) => None,
+            None if misspelt("name") => None,
             None => {
                 let problem = DocumentProblem::MissingKey {
                     key: "name".to_owned(),
@@ -187,7 +188,7 @@ impl Declaring<'_> {
                 self.diagnostics.report(on.key, problem);
                 None
             }
-            (None, None) if is_misspelt(table, "inputs", &KEYS) => None,
+            (None, None) if misspelt("on") || misspelt("inputs") => None,
             (None, None) => {
                 self.diagnostics.report(test.place, TrialProblem::NoData);
                 None
@@ -202,8 +203,7 @@ impl Declaring<'_> {
             None => Some(Vec::new()),
         };
         let stated = table.get("expect");
-        let is_misspelt = is_misspelt(table, "expect", &KEYS);
-        let nothing = stated.map_or(!is_misspelt, |list| {
+        let nothing = stated.map_or(!misspelt("expect"), |list| {
             list.as_list().is_some_and(<[Value]>::is_empty)
         });
         if nothing {
