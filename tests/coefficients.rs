@@ -7,12 +7,12 @@ mod workbench;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use athermal::core::node::Of;
 use athermal::core::recording::Table;
 use serde_json::Value;
-use workbench::{Scratch, athermal, fitted, numbers, plan, regression, secs};
+use workbench::{Finished, Scratch, athermal, fitted, numbers, plan, regression, secs};
 
 const SIGNALS: &str = r#"
 schema = 1
@@ -106,7 +106,7 @@ fn rows() -> Vec<[f64; 4]> {
 }
 
 /// A model of all kinds, fitted by the program, and the data.
-fn model(scratch: &Scratch) -> (std::path::PathBuf, std::path::PathBuf) {
+fn model(scratch: &Scratch) -> (PathBuf, PathBuf) {
     let lines = rows().into_iter().enumerate();
     let lines: Vec<String> = lines
         .map(|(nth, [a, b, c, z])| format!("{nth},{a},{b},{c},{z}"))
@@ -121,7 +121,7 @@ fn model(scratch: &Scratch) -> (std::path::PathBuf, std::path::PathBuf) {
     (model, data)
 }
 
-fn show(model: &Path, format: &str) -> workbench::Finished {
+fn show(model: &Path, format: &str) -> Finished {
     athermal(&[&"show", &model, &"--format", &format])
 }
 
@@ -224,10 +224,9 @@ fn a_graph_that_is_not_fitted_has_no_coefficients() {
 
 #[test]
 fn polynomials_and_their_standard_errors_are_those_of_the_oracle_in_the_units_of_the_data() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles/prediction_error");
-    let text = std::fs::read_to_string(folder.join("samples.csv")).unwrap();
-    let expected = std::fs::read_to_string(folder.join("expected.json")).unwrap();
-    let expected: Value = serde_json::from_str(&expected).unwrap();
+    let text = include_str!("oracles/prediction_error/samples.csv");
+    let expected = include_str!("oracles/prediction_error/expected.json");
+    let expected: Value = serde_json::from_str(expected).unwrap();
     let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     for (name, orders, letters) in [
         ("armax", "na = 2\nnb = 2\nnc = 1", "AABBC"),
@@ -237,7 +236,7 @@ fn polynomials_and_their_standard_errors_are_those_of_the_oracle_in_the_units_of
     ] {
         let column = header.iter().position(|known| *known == name).unwrap();
         let mut table = Table::default();
-        for (second, row) in numbers(&text).iter().enumerate() {
+        for (second, row) in numbers(text).iter().enumerate() {
             table.push(secs(second as f64), &[row[0], row[column]]);
         }
         let node =

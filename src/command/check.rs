@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use athermal::core::compile::{Plan, Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk};
-use athermal::core::trial;
+use athermal::core::trial::{self, Trial};
 use clap::Args;
 
 use crate::figures::count;
@@ -27,22 +27,26 @@ pub struct Check {
     strict: bool,
 }
 
-/// The plan of a graph whose tests have no mistake either; `None` after any, all of which are told.
-fn plan_of(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) -> Option<Plan> {
+/// The plan of a graph and its tests; `None` after any mistake in either, all of which are told.
+pub(super) fn plan_and_tests(
+    path: &Path,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<(Plan, Vec<Trial>)> {
     let graph = document::load(path, &Disk, sources, diagnostics)
         .and_then(|read| document::declare(read, diagnostics))?;
     let Some(plan) = compile(&graph, Wanted::default(), diagnostics) else {
         trial::mistakes(&graph, &Disk, sources, diagnostics);
         return None;
     };
-    trial::declare(&graph, &plan, &Disk, sources, diagnostics)?;
-    Some(plan)
+    let trials = trial::declare(&graph, &plan, &Disk, sources, diagnostics)?;
+    Some((plan, trials))
 }
 
 /// The number of mistakes in the tests of a graph that has no others.
 pub(super) fn mistakes_in_tests(path: &Path) -> usize {
     let mut diagnostics = Diagnostics::new();
-    plan_of(path, &mut Sources::new(), &mut diagnostics);
+    plan_and_tests(path, &mut Sources::new(), &mut diagnostics);
     diagnostics.error_count()
 }
 
@@ -57,9 +61,9 @@ impl Check {
         for path in &self.graphs {
             let before = diagnostics.error_count();
             let mut of_file = Diagnostics::new();
-            let plan = plan_of(path, &mut sources, &mut of_file);
+            let planned = plan_and_tests(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
-            if let Some(plan) = plan.filter(|_| diagnostics.error_count() == before) {
+            if let Some((plan, _)) = planned.filter(|_| diagnostics.error_count() == before) {
                 fine.push((path, plan));
             }
         }

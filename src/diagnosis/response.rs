@@ -146,8 +146,8 @@ struct Probe<'a> {
     /// The mean of every measured channel.
     rest: Vec<f64>,
     step: Duration,
-    /// Ticks at rest, and at least so many after the step.
-    ticks: (i64, i64),
+    /// So many ticks at rest, and at least as many after the step.
+    ticks: i64,
 }
 
 impl<'a> Probe<'a> {
@@ -166,7 +166,7 @@ impl<'a> Probe<'a> {
             model,
             rest: rest.collect(),
             step,
-            ticks: (ticks, ticks),
+            ticks,
         })
     }
 
@@ -187,16 +187,15 @@ impl<'a> Probe<'a> {
             engines.push(engine);
         }
         let mut found = vec![[Vec::new(), Vec::new()]; slots.len()];
-        let (resting, answering) = self.ticks;
-        for tick in 0..resting + MOST_INSTANTS {
+        for tick in 0..self.ticks + MOST_INSTANTS {
             for (engine, sign) in engines.iter_mut().zip([0.0, 1.0, -1.0]) {
                 let mut samples = self.rest.clone();
-                if tick >= resting {
+                if tick >= self.ticks {
                     samples[source] += sign * size;
                 }
                 engine.step(Instant::from_ns(tick * self.step.as_ns()), &samples)?;
             }
-            if tick < resting {
+            if tick < self.ticks {
                 continue;
             }
             let [at_rest, up, down] = &engines[..] else {
@@ -207,7 +206,7 @@ impl<'a> Probe<'a> {
                     answer.push(engine.value(slot) - at_rest.value(slot));
                 }
             }
-            if tick >= resting + answering && found.iter().flatten().all(|of| is_at_rest(of)) {
+            if tick >= 2 * self.ticks && found.iter().flatten().all(|of| is_at_rest(of)) {
                 break;
             }
         }

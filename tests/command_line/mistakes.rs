@@ -397,22 +397,8 @@ fn a_fit_does_without_the_tests_of_a_graph_and_says_so() {
 
 #[test]
 fn a_text_in_place_of_a_list_and_a_port_behind_a_channel_are_shown_as_they_are_written() {
-    let text = r#"schema = 1
-[signals.position]
-unit = "nm"
-channels = ["X"]
-max_age = "1min"
-[nodes.drift]
-type = "slope"
-inputs.signal = "position"
-windows = "5min"
-[nodes.again]
-type = "slope"
-inputs.signal = "position.X:slope"
-windows = ["5min"]
-[outputs]
-again = "again"
-"#;
+    let text = SOUND.replace("[\"5min\"]", "\"5min\"")
+        + "[nodes.thermal]\ntype = \"slope\"\ninputs.signal = \"position.X:slope\"\nwindows = [\"5min\"]\n";
     let scratch = Scratch::new("as-written");
     let graph = scratch.file("wrong.toml", text);
     let told = athermal(&[&"check", &"--format", &"json", &graph])

@@ -462,20 +462,16 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
     };
     let curve = match most {
         1 => String::new(),
-        _ => matrix("fitted on", &shown, &curve),
+        _ => format!(
+            "RMSE of fits on so many days in a row, 1 being that of fits on {most} days, on the\n\
+             same days, which no fit has seen\n{}",
+            matrix("fitted on", &shown, &curve)
+        ),
     };
     format!(
         "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
-         how many days are needed: {verdict}\n{}",
-        matrix("left out", &shown, &left_out),
-        if curve.is_empty() {
-            curve
-        } else {
-            format!(
-                "RMSE of fits on so many days in a row, 1 being that of fits on {most} days, on the\n\
-                 same days, which no fit has seen\n{curve}"
-            )
-        }
+         how many days are needed: {verdict}\n{curve}",
+        matrix("left out", &shown, &left_out)
     )
 }
 

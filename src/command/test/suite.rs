@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use athermal::core::compile::{Plan, Wanted, compile};
+use athermal::core::compile::Plan;
 use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{self, Disk};
 use athermal::core::trial::{self, Trial};
 
+use crate::command::check::plan_and_tests;
 use crate::terminal::{Failure, Terminal};
 
 /// A graph file and its tests.
@@ -41,22 +41,13 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
     let mut suites = Vec::new();
     for path in graphs {
         let mut of_file = Diagnostics::new();
-        let read = document::load(path, &Disk, &mut sources, &mut of_file);
-        let graph = read.and_then(|read| document::declare(read, &mut of_file));
-        let planned = graph.and_then(|graph| {
-            let Some(mut plan) = compile(&graph, Wanted::default(), &mut of_file) else {
-                trial::mistakes(&graph, &Disk, &mut sources, &mut of_file);
-                return None;
-            };
-            let trials = trial::declare(&graph, &plan, &Disk, &mut sources, &mut of_file)?;
-            trial::observe(&mut plan, &trials);
-            Some((plan, trials))
-        });
+        let planned = plan_and_tests(path, &mut sources, &mut of_file);
         let broken = of_file.has_errors();
         if broken {
             diagnostics.extend(of_file);
         }
-        if let Some((plan, trials)) = planned.filter(|_| !broken) {
+        if let Some((mut plan, trials)) = planned.filter(|_| !broken) {
+            trial::observe(&mut plan, &trials);
             let line = |trial: &Trial| (trial.name.clone(), sources.line_column(trial.place).0);
             let path = path.display().to_string();
             suites.push(Suite {
