@@ -114,13 +114,6 @@ impl Factor {
             held: (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
-
-    /// Its value in a row.
-    #[must_use]
-    pub fn value(&self, row: &[f64]) -> f64 {
-        let (least, largest) = self.held;
-        row[self.regressor].max(least).min(largest) - self.about
-    }
 }
 
 /// A noise, in the words in which a graph gives it.
