@@ -15,11 +15,11 @@ pub fn number(value: f64) -> String {
         format!("{value}")
     } else if size != 0.0 && !(1e-3..1e6).contains(&size) {
         format!("{value:.2e}")
-    } else if size >= 1000.0 || size == 0.0 {
+    } else if size >= 999.95 || size == 0.0 {
         format!("{value:.0}")
-    } else if size >= 100.0 {
+    } else if size >= 99.995 {
         format!("{value:.1}")
-    } else if size >= 1.0 {
+    } else if size >= 0.9995 {
         format!("{value:.2}")
     } else {
         format!("{value:.3}")
@@ -297,6 +297,8 @@ mod tests {
         assert_eq!(number(31.7149), "31.71");
         assert_eq!(number(0.041_23), "0.041");
         assert_eq!(number(1234.6), "1235");
+        let rounded_up = [999.96, 99.996, 0.9996].map(number);
+        assert_eq!(rounded_up, ["1000", "100.0", "1.00"]);
         assert_eq!(number(1e-9), "1.00e-9");
         assert_eq!(number(f64::NAN), "NaN");
     }

@@ -5,20 +5,15 @@ use athermal::diagnosis::lag::FeatureLags;
 
 use super::Diagnose;
 use super::tables::{SAYS_SOMETHING, Tables};
+use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
-
-/// How many commands are told.
-const MOST: usize = 2;
 
 impl Diagnose {
     /// What to try next, each with its reason; nothing where nothing follows.
     pub(super) fn next(&self, tables: &Tables) -> Option<String> {
-        let found = [
-            self.what_is_left(tables),
-            self.more_days(tables),
-            self.wider_windows(tables),
-        ];
-        let found: Vec<String> = found.into_iter().flatten().take(MOST).collect();
+        let left = self.what_is_left(tables);
+        let left = left.or_else(|| self.wider_windows(tables));
+        let found: Vec<String> = left.into_iter().chain(self.more_days(tables)).collect();
         (!found.is_empty()).then(|| found.join("\n"))
     }
 
@@ -30,21 +25,37 @@ impl Diagnose {
         command(&words.chain(more.iter().copied()).collect::<Vec<_>>())
     }
 
-    /// A feature tells something of what a prediction leaves: why was it not used?
+    /// A feature tells something of what a prediction leaves: does no estimator use it, or is it of little use there?
     fn what_is_left(&self, tables: &Tables) -> Option<String> {
         let (main, feature) = most_left(tables)?;
-        let why = format!(
-            "What {} leaves goes with {}. ",
-            main.prediction, feature.feature
-        );
-        let axis = quoted(&main.name);
-        Some(if self.of.is_empty() {
-            let look = self.command("diagnose", &["--of", &axis, "--no-fit"]);
-            format!("{why}Each regressor of {}:\n{look}", main.name)
+        let name = &feature.feature;
+        let users: Vec<&str> = tables.users_of(main, name).collect();
+        let why = format!("What {} leaves goes with {name}, ", main.prediction);
+        let (why, look) = if users.contains(&main.prediction.as_str()) {
+            let model = quoted(&self.model.display().to_string());
+            let node = quoted(&main.prediction);
+            let words = [
+                &program(),
+                "show",
+                &model,
+                "--format coefficients --node",
+                &node,
+            ];
+            (why + "which it uses; its coefficients:", command(&words))
+        } else if let Some(user) = users.first() {
+            let look = self.command("diagnose", &["--of", &quoted(user), "--no-fit"]);
+            (
+                format!("{why}which {user} uses; what that leaves by itself:"),
+                look,
+            )
         } else {
             let look = self.command("fit", &["--candidates", "-o again.json"]);
-            format!("{why}What a fit on these data tries, and takes:\n{look}")
-        })
+            (
+                why + "which no estimator uses; what a fit tries before it stops:",
+                look,
+            )
+        };
+        Some(paragraph("", 0, &why) + &look)
     }
 
     fn more_days(&self, tables: &Tables) -> Option<String> {

@@ -4,7 +4,7 @@ use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 use athermal::diagnosis::lag::{Correlogram, FeatureLags, Lags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::Residuals;
-use athermal::diagnosis::{Diagnosis, Main, is_asked};
+use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
 use super::responses;
 use crate::figures::{count, matrix, number, or_dash, stated, table};
@@ -89,6 +89,14 @@ impl<'a> Tables<'a> {
     pub(super) fn lags_of(&self, main: &Main) -> Option<&'a Lags> {
         let mut all = self.diagnosis.lags.iter();
         all.find(|of| of.truth == main.truth)
+    }
+
+    /// The estimators of a truth among whose regressors a feature is.
+    pub(super) fn users_of(&self, main: &'a Main, feature: &str) -> impl Iterator<Item = &'a str> {
+        let designs = self.diagnosis.designs.iter();
+        let uses = move |of: &&Design| of.regressors.iter().any(|of| of.name == feature);
+        let users = designs.filter(uses).map(|of| of.node.as_str());
+        users.filter(|node| !node.contains('.') || is_called(node, &main.name))
     }
 
     /// Whether all that is left of any truth may be noise.
