@@ -19,7 +19,7 @@ use crate::mean::mean;
 ///
 /// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985). Those of truths that
 /// overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much room: a bias as large as the
-/// usual error is told in some hours, one of half that size never.
+/// usual error is told in some hours, one of half that size hardly ever.
 ///
 /// The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
 /// `hold`. Of several predictions the mean is watched.
@@ -29,8 +29,7 @@ pub struct PageHinkley {
     /// What is watched.
     #[serde(default)]
     pub watch: Watched,
-    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more. They should span all
-    /// that the machine usually does, such as a day: where they were taken at rest, its next change of set point is an alarm.
+    /// How many truths there must be before it is known what errors are usual, and how many more before an alarm; 2 or more.
     #[serde(default = "thirty")]
     #[schemars(range(min = 2))]
     pub first: u64,
@@ -72,8 +71,7 @@ pub struct Adwin {
     /// What is watched.
     #[serde(default)]
     pub watch: Watched,
-    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more. They should span all
-    /// that the machine usually does, such as a day: where they were taken at rest, its next change of set point is an alarm.
+    /// How many truths there must be before it is known what errors are usual, and how many more before an alarm; 2 or more.
     #[serde(default = "thirty")]
     #[schemars(range(min = 2))]
     pub first: u64,

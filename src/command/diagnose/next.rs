@@ -42,7 +42,7 @@ impl Diagnose {
                 &node,
             ];
             (why + "which it uses; its coefficients:", command(&words))
-        } else if let Some(user) = users.first() {
+        } else if let Some(user) = users.first().filter(|_| !tables.is_estimator(main)) {
             let look = self.command("diagnose", &["--of", &quoted(user), "--no-fit"]);
             (
                 format!("{why}which {user} uses; what that leaves by itself:"),
@@ -51,7 +51,7 @@ impl Diagnose {
         } else {
             let look = self.command("fit", &["--candidates", "-o again.json"]);
             (
-                why + "which no estimator uses; what a fit tries before it stops:",
+                why + "which it does not use; what a fit tries before it stops:",
                 look,
             )
         };

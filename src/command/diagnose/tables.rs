@@ -99,6 +99,12 @@ impl<'a> Tables<'a> {
         users.filter(|node| !node.contains('.') || is_called(node, &main.name))
     }
 
+    /// Whether a prediction is that of an estimator, and not a vote of several.
+    pub(super) fn is_estimator(&self, main: &Main) -> bool {
+        let mut designs = self.diagnosis.designs.iter();
+        designs.any(|of| of.node == main.prediction)
+    }
+
     /// Whether all that is left of any truth may be noise.
     pub(super) fn all_white(&self) -> bool {
         let all = self.diagnosis.residuals.iter();
