@@ -15,11 +15,11 @@ pub fn number(value: f64) -> String {
         format!("{value}")
     } else if size != 0.0 && !(1e-3..1e6).contains(&size) {
         format!("{value:.2e}")
-    } else if size >= 1000.0 || size == 0.0 {
+    } else if size >= 999.95 || size == 0.0 {
         format!("{value:.0}")
-    } else if size >= 100.0 {
+    } else if size >= 99.995 {
         format!("{value:.1}")
-    } else if size >= 1.0 {
+    } else if size >= 0.9995 {
         format!("{value:.2}")
     } else {
         format!("{value:.3}")
@@ -44,6 +44,71 @@ pub fn count(value: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// A number to so many significant digits.
+#[must_use]
+pub fn digits(value: f64, count: usize) -> String {
+    let after_first = count.saturating_sub(1);
+    // Rounding may reach the next power of ten, which this has behind it.
+    let scientific = format!("{value:.after_first$e}");
+    let exponent = scientific.rsplit_once('e');
+    match exponent.and_then(|(_, exponent)| exponent.parse::<i32>().ok()) {
+        _ if value == 0.0 => "0".to_owned(),
+        Some(exponent) if (-4..6).contains(&exponent) => {
+            let after = usize::try_from(after_first as i32 - exponent).unwrap_or(0);
+            format!("{value:.after$}")
+        }
+        _ => scientific,
+    }
+}
+
+/// A unit in which times are told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeUnit {
+    /// Its name, of several: `minutes`.
+    pub name: &'static str,
+    /// Its symbol: `min`.
+    pub symbol: &'static str,
+    /// How many seconds it has.
+    pub seconds: f64,
+}
+
+impl TimeUnit {
+    /// The unit in which times of up to so many seconds are read best: the longest of which they have two.
+    #[must_use]
+    pub fn of(longest_s: f64) -> Self {
+        let (name, symbol, seconds) = match longest_s.abs() {
+            short if short > 0.0 && short < 1.0 => ("milliseconds", "ms", 1e-3),
+            short if short < 120.0 => ("seconds", "s", 1.0),
+            long if long >= 172_800.0 => ("days", "d", 86_400.0),
+            long if long >= 7_200.0 => ("hours", "h", 3_600.0),
+            _ => ("minutes", "min", 60.0),
+        };
+        Self {
+            name,
+            symbol,
+            seconds,
+        }
+    }
+}
+
+/// A time to three significant digits, in the unit in which it is read best.
+#[must_use]
+pub fn time(seconds: f64) -> String {
+    let unit = TimeUnit::of(seconds);
+    let number = digits(seconds / unit.seconds, 3);
+    let number = match number.contains('.') && !number.contains('e') {
+        true => number.trim_end_matches('0').trim_end_matches('.'),
+        false => &number,
+    };
+    format!("{number} {}", unit.symbol)
+}
+
+/// A time as a graph file states it; one that is too long for that as [`time`] tells it.
+#[must_use]
+pub fn stated(seconds: f64) -> String {
+    Duration::from_secs_f64(seconds).map_or_else(|| time(seconds), length)
 }
 
 /// A length of time, rounded to the millisecond where it is longer than that.
@@ -232,8 +297,28 @@ mod tests {
         assert_eq!(number(31.7149), "31.71");
         assert_eq!(number(0.041_23), "0.041");
         assert_eq!(number(1234.6), "1235");
+        let rounded_up = [999.96, 99.996, 0.9996].map(number);
+        assert_eq!(rounded_up, ["1000", "100.0", "1.00"]);
         assert_eq!(number(1e-9), "1.00e-9");
         assert_eq!(number(f64::NAN), "NaN");
+    }
+
+    #[test]
+    fn digits_stay_as_many_where_rounding_passes_a_power_of_ten() {
+        let told = [0.0, 12.345_678, -0.000_123_456, 1_234_567.0, 98_765.4].map(|it| digits(it, 5));
+        assert_eq!(told, ["0", "12.346", "-0.00012346", "1.2346e6", "98765"]);
+        let told = [9.996, 99.96, 0.999_6, 999_999.6, 0.000_099_996].map(|it| digits(it, 3));
+        assert_eq!(told, ["10.0", "100", "1.00", "1.00e6", "0.000100"]);
+        assert_eq!(digits(f64::NAN, 3), "NaN");
+    }
+
+    #[test]
+    fn times_have_the_unit_in_which_they_are_read_best() {
+        let times = [0.0456, 90.0, 3_600.0, 12.0 * 3_600.0, 7.65 * 60.0, 1e7].map(time);
+        let expected = ["45.6 ms", "90 s", "60 min", "12 h", "7.65 min", "116 d"];
+        assert_eq!(times, expected);
+        assert_eq!(TimeUnit::of(0.0).symbol, "s");
+        assert_eq!(stated(-150.0), "-150s");
     }
 
     #[test]

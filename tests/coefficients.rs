@@ -6,6 +6,7 @@
 mod workbench;
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -204,6 +205,35 @@ fn the_table_fits_the_terminal_and_says_what_each_number_is() {
         "{text}"
     );
     insta::assert_snapshot!(text);
+}
+
+#[test]
+fn coefficients_of_some_nodes_are_told_alone_and_a_name_that_none_has_is_told() {
+    let scratch = Scratch::new("coefficients-of-some");
+    let (model, _) = model(&scratch);
+    let of = |nodes: &[&str], format: &str| {
+        let mut words: Vec<&dyn AsRef<OsStr>> = vec![&"show", &model, &"--format"];
+        words.push(&format);
+        words.extend(
+            nodes
+                .iter()
+                .flat_map(|node| [&"--node" as &dyn AsRef<OsStr>, node]),
+        );
+        athermal(&words)
+    };
+    let two = of(&["ridge", "lasso"], "coefficients").ended(0).out;
+    let heads = two.lines().filter(|line| line.contains(" of position.Z)"));
+    let heads: Vec<&str> = heads.map(|line| line.split(' ').next().unwrap()).collect();
+    assert_eq!(heads, ["ridge", "lasso"], "{two}");
+    let one = of(&["ar"], "json").ended(0).json();
+    assert_eq!(one["estimators"].as_array().unwrap().len(), 1);
+    let unknown = of(&["rigde"], "coefficients");
+    unknown
+        .ended(2)
+        .tells(&["`rigde`, did you mean `ridge`?", "polynomial"]);
+    of(&["ridge"], "svg")
+        .ended(2)
+        .tells(&["--format coefficients"]);
 }
 
 #[test]

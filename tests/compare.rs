@@ -132,6 +132,62 @@ fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another()
 }
 
 #[test]
+fn a_graph_and_its_copy_differ_by_nothing_and_others_by_what_their_errors_vary() {
+    let scratch = Scratch::new("compare-copy");
+    let log = simulated(&scratch, "log.csv", "die-tester", 1.0, 1);
+    let copy = scratch.file(
+        "copy.toml",
+        format!(
+            "schema = 1\nextends = {:?}\nname = \"copy\"\n",
+            graph("die-tester")
+        ),
+    );
+    let compared = |format: &str| {
+        athermal(&[
+            &"compare",
+            &graph("die-tester"),
+            &copy,
+            &"--data",
+            &log,
+            &"--on",
+            &log,
+            &"--format",
+            &format,
+        ])
+        .ended(0)
+    };
+    let told = compared("json").json();
+    let table = &told["comparisons"][0];
+    let rows = table["rows"].as_array().unwrap();
+    let (mut sure, mut zero) = (0, 0);
+    for (column, truth) in table["truths"].as_array().unwrap().iter().enumerate() {
+        let best = &rows[usize::try_from(truth["best"].as_u64().unwrap()).unwrap()];
+        for row in rows {
+            let error = row["difference_error"][column].as_f64().unwrap();
+            let difference =
+                row["rmse"][column].as_f64().unwrap() - best["rmse"][column].as_f64().unwrap();
+            if row["node"] == best["node"] {
+                assert_eq!((difference, error), (0.0, 0.0), "{row}");
+                zero += 1;
+            } else {
+                assert!(difference > 0.0 && error > 0.0, "{row}");
+                sure += usize::from(difference > 2.0 * error);
+            }
+        }
+    }
+    // Of six axes the best and its copy; of the three other voters of either graph some are surely worse.
+    assert_eq!(zero, 12);
+    assert!(sure > 6, "{sure}");
+    let text = compared("table").out;
+    assert_eq!(
+        text.matches(" ±0\n").count() + text.matches(" ±0 ").count(),
+        6,
+        "{text}"
+    );
+    assert!(text.contains("~"), "{text}");
+}
+
+#[test]
 fn horizons_are_not_compared_with_each_other() {
     let scratch = Scratch::new("compare-horizons");
     let log = simulated(&scratch, "log.csv", "die-tester", 1.0, 1);

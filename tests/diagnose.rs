@@ -449,6 +449,15 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
             told.out
         );
     }
+    // The simulated room tells something of what the vote leaves.
+    assert!(
+        told.told.contains("diagnose") && told.told.contains("--of "),
+        "{}",
+        told.told
+    );
+    for line in told.told.lines() {
+        assert!(line.chars().count() <= 80 || line.contains('/'), "{line}");
+    }
     let pictures = [
         "autocorrelation-vote.Z1",
         "lags-drift.Z1",

@@ -5,7 +5,6 @@
 
 mod workbench;
 
-use std::path::Path;
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
@@ -13,13 +12,12 @@ use athermal::core::fit::{FitOptions, Outcome, fit};
 use athermal::core::node::{Predictor, TrainingError, TrainingReport};
 use athermal::core::recording::Table;
 use serde_json::Value;
-use workbench::{coefficients, fitted, numbers, plan, problems, regression, secs};
+use workbench::{coefficients, fitted, numbers, own_oracle, plan, problems, regression, secs};
 
 const COLUMNS: usize = 12;
 
 fn file(name: &str) -> String {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles");
-    std::fs::read_to_string(folder.join(name)).unwrap()
+    std::fs::read_to_string(own_oracle(name)).unwrap()
 }
 
 fn expected(name: &str) -> Value {

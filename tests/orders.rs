@@ -4,14 +4,14 @@
 
 mod workbench;
 
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
 
 use serde_json::Value;
-use workbench::{Scratch, athermal};
+use workbench::{Scratch, athermal, athermal_on, own_oracle};
 
-fn oracle(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles/orders");
-    folder.join(name)
+/// A graph that leaves open of how many steps back it reads, up to `most`.
+fn graph_up_to(most: usize, by: &str, node: &str) -> String {
+    graph(by, node).replace("1..6", &format!("1..{most}"))
 }
 
 fn graph(by: &str, node: &str) -> String {
@@ -44,14 +44,15 @@ solver = { type = "ols" }
 const ARMA: &str = "type = \"arma\"\nnc = 0";
 
 fn expected() -> Vec<Value> {
-    serde_json::from_str(&std::fs::read_to_string(oracle("expected.json")).unwrap()).unwrap()
+    serde_json::from_str(&std::fs::read_to_string(own_oracle("orders/expected.json")).unwrap())
+        .unwrap()
 }
 
 /// The table of orders that a fit told, and the text for people.
 fn fitted(name: &str, graph: &str) -> (Value, String) {
     let scratch = Scratch::new(&format!("orders-{name}"));
     let graph = scratch.file("graph.toml", graph);
-    let (data, model) = (oracle("series.csv"), scratch.path("model.json"));
+    let (data, model) = (own_oracle("orders/series.csv"), scratch.path("model.json"));
     let told = athermal(&[&"fit", &graph, &"--data", &data, &"--output", &model]).ended(0);
     let text = std::fs::read_to_string(&model).unwrap();
     let model: Value = serde_json::from_str(&text).unwrap();
@@ -110,6 +111,38 @@ fn the_search_for_a_model_without_a_moving_average_compares_as_least_squares_do(
             );
         }
     }
+}
+
+#[test]
+fn the_best_orders_are_told_first_and_all_of_many_where_they_are_asked_for() {
+    let scratch = Scratch::new("orders-many");
+    let graph = scratch.file("graph.toml", graph_up_to(12, "bic", ARMA));
+    let (data, model) = (own_oracle("orders/series.csv"), scratch.path("model.json"));
+    let orders = |more: &[&dyn AsRef<OsStr>]| -> Vec<usize> {
+        let to: [&dyn AsRef<OsStr>; 2] = [&"-o", &model];
+        let told = athermal_on("fit", &graph, &data, &[&to, more].concat()).ended(0);
+        assert_eq!(
+            told.out.contains("and 4 more"),
+            more.is_empty(),
+            "{}",
+            told.out
+        );
+        let lines = told.out.lines();
+        let orders = lines.filter_map(|line| line.trim().strip_prefix("na "));
+        orders
+            .map(|line| line.split(' ').next().unwrap().parse().unwrap())
+            .collect()
+    };
+    let (best, all) = (orders(&[]), orders(&[&"--candidates"]));
+    assert_eq!((best.len(), all.len()), (8, 12));
+    assert_eq!(best, all[..8]);
+    let kept: Value = serde_json::from_str(&std::fs::read_to_string(&model).unwrap()).unwrap();
+    let tried = kept["card"]["estimators"][0]["orders"]["tried"].clone();
+    let bic = |na: usize| tried[na - 1]["bic"].as_f64().unwrap();
+    assert!(
+        all.windows(2).all(|pair| bic(pair[0]) <= bic(pair[1])),
+        "{all:?}"
+    );
 }
 
 #[test]

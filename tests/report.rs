@@ -352,7 +352,7 @@ fn a_sensor_that_failed_is_told_with_what_was_wrong() {
     let told = report(&model, &days, &[]).out;
     let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
     for expected in [
-        "temperature.t1: 1 gap, the longest 60 min",
+        "temperature.t1: 1 gap, the longest 60.2 min",
         "temperature.t3: 2 out of range; 1 infinite",
         "stuck at",
     ] {

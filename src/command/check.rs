@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use athermal::Model;
 use athermal::core::compile::{Plan, Wanted, compile};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk};
@@ -43,10 +44,10 @@ pub(super) fn plan_and_tests(
     Some((plan, trials))
 }
 
-/// The number of mistakes in the tests of a graph that has no others.
-pub(super) fn mistakes_in_tests(path: &Path) -> usize {
+/// The number of mistakes in the tests of a graph that has no others, read from `sources`.
+pub(super) fn mistakes_in_tests(model: &Model, sources: &mut Sources) -> usize {
     let mut diagnostics = Diagnostics::new();
-    plan_and_tests(path, &mut Sources::new(), &mut diagnostics);
+    trial::declare(&model.graph, &model.plan, &Disk, sources, &mut diagnostics);
     diagnostics.error_count()
 }
 

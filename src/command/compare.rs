@@ -7,20 +7,24 @@ use athermal::Model;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
 use athermal::core::score::trace;
-use athermal::diagnosis::comparison::{Comparison, Contender, compare};
+use athermal::diagnosis::comparison::{Column, Comparison, Contender, compare};
 use clap::Args;
 use serde_json::json;
 
 use super::data::{self, Data};
 use super::evaluate::check_limit;
 use super::fit::fit_without_card;
-use crate::figures::{count, length, matrix, number, or_dash};
+use crate::figures::{count, digits, matrix, number, or_dash, stated};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit several graphs on the same data and score them on others, in one table
 ///
 /// Every prediction of every graph is a row, every axis a column. All that predict the same truth over the same horizon are scored
 /// on the instants at which all of them are valid, beside no model and persistence.
+///
+/// Beside each score stands the standard error of its difference to the best of the column: the instants are cut into ten blocks of
+/// time, whose differences tell how much that of all of them would vary (batch means; Law and Kelton). A difference of less than
+/// two standard errors, marked ~, may be chance: of two such graphs choose the simpler one, or score them on more days.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal compare graphs/die-tester.toml mine.toml --data week.csv --on days.csv
@@ -39,6 +43,9 @@ pub struct Compare {
     #[arg(long, value_name = "QUANTITY")]
     abs_truth_below: Option<Quantity>,
 }
+
+/// A difference of fewer standard errors may be chance.
+const SURE: f64 = 2.0;
 
 /// A graph's fit.
 struct Fitted {
@@ -154,29 +161,10 @@ fn describe(comparison: &Comparison) -> String {
         .rows
         .iter()
         .any(|row| row.graph != comparison.rows[0].graph);
-    let counts = comparison.truths.iter().map(|truth| truth.count as u64);
-    let (fewest, most) = (counts.clone().min(), counts.max());
-    let instants = match (fewest, most) {
-        (Some(fewest), Some(most)) if fewest != most => {
-            format!("{} to {}", count(fewest), count(most))
-        }
-        (_, most) => count(most.unwrap_or(0)),
-    };
-    let duration =
-        |seconds: f64| athermal::Duration::from_secs_f64(seconds).map_or_else(String::new, length);
-    let mut text = format!(
-        "RMSE in {}, {} ahead, {instants} instants; * best, ! worse than no model\n",
-        comparison.unit,
-        duration(comparison.ahead_s)
-    );
-    let columns = comparison.truths.iter().map(|truth| truth.name.clone());
-    let columns: Vec<String> = columns.collect();
-    let plain = |of: fn(&athermal::diagnosis::comparison::Column) -> Option<f64>| -> Vec<String> {
-        comparison
-            .truths
-            .iter()
-            .map(|truth| or_dash(of(truth)))
-            .collect()
+    let columns: Vec<String> = comparison.truths.iter().map(|of| of.name.clone()).collect();
+    let plain = |of: fn(&Column) -> Option<f64>| -> Vec<String> {
+        let truths = comparison.truths.iter();
+        truths.map(|truth| or_dash(of(truth))).collect()
     };
     let mut rows = vec![
         ("no model".to_owned(), plain(|truth| truth.no_model)),
@@ -187,26 +175,51 @@ fn describe(comparison: &Comparison) -> String {
         if several && graph.replace(&row.graph) != Some(&row.graph) {
             rows.push((row.graph.clone(), vec![String::new(); columns.len()]));
         }
-        let cells = row
-            .rmse
-            .iter()
-            .zip(&comparison.truths)
-            .map(|(rmse, truth)| {
-                let worse =
-                    matches!((rmse, truth.no_model), (Some(rmse), Some(zero)) if *rmse > zero);
-                let mark = match (truth.best == Some(nth), worse) {
-                    (true, _) => "*",
-                    (_, true) => "!",
-                    _ => "",
-                };
-                format!("{mark}{}", or_dash(*rmse))
-            });
+        let truths = comparison.truths.iter().enumerate();
+        let cells = truths.map(|(column, truth)| cell(comparison, nth, column, truth));
         let indent = if several { "  " } else { "" };
         let label = format!("{indent}{} ({})", row.node, row.kind);
         rows.push((label, cells.collect()));
     }
-    text.push_str(&matrix("", &columns, &rows));
-    text
+    heading(comparison) + &matrix("", &columns, &rows)
+}
+
+fn heading(comparison: &Comparison) -> String {
+    let counts = comparison.truths.iter().map(|truth| truth.count as u64);
+    let (fewest, most) = (counts.clone().min(), counts.max());
+    let instants = match (fewest, most) {
+        (Some(fewest), Some(most)) if fewest != most => {
+            format!("{} to {}", count(fewest), count(most))
+        }
+        (_, most) => count(most.unwrap_or(0)),
+    };
+    format!(
+        "RMSE in {}, {} ahead, {instants} instants; * best, ! worse than no model\n\
+         ± standard error of the difference to the best; ~ that may be chance\n",
+        comparison.unit,
+        stated(comparison.ahead_s)
+    )
+}
+
+/// The error of a row, and how sure it is that it differs from the best.
+fn cell(comparison: &Comparison, row: usize, column: usize, truth: &Column) -> String {
+    let of = |row: usize| comparison.rows[row].rmse[column];
+    let Some(rmse) = of(row) else {
+        return "-".to_owned();
+    };
+    let worse = truth.no_model.is_some_and(|zero| rmse > zero);
+    let worse = if worse { "!" } else { "" };
+    if truth.best == Some(row) {
+        return format!("*{}", number(rmse));
+    }
+    let best = truth.best.and_then(of).unwrap_or(rmse);
+    match comparison.rows[row].difference_error[column] {
+        Some(error) => {
+            let chance = if rmse - best <= SURE * error { "~" } else { "" };
+            format!("{chance}{worse}{} ±{}", number(rmse), digits(error, 2))
+        }
+        None => format!("{worse}{}", number(rmse)),
+    }
 }
 
 #[cfg(test)]

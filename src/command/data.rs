@@ -7,6 +7,7 @@ use athermal::files::{Dataset, Options, Report};
 use clap::Args;
 
 use crate::figures::count;
+use crate::invocation::quoted;
 use crate::terminal::{Failure, Terminal};
 
 /// Recorded data.
@@ -49,6 +50,16 @@ impl Data {
                 ..Options::default()
             },
         )
+    }
+
+    /// These files as a command for a shell names them; more of them may follow.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let lenient = self.lenient.then(|| "--lenient".to_owned());
+        let files = self.files.iter();
+        let files = files.map(|path| quoted(&path.display().to_string()));
+        let words = lenient.into_iter().chain(["--data".to_owned()]);
+        words.chain(files).collect()
     }
 
     /// What a model's card says of the files.

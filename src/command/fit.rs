@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use athermal::Model;
+use athermal::core::compile::Wanted;
+use athermal::core::diagnostic::Sources;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
 use athermal::core::node::{OrderTable, SelectionStep};
@@ -40,7 +42,7 @@ pub struct Fit {
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
     #[arg(long, value_name = "MB", default_value_t = 64)]
     memory: usize,
-    /// Tell what else was tried at each step of a selection, and with what score
+    /// Tell what else was tried at each step of a selection, and with what score, and all orders that were compared
     #[arg(long)]
     candidates: bool,
 }
@@ -51,8 +53,9 @@ impl Fit {
     /// # Errors
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let mut model = Model::load(&self.graph)?;
-        self.doubt_tests(terminal);
+        let mut sources = Sources::new();
+        let mut model = Model::load_from(&self.graph, Wanted::default(), &mut sources)?;
+        self.doubt_tests(&model, sources, terminal);
         let defaults = FitOptions::default();
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
@@ -81,11 +84,11 @@ impl Fit {
 
     /// Tells of mistakes in the tests of a graph file. They take nothing from the fit, and those of a file that is extended may
     /// not be the user's to mend; but nobody should find them only when the model is in use.
-    fn doubt_tests(&self, terminal: &Terminal) {
+    fn doubt_tests(&self, model: &Model, mut sources: Sources, terminal: &Terminal) {
         if self.graph.extension().is_none_or(|kind| kind != "toml") {
             return;
         }
-        let (of, path) = (mistakes_in_tests(&self.graph), self.graph.display());
+        let (of, path) = (mistakes_in_tests(model, &mut sources), self.graph.display());
         if of > 0 {
             let mistakes = if of == 1 {
                 "a mistake".to_owned()
@@ -205,10 +208,34 @@ fn tell_step(
     }
 }
 
-/// What is told of orders that were compared.
-fn tell_orders(text: &mut String, orders: &OrderTable) {
+/// How many of the orders that were compared are told where not all are asked for.
+const BEST_ORDERS: usize = 8;
+
+/// What is told of orders that were compared: the best first.
+fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
-    let cells = orders.tried.iter().enumerate().map(|(nth, tried)| {
+    let mut ranks: Vec<usize> = (0..orders.tried.len()).collect();
+    let figure = |nth: usize| {
+        let tried = &orders.tried[nth];
+        match orders.by.as_str() {
+            "AIC" => tried.aic,
+            "BIC" => tried.bic,
+            "FPE" => tried.fpe,
+            _ => tried.aicc,
+        }
+    };
+    let rank = |a: usize, b: usize| {
+        let chosen = (b == orders.chosen).cmp(&(a == orders.chosen));
+        chosen.then(figure(a).total_cmp(&figure(b)))
+    };
+    ranks.sort_by(|&a, &b| rank(a, b));
+    let shown = if all {
+        ranks.len()
+    } else {
+        BEST_ORDERS.min(ranks.len())
+    };
+    let cells = ranks[..shown].iter().map(|&nth| {
+        let tried = &orders.tried[nth];
         let chosen = nth == orders.chosen;
         let mut cells = vec![
             format!("  {}", tried.order),
@@ -231,6 +258,10 @@ fn tell_orders(text: &mut String, orders: &OrderTable) {
         cells
     });
     text.push_str(&table(&header, &cells.collect::<Vec<_>>()));
+    if shown < ranks.len() {
+        let more = ranks.len() - shown;
+        let _ = writeln!(text, "  and {more} more, which --candidates tells");
+    }
 }
 
 /// How wide the longest name in a selection is.
@@ -292,7 +323,7 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         text.push_str(&paragraph("  no more:", 6, &would));
     }
     if let Some(orders) = &report.orders {
-        tell_orders(&mut text, orders);
+        tell_orders(&mut text, orders, candidates);
     }
     let mut facts = Vec::new();
     if let Some(rmse) = report.in_sample_rmse {

@@ -6,6 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::fit::write_aside;
+use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};
 use crate::terminal::{Answer, Failure, Format, Terminal, print};
@@ -63,7 +64,7 @@ impl Init {
         let people = terminal.format == Format::Table;
         if people {
             for remark in &starter.remarks {
-                terminal.note(remark);
+                terminal.note(paragraph("", 2, remark).trim_end());
             }
         }
         if to_stdout {

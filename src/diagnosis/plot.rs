@@ -8,6 +8,7 @@ use super::response::{Response, Responses};
 use super::window::{Width, Windows};
 use super::{Diagnosis, Main, is_asked};
 use crate::chart::{Chart, LINES, Layer, Mark, Plot};
+use crate::figures::TimeUnit;
 
 /// Lines whose labels have room beside each other.
 const MOST_FEATURES: usize = 4;
@@ -22,15 +23,6 @@ const RATIOS_SHOWN: f64 = 2.0;
 /// Impulses are shown whole unless the largest is so many times beyond all but so many points of each line.
 const SPIKE: f64 = 10.0;
 const IN_SPIKES: usize = 4;
-
-/// A unit of time in which lengths up to the longest are short numbers: its name, and how many seconds it has.
-fn time_unit(longest_s: f64) -> (&'static str, &'static str, f64) {
-    match longest_s {
-        short if short < 120.0 => ("seconds", "s", 1.0),
-        long if long >= 10.0 * 3600.0 => ("hours", "h", 3600.0),
-        _ => ("minutes", "min", 60.0),
-    }
-}
 
 fn longest(times_s: &[f64]) -> f64 {
     times_s.iter().map(|time| time.abs()).fold(0.0, f64::max)
@@ -183,16 +175,20 @@ fn windows(windows: &[&Windows]) -> Picture {
         of.widths.iter().filter(shown).cloned().collect()
     };
     let all = windows.iter().flat_map(|of| shown(of));
-    let (unit, _, unit_s) = time_unit(all.map(|of| of.window_s).fold(0.0, f64::max));
+    let unit = TimeUnit::of(all.map(|of| of.window_s).fold(0.0, f64::max));
     let points = |widths: &[Width]| -> (Vec<f64>, Vec<f64>) {
         let each = widths.iter();
-        each.map(|of| (of.window_s / unit_s, of.ratio)).unzip()
+        each.map(|of| (of.window_s / unit.seconds, of.ratio))
+            .unzip()
     };
     let lines = windows.iter().enumerate().map(|(nth, of)| {
         let (x, y) = points(&shown(of));
         Points::line(nth, &of.truth, x, y)
     });
-    let mut own: Vec<f64> = windows.iter().map(|of| of.window_s / unit_s).collect();
+    let mut own: Vec<f64> = windows
+        .iter()
+        .map(|of| of.window_s / unit.seconds)
+        .collect();
     own.dedup();
     let own = match own[..] {
         [one] => format!(", that of the graph is {}", (100.0 * one).round() / 100.0),
@@ -200,7 +196,7 @@ fn windows(windows: &[&Windows]) -> Picture {
     };
     Picture {
         title: "Signal to noise of the drift against its window".to_owned(),
-        x_label: format!("window in {unit}{own}"),
+        x_label: format!("window in {}{own}", unit.name),
         y_label: "signal to noise".to_owned(),
         points: lines.collect(),
         ..Picture::default()
@@ -209,12 +205,12 @@ fn windows(windows: &[&Windows]) -> Picture {
 
 fn autocorrelation(of: &Residuals) -> Picture {
     let count = of.autocorrelation.len();
-    let (unit, _, unit_s) = time_unit(count as f64 * of.spacing_s);
+    let unit = TimeUnit::of(count as f64 * of.spacing_s);
     let x: Vec<f64> = (1..=count)
-        .map(|lag| lag as f64 * of.spacing_s / unit_s)
+        .map(|lag| lag as f64 * of.spacing_s / unit.seconds)
         .collect();
     // The bounds reach past the bars to either side, or half of the outer ones would be cut off.
-    let ends = [0.4, of.bound.len() as f64 + 0.6].map(|lag| lag * of.spacing_s / unit_s);
+    let ends = [0.4, of.bound.len() as f64 + 0.6].map(|lag| lag * of.spacing_s / unit.seconds);
     let around = |inner: &[f64], first: f64, last: f64| -> Vec<f64> {
         let inner = inner.iter().copied();
         std::iter::once(first).chain(inner).chain([last]).collect()
@@ -239,7 +235,7 @@ fn autocorrelation(of: &Residuals) -> Picture {
     let (above, below) = (bound(1.0, "95 % of a white series"), bound(-1.0, ""));
     Picture {
         title: format!("Autocorrelation of the residuals of {}", of.prediction),
-        x_label: format!("lag in {unit}"),
+        x_label: format!("lag in {}", unit.name),
         y_label: format!("autocorrelation of what {} leaves", of.prediction),
         points: vec![bars, above, below],
         ..Picture::default()
@@ -255,7 +251,7 @@ pub(crate) fn with_truth(of: &Lags) -> Picture {
 fn with_residual(of: &Lags) -> Picture {
     let left = format!("what {} leaves of {}", of.prediction, of.truth);
     let mut picture = lags(of, &left, |feature| &feature.residual);
-    let (_, _, unit_s) = time_unit(longest(&of.lag_s));
+    let unit = TimeUnit::of(longest(&of.lag_s));
     let all = picture.points.iter().flat_map(|of| &of.y);
     let (low, high) = all
         .filter(|y| !y.is_nan())
@@ -263,7 +259,7 @@ fn with_residual(of: &Lags) -> Picture {
             (f64::min(low, y), f64::max(high, y))
         });
     picture.points.push(Points {
-        x: vec![of.ahead_s / unit_s; 2],
+        x: vec![of.ahead_s / unit.seconds; 2],
         y: vec![low, high],
         class: KNOWN,
         label: "known from here on".to_owned(),
@@ -274,8 +270,8 @@ fn with_residual(of: &Lags) -> Picture {
 
 /// Of each sensor the feature that says most.
 fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Picture {
-    let (unit, _, unit_s) = time_unit(longest(&of.lag_s));
-    let x: Vec<f64> = of.lag_s.iter().map(|lag| lag / unit_s).collect();
+    let unit = TimeUnit::of(longest(&of.lag_s));
+    let x: Vec<f64> = of.lag_s.iter().map(|lag| lag / unit.seconds).collect();
     let mut shown: Vec<&FeatureLags> = Vec::new();
     let sensor = |name: &str| name.split('@').next().unwrap_or_default().to_owned();
     for feature in of.features.iter().filter(|of| !side(of).best.is_nan()) {
@@ -298,7 +294,7 @@ fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Pictu
     points.extend(Points::bounds(&x, 3.0 * widest, "±3 σ of chance"));
     Picture {
         title: format!("Correlation of features with {title}"),
-        x_label: format!("{unit} by which {} follows the feature", of.truth),
+        x_label: format!("{} by which {} follows the feature", unit.name, of.truth),
         y_label: format!("r with {title}"),
         points,
         ..Picture::default()
@@ -316,11 +312,11 @@ pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
     largest.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
     largest.truncate(LINES.len());
     let times = largest.iter().flat_map(|of| &of.time_s).copied();
-    let (times_are, short_unit, unit_s) = time_unit(times.fold(0.0, f64::max));
+    let time = TimeUnit::of(times.fold(0.0, f64::max));
     let lines = largest.iter().enumerate().map(|(nth, sensor)| {
-        let x = sensor.time_s.iter().map(|time| time / unit_s).collect();
+        let x = sensor.time_s.iter().map(|at| at / time.seconds).collect();
         let y = if impulse {
-            let per_unit = sensor.impulse.iter().map(|y| y * unit_s / 60.0);
+            let per_unit = sensor.impulse.iter().map(|y| y * time.seconds / 60.0);
             per_unit.collect()
         } else {
             sensor.step.clone()
@@ -330,7 +326,10 @@ pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
     let lines: Vec<Points> = lines.collect();
     let of_unit = of.sensors.first().map_or("", |of| of.sensor_unit.as_str());
     let (what, unit) = if impulse {
-        ("Impulse", format!("{} per {of_unit}·{short_unit}", of.unit))
+        (
+            "Impulse",
+            format!("{} per {of_unit}·{}", of.unit, time.symbol),
+        )
     } else {
         ("Step", format!("{} per {of_unit}", of.unit))
     };
@@ -343,7 +342,8 @@ pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
     Picture {
         title: format!("{what} response of {}", of.node),
         x_label: format!(
-            "{times_are} after the {}",
+            "{} after the {}",
+            time.name,
             if impulse { "impulse" } else { "step" }
         ),
         y_label: format!("{}: {unit}{cut}", of.node),

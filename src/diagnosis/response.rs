@@ -99,7 +99,7 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         .map(|&node| plan.nodes[node].slots.start)
         .collect();
     let of_truth = of_truths(plan);
-    let Some(probe) = Probe::new(model, observation) else {
+    let Some(probe) = Probe::new(model, observation, &slots)? else {
         return Ok(Vec::new());
     };
     let mut sensors: Vec<Vec<Response>> = vec![Vec::new(); slots.len()];
@@ -108,10 +108,14 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
             spread if spread > 0.0 => spread,
             _ => continue,
         };
-        let answers = probe.run(&slots, source, size)?;
+        let answers = probe.run(source, size)?;
         for (nth, [up, down]) in answers.iter().enumerate() {
             let ahead = plan.channels[slots[nth]].channel.ahead;
-            let answer = Answer { up, down, size };
+            let answer = Answer {
+                up: &up.values,
+                down: &down.values,
+                size,
+            };
             if let Some(response) = answer.response(plan, source, ahead, probe.step) {
                 sensors[nth].push(response);
             }
@@ -143,70 +147,90 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
 /// A graph at rest that is about to be disturbed.
 struct Probe<'a> {
     model: &'a Model,
+    /// The slots whose values are followed.
+    slots: &'a [usize],
     /// The mean of every measured channel.
     rest: Vec<f64>,
     step: Duration,
     /// So many ticks at rest, and at least as many after the step.
     ticks: i64,
+    /// Of each tick after those at rest, what the slots are where nothing steps.
+    undisturbed: Vec<Vec<f64>>,
 }
 
 impl<'a> Probe<'a> {
     /// None where nothing was measured often enough to say at which rate.
-    fn new(model: &'a Model, observation: &Observation) -> Option<Self> {
+    fn new(
+        model: &'a Model,
+        observation: &Observation,
+        slots: &'a [usize],
+    ) -> Result<Option<Self>, EngineError> {
         let sources = &observation.sources;
         let intervals = sources.iter().filter_map(|source| source.interval());
+        let Some(interval) = intervals.min() else {
+            return Ok(None);
+        };
         let warm_up = model.plan.warm_up;
         let widest = Duration::from_ns(warm_up.as_ns() / MOST_INSTANTS);
-        let step = intervals.min()?.max(widest).max(Duration::from_ns(1));
+        let step = interval.max(widest).max(Duration::from_ns(1));
         let ticks = (warm_up.as_ns() / step.as_ns() + 2).min(MOST_INSTANTS);
         let rest = sources
             .iter()
             .map(|of| if of.samples > 0 { of.mean } else { f64::NAN });
-        Some(Self {
+        let mut probe = Self {
             model,
+            slots,
             rest: rest.collect(),
             step,
             ticks,
-        })
+            undisturbed: Vec::new(),
+        };
+        let mut engine = probe.engine_at_rest()?;
+        for tick in 0..MOST_INSTANTS {
+            probe.advance(&mut engine, tick, &probe.rest)?;
+            let values = slots.iter().map(|&slot| engine.value(slot)).collect();
+            probe.undisturbed.push(values);
+        }
+        Ok(Some(probe))
     }
 
-    /// How slots change from the instant on at which a source steps up and down by `size`, tick by tick, against a run in which it
-    /// rests; NaN where there is no value.
-    fn run(
-        &self,
-        slots: &[usize],
-        source: usize,
-        size: f64,
-    ) -> Result<Vec<[Vec<f64>; 2]>, EngineError> {
-        let mut engines = Vec::new();
-        for _ in 0..3 {
-            let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
-            // Nothing has been measured that could be learned from.
-            engine.freeze(true);
-            engine.predict_in(Mode::FreeRun);
-            engines.push(engine);
+    /// An engine that has seen all sensors at rest until the tick before the step.
+    fn engine_at_rest(&self) -> Result<Engine, EngineError> {
+        let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
+        // Nothing has been measured that could be learned from.
+        engine.freeze(true);
+        engine.predict_in(Mode::FreeRun);
+        for tick in -self.ticks..0 {
+            self.advance(&mut engine, tick, &self.rest)?;
         }
-        let mut found = vec![[Vec::new(), Vec::new()]; slots.len()];
-        for tick in 0..self.ticks + MOST_INSTANTS {
-            for (engine, sign) in engines.iter_mut().zip([0.0, 1.0, -1.0]) {
-                let mut samples = self.rest.clone();
-                if tick >= self.ticks {
-                    samples[source] += sign * size;
+        Ok(engine)
+    }
+
+    /// Steps an engine; the tick of the step is 0.
+    fn advance(&self, engine: &mut Engine, tick: i64, samples: &[f64]) -> Result<(), EngineError> {
+        let at = Instant::from_ns((self.ticks + tick) * self.step.as_ns());
+        engine.step(at, samples).map(|_| ())
+    }
+
+    /// How the slots change from the instant on at which a source steps up and down by `size`, tick by tick, against a run in which
+    /// it rests; NaN where there is no value.
+    fn run(&self, source: usize, size: f64) -> Result<Vec<[Course; 2]>, EngineError> {
+        let mut runs = Vec::new();
+        for change in [size, -size] {
+            let mut samples = self.rest.clone();
+            samples[source] += change;
+            runs.push((self.engine_at_rest()?, samples));
+        }
+        let mut found = vec![<[Course; 2]>::default(); self.slots.len()];
+        for (tick, undisturbed) in (0..).zip(&self.undisturbed) {
+            for (side, (engine, samples)) in runs.iter_mut().enumerate() {
+                self.advance(engine, tick, samples)?;
+                let slots = self.slots.iter().zip(undisturbed);
+                for ((&slot, rest), courses) in slots.zip(&mut found) {
+                    courses[side].push(engine.value(slot) - rest);
                 }
-                engine.step(Instant::from_ns(tick * self.step.as_ns()), &samples)?;
             }
-            if tick < self.ticks {
-                continue;
-            }
-            let [at_rest, up, down] = &engines[..] else {
-                break;
-            };
-            for (&slot, answers) in slots.iter().zip(&mut found) {
-                for (engine, answer) in [up, down].into_iter().zip(answers) {
-                    answer.push(engine.value(slot) - at_rest.value(slot));
-                }
-            }
-            if tick >= 2 * self.ticks && found.iter().flatten().all(|of| is_at_rest(of)) {
+            if tick >= self.ticks && found.iter().flatten().all(Course::is_at_rest) {
                 break;
             }
         }
@@ -214,14 +238,28 @@ impl<'a> Probe<'a> {
     }
 }
 
-/// Whether an answer has not changed of late; one that is no number never will.
-fn is_at_rest(answer: &[f64]) -> bool {
-    let Some(before) = answer.len().checked_sub(QUIET + 1) else {
-        return false;
-    };
-    let largest = answer.iter().map(|y| y.abs()).fold(0.0, f64::max);
-    let (was, is) = (answer[before], answer[answer.len() - 1]);
-    is.is_nan() || (is - was).abs() <= AT_REST * largest
+/// What a slot did after a step, tick by tick.
+#[derive(Clone, Default)]
+struct Course {
+    values: Vec<f64>,
+    /// The largest of their sizes.
+    largest: f64,
+}
+
+impl Course {
+    fn push(&mut self, value: f64) {
+        self.values.push(value);
+        self.largest = self.largest.max(value.abs());
+    }
+
+    /// Whether it has not changed of late; one that is no number never will.
+    fn is_at_rest(&self) -> bool {
+        let Some(before) = self.values.len().checked_sub(QUIET + 1) else {
+            return false;
+        };
+        let (was, is) = (self.values[before], self.values[self.values.len() - 1]);
+        is.is_nan() || (is - was).abs() <= AT_REST * self.largest
+    }
 }
 
 /// What a slot did after a step up and a step down.

@@ -6,6 +6,8 @@ use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
 use serde::Serialize;
 
+use crate::figures::time;
+
 /// As many samples with the very same value look stuck, where the channel changes otherwise.
 const STUCK: u64 = 20;
 /// The share of samples that differ from the one before in a channel that changes.
@@ -186,7 +188,7 @@ impl SensorFacts {
             remarks.push(format!(
                 "{} gap{plural}, the longest {}",
                 self.gaps,
-                minutes(self.longest_gap_s)
+                time(self.longest_gap_s)
             ));
         }
         let moving = self.looking.changes as f64 + self.most_unchanged as f64;
@@ -202,13 +204,5 @@ impl SensorFacts {
             .filter(|(reason, _)| **reason != "healthy");
         remarks.extend(faults.map(|(reason, ticks)| format!("{reason} at {ticks} ticks")));
         remarks
-    }
-}
-
-fn minutes(seconds: f64) -> String {
-    match seconds {
-        s if s >= 7200.0 => format!("{:.1} h", s / 3600.0),
-        s if s >= 120.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{s:.0} s"),
     }
 }

@@ -3,6 +3,8 @@
 use athermal::core::time::Duration;
 use athermal::files::{Description, TimeForm};
 
+use crate::figures::time;
+
 /// The time of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clock {
@@ -62,19 +64,13 @@ impl Clock {
             .to_string()
     }
 
-    /// A length of time for people, to two or three digits.
+    /// A length of time for people, to three digits.
     #[must_use]
     pub fn about(&self, seconds: f64) -> String {
         if self.counts_samples() {
             return self.length(seconds);
         }
-        let (size, unit) = match seconds {
-            s if s >= 2.0 * 86_400.0 => (s / 86_400.0, "days"),
-            s if s >= 7200.0 => (s / 3600.0, "h"),
-            s if s >= 120.0 => (s / 60.0, "min"),
-            s => (s, "s"),
-        };
-        format!("{} {unit}", (size * 10.0).round() / 10.0)
+        time(seconds)
     }
 
     /// What was found, for people.

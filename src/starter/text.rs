@@ -9,7 +9,7 @@ use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::group::{Group, groups};
 use super::survey::Survey;
-use super::window::Choice;
+use super::window::{Choice, ENOUGH};
 use crate::figures::{count, number};
 
 /// The text of the graph.
@@ -211,14 +211,10 @@ impl Writer<'_> {
             .filter(|(width_s, _)| *width_s <= 6.0 * self.choice.drift_s);
         for (width_s, ratios) in shown {
             let told: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.1}")).collect();
-            let mark = if *width_s == self.choice.drift_s {
-                if self.choice.enough {
-                    "  <- chosen: the narrowest with 2 on half of them"
-                } else {
-                    "  <- chosen: the highest, though below 2"
-                }
-            } else {
-                ""
+            let mark = match (*width_s == self.choice.drift_s, self.choice.enough) {
+                (false, _) => String::new(),
+                (_, true) => format!("  <- chosen: the narrowest with {ENOUGH} on half of them"),
+                (_, false) => format!("  <- chosen: the highest, though below {ENOUGH}"),
             };
             let _ = writeln!(
                 text,

@@ -10,7 +10,7 @@ use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
 
 /// Signal to noise of a drift that is enough: a fifth of its variance is then noise, `1 / (1 + 2²)`.
-const ENOUGH: f64 = 2.0;
+pub(super) const ENOUGH: f64 = 2.0;
 /// Samples in the shortest window of a temperature.
 const FEWEST_OF_FEATURE: f64 = 3.0;
 /// The longest window of a temperature may take up such a share of the log.

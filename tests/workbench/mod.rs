@@ -45,6 +45,12 @@ pub fn graphs(folder: &str) -> Vec<PathBuf> {
     graphs
 }
 
+/// A file under this project's own `tests/oracles`, whose `generate.py` wrote it.
+pub fn own_oracle(file: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles");
+    folder.join(file)
+}
+
 /// A file of reference results, as text; nothing, with a remark, where this machine lacks it.
 pub fn oracle(file: &str) -> Option<String> {
     let path = data()?.with_file_name("oracles").join(file);

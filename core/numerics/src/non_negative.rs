@@ -138,6 +138,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::oracle;
 
     fn solve(rows: &[([f64; 3], f64)]) -> Vec<f64> {
         let places = (0..9).map(|place| (place / 3, place % 3));
@@ -187,11 +188,7 @@ mod tests {
 
     /// Rows of a table under `tests/oracles/`, see its `generate.py`.
     fn table(file: &str) -> Vec<Vec<f64>> {
-        let folder = concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../tests/oracles/non_negative"
-        );
-        let text = std::fs::read_to_string(format!("{folder}/{file}")).unwrap();
+        let text = oracle::own_text(&format!("non_negative/{file}"));
         let row = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect();
         text.lines().map(row).collect()
     }

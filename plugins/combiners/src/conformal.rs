@@ -233,34 +233,6 @@ mod tests {
     }
 
     #[test]
-    fn intervals_equal_the_oracle() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/oracles/conformal");
-        let text = std::fs::read_to_string(format!("{folder}/expected.csv")).unwrap();
-        let mut node = conformal(0.8, 0.05);
-        let mut compared = 0;
-        for (second, line) in text.lines().skip(1).enumerate() {
-            let cells: Vec<f64> = line
-                .split(',')
-                .map(|cell| cell.parse().unwrap_or(f64::NAN))
-                .collect();
-            let [prediction, truth, lower, upper] = cells[..] else {
-                panic!("four cells")
-            };
-            let now = s(second as i64);
-            node.advance(now);
-            let found = node.interval(Votes(&[prediction]));
-            assert_eq!(found[0].is_nan(), lower.is_nan(), "row {second}");
-            if !lower.is_nan() {
-                assert!((found[0] - lower).abs() < 1e-12 && (found[1] - upper).abs() < 1e-12);
-                compared += 1;
-            }
-            node.judge(found, truth);
-            node.observe(Votes(&[prediction]), truth, now);
-        }
-        assert!(compared > 900);
-    }
-
-    #[test]
     fn nothing_is_said_before_there_are_enough_errors() {
         let mut node = conformal(0.9, 0.0);
         for second in 0..9 {

@@ -11,10 +11,15 @@ use crate::mean::mean;
 
 /// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
 ///
-/// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the root mean
-/// square of the first `first` of them: `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, and an alarm where `m_t` has gone `λ` from its
-/// smallest or largest value (Page 1954; Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins
-/// anew. It takes the errors for independent; those of truths that overlap are not, so let it take one in a while with `every`.
+/// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the usual error:
+/// `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, and an alarm where `m_t` has gone `λ` from its smallest or largest value (Page 1954;
+/// Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins anew. The usual error is the root mean
+/// square of all that have been taken; one that is larger than five times that counts as five (Huber 1981), so that neither a
+/// glitch nor the minutes after a change of set point are an alarm by themselves.
+///
+/// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985). Those of truths that
+/// overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much room: a bias as large as the
+/// usual error is told in some hours, one of half that size hardly ever.
 ///
 /// The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
 /// `hold`. Of several predictions the mean is watched.
@@ -24,12 +29,11 @@ pub struct PageHinkley {
     /// What is watched.
     #[serde(default)]
     pub watch: Watched,
-    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more. They should span all
-    /// that the machine usually does, such as a day: where they were taken at rest, its next change of set point is an alarm.
+    /// How many truths there must be before it is known what errors are usual, and how many more before an alarm; 2 or more.
     #[serde(default = "thirty")]
     #[schemars(range(min = 2))]
     pub first: u64,
-    /// `δ`, a change that is not worth an alarm, in multiples of the usual error; 0 or more.
+    /// `δ`, half of the smallest change that is worth an alarm, in multiples of the usual error; 0 or more.
     #[serde(default = "tolerance")]
     #[schemars(range(min = 0.0))]
     pub tolerance: f64,
@@ -41,8 +45,9 @@ pub struct PageHinkley {
     #[serde(default = "factor")]
     #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub factor: f64,
-    /// The time from one truth that is taken to the next; with none, all are.
-    #[serde(default)]
+    /// The time from one truth that is taken to the next; with none, all are. It should be no shorter than the span of a truth and
+    /// the horizon, so that errors do not overlap much.
+    #[serde(default = "five_minutes")]
     pub every: Duration,
     /// How long an alarm stands.
     #[serde(default = "hour")]
@@ -51,8 +56,9 @@ pub struct PageHinkley {
 
 /// Passes a prediction on, and watches with adaptive windowing whether the model behind it has drifted.
 ///
-/// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the root mean square
-/// of the first `first` of them. There is an alarm, and the window begins anew, where it has two sides with means that are
+/// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual error: the
+/// root mean square of all that have been taken, of which one larger than five times that counts as five. There is an alarm, and
+/// the window begins anew, where it has two sides with means that are
 /// farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
@@ -65,8 +71,7 @@ pub struct Adwin {
     /// What is watched.
     #[serde(default)]
     pub watch: Watched,
-    /// How many truths say what errors are usual, and how many more there must be before an alarm; 2 or more. They should span all
-    /// that the machine usually does, such as a day: where they were taken at rest, its next change of set point is an alarm.
+    /// How many truths there must be before it is known what errors are usual, and how many more before an alarm; 2 or more.
     #[serde(default = "thirty")]
     #[schemars(range(min = 2))]
     pub first: u64,
@@ -114,11 +119,11 @@ fn five() -> u64 {
 }
 
 fn tolerance() -> f64 {
-    PageHinkleyOptions::default().tolerance
+    0.5
 }
 
 fn threshold() -> f64 {
-    PageHinkleyOptions::default().threshold
+    30.0
 }
 
 fn factor() -> f64 {
@@ -129,9 +134,16 @@ fn confidence() -> f64 {
     AdwinOptions::default().confidence
 }
 
+fn five_minutes() -> Duration {
+    Duration::from_ns(300_000_000_000)
+}
+
 fn hour() -> Duration {
     Duration::from_ns(3_600_000_000_000)
 }
+
+/// An error that is more times as large as usual counts as so many times.
+const LARGEST: f64 = 5.0;
 
 /// The numbers of the port `reason`.
 mod reason {
@@ -302,7 +314,7 @@ struct Watching<D> {
 struct Seen<D> {
     watch: Watched,
     detector: D,
-    /// How many errors say what is usual, and the mean of their squares.
+    /// How many errors have been taken, and the mean of their squares.
     count: u64,
     mean_square: f64,
     /// When the last truth was taken.
@@ -380,13 +392,18 @@ where
             return;
         }
         seen.taken = Some(arrived);
-        if seen.count < self.first {
-            seen.count += 1;
-            seen.mean_square += (error * error - seen.mean_square) / seen.count as f64;
+        let known = seen.count >= self.first;
+        let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
+        let error = match known {
+            true => error.clamp(-LARGEST * usual, LARGEST * usual),
+            false => error,
+        };
+        seen.count += 1;
+        seen.mean_square += (error * error - seen.mean_square) / seen.count as f64;
+        if !known {
             return;
         }
-        let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
-        let relative = error / usual;
+        let relative = error / seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
         let value = match seen.watch {
             Watched::Error => relative,
             Watched::Size => relative.abs(),
@@ -455,8 +472,9 @@ mod tests {
         said
     }
 
+    /// With its defaults, but for truths that come every minute and do not overlap.
     fn page_hinkley() -> PageHinkley {
-        serde_json::from_str("{}").unwrap()
+        serde_json::from_str(r#"{ "every": "0s" }"#).unwrap()
     }
 
     fn adwin() -> Adwin {
@@ -543,6 +561,30 @@ mod tests {
             size.build(1).restore(seen()),
             Restored::Cold { .. }
         ));
+    }
+
+    #[test]
+    fn a_glitch_is_no_alarm_and_leaves_the_test_as_sensitive_as_it_was() {
+        let mut node = page_hinkley().build(1);
+        let vote = Votes(&[0.0]);
+        let mut alarm = None;
+        for nth in 0..400_i64 {
+            let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+            let error = match nth {
+                150 => 1e9,
+                0..300 => sign,
+                _ => sign + 2.0,
+            };
+            node.observe(vote, error, s(60 * nth));
+            node.advance(s(60 * nth));
+            if node.reason(vote) == reason::UP {
+                alarm.get_or_insert(nth);
+            }
+        }
+        assert!(
+            alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
+            "{alarm:?}"
+        );
     }
 
     #[test]

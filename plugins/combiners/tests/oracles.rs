@@ -1,26 +1,32 @@
-//! The weights of votes against tables made with other libraries, see `tests/oracles/votes/generate.py`.
+//! The weights of votes against tables made with other libraries, and intervals against a plain implementation; `generate.py` in
+//! each folder under `tests/oracles` says how.
 
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 
-use athermal_combiners::{AutoWeighted, Fading, Hedge, LastTruths, Memory, Weighting};
+use athermal_combiners::{AutoWeighted, Conformal, Fading, Hedge, LastTruths, Memory, Weighting};
 use athermal_core::node::{Combiner, Votes};
 use athermal_core::time::{Duration, Instant};
 
+/// The rows of a table; an empty cell is NaN.
 fn table(file: &str) -> Vec<Vec<f64>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles/votes");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/oracles");
     let text = std::fs::read_to_string(folder.join(file)).unwrap();
-    let row = |line: &str| line.split(',').map(|cell| cell.parse().unwrap()).collect();
+    let number = |cell: &str| match cell {
+        "" => f64::NAN,
+        cell => cell.parse().unwrap(),
+    };
+    let row = |line: &str| line.split(',').map(number).collect();
     text.lines().skip(1).map(row).collect()
 }
 
 /// Follows the rows of the input and compares the weights before each truth with columns of a table.
 fn compare(parameters: &dyn Combiner, file: &str, column: usize, tolerance: f64) {
-    let expected = table(file);
+    let expected = table(&format!("votes/{file}"));
     let mut running = parameters.build(3);
     let mut compared = 0;
-    for (row, values) in table("input.csv").iter().enumerate() {
+    for (row, values) in table("votes/input.csv").iter().enumerate() {
         let arrived = Instant::from_ns((values[0] * 1e9) as i64);
         let votes = Votes(&values[2..]);
         running.advance(arrived);
@@ -91,4 +97,32 @@ fn oracle_of_exponential_weights_at_a_stated_rate() {
 #[test]
 fn oracle_of_exponential_weights_that_find_their_rate() {
     compare(&hedge(None), "hedge.csv", 4, 1e-9);
+}
+
+#[test]
+fn oracle_of_intervals_that_allow_for_what_they_missed() {
+    let memory = Duration::from_ns(60_000_000_000);
+    let mut node = Conformal {
+        coverage: 0.8,
+        memory,
+        gain: 0.05,
+    }
+    .build(1);
+    let mut compared = 0;
+    for (second, cells) in (0..).zip(table("conformal/expected.csv")) {
+        let [prediction, truth, lower, upper] = cells[..] else {
+            panic!("four cells")
+        };
+        let now = Instant::from_ns(second * 1_000_000_000);
+        node.advance(now);
+        let found = node.interval(Votes(&[prediction]));
+        assert_eq!(found[0].is_nan(), lower.is_nan(), "row {second}");
+        if !lower.is_nan() {
+            assert!((found[0] - lower).abs() < 1e-12 && (found[1] - upper).abs() < 1e-12);
+            compared += 1;
+        }
+        node.judge(found, truth);
+        node.observe(Votes(&[prediction]), truth, now);
+    }
+    assert!(compared > 900);
 }

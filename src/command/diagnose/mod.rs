@@ -1,5 +1,7 @@
 //! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
 
+mod next;
+mod responses;
 mod tables;
 
 use std::path::PathBuf;
@@ -83,18 +85,24 @@ impl Diagnose {
         };
         let (diagnosis, observation) = diagnose(&model, &dataset, &options, &mut progress)?;
         drop(bar);
+        let tables = Tables::new(&diagnosis, &self.of);
         if terminal.format == Format::Json {
             let files = dataset.paths().iter();
             let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
             println!("{:#}", json!({ "data": files, "diagnosis": diagnosis }));
         } else {
-            print!("{}", Tables::new(&diagnosis, &self.of).text());
+            print!("{}", tables.text());
         }
         let trace = &observation.trace;
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
         self.tell(terminal, &diagnosis);
         if let Some(folder) = &self.plots {
             write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
+        }
+        if terminal.format == Format::Table
+            && let Some(next) = self.next(&tables)
+        {
+            terminal.note(format_args!("\n{next}"));
         }
         Ok(Answer::Fine)
     }

@@ -1,25 +1,20 @@
 //! Decides how the facts of a diagnosis look as text, in 80 columns.
 
-use std::fmt::Write as _;
-
-use athermal::Duration;
 use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
-use athermal::diagnosis::lag::{Correlogram, FeatureLags};
+use athermal::diagnosis::lag::{Correlogram, FeatureLags, Lags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::Residuals;
-use athermal::diagnosis::response::Response;
-use athermal::diagnosis::{Diagnosis, Main, is_asked};
+use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
-use crate::figures::{count, length, matrix, number, or_dash, table};
+use super::responses;
+use crate::figures::{count, matrix, number, or_dash, stated, table};
 
 /// Features that are named of each truth.
 const FEATURES: usize = 3;
 /// A correlation that lies so many standard errors from none says something.
-const SAYS_SOMETHING: f64 = 3.0;
+pub(super) const SAYS_SOMETHING: f64 = 3.0;
 /// A variance inflation beyond which a coefficient means little by itself (Marquardt 1970).
 const INFLATED: f64 = 10.0;
-/// By how much answers to a step up and down differ at least where it is worth a word.
-const BENT: f64 = 0.005;
 
 /// The tables of a diagnosis, of the predictions asked for.
 pub struct Tables<'a> {
@@ -55,7 +50,7 @@ impl<'a> Tables<'a> {
     }
 
     /// The truths of which something is shown.
-    fn main(&self) -> impl Iterator<Item = &'a Main> {
+    pub(super) fn main(&self) -> impl Iterator<Item = &'a Main> {
         let shown = |main: &&Main| {
             let residuals = self.diagnosis.residuals.iter();
             let mut of_truth = residuals.filter(|of| of.truth == main.truth);
@@ -90,10 +85,46 @@ impl<'a> Tables<'a> {
         tables.join("\n")
     }
 
+    /// The correlations of a truth with features; none where it has no features.
+    pub(super) fn lags_of(&self, main: &Main) -> Option<&'a Lags> {
+        let mut all = self.diagnosis.lags.iter();
+        all.find(|of| of.truth == main.truth)
+    }
+
+    /// The estimators of a truth among whose regressors a feature is.
+    pub(super) fn users_of(&self, main: &'a Main, feature: &str) -> impl Iterator<Item = &'a str> {
+        let designs = self.diagnosis.designs.iter();
+        let uses = move |of: &&Design| of.regressors.iter().any(|of| of.name == feature);
+        let users = designs.filter(uses).map(|of| of.node.as_str());
+        users.filter(|node| !node.contains('.') || is_called(node, &main.name))
+    }
+
+    /// Whether a prediction is that of an estimator, and not a vote of several.
+    pub(super) fn is_estimator(&self, main: &Main) -> bool {
+        let mut designs = self.diagnosis.designs.iter();
+        designs.any(|of| of.node == main.prediction)
+    }
+
+    /// Whether all that is left of any truth may be noise.
+    pub(super) fn all_white(&self) -> bool {
+        let all = self.diagnosis.residuals.iter();
+        let mut shown = all.filter(|of| self.shows(&of.prediction)).peekable();
+        shown.peek().is_some() && shown.all(|of| of.white() == Some(true))
+    }
+
+    /// Whether fits on fewer days than there are were too far from those on all others.
+    pub(super) fn more_days_may_help(&self) -> bool {
+        let all = self.diagnosis.residuals.iter();
+        let shown = all.filter(|of| self.shows(&of.prediction));
+        let shown: Vec<&str> = shown.map(|of| of.prediction.as_str()).collect();
+        let days = self.diagnosis.days.as_ref();
+        days.is_some_and(|days| days.count > 2 && enough(days, &shown).is_none())
+    }
+
     fn lags(&self) -> String {
         let mut rows = Vec::new();
         for main in self.main() {
-            let Some(of) = self.diagnosis.lags.iter().find(|of| of.truth == main.truth) else {
+            let Some(of) = self.lags_of(main) else {
                 continue;
             };
             let mut list = |title: String, side: fn(&FeatureLags) -> &Correlogram, least: f64| {
@@ -137,98 +168,7 @@ impl<'a> Tables<'a> {
     fn responses(&self) -> String {
         let all = self.diagnosis.responses.iter();
         let shown: Vec<_> = all.filter(|of| self.shows_estimator(&of.node)).collect();
-        let mut text = String::new();
-        let mut nodes: Vec<&str> = shown.iter().map(|of| name_of(&of.node)).collect();
-        nodes.dedup();
-        for node in nodes {
-            let of_node: Vec<_> = shown
-                .iter()
-                .filter(|of| name_of(&of.node) == node)
-                .collect();
-            let columns: Vec<String> = of_node.iter().map(|of| axis_of(&of.truth)).collect();
-            let mut sensors: Vec<&Response> = Vec::new();
-            for sensor in of_node.iter().flat_map(|of| &of.sensors) {
-                if !sensors.iter().any(|known| known.sensor == sensor.sensor) {
-                    sensors.push(sensor);
-                }
-            }
-            if sensors.is_empty() {
-                continue;
-            }
-            let cells = |sensors: &[&Response],
-                         cell: fn(&Response) -> String|
-             -> Vec<(String, Vec<String>)> {
-                let row = |sensor: &&Response| {
-                    let find = |of: &&&athermal::diagnosis::response::Responses| {
-                        let mut of = of.sensors.iter();
-                        let found = of.find(|of| of.sensor == sensor.sensor);
-                        found.map_or("-".to_owned(), cell)
-                    };
-                    (sensor.sensor.clone(), of_node.iter().map(find).collect())
-                };
-                sensors.iter().map(row).collect()
-            };
-            let unit = &of_node[0].unit;
-            let in_the_end = in_the_end(unit);
-            let has = |of: &Response, kind: fn(&Response) -> Option<f64>| {
-                let mut all = of_node.iter().flat_map(|node| &node.sensors);
-                all.any(|other| other.sensor == of.sensor && kind(other).is_some())
-            };
-            for alike in grouped(sensors.iter().copied(), |of| of.sensor_unit.clone()) {
-                let step = format!("{node}: how far a step of 1 {} moves", alike[0].sensor_unit);
-                let (come_back, last): (Vec<_>, Vec<_>) = alike
-                    .into_iter()
-                    .partition(|of| has(of, |of| of.total) || !has(of, |of| of.gain));
-                if !come_back.is_empty() {
-                    let _ = writeln!(text, "{step} what it predicts in the end, in {in_the_end}");
-                    let total = |of: &Response| of.total.map_or("no end".to_owned(), number);
-                    let mut rows = cells(&come_back, total);
-                    if come_back.len() > 1 {
-                        // What sensors that tell the same share among them means more than what each has of it.
-                        let together = of_node.iter().map(|of| {
-                            let names = |one: &&Response| {
-                                let mut all = come_back.iter();
-                                all.any(|other| other.sensor == one.sensor)
-                            };
-                            let totals = of.sensors.iter().filter(names).map(|of| of.total);
-                            let sum: Option<f64> = totals.sum();
-                            sum.map_or("no end".to_owned(), number)
-                        });
-                        rows.push(("all together".to_owned(), together.collect()));
-                    }
-                    text.push_str(&matrix("sensor", &columns, &rows));
-                }
-                if !last.is_empty() {
-                    let _ = writeln!(text, "{step} what it predicts for good, in {unit}");
-                    let gain = |of: &Response| of.gain.map_or("no end".to_owned(), number);
-                    text.push_str(&matrix("sensor", &columns, &cells(&last, gain)));
-                }
-            }
-            let all = of_node.iter().flat_map(|of| &of.sensors);
-            let longest = all.filter_map(|of| of.settled_s).fold(0.0, f64::max);
-            let in_minutes = longest >= 120.0;
-            let _ = writeln!(
-                text,
-                "{node}: time until nine tenths of that have come, in {}",
-                if in_minutes { "min" } else { "s" }
-            );
-            let in_unit: fn(&Response) -> String = if in_minutes {
-                |of| times(of.settled_s, 60.0)
-            } else {
-                |of| times(of.settled_s, 1.0)
-            };
-            text.push_str(&matrix("sensor", &columns, &cells(&sensors, in_unit)));
-            let bent = of_node.iter().flat_map(|of| &of.sensors);
-            if bent.clone().any(|of| of.asymmetry >= BENT) {
-                let largest = bent.map(|of| of.asymmetry).fold(0.0, f64::max);
-                let _ = writeln!(
-                    text,
-                    "  it is not linear: steps up and down differ by up to {:.0} %",
-                    100.0 * largest
-                );
-            }
-        }
-        text
+        responses::text(&shown)
     }
 
     fn designs(&self) -> String {
@@ -421,7 +361,20 @@ fn residuals(shown: &[&Residuals]) -> String {
     )
 }
 
+/// On how many days a fit comes near those on all others, of all predictions shown; none where on all of them only.
+fn enough(days: &Days, shown: &[&str]) -> Option<usize> {
+    let near = |point: &CurvePoint| {
+        let scores = point.scores.iter();
+        let mut of_shown = scores.filter(|score| shown.contains(&score.prediction.as_str()));
+        of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
+    };
+    let last_far = days.curve.iter().rposition(|point| !near(point));
+    let first_near = days.curve.get(last_far.map_or(0, |last| last + 1))?;
+    (first_near.days < days.count - 1).then_some(first_near.days)
+}
+
 fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
+    let enough = enough(days, shown);
     let shown: Vec<String> = shown.iter().map(|&name| name.to_owned()).collect();
     let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<f64>| -> Vec<String> {
         let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
@@ -439,21 +392,14 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
         (label, cells(&point.scores, DayScore::ratio))
     });
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
-    let near = |point: &CurvePoint| {
-        let scores = point.scores.iter();
-        let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
-        of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
-    };
-    let last_far = days.curve.iter().rposition(|point| !near(point));
-    let enough = days.curve.get(last_far.map_or(0, |last| last + 1));
     let most = days.count - 1;
-    let verdict = match enough.map_or(days.count, |point| point.days) {
+    let verdict = match enough {
         _ if most == 1 => "two are too few to tell",
-        enough if enough < most => {
+        Some(enough) => {
             let plural = if enough == 1 { " is" } else { "s are" };
             &format!("{enough} day{plural} enough to come within 5 % of {most}")
         }
-        _ => "more days may still make it better",
+        None => "more days may still make it better",
     };
     let of_day = if days.day_s == 86_400.0 {
         String::new()
@@ -476,7 +422,10 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
 }
 
 /// What is alike in `by` together, in the order in which the first of each comes.
-fn grouped<T, K: PartialEq>(all: impl Iterator<Item = T>, by: impl Fn(&T) -> K) -> Vec<Vec<T>> {
+pub(super) fn grouped<T, K: PartialEq>(
+    all: impl Iterator<Item = T>,
+    by: impl Fn(&T) -> K,
+) -> Vec<Vec<T>> {
     let mut groups: Vec<(K, Vec<T>)> = Vec::new();
     for one in all {
         let key = by(&one);
@@ -506,35 +455,19 @@ fn regressors(of: &Design) -> String {
 }
 
 /// The node of an instance: `thermal` of `thermal.Z1`.
-fn name_of(instance: &str) -> &str {
+pub(super) fn name_of(instance: &str) -> &str {
     instance.split_once('.').map_or(instance, |(node, _)| node)
 }
 
-fn axis_of(channel: &str) -> String {
+pub(super) fn axis_of(channel: &str) -> String {
     let axis = channel.split_once('.').map_or(channel, |(_, axis)| axis);
     axis.to_owned()
 }
 
-/// The unit of a sum over minutes: that of a position, where the truth is its drift per minute.
-fn in_the_end(unit: &str) -> String {
-    unit.strip_suffix("/min")
-        .map_or_else(|| format!("{unit}·min"), str::to_owned)
-}
-
-/// A length of time as a number of units of so many seconds.
-fn times(length_s: Option<f64>, unit_s: f64) -> String {
-    length_s.map_or("no end".to_owned(), |length| number(length / unit_s))
-}
-
 /// A length of time, to the second where it is longer than a minute.
 fn seconds(seconds: f64) -> String {
-    let sign = if seconds < 0.0 { "-" } else { "" };
-    let size = match seconds.abs() {
-        long if long > 60.0 => long.round(),
-        short => short,
-    };
-    let duration = Duration::from_secs_f64(size);
-    duration.map_or_else(|| "-".to_owned(), |of| format!("{sign}{}", length(of)))
+    let is_long = seconds.abs() > 60.0;
+    stated(if is_long { seconds.round() } else { seconds })
 }
 
 #[cfg(test)]
@@ -542,9 +475,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drift_per_minute_ends_as_a_length() {
-        assert_eq!(in_the_end("nm/min"), "nm");
-        assert_eq!(in_the_end("W/m2"), "W/m2·min");
+    fn lags_are_told_to_the_second_where_they_are_longer_than_a_minute() {
         assert_eq!(seconds(-150.05), "-150s");
         assert_eq!(seconds(0.08), "80ms");
     }

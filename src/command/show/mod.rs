@@ -7,6 +7,8 @@ use std::path::PathBuf;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
+use athermal::core::diagnostic::nearest;
+use athermal::diagnosis::{is_asked, is_called};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::{Value, json};
@@ -28,7 +30,7 @@ use coefficients::Told;
   athermal show graphs/die-tester.toml
   athermal show graphs/die-tester.toml --format svg > die-tester.svg
   athermal show graphs/die-tester.toml --format mermaid      for Markdown
-  athermal show model.json --format coefficients
+  athermal show model.json --format coefficients --node thermal.Z1
   athermal show model.json --expand --format dot | dot -Tpdf -o graph.pdf")]
 pub struct Show {
     /// The graph, or a model
@@ -39,6 +41,9 @@ pub struct Show {
     /// Show each instance of a node with `each` on its own
     #[arg(long)]
     expand: bool,
+    /// Tell the coefficients of these estimators only, by node, instance or axis
+    #[arg(long = "node", value_name = "NAME")]
+    nodes: Vec<String>,
 }
 
 fn formats() -> PossibleValuesParser {
@@ -61,8 +66,17 @@ impl Show {
     pub fn run(&self, _terminal: &Terminal) -> Result<Answer, Failure> {
         if self.format == "coefficients" {
             let model = load_fitted(&self.graph, Wanted::default())?;
-            print(tables::text(&model, &coefficients::told(&model)).as_bytes())?;
+            let told = self.told(&model)?;
+            let mut unfitted = model.unfitted();
+            unfitted.retain(|node| is_asked(node, &self.nodes));
+            print(tables::text(&told, &unfitted).as_bytes())?;
             return Ok(Answer::Fine);
+        }
+        if !self.nodes.is_empty() && self.format != "json" {
+            return Err(Failure::Request(format!(
+                "--node chooses coefficients, and the format is {}: add `--format coefficients`",
+                self.format
+            )));
         }
         let model = Model::load(&self.graph)?;
         let drawn = || diagram(&model.plan, self.expand);
@@ -70,12 +84,42 @@ impl Show {
             "mermaid" => mermaid::text(&drawn()),
             "dot" => dot::text(&drawn()),
             "svg" => svg::text(&drawn()),
-            "json" => format!("{:#}\n", facts(&drawn(), &coefficients::told(&model))),
+            "json" => format!("{:#}\n", facts(&drawn(), &self.told(&model)?)),
             _ => plan::text(&model.plan, self.expand),
         };
         print(text.as_bytes())?;
         Ok(Answer::Fine)
     }
+
+    /// The coefficients of the estimators asked for; every name must be that of one.
+    fn told(&self, model: &Model) -> Result<Vec<Told>, Failure> {
+        let mut told = coefficients::told(model);
+        let unfitted = model.unfitted();
+        let known = told.iter().map(|of| &of.node).chain(&unfitted);
+        let known: Vec<&str> = known.map(String::as_str).collect();
+        let is_known = |name: &&String| known.iter().any(|of| is_called(of, name));
+        if let Some(name) = self.nodes.iter().find(|name| !is_known(name)) {
+            return Err(Failure::Request(no_estimator(name, &known)));
+        }
+        told.retain(|of| is_asked(&of.node, &self.nodes));
+        Ok(told)
+    }
+}
+
+/// That no estimator among those known goes by a name, and which do.
+fn no_estimator(name: &str, known: &[&str]) -> String {
+    let mut nodes: Vec<&str> = known
+        .iter()
+        .map(|of| of.split_once('.').map_or(*of, |(node, _)| node))
+        .collect();
+    nodes.dedup();
+    let near = nearest(name, known.iter().chain(&nodes).copied());
+    let near = near.map_or_else(String::new, |near| format!(", did you mean `{near}`?"));
+    let there = match nodes[..] {
+        [] => "nothing in the graph is fitted".to_owned(),
+        _ => format!("fitted are {}", nodes.join(", ")),
+    };
+    format!("there is no fitted estimator `{name}`{near} ({there})")
 }
 
 fn facts(diagram: &Diagram, told: &[Told]) -> Value {

@@ -3,23 +3,22 @@
 use std::fmt::Write as _;
 
 use athermal::core::node::Mode;
-use athermal::{Duration, Model};
 
 use super::coefficients::{Found, Told};
-use crate::figures::{length, paragraph, table};
+use crate::figures::{digits, paragraph, stated, table, time};
 
 /// The longest name that numbers stand beside; what is longer is told above them.
 const LONGEST_NAME: usize = 36;
 
 /// All that is told of a model.
-pub(super) fn text(model: &Model, told: &[Told]) -> String {
+pub(super) fn text(told: &[Told], unfitted: &[String]) -> String {
     let mut text = String::new();
     for of in told {
         let found = of.found.as_ref();
         text.push_str(&found.map_or_else(|| untold(of), |found| estimator(of, found)));
         text.push('\n');
     }
-    for node in model.unfitted() {
+    for node in unfitted {
         let _ = writeln!(text, "{node} could not be fitted\n");
     }
     let all = told.iter().filter_map(|of| of.found.as_ref());
@@ -29,7 +28,7 @@ pub(super) fn text(model: &Model, told: &[Told]) -> String {
             "std. error: as if the errors of rows were independent, so too small where\n\
              windows overlap; with a penalty, the spread of the posterior\n",
         );
-    } else if told.is_empty() {
+    } else if told.is_empty() && unfitted.is_empty() {
         text.push_str("nothing in the graph is fitted\n");
     }
     text
@@ -195,42 +194,6 @@ fn fading(mode: &Mode) -> String {
     }
 }
 
-/// A number to so many significant digits.
-fn digits(value: f64, count: usize) -> String {
-    let size = value.abs();
-    if value == 0.0 {
-        "0".to_owned()
-    } else if !(1e-4..1e6).contains(&size) {
-        format!("{value:.*e}", count - 1)
-    } else {
-        let before = size.log10().floor() as i32 + 1;
-        let after = usize::try_from(count as i32 - before).unwrap_or(0);
-        format!("{value:.after$}")
-    }
-}
-
-/// A time as a graph file states it.
-fn stated(seconds: f64) -> String {
-    Duration::from_secs_f64(seconds).map_or_else(|| time(seconds), length)
-}
-
-/// A time to three significant digits, in the unit in which it is read best.
-fn time(seconds: f64) -> String {
-    let (unit, length) = match seconds {
-        short if short < 1.0 => ("ms", 1e-3),
-        short if short < 120.0 => ("s", 1.0),
-        short if short < 3_600.0 => ("min", 60.0),
-        short if short < 172_800.0 => ("h", 3_600.0),
-        _ => ("d", 86_400.0),
-    };
-    let number = digits(seconds / length, 3);
-    let number = match number.contains('.') && !number.contains('e') {
-        true => number.trim_end_matches('0').trim_end_matches('.'),
-        false => &number,
-    };
-    format!("{number} {unit}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,11 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_their_digits_and_times_the_unit_in_which_they_are_read_best() {
-        let told = [0.0, 12.345_678, -0.000_123_456, 1_234_567.0, 98_765.4].map(|it| digits(it, 5));
-        assert_eq!(told, ["0", "12.346", "-0.00012346", "1.2346e6", "98765"]);
-        let times = [0.0456, 90.0, 3_600.0, 7.65 * 60.0, 1e7].map(time);
-        assert_eq!(times, ["45.6 ms", "90 s", "1 h", "7.65 min", "116 d"]);
+    fn what_does_not_come_to_rest_is_said_to() {
         let mode = |time_constant_s: f64| Mode {
             of: "A".to_owned(),
             time_constant_s,

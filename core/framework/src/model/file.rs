@@ -78,12 +78,25 @@ impl Model {
     /// # Errors
     /// As [`Model::load`].
     pub fn load_for(path: impl AsRef<Path>, wanted: Wanted) -> Result<Self, ModelError> {
+        Self::load_from(path, wanted, &mut Sources::new())
+    }
+
+    /// The same, adding the files of a graph to `sources`: from there the tests of the graph can be declared
+    /// ([`trial::declare`](crate::trial::declare)) without reading it again.
+    ///
+    /// # Errors
+    /// As [`Model::load`].
+    pub fn load_from(
+        path: impl AsRef<Path>,
+        wanted: Wanted,
+        sources: &mut Sources,
+    ) -> Result<Self, ModelError> {
         let path = path.as_ref();
         if path
             .extension()
             .is_some_and(|extension| extension == "toml")
         {
-            return Self::load_graph(path, wanted);
+            return Self::load_graph(path, wanted, sources);
         }
         let text = std::fs::read_to_string(path).map_err(|source| ModelError::Unreadable {
             path: path.to_owned(),
@@ -156,9 +169,9 @@ impl Model {
         })
     }
 
-    fn load_graph(path: &Path, wanted: Wanted) -> Result<Self, ModelError> {
-        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-        let graph = document::load(path, &Disk, &mut sources, &mut diagnostics)
+    fn load_graph(path: &Path, wanted: Wanted, sources: &mut Sources) -> Result<Self, ModelError> {
+        let mut diagnostics = Diagnostics::new();
+        let graph = document::load(path, &Disk, sources, &mut diagnostics)
             .and_then(|read| document::declare(read, &mut diagnostics));
         let plan = graph
             .as_ref()
@@ -172,7 +185,7 @@ impl Model {
             }),
             _ => Err(ModelError::Graph {
                 diagnostics: Box::new(diagnostics),
-                sources: Box::new(sources),
+                sources: Box::new(std::mem::take(sources)),
             }),
         }
     }

@@ -1,0 +1,91 @@
+//! Decides which commands are worth trying after a diagnosis: only those that what was found asks for, two at most.
+
+use athermal::diagnosis::Main;
+use athermal::diagnosis::lag::FeatureLags;
+
+use super::Diagnose;
+use super::tables::{SAYS_SOMETHING, Tables};
+use crate::figures::paragraph;
+use crate::invocation::{command, program, quoted};
+
+impl Diagnose {
+    /// What to try next, each with its reason; nothing where nothing follows.
+    pub(super) fn next(&self, tables: &Tables) -> Option<String> {
+        let left = self.what_is_left(tables);
+        let left = left.or_else(|| self.wider_windows(tables));
+        let found: Vec<String> = left.into_iter().chain(self.more_days(tables)).collect();
+        (!found.is_empty()).then(|| found.join("\n"))
+    }
+
+    fn command(&self, name: &str, more: &[&str]) -> String {
+        let (program, model) = (program(), quoted(&self.model.display().to_string()));
+        let data = self.data.words();
+        let words = [&*program, name, &model].into_iter();
+        let words = words.chain(data.iter().map(String::as_str));
+        command(&words.chain(more.iter().copied()).collect::<Vec<_>>())
+    }
+
+    /// A feature tells something of what a prediction leaves: does no estimator use it, or is it of little use there?
+    fn what_is_left(&self, tables: &Tables) -> Option<String> {
+        let (main, feature) = most_left(tables)?;
+        let name = &feature.feature;
+        let users: Vec<&str> = tables.users_of(main, name).collect();
+        let why = format!("What {} leaves goes with {name}, ", main.prediction);
+        let (why, look) = if users.contains(&main.prediction.as_str()) {
+            let model = quoted(&self.model.display().to_string());
+            let node = quoted(&main.prediction);
+            let words = [
+                &program(),
+                "show",
+                &model,
+                "--format coefficients --node",
+                &node,
+            ];
+            (why + "which it uses; its coefficients:", command(&words))
+        } else if let Some(user) = users.first().filter(|_| !tables.is_estimator(main)) {
+            let look = self.command("diagnose", &["--of", &quoted(user), "--no-fit"]);
+            (
+                format!("{why}which {user} uses; what that leaves by itself:"),
+                look,
+            )
+        } else {
+            let look = self.command("fit", &["--candidates", "-o again.json"]);
+            (
+                why + "which it does not use; what a fit tries before it stops:",
+                look,
+            )
+        };
+        Some(paragraph("", 0, &why) + &look)
+    }
+
+    fn more_days(&self, tables: &Tables) -> Option<String> {
+        let fit = self.command("fit", &["MORE.csv", "-o better.json"]);
+        let wanted = tables.more_days_may_help();
+        wanted.then(|| format!("More days may still make it better; with another log:\n{fit}"))
+    }
+
+    /// Where what is left is noise, only a truth with less of it can be told better.
+    fn wider_windows(&self, tables: &Tables) -> Option<String> {
+        let of = self.of.iter().map(|name| quoted(name));
+        let of = of.flat_map(|name| ["--of".to_owned(), name]);
+        let more: Vec<String> = of.chain(["--window --no-fit".to_owned()]).collect();
+        let more: Vec<&str> = more.iter().map(String::as_str).collect();
+        let look = self.command("diagnose", &more);
+        let wanted = !self.window && tables.all_white();
+        wanted.then(|| {
+            format!("What is left is white; how much noise other windows would have:\n{look}")
+        })
+    }
+}
+
+/// Of what predictions leave, that which a feature tells most of for sure.
+fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
+    let left = tables.main().filter_map(|main| {
+        let features = tables.lags_of(main)?.features.iter();
+        let sure = features.filter(|of| of.residual.significance() >= SAYS_SOMETHING);
+        let size = |of: &FeatureLags| of.residual.best.abs();
+        let most = sure.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        Some((main, most))
+    });
+    left.max_by(|a, b| a.1.residual.best.abs().total_cmp(&b.1.residual.best.abs()))
+}

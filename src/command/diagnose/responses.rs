@@ -1,0 +1,239 @@
+//! Decides how the answers of estimators to their sensors look as text.
+
+use std::fmt::Write as _;
+
+use athermal::diagnosis::response::{Response, Responses};
+
+use super::tables::{axis_of, grouped, name_of};
+use crate::figures::{TimeUnit, matrix, number};
+
+/// By how much answers to a step up and down differ at least where it is worth a word.
+const BENT: f64 = 0.005;
+
+/// The tables of all estimators, node by node.
+pub(super) fn text(shown: &[&Responses]) -> String {
+    let nodes = grouped(shown.iter().copied(), |of| name_of(&of.node).to_owned());
+    let nodes = nodes.into_iter().filter_map(Node::of);
+    nodes.map(|node| node.text()).collect()
+}
+
+/// The instances of a node, each a column.
+struct Node<'a> {
+    name: &'a str,
+    instances: Vec<&'a Responses>,
+    columns: Vec<String>,
+    /// The first answer to each sensor that any of them answers: a row each.
+    sensors: Vec<&'a Response>,
+}
+
+impl<'a> Node<'a> {
+    /// None where no sensor is answered.
+    fn of(instances: Vec<&'a Responses>) -> Option<Self> {
+        let mut sensors: Vec<&Response> = Vec::new();
+        for sensor in instances.iter().flat_map(|of| &of.sensors) {
+            if !sensors.iter().any(|known| known.sensor == sensor.sensor) {
+                sensors.push(sensor);
+            }
+        }
+        Some(Self {
+            name: name_of(&sensors.first().and(instances.first())?.node),
+            columns: instances.iter().map(|of| axis_of(&of.truth)).collect(),
+            instances,
+            sensors,
+        })
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for alike in grouped(self.sensors.iter().copied(), |of| of.sensor_unit.clone()) {
+            let (come_back, last): (Vec<_>, Vec<_>) = alike.into_iter().partition(|of| {
+                self.any(of, |of| of.total.is_some()) || !self.any(of, |of| of.gain.is_some())
+            });
+            text.push_str(&self.totals(&come_back));
+            text.push_str(&self.gains(&last));
+        }
+        text.push_str(&self.settled());
+        text.push_str(&self.bent());
+        text
+    }
+
+    /// Whether something is true of any answer to a sensor.
+    fn any(&self, sensor: &Response, is: fn(&Response) -> bool) -> bool {
+        let mut all = self.all().filter(|of| of.sensor == sensor.sensor);
+        all.any(is)
+    }
+
+    fn all(&self) -> impl Iterator<Item = &'a Response> {
+        self.instances.iter().flat_map(|of| &of.sensors)
+    }
+
+    fn unit(&self) -> &'a str {
+        &self.instances[0].unit
+    }
+
+    /// A row for each sensor.
+    fn rows(
+        &self,
+        sensors: &[&Response],
+        cell: impl Fn(&Response) -> String,
+    ) -> Vec<(String, Vec<String>)> {
+        let row = |sensor: &&Response| {
+            let cells = self.instances.iter().map(|of| {
+                let mut answers = of.sensors.iter();
+                let found = answers.find(|of| of.sensor == sensor.sensor);
+                found.map_or("-".to_owned(), &cell)
+            });
+            (sensor.sensor.clone(), cells.collect())
+        };
+        sensors.iter().map(row).collect()
+    }
+
+    /// What comes of steps of sensors of one unit whose answers come back to nothing.
+    fn totals(&self, sensors: &[&Response]) -> String {
+        let Some(first) = sensors.first() else {
+            return String::new();
+        };
+        let mut rows = self.rows(sensors, |of| or_no_end(of.total));
+        if sensors.len() > 1 {
+            // What sensors that tell the same share among them means more than what each has of it.
+            let together = self.instances.iter().map(|of| together(of, sensors));
+            rows.push(("all together".to_owned(), together.collect()));
+        }
+        format!(
+            "{}: how far a step of 1 {} moves what it predicts in the end, in {}\n{}",
+            self.name,
+            first.sensor_unit,
+            in_the_end(self.unit()),
+            matrix("sensor", &self.columns, &rows)
+        )
+    }
+
+    /// The same of those that are answered for as long as they stay where they are.
+    fn gains(&self, sensors: &[&Response]) -> String {
+        let Some(first) = sensors.first() else {
+            return String::new();
+        };
+        let rows = self.rows(sensors, |of| or_no_end(of.gain));
+        format!(
+            "{}: how far a step of 1 {} moves what it predicts for good, in {}\n{}",
+            self.name,
+            first.sensor_unit,
+            self.unit(),
+            matrix("sensor", &self.columns, &rows)
+        )
+    }
+
+    fn settled(&self) -> String {
+        let longest = self.all().filter_map(|of| of.settled_s).fold(0.0, f64::max);
+        let unit = TimeUnit::of(longest);
+        let rows = self.rows(&self.sensors, |of| {
+            or_no_end(of.settled_s.map(|settled_s| settled_s / unit.seconds))
+        });
+        format!(
+            "{}: time until nine tenths of that have come, in {}\n{}",
+            self.name,
+            unit.symbol,
+            matrix("sensor", &self.columns, &rows)
+        )
+    }
+
+    fn bent(&self) -> String {
+        let largest = self.all().map(|of| of.asymmetry).fold(0.0, f64::max);
+        let mut text = String::new();
+        if largest >= BENT {
+            let _ = writeln!(
+                text,
+                "  it is not linear: steps up and down differ by up to {:.0} %",
+                100.0 * largest
+            );
+        }
+        text
+    }
+}
+
+/// The sum of what an instance makes of the sensors; it may answer none of them.
+fn together(of: &Responses, sensors: &[&Response]) -> String {
+    let among = |one: &&Response| sensors.iter().any(|other| other.sensor == one.sensor);
+    let answers: Vec<&Response> = of.sensors.iter().filter(among).collect();
+    if answers.is_empty() {
+        return "-".to_owned();
+    }
+    or_no_end(answers.iter().map(|of| of.total).sum())
+}
+
+fn or_no_end(value: Option<f64>) -> String {
+    value.map_or("no end".to_owned(), number)
+}
+
+/// The unit of a sum over minutes: that of a position, where the truth is its drift per minute.
+fn in_the_end(unit: &str) -> String {
+    unit.strip_suffix("/min")
+        .map_or_else(|| format!("{unit}·min"), str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answer(sensor: &str, total: Option<f64>, settled_s: f64) -> Response {
+        Response {
+            sensor: format!("temperature.{sensor}"),
+            sensor_unit: "K".to_owned(),
+            time_s: Vec::new(),
+            step: Vec::new(),
+            impulse: Vec::new(),
+            total,
+            gain: None,
+            peak_s: 0.0,
+            peak: 1.0,
+            settled_s: Some(settled_s),
+            asymmetry: 0.0,
+        }
+    }
+
+    fn instance(axis: &str, unit: &str, sensors: Vec<Response>) -> Responses {
+        Responses {
+            node: format!("thermal.{axis}"),
+            truth: format!("drift.{axis}"),
+            unit: unit.to_owned(),
+            sensors,
+        }
+    }
+
+    #[test]
+    fn a_drift_per_minute_ends_as_a_length() {
+        assert_eq!(in_the_end("nm/min"), "nm");
+        assert_eq!(in_the_end("W/m2"), "W/m2·min");
+    }
+
+    #[test]
+    fn an_instance_that_answers_no_sensor_of_a_unit_has_no_sum_of_them() {
+        let heater = Response {
+            sensor_unit: "W".to_owned(),
+            ..answer("heater", Some(5.0), 60.0)
+        };
+        let both = vec![answer("a", Some(2.0), 60.0), answer("b", Some(1.0), 60.0)];
+        let endless = vec![answer("a", Some(2.0), 60.0), answer("b", None, 60.0)];
+        let of = [
+            instance("X", "nm/min", both),
+            instance("Y", "nm/min", vec![heater]),
+            instance("Z", "nm/min", endless),
+        ];
+        let told = text(&of.iter().collect::<Vec<_>>());
+        let together = told.lines().find(|line| line.contains("all together"));
+        let cells: Vec<&str> = together.unwrap().split("  ").collect();
+        let cells: Vec<&str> = cells.into_iter().map(str::trim).collect();
+        let cells: Vec<&str> = cells.into_iter().filter(|cell| !cell.is_empty()).collect();
+        assert_eq!(cells, ["all together", "3.00", "-", "no end"], "{told}");
+    }
+
+    #[test]
+    fn settling_is_told_in_the_unit_in_which_the_longest_is_read_best() {
+        for (settled_s, unit, number) in [(90.0, "s", "90.00"), (43_200.0, "h", "12.00")] {
+            let of = instance("X", "nm/min", vec![answer("a", Some(2.0), settled_s)]);
+            let told = text(&[&of]);
+            assert!(told.contains(&format!("have come, in {unit}\n")), "{told}");
+            assert!(told.trim_end().ends_with(number), "{told}");
+        }
+    }
+}
