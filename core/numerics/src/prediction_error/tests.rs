@@ -1,17 +1,7 @@
 use super::residuals::{counted_from, derivatives, residuals, sum_of_squares};
 use super::search::remembered;
 use super::*;
-
-/// Numbers between −1 and 1 that nobody could guess.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1 << 30) - 1.0
-    }
-}
+use crate::draws::uniform as noise;
 
 /// What a model gives when it is fed noise, in two segments.
 fn simulated(model: &Polynomials, count: usize, spread: f64, seed: u64) -> Samples {
