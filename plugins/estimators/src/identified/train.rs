@@ -10,6 +10,7 @@ use athermal_numerics::{
 use super::follow::{Identified, MOST_SERIES};
 use super::{Asked, Differences};
 use crate::conditioning::tell_rows;
+use crate::order::{Order, Tried};
 use crate::regression::told;
 use crate::scaling::Scaling;
 
@@ -247,13 +248,6 @@ impl Asked {
         spread: f64,
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
-        let search = |orders: &athermal_numerics::Orders| {
-            let most = MOST_WORK / orders.coefficients().max(1);
-            PredictionError {
-                penalty: self.penalty,
-                most_steps: most.clamp(20, 100),
-            }
-        };
         // By default no order is open.
         let order = self.order.unwrap_or_default();
         let mut candidates = Vec::new();
@@ -264,7 +258,10 @@ impl Asked {
         if let [(_, orders)] = &candidates[..]
             && self.order.is_none()
         {
-            return search(orders).fit(orders, samples, 0).map_err(told);
+            return self
+                .search(orders.coefficients())
+                .fit(orders, samples, 0)
+                .map_err(told);
         }
         let firsts = candidates.iter().map(|(_, orders)| orders.first());
         let first = firsts.max().unwrap_or(0);
@@ -272,34 +269,42 @@ impl Asked {
         let mut fits = Vec::new();
         let mut failed = None;
         for (candidate, orders) in candidates {
-            match search(&orders).fit(&orders, samples, first) {
+            let coefficients = orders.coefficients();
+            match self.search(coefficients).fit(&orders, samples, first) {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
-                    let coefficients = orders.coefficients();
-                    let figures = InformationCriteria::of(fit.rows, coefficients, squares);
-                    tried.push((candidate, coefficients, figures));
+                    tried.push(Tried {
+                        name: self.name(&order, &candidate, orders.differences),
+                        coefficients,
+                        figures: InformationCriteria::of(fit.rows, coefficients, squares),
+                    });
                     fits.push(fit);
                 }
                 Err(error) => failed = Some(error),
             }
         }
-        let Some((best, mut table)) = order.best(samples.counted(first), &tried) else {
+        let Some((best, table)) = order.best(samples.counted(first), tried) else {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
-        if let Differences::Told = self.differences {
-            for (told, fit) in table.tried.iter_mut().zip(&fits) {
-                let differences = format!("differences {}", fit.model.differences);
-                let orders = (!told.order.is_empty()).then_some(&*told.order);
-                told.order = orders
-                    .into_iter()
-                    .chain([&*differences])
-                    .collect::<Vec<_>>()
-                    .join(", ");
-            }
-        }
         report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
+    }
+
+    fn search(&self, coefficients: usize) -> PredictionError {
+        let most = MOST_WORK / coefficients.max(1);
+        PredictionError {
+            penalty: self.penalty,
+            most_steps: most.clamp(20, 100),
+        }
+    }
+
+    /// What is open of an order, as a report tells it.
+    fn name(&self, order: &Order, orders: &[usize; 6], differences: usize) -> String {
+        let told = matches!(self.differences, Differences::Told);
+        let differences = told.then(|| format!("differences {differences}"));
+        let parts: Vec<String> = order.names(orders).chain(differences).collect();
+        parts.join(", ")
     }
 }
 
@@ -329,9 +334,20 @@ impl Pace {
     }
 
     fn told(self) -> String {
-        match self.series {
-            1 => format!("a step is {}", self.step),
-            series => format!("a step is {}, in {series} interleaved series", self.step),
+        let Self {
+            step,
+            truths,
+            series,
+        } = self;
+        match series {
+            1 => format!("a step is {step}"),
+            series if series == truths => {
+                format!("a step is {step}, in {series} interleaved series")
+            }
+            series => format!(
+                "a step is {step}, in {series} interleaved series of the {truths} truths within one; the others are \
+                 not used"
+            ),
         }
     }
 }
@@ -405,5 +421,7 @@ mod tests {
             assert!(apart.into_iter().all(|apart| apart == 100.0));
         }
         assert_eq!(series, MOST_SERIES);
+        let told = "16 interleaved series of the 50 truths within one; the others are not used";
+        assert!(pace.told().ends_with(told), "{}", pace.told());
     }
 }
