@@ -4,7 +4,7 @@ use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, Train
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
     InformationCriteria, Polynomials, PredictionError, PredictionErrorFit, Samples,
-    Standardization, Standardizer, Stepper,
+    Standardization, Standardizer,
 };
 
 use super::follow::{Identified, MOST_SERIES};
@@ -181,8 +181,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
-        let stepper = Stepper::new(found.model);
-        let variances = stepper.variances(STEPS_AHEAD);
+        let variances = found.model.variances(STEPS_AHEAD);
         Ok(Identified {
             regressors: self.names.clone(),
             scaling: Scaling {
@@ -194,7 +193,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 .iter()
                 .map(|sum| (variance * sum).sqrt())
                 .collect(),
-            model: stepper.model().clone(),
+            model: found.model,
             errors: found.errors,
             step: pace.step,
             series: pace.series,
