@@ -219,6 +219,11 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
         .unwrap();
     let edge = fit.model.inputs[1].f[0];
     assert!(fit.converged && (0.99..1.0).contains(&edge), "{fit:?}");
+    let errors = PredictionError::default().standard_errors(&fit, &samples);
+    let [free, held] = &errors.unwrap().inputs[..] else {
+        panic!("there are two inputs")
+    };
+    assert_eq!((free.f.len(), held.f.len(), held.b.len()), (1, 0, 1));
     let (at, first) = (fit.model.flat(), counted_from(&orders(&grows), 0));
     let mut compared = 0;
     for (nth, by) in (0..at.len()).flat_map(|nth| [(nth, 1e-3), (nth, -1e-3)]) {
@@ -295,6 +300,8 @@ fn what_a_short_record_cannot_tell_from_a_unit_root_is_not_told_as_one() {
         .fit(&asked(0, None, 1, 0, 0), &samples, 0)
         .unwrap();
     assert!((-0.95..-0.94).contains(&fit.model.c[0]), "{fit:?}");
+    let errors = PredictionError::default().standard_errors(&fit, &samples);
+    assert_eq!(errors.map(|errors| errors.c), Some(vec![]));
 }
 
 /// What `generate.py` wrote.
@@ -315,12 +322,17 @@ impl Oracle {
         }
     }
 
-    fn fit(&self, name: &str, orders: &Orders) -> PredictionErrorFit {
+    fn samples(&self, name: &str, orders: &Orders) -> Samples {
         let column = self.names.iter().position(|other| other == name).unwrap();
         let mut samples = Samples::new(orders.inputs.len());
         for row in &self.samples {
             samples.push(orders.inputs.iter().map(|_| row[0]), row[column]);
         }
+        samples
+    }
+
+    fn fit(&self, name: &str, orders: &Orders) -> PredictionErrorFit {
+        let samples = self.samples(name, orders);
         PredictionError::default().fit(orders, &samples, 0).unwrap()
     }
 
@@ -390,7 +402,10 @@ fn coefficients_equal_the_oracle_of_scipy() {
 fn standard_errors_equal_the_oracle_of_scipy() {
     let oracle = Oracle::read();
     for (name, orders) in of_oracle() {
-        let found = oracle.fit(name, &orders).errors.unwrap().flat();
+        let samples = oracle.samples(name, &orders);
+        let fit = oracle.fit(name, &orders);
+        let found = PredictionError::default().standard_errors(&fit, &samples);
+        let found = found.unwrap().flat();
         let expected = oracle.numbers(name, "scipy", "errors");
         assert_eq!(found.len(), expected.len());
         for (found, expected) in found.iter().zip(&expected) {

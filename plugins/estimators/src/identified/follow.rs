@@ -31,7 +31,7 @@ pub(super) struct Identified {
     pub(super) scaling: Scaling,
     /// On scaled inputs, in the unit of the truth.
     pub(super) model: Polynomials,
-    /// The standard error of each coefficient, in its place.
+    /// The standard error of each coefficient, in its place; of a polynomial that has none, an empty list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) errors: Option<Polynomials>,
     pub(super) step: Duration,

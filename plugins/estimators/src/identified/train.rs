@@ -46,7 +46,7 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) model: Polynomials,
-    /// The standard errors of its coefficients, where they are known.
+    /// The standard errors of its coefficients, where they are known; of a polynomial that has none, an empty list.
     pub(crate) errors: Option<Polynomials>,
     pub(crate) residual_sum_of_squares: f64,
     pub(crate) rows: usize,
@@ -218,9 +218,15 @@ impl Identify for Asked {
     ) -> Result<Found, TrainingError> {
         // In units of their spread, or the search would depend on the unit of the truth.
         let spread = samples.spread();
-        let mut fit = self.fit(&samples.divided(spread), spread, report)?;
+        let divided = samples.divided(spread);
+        let mut fit = self.fit(&divided, spread, report)?;
+        let search = PredictionError {
+            penalty: self.penalty,
+            ..PredictionError::default()
+        };
+        let mut errors = search.standard_errors(&fit, &divided);
         fit.model.rescale(spread);
-        if let Some(errors) = &mut fit.errors {
+        if let Some(errors) = &mut errors {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
@@ -235,7 +241,7 @@ impl Identify for Asked {
             rows: fit.rows,
             variance: fit.variance(),
             model: fit.model,
-            errors: fit.errors,
+            errors,
         })
     }
 }
