@@ -445,6 +445,19 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() {
+        let mut model = identified(Duration::from_ns(1_000_000_000));
+        model.model.a = vec![-0.9, 0.1];
+        for (errors, mistakes) in [(vec![], 0), (vec![0.1], 1), (vec![0.1, 0.2], 0)] {
+            model.errors = Some(Polynomials {
+                a: errors,
+                ..model.model.clone()
+            });
+            assert_eq!(model.mistakes().len(), mistakes);
+        }
+    }
+
     /// What it predicts of a truth of 0 around a pause of so many steps.
     fn around_a_pause(steps: i64) -> Vec<f64> {
         let step = Duration::from_ns(1_000_000_000);
