@@ -153,7 +153,9 @@ fn the_doubt_of_a_start_is_carried_to_the_sample_that_is_predicted() {
         for known in 0..6 {
             let mut stepper = Stepper::new(model.clone());
             stepper.settle_on(0.0);
-            (0..known).for_each(|_| drop(stepper.step(|_| 0.0, Some(0.0))));
+            for _ in 0..known {
+                stepper.step(|_| 0.0, Some(0.0));
+            }
             // As many are missing as there are between the newest and the one that is predicted, or fewer.
             for missed in 0..4 {
                 for steps in 1..4 {
