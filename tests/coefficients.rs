@@ -237,6 +237,23 @@ fn coefficients_of_some_nodes_are_told_alone_and_a_name_that_none_has_is_told() 
 }
 
 #[test]
+fn a_polynomial_without_standard_errors_is_said_to_be_held_by_its_bound() {
+    let scratch = Scratch::new("coefficients-bounded");
+    let (model, _) = model(&scratch);
+    let why = "polynomials without one are held by the bound of stability";
+    let told = show(&model, "coefficients").ended(0).out;
+    assert!(!told.contains(why), "{told}");
+    let mut written: Value =
+        serde_json::from_str(&std::fs::read_to_string(&model).unwrap()).unwrap();
+    let errors = written.pointer_mut("/fitted/armax/errors").unwrap();
+    assert_eq!(errors["c"].as_array().unwrap().len(), 1);
+    errors["c"] = serde_json::json!([]);
+    let bounded = scratch.file("bounded.json", written.to_string());
+    let told = show(&bounded, "coefficients").ended(0).out;
+    assert!(told.contains(why), "{told}");
+}
+
+#[test]
 fn a_graph_that_is_not_fitted_has_no_coefficients() {
     let scratch = Scratch::new("coefficients-unfitted");
     let graph = scratch.file("graph.toml", graph());

@@ -166,6 +166,59 @@ fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
 }
 
 #[test]
+fn deviations_are_those_of_as_many_steps_as_predictions_are_made_over() {
+    let scratch = Scratch::new("modes-deviations");
+    let data = scratch.file("data.csv", csv(&series(2000)));
+    let nodes = r#"
+        [nodes.past]
+        type = "ar"
+        inputs.truth = "output.y"
+        ahead = "10s"
+        lags = ["0s"]
+        solver = { type = "ols" }
+        [nodes.followed]
+        type = "arma"
+        inputs.truth = "output.y"
+        ahead = "0s"
+        na = 1
+        nc = 0
+        [outputs]
+    "#;
+    let text = GRAPH.replace("LEARN", "").replace("[outputs]", nodes);
+    let text = text + "past = \"past\"\nfollowed = \"followed\"\n";
+    let graph = scratch.file("graph.toml", text);
+    let model = fitted(&scratch, "model.json", &graph, &data);
+    let widths = |mode: &[&str]| {
+        let scores = scores(&model, &data, &[mode, &["--each-on-its-own"]].concat());
+        ["past", "followed"].map(|node| {
+            let of = scores.iter().find(|score| score["node"] == node).unwrap();
+            of["interval"]["width"].as_f64().unwrap()
+        })
+    };
+    let told = athermal(&[&"show", &model, &"--format", &"json"]).ended(0);
+    let told = told.json();
+    let kept = |node: &str| {
+        let all = told["estimators"].as_array().unwrap().iter();
+        let mut of = all.filter(|of| of["node"] == node);
+        let terms = of.next().unwrap()["coefficients"].as_array().unwrap();
+        terms[1]["value"].as_f64().unwrap().abs()
+    };
+    let one = widths(&[]);
+    let three = widths(&["--mode", "k-step", "--steps", "3"]);
+    let free = widths(&["--mode", "free-run"]);
+    let off = |found: f64, expected: f64| (found / expected - 1.0).abs();
+    // The sums of the squares of what an innovation of an autoregression leads to.
+    let square = kept("past").powi(2);
+    let of_three = (1.0 + square + square * square).sqrt() * one[0];
+    assert!(off(three[0], of_three) < 1e-3, "{three:?}, {one:?}");
+    for (nth, node) in ["past", "followed"].into_iter().enumerate() {
+        let of_all = one[nth] / (1.0 - kept(node).powi(2)).sqrt();
+        // At the beginning of the run it is less.
+        assert!(off(free[nth], of_all) < 1e-2, "{node}: {free:?}, {one:?}");
+    }
+}
+
+#[test]
 fn steps_are_asked_for_and_refused_where_they_mean_nothing() {
     let scratch = Scratch::new("modes-steps");
     let data = scratch.file("data.csv", csv(&series(20)));

@@ -31,8 +31,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 ///
 /// `--mode` tells how far the model reaches by itself: one step from measured past truths, several steps with its own
 /// predictions in between, or freely, from features alone and its own past. Features made of what the truth is made of
-/// stay as they were measured, and so do the weights of votes. Standard deviations in a free run are those of one step, so
-/// that they cover less.
+/// stay as they were measured, and so do the weights of votes. Standard deviations are those of as many steps as there are
+/// since the newest measured truth, as far as the noise is what the model takes it for.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal evaluate model.json --data test.csv\n  \

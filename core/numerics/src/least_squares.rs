@@ -421,13 +421,8 @@ mod tests {
         let (mut slow, mut slower) = (0.0, 0.0);
         let mut past = [[0.0; 23]; 2];
         let mut blocks = GramBlocks::with_row_memory(46, row_memory);
-        let mut noise = 1_u64;
-        let mut uniform = || {
-            noise = noise
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut even = crate::draws::uniform(1);
+        let mut uniform = || 0.5 * even();
         for t in 0..3600 {
             let room = 21.0 + (f64::from(t) / 600.0).sin() + 0.3 * uniform();
             slow += (room - slow) / 20.0;

@@ -92,4 +92,6 @@ pub use state_space::{
 };
 
 #[cfg(test)]
+mod draws;
+#[cfg(test)]
 mod oracle;

@@ -33,10 +33,7 @@ impl PredictionVariance {
         } else {
             1.0 / self.rows as f64
         };
-        let mut rest = self.root.as_slice();
-        for i in 0..x.len() {
-            let (row, below) = rest.split_at((i + 1).min(rest.len()));
-            rest = below;
+        for row in self.triangle().take(x.len()) {
             let along: f64 = row
                 .iter()
                 .enumerate()
@@ -52,12 +49,10 @@ impl PredictionVariance {
     /// do not tell of.
     #[must_use]
     pub fn standard_errors(&self) -> Vec<f64> {
-        let mut squares = vec![0.0; self.width()];
+        let mut squares = Vec::new();
         let mut of_intercept = 1.0 / self.rows as f64;
-        let mut rest = self.root.as_slice();
-        for i in 0..squares.len() {
-            let (row, below) = rest.split_at((i + 1).min(rest.len()));
-            rest = below;
+        for row in self.triangle() {
+            squares.push(0.0);
             for (square, w) in squares.iter_mut().zip(row) {
                 *square += w * w;
             }
@@ -72,9 +67,14 @@ impl PredictionVariance {
         all.map(|square| (self.noise * square).sqrt()).collect()
     }
 
-    /// How many columns the triangle is of.
-    fn width(&self) -> usize {
-        (((8 * self.root.len() + 1) as f64).sqrt() as usize).saturating_sub(1) / 2
+    /// The rows of `W`, each one longer than the one before it.
+    fn triangle(&self) -> impl Iterator<Item = &[f64]> {
+        let mut rest = self.root.as_slice();
+        (1..).map_while(move |length| {
+            let (row, below) = rest.split_at_checked(length)?;
+            rest = below;
+            Some(row)
+        })
     }
 }
 

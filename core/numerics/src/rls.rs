@@ -2,6 +2,7 @@
 //! how regressors are scaled (they should be standardised), nor which rows are learned from.
 
 use crate::checks::{check_length, check_parameter};
+use crate::scratch::Scratch;
 use crate::{Gram, NumericsError};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -51,9 +52,9 @@ pub struct Rls {
     coefficients: Vec<f64>,
     /// Row by row, in units of the noise variance.
     covariance: Vec<f64>,
-    /// Scratch: covariance times row.
+    /// Covariance times row.
     #[serde(skip)]
-    projected: Vec<f64>,
+    projected: Scratch,
     seen: u64,
 }
 
@@ -83,7 +84,7 @@ impl TryFrom<Saved> for Rls {
         check_length("covariance", width * width, covariance.len())?;
         Ok(Self {
             options,
-            projected: vec![0.0; width],
+            projected: Scratch(vec![0.0; width]),
             coefficients,
             covariance,
             seen,
@@ -160,7 +161,7 @@ impl Rls {
         }
         Ok(Self {
             options,
-            projected: vec![0.0; width],
+            projected: Scratch(vec![0.0; width]),
             coefficients,
             covariance,
             seen: 0,
@@ -215,10 +216,11 @@ impl Rls {
         let error = y - self.predict(x);
         let width = x.len();
         let rows = self.covariance.chunks_exact(width.max(1));
-        for (projected, row) in self.projected.iter_mut().zip(rows) {
+        let projected = &mut self.projected.0;
+        for (projected, row) in projected.iter_mut().zip(rows) {
             *projected = dot(row, x);
         }
-        let spread = dot(&self.projected, x);
+        let spread = dot(projected, x);
         let mut factor = self.options.forgetting.factor(error, spread);
         let trace: f64 = self.covariance.iter().step_by(width + 1).sum();
         if trace > factor * self.options.most_trace {
@@ -231,15 +233,15 @@ impl Rls {
             return error;
         }
         self.seen += 1;
-        for (coefficient, projected) in self.coefficients.iter_mut().zip(&self.projected) {
+        for (coefficient, projected) in self.coefficients.iter_mut().zip(&*projected) {
             *coefficient += projected * pull;
         }
         let root = total.sqrt().recip();
-        self.projected.iter_mut().for_each(|value| *value *= root);
+        projected.iter_mut().for_each(|value| *value *= root);
         let grow = factor.recip();
         let rows = self.covariance.chunks_exact_mut(width.max(1));
-        for (row, &left) in rows.zip(&self.projected) {
-            for (value, &right) in row.iter_mut().zip(&self.projected) {
+        for (row, &left) in rows.zip(&*projected) {
+            for (value, &right) in row.iter_mut().zip(&*projected) {
                 *value = (*value - left * right) * grow;
             }
         }

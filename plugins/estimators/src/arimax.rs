@@ -93,23 +93,14 @@ mod tests {
     use super::*;
     use crate::identified::Identify;
     use athermal_core::node::TrainingReport;
+    use athermal_core::prng::Prng;
     use athermal_numerics::Samples;
 
     /// How often the noise is integrated of what an input brings about, beside noise of which each value keeps so much of the
     /// last one; and what was compared.
     fn told(kept: f64, order: Option<Order>) -> (usize, Vec<String>) {
-        let mut state = 7_u64;
-        let mut random = || {
-            let sum: f64 = (0..12)
-                .map(|_| {
-                    state = state
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1);
-                    (state >> 11) as f64 / (1_u64 << 53) as f64
-                })
-                .sum();
-            sum - 6.0
-        };
+        let mut prng = Prng::stream(7, "arimax");
+        let mut random = || prng.normal();
         let mut samples = Samples::new(1);
         samples.segment();
         let mut noise = 0.0;

@@ -4,7 +4,7 @@ use athermal_core::node::{Mistake, Regressor, TrainingReport};
 use athermal_core::time::Duration;
 use athermal_numerics::{GramBlocks, InformationCriteria, LeastSquares, NumericsError};
 
-use crate::order::Order;
+use crate::order::{Order, Tried};
 
 /// How many of the first lags are compared.
 #[derive(Debug, Clone)]
@@ -57,12 +57,16 @@ impl LagOrder {
             let fit = LeastSquares::ridge(alpha).solve(&gram, &columns, scales, blocks.rows())?;
             let coefficients = columns.len() - fit.constant.len() + 1;
             let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
-            tried.push((orders, coefficients, figures));
+            tried.push(Tried {
+                name: self.order.names(&orders).collect::<Vec<_>>().join(", "),
+                coefficients,
+                figures,
+            });
             all.push(columns);
         }
         let (best, table) = self
             .order
-            .best(rows, &tried)
+            .best(rows, tried)
             .ok_or(NumericsError::TooFewRows {
                 needed: 4,
                 found: gram.count(),

@@ -119,6 +119,15 @@ pub struct Order {
     pub nk: Option<OrderRange>,
 }
 
+/// A model that was compared with others.
+#[derive(Debug)]
+pub(crate) struct Tried {
+    /// What is open of its orders, as a report tells it.
+    pub(crate) name: String,
+    pub(crate) coefficients: usize,
+    pub(crate) figures: InformationCriteria,
+}
+
 /// An order that may be compared: its letter.
 pub(crate) const LETTERS: [&str; 6] = ["na", "nb", "nc", "nd", "nf", "nk"];
 
@@ -194,37 +203,28 @@ impl Order {
         self.ranges().map(|range| range.is_some())
     }
 
-    /// The orders as a report tells them.
-    pub(crate) fn name(&self, orders: &[usize; 6]) -> String {
+    /// The open orders, each as a report tells it.
+    pub(crate) fn names<'a>(&self, orders: &'a [usize; 6]) -> impl Iterator<Item = String> + 'a {
         let open = LETTERS.iter().zip(orders).zip(self.open());
         let open = open.filter(|(_, open)| *open);
-        let named: Vec<String> = open
-            .map(|((letter, order), _)| format!("{letter} {order}"))
-            .collect();
-        named.join(", ")
+        open.map(|((letter, order), _)| format!("{letter} {order}"))
     }
 
-    /// The best of what was tried, and the table of all: each with its orders, its coefficients and the figures.
-    pub(crate) fn best(
-        &self,
-        rows: usize,
-        tried: &[([usize; 6], usize, InformationCriteria)],
-    ) -> Option<(usize, OrderTable)> {
-        let by = |figures: &InformationCriteria| figures.by(self.by.criterion());
-        let worth = tried.iter().map(|(_, _, figures)| by(figures)).enumerate();
+    /// The best of what was tried, and the table of all.
+    pub(crate) fn best(&self, rows: usize, tried: Vec<Tried>) -> Option<(usize, OrderTable)> {
+        let by = |tried: &Tried| tried.figures.by(self.by.criterion());
+        let worth = tried.iter().map(by).enumerate();
         let (best, _) = worth
             .filter(|(_, worth)| worth.is_finite())
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let told = tried
-            .iter()
-            .map(|(orders, coefficients, figures)| TriedOrder {
-                order: self.name(orders),
-                coefficients: *coefficients,
-                aic: figures.aic,
-                aicc: figures.aicc,
-                bic: figures.bic,
-                fpe: figures.fpe,
-            });
+        let told = tried.into_iter().map(|tried| TriedOrder {
+            order: tried.name,
+            coefficients: tried.coefficients,
+            aic: tried.figures.aic,
+            aicc: tried.figures.aicc,
+            bic: tried.figures.bic,
+            fpe: tried.figures.fpe,
+        });
         let table = OrderTable {
             by: self.by.name().to_owned(),
             rows,

@@ -53,7 +53,8 @@ pub struct StateSpace {
     #[serde(default)]
     pub states: States,
     /// How many steps past and future have each, 2 to 100; as many as there are states where that is more. Without it ten, or
-    /// fewer where rows without a gap would not make twice as many windows of both as a past has values.
+    /// fewer where rows without a gap would not make twice as many windows of both as a past has values, or where a past would
+    /// have more than 1000 values, one of the truth and one of each feature at every step.
     #[serde(default)]
     #[schemars(range(min = 2, max = 100))]
     pub horizon: Option<usize>,
@@ -180,6 +181,15 @@ impl StateSpace {
         shortest..=self.horizon.unwrap_or(USUAL).max(shortest)
     }
 
+    /// What to ask for so that a horizon becomes shorter than this; none where there is no shorter one.
+    fn shortened(&self, horizon: usize) -> Option<Shortened> {
+        match self.states {
+            _ if horizon <= 2 => None,
+            States::Given(states) if states >= horizon => Some(Shortened::ByStates),
+            States::Given(_) | States::Told(_) => Some(Shortened::ByHorizon),
+        }
+    }
+
     fn subspace(&self, horizon: usize, series: usize) -> Subspace {
         Subspace {
             horizon,
@@ -200,6 +210,13 @@ impl StateSpace {
     }
 }
 
+/// What makes a horizon shorter.
+#[derive(Debug, Clone, Copy)]
+enum Shortened {
+    ByStates,
+    ByHorizon,
+}
+
 impl Identify for StateSpace {
     fn every(&self) -> Option<Duration> {
         self.every
@@ -209,9 +226,16 @@ impl Identify for StateSpace {
         let shortest = *self.horizons().start();
         let past = shortest * (inputs + 1);
         (past > LARGEST_PAST).then(|| {
+            let shorter = match self.shortened(shortest) {
+                None => "",
+                Some(Shortened::ByStates) => {
+                    ", or ask for fewer `states`, which allow a shorter horizon"
+                }
+                Some(Shortened::ByHorizon) => ", or give a shorter `horizon`",
+            };
             format!(
-                "{inputs} features over a `horizon` of {shortest} steps make a past of {past} values, and at most \
-                 {LARGEST_PAST} are fitted: name fewer features, or give a shorter horizon"
+                "{inputs} features over a horizon of {shortest} steps make a past of {past} values, and at most \
+                 {LARGEST_PAST} are fitted: name fewer features{shorter}"
             )
         })
     }
@@ -248,12 +272,14 @@ impl Identify for StateSpace {
         let found = self.subspace(horizon, series).identify(&records, width);
         let found = found.map_err(|error| match error {
             NumericsError::TooFewStretches { .. } => TrainingError::Unsolvable {
-                reason: match self.states {
-                    _ if horizon <= 2 => format!("{error}; fewer features need fewer of them"),
-                    States::Given(states) if states == horizon => format!(
+                reason: match self.shortened(horizon) {
+                    None => format!("{error}; fewer features need fewer of them"),
+                    Some(Shortened::ByStates) => format!(
                         "{error}; fewer `states` allow a shorter horizon, which needs fewer and shorter ones"
                     ),
-                    _ => format!("{error}; a shorter `horizon` needs fewer and shorter ones"),
+                    Some(Shortened::ByHorizon) => {
+                        format!("{error}; a shorter `horizon` needs fewer and shorter ones")
+                    }
                 },
             },
             error => told(error),
@@ -316,16 +342,40 @@ fn note(found: &athermal_numerics::Identification) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use athermal_core::prng::Prng;
+
+    fn asking(states: States, horizon: Option<usize>) -> StateSpace {
+        StateSpace {
+            states,
+            horizon,
+            weighting: Weighting::default(),
+            every: None,
+        }
+    }
+
+    #[test]
+    fn too_long_a_past_names_what_makes_it_shorter_and_nothing_that_does_not() {
+        let told = |states: States, horizon: Option<usize>, inputs: usize| {
+            let asked = asking(states, horizon);
+            assert_eq!(asked.misfit(1), None);
+            let misfit = asked.misfit(inputs).unwrap();
+            misfit.split_once("name ").unwrap().1.to_owned()
+        };
+        assert_eq!(told(States::default(), None, 500), "fewer features");
+        assert_eq!(told(States::Given(2), Some(2), 500), "fewer features");
+        assert_eq!(
+            told(States::Given(20), Some(10), 60),
+            "fewer features, or ask for fewer `states`, which allow a shorter horizon"
+        );
+        let horizon = "fewer features, or give a shorter `horizon`";
+        assert_eq!(told(States::Given(5), Some(10), 120), horizon);
+        assert_eq!(told(States::default(), Some(100), 60), horizon);
+    }
 
     /// What a fit with the defaults tells of so many stretches of 24 samples, of an output that follows the first of nine inputs.
     fn told(stretches: usize, horizon: Option<usize>) -> Result<Vec<String>, TrainingError> {
-        let mut state = 7_u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut prng = Prng::stream(7, "state space");
+        let mut random = || prng.between(-0.5, 0.5);
         let mut samples = Samples::new(9);
         for _ in 0..stretches {
             samples.segment();
@@ -336,12 +386,7 @@ mod tests {
                 samples.push(inputs, output);
             }
         }
-        let asked = StateSpace {
-            states: States::default(),
-            horizon,
-            weighting: Weighting::default(),
-            every: None,
-        };
+        let asked = asking(States::default(), horizon);
         let mut report = TrainingReport::default();
         asked.identify(&samples, 1, &mut report)?;
         Ok(report.notes)

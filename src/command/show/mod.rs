@@ -22,9 +22,10 @@ use coefficients::Told;
 ///
 /// Coefficients are in the units of the data, temperatures as K, with their standard errors where theory tells them: those of
 /// least squares; with a penalty those of the posterior of ridge, on which the port `deviation` stands too; of `rls` those that
-/// its memory leaves; of models that are identified by the prediction error those that its derivatives tell. They take the errors
-/// of rows for independent, and are too small where windows overlap. In products regressors count from their means. What follows
-/// its own past comes to rest in time constants; those of a state space are its eigenvalues.
+/// its memory leaves; of models that are identified by the prediction error those that its derivatives tell, with none for a
+/// polynomial that would be unstable if the search had let it. They take the errors of rows for independent, and are too small
+/// where windows overlap. In products regressors count from their means. What follows its own past comes to rest in time
+/// constants; those of a state space are its eigenvalues.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal show graphs/die-tester.toml

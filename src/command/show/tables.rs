@@ -28,10 +28,27 @@ pub(super) fn text(told: &[Told], unfitted: &[String]) -> String {
             "std. error: as if the errors of rows were independent, so too small where\n\
              windows overlap; with a penalty, the spread of the posterior\n",
         );
+        let mut found = told.iter().filter_map(|of| of.found.as_ref());
+        if found.any(is_bounded) {
+            text.push_str(
+                "polynomials without one are held by the bound of stability, where none is known\n",
+            );
+        }
     } else if told.is_empty() && unfitted.is_empty() {
         text.push_str("nothing in the graph is fitted\n");
     }
     text
+}
+
+/// Whether some polynomials have standard errors, and others have not.
+fn is_bounded(found: &Found) -> bool {
+    let of_polynomials = found
+        .coefficients
+        .iter()
+        .filter(|of| of.polynomial.is_some());
+    let (with, without): (Vec<_>, Vec<_>) =
+        of_polynomials.partition(|of| of.standard_error.is_some());
+    !with.is_empty() && !without.is_empty()
 }
 
 fn untold(of: &Told) -> String {

@@ -189,10 +189,23 @@ impl Estimate {
             Some(learning) => learning.predict(&self.row, now),
             None => self.predictor.predict(&self.row),
         };
-        if let Some(feedback) = &mut self.feedback {
-            feedback.ran(&self.row, prediction, now);
+        if self.feedback.is_some() {
+            self.feed_back(prediction, now);
         }
         prediction.is_finite().then_some((prediction, oldest))
+    }
+
+    /// Writes a run down for those that read its prediction in place of the truth.
+    fn feed_back(&mut self, prediction: f64, now: Instant) {
+        let deviation = self.deviation_of_one(now);
+        let (learning, predictor) = (&self.learning, &self.predictor);
+        let predict = |row: &[f64], at: Instant| match learning {
+            Some(learning) => learning.predict(row, at),
+            None => predictor.predict(row),
+        };
+        if let Some(feedback) = &mut self.feedback {
+            feedback.ran(&self.row, prediction, deviation, now, predict);
+        }
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.
@@ -224,14 +237,20 @@ impl Estimate {
 
     /// The standard deviation of the truth about the prediction that was made at this tick.
     pub(crate) fn deviation(&self, now: Instant) -> f64 {
-        let deviation = match &self.learning {
-            Some(learning) => learning.deviation(&self.row, now),
-            None => self.predictor.deviation(&self.row),
-        };
+        let widened = self.feedback.as_ref().map_or(1.0, |of| of.widened());
+        let deviation = widened * self.deviation_of_one(now);
         if deviation.is_finite() {
             deviation
         } else {
             f64::NAN
+        }
+    }
+
+    /// The same from past truths that were all measured.
+    fn deviation_of_one(&self, now: Instant) -> f64 {
+        match &self.learning {
+            Some(learning) => learning.deviation(&self.row, now),
+            None => self.predictor.deviation(&self.row),
         }
     }
 

@@ -9,6 +9,9 @@ use super::{Mode, Slots};
 use crate::compile::{Entry, TruthLink};
 use crate::time::{Duration, Instant};
 
+/// How many of the newest innovations that a prediction rests on count in its deviation.
+const MOST_BROUGHT: usize = 256;
+
 /// The predictions of one estimator, as they stand in for the truths that it would read.
 #[derive(Debug)]
 pub(crate) struct Feedback {
@@ -21,6 +24,14 @@ pub(crate) struct Feedback {
     truths: VecDeque<Truth>,
     deepest: Duration,
     row: Vec<f64>,
+    /// Up to when truths are read as they were measured.
+    origin: Instant,
+    /// How the prediction of the last run changes with each past truth.
+    slopes: Vec<f64>,
+    /// By how much a past truth is changed to tell that.
+    nudge: f64,
+    /// What [`widened`](Self::widened) tells.
+    widened: f64,
 }
 
 /// A past truth in a row.
@@ -38,8 +49,17 @@ struct Truth {
     measured: f64,
     /// What was predicted of it: NaN where nothing was.
     predicted: f64,
-    /// The run that predicted it, and its regressors; none where there was no run.
-    run: Option<(Instant, Vec<f64>)>,
+    /// The run that predicted it; none where there was none.
+    run: Option<Run>,
+    /// What its innovation and those of the truths before it, the newest first, make of the error of what was predicted.
+    brought: Vec<f64>,
+}
+
+#[derive(Debug)]
+struct Run {
+    at: Instant,
+    regressors: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
 impl Feedback {
@@ -61,11 +81,15 @@ impl Feedback {
             link: *link,
             mode,
             step: Step::new(smallest + link.ahead),
-            past,
-            pairing: Pairing::new(link, regressors.len() + 1),
+            pairing: Pairing::new(link, regressors.len() + past.len() + 1),
             truths: VecDeque::new(),
             deepest,
             row: vec![0.0; regressors.len()],
+            origin: Instant::MIN,
+            slopes: vec![0.0; past.len()],
+            past,
+            nudge: 1.0,
+            widened: 1.0,
         })
     }
 
@@ -82,14 +106,28 @@ impl Feedback {
         if self.truths.back().is_some_and(|last| last.at == now) {
             return;
         }
-        let paired = self.pairing.truth(now);
-        let run = paired.map(|paired| (paired.at, paired.row));
+        let mut predicted = f64::NAN;
+        let run = self.pairing.truth(now).map(|paired| {
+            let (regressors, rest) = paired.row.split_at(self.row.len());
+            let (slopes, last) = rest.split_at(self.past.len());
+            predicted = last[0];
+            Run {
+                at: paired.at,
+                regressors: regressors.to_vec(),
+                slopes: slopes.to_vec(),
+            }
+        });
+        let known = self.truths.len();
+        let brought = run
+            .as_ref()
+            .map(|run| self.error_of(run, self.origin, known));
         self.truths.push_back(Truth {
             at: now,
             stamp,
             measured,
-            predicted: run.map_or(f64::NAN, |(_, row)| row[row.len() - 1]),
-            run: run.map(|(at, row)| (at, row[..row.len() - 1].to_vec())),
+            predicted,
+            run,
+            brought: brought.unwrap_or_default(),
         });
         self.step.truth(now);
         let reach = match self.mode {
@@ -119,6 +157,7 @@ impl Feedback {
                 origin
             }
         };
+        self.origin = origin;
         self.read(row, now, origin, self.truths.len());
     }
 
@@ -127,19 +166,19 @@ impl Feedback {
         let first = self.truths.partition_point(|truth| truth.at <= origin);
         let mut row = std::mem::take(&mut self.row);
         for nth in first..self.truths.len() {
-            let predicted = match &self.truths[nth].run {
-                None => f64::NAN,
-                Some((at, of_run)) => {
-                    row.copy_from_slice(of_run);
-                    self.read(&mut row, *at, origin, nth);
-                    if row.iter().any(|value| value.is_nan()) {
-                        f64::NAN
-                    } else {
-                        predict(&row, *at)
-                    }
-                }
+            let Some(mut run) = self.truths[nth].run.take() else {
+                continue;
             };
-            self.truths[nth].predicted = predicted;
+            row.copy_from_slice(&run.regressors);
+            self.read(&mut row, run.at, origin, nth);
+            let mut predicted = f64::NAN;
+            if !row.iter().any(|value| value.is_nan()) {
+                predicted = predict(&row, run.at);
+                self.tell_slopes(&mut run.slopes, &mut row, predicted, run.at, &predict);
+            }
+            let brought = self.error_of(&run, origin, nth);
+            let truth = &mut self.truths[nth];
+            (truth.predicted, truth.brought, truth.run) = (predicted, brought, Some(run));
         }
         self.row = row;
     }
@@ -147,27 +186,108 @@ impl Feedback {
     /// Reads the past truths of a run at `now`, among the first `known`, those up to the origin as they were measured.
     fn read(&self, row: &mut [f64], now: Instant, origin: Instant, known: usize) {
         for past in &self.past {
-            let asked = now - past.lag;
-            let count = self.truths.partition_point(|truth| truth.at <= asked);
-            let last = count.min(known).checked_sub(1);
-            let truth = last.map(|last| &self.truths[last]);
-            let young = truth.filter(|truth| asked - truth.stamp <= past.max_age);
-            row[past.place] = young.map_or(f64::NAN, |truth| self.stand_in(truth, origin));
+            let truth = self.found(past, now, known);
+            row[past.place] = truth.map_or(f64::NAN, |nth| {
+                let truth = &self.truths[nth];
+                if self.is_measured(truth, origin) {
+                    truth.measured
+                } else {
+                    truth.predicted
+                }
+            });
         }
     }
 
-    fn stand_in(&self, truth: &Truth, origin: Instant) -> f64 {
+    /// Which of the first `known` truths a run at `now` reads; none where that is too old.
+    fn found(&self, past: &Past, now: Instant, known: usize) -> Option<usize> {
+        let asked = now - past.lag;
+        let count = self.truths.partition_point(|truth| truth.at <= asked);
+        let last = count.min(known).checked_sub(1)?;
+        (asked - self.truths[last].stamp <= past.max_age).then_some(last)
+    }
+
+    /// Whether a truth is read as it was measured.
+    fn is_measured(&self, truth: &Truth, origin: Instant) -> bool {
         let begins = self.mode == Mode::FreeRun && truth.predicted.is_nan();
-        if begins || truth.at <= origin {
-            truth.measured
-        } else {
-            truth.predicted
+        begins || truth.at <= origin
+    }
+
+    /// Writes a run down, with what it predicted, about which the truth has this deviation while past truths are measured.
+    pub(crate) fn ran(
+        &mut self,
+        row: &[f64],
+        prediction: f64,
+        deviation: f64,
+        now: Instant,
+        predict: impl Fn(&[f64], Instant) -> f64,
+    ) {
+        if deviation > 0.0 {
+            self.nudge = deviation;
+        }
+        let (mut nudged, mut slopes) = (
+            std::mem::take(&mut self.row),
+            std::mem::take(&mut self.slopes),
+        );
+        nudged.copy_from_slice(row);
+        self.tell_slopes(&mut slopes, &mut nudged, prediction, now, predict);
+        (self.row, self.slopes) = (nudged, slopes);
+        self.pairing.run(now, [row, &self.slopes, &[prediction]]);
+        let brought = self.brought(&self.slopes, now, self.origin, self.truths.len());
+        let squares = brought.iter().map(|by| by * by);
+        self.widened = (1.0 + squares.sum::<f64>()).sqrt();
+    }
+
+    /// Tells how a prediction from a row changes with each past truth in it.
+    fn tell_slopes(
+        &self,
+        slopes: &mut [f64],
+        row: &mut [f64],
+        prediction: f64,
+        at: Instant,
+        predict: impl Fn(&[f64], Instant) -> f64,
+    ) {
+        for (slope, past) in slopes.iter_mut().zip(&self.past) {
+            let truth = row[past.place];
+            row[past.place] = truth + self.nudge;
+            *slope = (predict(row, at) - prediction) / self.nudge;
+            row[past.place] = truth;
         }
     }
 
-    /// Writes a run down, with what it predicted.
-    pub(crate) fn ran(&mut self, row: &[f64], prediction: f64, now: Instant) {
-        self.pairing.run(now, [row, &[prediction]]);
+    /// How many times as large as from measured truths alone the deviation about the prediction of the last run is.
+    ///
+    /// What was predicted of a truth errs by its innovation, and by what the errors of those that it was predicted from lead
+    /// to: the deviation is that of as many steps as there are since the truths that were measured (Ljung 1999, section 3.2),
+    /// to first order where the estimator is not linear. Innovations are taken to be as large as each other, and independent.
+    pub(crate) fn widened(&self) -> f64 {
+        self.widened
+    }
+
+    /// What innovations make of the error of a run, its own first.
+    fn error_of(&self, run: &Run, origin: Instant, known: usize) -> Vec<f64> {
+        let before = self.brought(&run.slopes, run.at, origin, known);
+        std::iter::once(1.0).chain(before).collect()
+    }
+
+    /// What the innovations of the first `known` truths, the newest first, make of the error of a run at `now`.
+    fn brought(&self, slopes: &[f64], now: Instant, origin: Instant, known: usize) -> Vec<f64> {
+        let mut brought: Vec<f64> = Vec::new();
+        for (past, slope) in self.past.iter().zip(slopes) {
+            let Some(nth) = self.found(past, now, known) else {
+                continue;
+            };
+            let truth = &self.truths[nth];
+            if self.is_measured(truth, origin) {
+                continue;
+            }
+            let newer = known - 1 - nth;
+            let reach = (newer + truth.brought.len()).min(MOST_BROUGHT);
+            brought.resize(brought.len().max(reach), 0.0);
+            for (to, by) in brought.iter_mut().skip(newer).zip(&truth.brought) {
+                *to += slope * by;
+            }
+        }
+        brought
     }
 
     pub(crate) fn segment(&mut self) {

@@ -358,17 +358,7 @@ fn coefficients_are_those_of_all_observations_even_where_they_share_noise() {
 
 #[test]
 fn a_level_that_returns_is_found_as_an_autoregression() {
-    let mut state = 7_u64;
-    let mut normal = || {
-        let mut sum = 0.0;
-        for _ in 0..12 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
-        }
-        sum - 6.0
-    };
+    let mut normal = crate::draws::normal(7);
     let kept: f64 = 0.8;
     let mut level = 0.0;
     let observations: Vec<f64> = (0..4000)

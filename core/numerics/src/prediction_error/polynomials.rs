@@ -166,6 +166,39 @@ impl Polynomials {
         product.split_off(1)
     }
 
+    /// What comes of 1 that is added to the noise before its filters, `1/(A(q) D(q) (1 − q⁻¹)^d)`: in the same sample, in the
+    /// next one and so on.
+    #[must_use]
+    pub fn response(&self, most: usize) -> Vec<f64> {
+        let whitening = self.whitening();
+        let (mut noise, mut response) = (Vec::with_capacity(most), Vec::with_capacity(most));
+        let past = |polynomial: &[f64], values: &[f64]| -> f64 {
+            let back = polynomial.iter().zip(values.iter().rev());
+            back.map(|(p, value)| p * value).sum()
+        };
+        for nth in 0..most {
+            let own = f64::from(u8::from(nth == 0)) - past(&whitening, &noise);
+            noise.push(own);
+            response.push(own - past(&self.a, &response));
+        }
+        response
+    }
+
+    /// The variance of predictions one sample ahead, two samples and so on, in that of an innovation: sums of the squares of
+    /// what an innovation leads to (Ljung 1999, section 3.2).
+    #[must_use]
+    pub fn variances(&self, most: usize) -> Vec<f64> {
+        let response = self.response(most);
+        let mut sum = 0.0;
+        let variances = (0..most).map(|nth| {
+            let back = response[..nth].iter().rev().zip(&self.c);
+            let brought = response[nth] + back.map(|(h, c)| h * c).sum::<f64>();
+            sum += brought * brought;
+            sum
+        });
+        variances.collect()
+    }
+
     /// Which of the coefficients, in the order of [`flat`](Self::flat), are of an unstable filter. Predictions are made through
     /// `1/C` and `1/F`, of which the roots must lie inside this radius.
     pub(super) fn unstable(&self, radius: f64) -> Vec<bool> {

@@ -2,28 +2,78 @@
 
 use faer::Mat;
 
-use super::Polynomials;
+use super::search::{descend, remembered};
+use super::{Polynomials, PredictionError, PredictionErrorFit, Samples};
 use crate::cholesky::inverse_of_factor;
 
-/// The standard errors of all coefficients, each in the place of its coefficient: `s √((JᵀJ)⁻¹)_ii` with the Jacobian `J` of the
-/// residuals and their variance `s²` (Ljung 1999, eq. 9.17 and 9.18); with a penalty those of the posterior, as in ridge. None
-/// where the samples do not determine all coefficients.
-pub(super) fn standard_errors(
+/// The share of a step of the search at which a polynomial that it would make unstable counts as held: a whole one also makes
+/// others so, of which the best lies inside.
+const SHARE: f64 = 1e-3;
+
+impl PredictionError {
+    /// The standard errors of all coefficients that this search found in these samples, each in the place of its coefficient:
+    /// `s √((JᵀJ)⁻¹)_ii` with the Jacobian `J` of the residuals and their variance `s²` (Ljung 1999, eq. 9.17 and 9.18); with a
+    /// penalty those of the posterior, as in ridge.
+    ///
+    /// A polynomial that only the bound of stability holds where it is has none, and its list is empty: the theory is that of a
+    /// minimum, which there lies outside. Those of the others are told as if it were known. None at all where the samples do
+    /// not determine all coefficients.
+    #[must_use]
+    pub fn standard_errors(
+        &self,
+        fit: &PredictionErrorFit,
+        samples: &Samples,
+    ) -> Option<Polynomials> {
+        let (hessian, gradient) = self.normal_equations(&fit.model, samples, fit.first);
+        let held = held(&fit.model, &hessian, &gradient, remembered(samples))?;
+        let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
+        let scale = |i: usize| hessian[(free[i], free[i])].sqrt();
+        let scaled = Mat::from_fn(free.len(), free.len(), |i, j| {
+            hessian[(free[i], free[j])] / (scale(i) * scale(j))
+        });
+        let root = inverse_of_factor(&scaled)?;
+        let mut errors = vec![f64::NAN; held.len()];
+        for (i, &place) in free.iter().enumerate() {
+            let square = root.col(i).squared_norm_l2();
+            errors[place] = (fit.variance() * square).sqrt() / scale(i);
+        }
+        let known = free.iter().all(|&place| errors[place].is_finite());
+        known.then(|| without_held(fit.model.with(&errors)))
+    }
+}
+
+/// Which coefficients, in the order of [`flat`](Polynomials::flat), are of a polynomial that would be better outside of the
+/// bound of stability.
+fn held(
     model: &Polynomials,
     hessian: &Mat<f64>,
-    variance: f64,
-) -> Option<Polynomials> {
-    let count = hessian.nrows();
-    let scales: Vec<f64> = (0..count).map(|i| hessian[(i, i)].sqrt()).collect();
-    let scaled = Mat::from_fn(count, count, |i, j| {
-        hessian[(i, j)] / (scales[i] * scales[j])
-    });
-    let root = inverse_of_factor(&scaled)?;
-    let errors = scales.iter().enumerate().map(|(i, scale)| {
-        let square = root.col(i).squared_norm_l2();
-        (variance * square).sqrt() / scale
-    });
-    let errors: Vec<f64> = errors.collect();
-    let known = errors.iter().all(|error| error.is_finite());
-    known.then(|| model.with(&errors))
+    gradient: &[f64],
+    radius: f64,
+) -> Option<Vec<bool>> {
+    let flat = model.flat();
+    let mut damping = vec![0.0; flat.len()];
+    loop {
+        let change = descend(hessian, gradient, &damping)?;
+        let moved = flat.iter().zip(&change).map(|(at, by)| at - SHARE * by);
+        let moved = model.with(&moved.collect::<Vec<_>>());
+        let held_before = damping.clone();
+        for (of, unstable) in damping.iter_mut().zip(moved.unstable(radius)) {
+            if unstable {
+                *of = f64::INFINITY;
+            }
+        }
+        if damping == held_before {
+            return Some(damping.iter().map(|&of| of > 0.0).collect());
+        }
+    }
+}
+
+/// Errors of which those of a polynomial that is held, which are no numbers, are left out.
+fn without_held(mut errors: Polynomials) -> Polynomials {
+    let filters = errors.inputs.iter_mut().map(|input| &mut input.f);
+    let all = filters.chain([&mut errors.a, &mut errors.c, &mut errors.d]);
+    for polynomial in all.filter(|of| of.iter().any(|error| error.is_nan())) {
+        polynomial.clear();
+    }
+    errors
 }

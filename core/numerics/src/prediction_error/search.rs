@@ -4,7 +4,6 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::initial::starts;
-use super::precision::standard_errors;
 use super::residuals::{counted_from, derivatives, sum_of_squares};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
@@ -40,12 +39,12 @@ impl Default for PredictionError {
 pub struct PredictionErrorFit {
     /// The model.
     pub model: Polynomials,
-    /// The standard error of each of its coefficients, where the samples determine all of them.
-    pub errors: Option<Polynomials>,
     /// Without the penalty.
     pub residual_sum_of_squares: f64,
     /// Residuals that were counted.
     pub rows: usize,
+    /// How many samples of each segment were not.
+    pub first: usize,
     /// Steps of the search.
     pub steps: usize,
     /// Whether the search ended since no step was worth it.
@@ -118,17 +117,14 @@ impl PredictionError {
             .min_by(|(sum, _), (other, _)| sum.total_cmp(other));
         let (_, start) = best.ok_or(NumericsError::NotFinite)?;
         let (model, steps, converged) = self.search(start, samples, first, radius);
-        let mut fit = PredictionErrorFit {
+        Ok(PredictionErrorFit {
             residual_sum_of_squares: sum_of_squares(&model, samples, first),
             model,
-            errors: None,
             rows: samples.counted(first),
+            first,
             steps,
             converged,
-        };
-        let (hessian, _) = self.normal_equations(&fit.model, samples, first);
-        fit.errors = standard_errors(&fit.model, &hessian, fit.variance());
-        Ok(fit)
+        })
     }
 
     fn objective(&self, model: &Polynomials, samples: &Samples, first: usize) -> f64 {
@@ -189,7 +185,7 @@ impl PredictionError {
     }
 
     /// `JᵀJ` and `Jᵀε`, with the penalty.
-    fn normal_equations(
+    pub(super) fn normal_equations(
         &self,
         model: &Polynomials,
         samples: &Samples,
@@ -220,7 +216,7 @@ pub(super) fn remembered(samples: &Samples) -> f64 {
 }
 
 /// The step that `(H + diag λ diag H) δ = g` asks for, 0 where the damping `λ` is beyond all bounds; none where it has no solution.
-fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<f64>> {
     let count = gradient.len();
     let scales: Vec<f64> = (0..count).map(|i| hessian[(i, i)].sqrt()).collect();
     let scales: Vec<f64> = scales

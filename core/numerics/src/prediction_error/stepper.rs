@@ -3,16 +3,16 @@
 use serde::{Deserialize, Serialize};
 
 use super::Polynomials;
+use crate::NumericsError;
+use crate::checks::check_length;
 use crate::scratch::Scratch;
 
 /// A model, followed sample by sample. Nothing is allocated once it is built.
 ///
 /// Of a sample that is missing it takes what it had predicted for it, so that predictions several samples ahead are steps
 /// without one (Ljung 1999, section 3.2).
-///
-/// One that was read back has no scratch: it is for another to [`resume`](Self::resume) from, not to be stepped itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Saved")]
 pub struct Stepper {
     model: Polynomials,
     whitening: Vec<f64>,
@@ -20,12 +20,71 @@ pub struct Stepper {
     past: Vec<f64>,
     noise: Vec<f64>,
     innovations: Vec<f64>,
-    /// How unsure the innovations are, each with each, in the variance of one.
+    /// How unsure the innovations were at the newest sample that was there, each with each, in the variance of one.
     doubt: Vec<f64>,
-    /// `P c` of this doubt `P`, while it is worked out.
+    /// How many samples have been missing since then.
+    missed: usize,
+    /// `P w` of this doubt `P`, while it is worked out.
     #[serde(skip)]
     shared: Scratch,
     inputs: Vec<PastInput>,
+}
+
+/// A stepper as it is read, before it is known whether its parts fit together.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Saved {
+    model: Polynomials,
+    whitening: Vec<f64>,
+    past: Vec<f64>,
+    noise: Vec<f64>,
+    innovations: Vec<f64>,
+    doubt: Vec<f64>,
+    /// Once it was not written.
+    #[serde(default)]
+    missed: usize,
+    inputs: Vec<PastInput>,
+}
+
+impl TryFrom<Saved> for Stepper {
+    type Error = NumericsError;
+
+    fn try_from(saved: Saved) -> Result<Self, NumericsError> {
+        let Saved {
+            model,
+            whitening,
+            past,
+            noise,
+            innovations,
+            doubt,
+            missed,
+            inputs,
+        } = saved;
+        let order = model.c.len();
+        let of_noise = model.d.len().saturating_add(model.differences);
+        check_length("past", model.a.len(), past.len())?;
+        check_length("whitening", of_noise, whitening.len())?;
+        check_length("noise", of_noise, noise.len())?;
+        check_length("innovations", order, innovations.len())?;
+        check_length("doubt", order * order, doubt.len())?;
+        check_length("inputs", model.inputs.len(), inputs.len())?;
+        for (past, of) in inputs.iter().zip(&model.inputs) {
+            let reach = of.delay.saturating_add(of.b.len());
+            check_length("inputs.values", reach, past.values.len())?;
+            check_length("inputs.filtered", of.f.len(), past.filtered.len())?;
+        }
+        Ok(Self {
+            model,
+            whitening,
+            past,
+            noise,
+            innovations,
+            doubt,
+            missed,
+            shared: Scratch(vec![0.0; order]),
+            inputs,
+        })
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,6 +110,7 @@ impl Stepper {
             noise: vec![0.0; whitening.len()],
             innovations: vec![0.0; model.c.len()],
             doubt: vec![0.0; model.c.len() * model.c.len()],
+            missed: 0,
             shared: Scratch(vec![0.0; model.c.len()]),
             inputs: inputs.collect(),
             whitening,
@@ -79,6 +139,7 @@ impl Stepper {
     /// What was not foreseen until now is not known, but for its variance.
     fn doubt_innovations(&mut self) {
         self.innovations.fill(0.0);
+        self.missed = 0;
         self.doubt.fill(0.0);
         let count = self.innovations.len();
         self.doubt
@@ -141,14 +202,15 @@ impl Stepper {
     /// `C(q) e` (Ansley 1979). Its gain is that of `C` as soon as the start is forgotten, and for a root on the unit circle,
     /// where it never is, that of a mean.
     fn take_innovation(&mut self, off: Option<f64>) {
-        if self.is_sure() {
-            return push(&mut self.innovations, off.unwrap_or(0.0));
-        }
         let Some(off) = off else {
             // It is taken for as it was foreseen.
-            self.shared.0.fill(0.0);
-            return self.pass(0.0, 0.0);
+            self.missed = self.missed.saturating_add(1);
+            return push(&mut self.innovations, 0.0);
         };
+        self.pass_missed();
+        if self.is_sure() {
+            return push(&mut self.innovations, off);
+        }
         let count = self.innovations.len();
         let c = &self.model.c;
         let shared = &mut self.shared.0;
@@ -165,7 +227,8 @@ impl Stepper {
             *doubt -= shared[nth / count] * shared[nth % count] / variance;
         }
         shared.iter_mut().for_each(|of| *of /= -variance);
-        self.pass(newest, 1.0 - 1.0 / variance);
+        push(&mut self.innovations, newest);
+        self.pass(1.0 - 1.0 / variance);
         let mut own = self.doubt.iter().step_by(count + 1);
         if own.all(|&own| own < 4.0 * f64::EPSILON) {
             self.doubt.fill(0.0);
@@ -179,18 +242,43 @@ impl Stepper {
         own.all(|&own| own == 0.0)
     }
 
-    /// By how much the variance of what is predicted of the next sample is larger than that of an innovation, in the latter:
-    /// more than 0 after a start, until what was not foreseen before it counts no more (Ansley 1979).
+    /// How many samples have been missing since the newest that was there.
     #[must_use]
-    pub fn doubt(&self) -> f64 {
-        let c = &self.model.c;
-        let rows = self.doubt.chunks_exact(c.len().max(1));
-        rows.zip(c).map(|(row, own)| own * product(c, row)).sum()
+    pub fn missed(&self) -> usize {
+        self.missed
     }
 
-    /// Puts an innovation before those of the past, with what it is in doubt by itself and together with each of them.
-    fn pass(&mut self, newest: f64, doubt: f64) {
-        push(&mut self.innovations, newest);
+    /// By how much the variance of what is predicted so many samples ahead is larger than that of
+    /// [`variances`](Polynomials::variances), in that of an innovation: more than 0 after a start, until what was not foreseen
+    /// before it counts no more (Ansley 1979). What the innovations `e` are in doubt leads to `w e` in the sample asked for,
+    /// with `w_i = Σ_m h_(steps − m) c_(m + i)` and the [`response`](Polynomials::response) `h` of the model, of which the last
+    /// counts for all beyond.
+    pub fn doubt(&mut self, response: &[f64], steps: usize) -> f64 {
+        if self.is_sure() {
+            return 0.0;
+        }
+        let ahead = self.missed.saturating_add(steps).min(response.len());
+        let (c, shared) = (&self.model.c, &mut self.shared.0);
+        for (nth, of) in shared.iter_mut().enumerate() {
+            let back = response[..ahead].iter().rev();
+            *of = c[nth..].iter().zip(back).map(|(c, h)| c * h).sum();
+        }
+        let rows = self.doubt.chunks_exact(c.len().max(1));
+        let each = rows.zip(&*shared);
+        each.map(|(row, own)| own * product(shared, row)).sum()
+    }
+
+    /// Puts the samples that have been missing before the innovations that are in doubt: they are in none.
+    fn pass_missed(&mut self) {
+        self.shared.0.fill(0.0);
+        for _ in 0..self.missed.min(self.innovations.len()) {
+            self.pass(0.0);
+        }
+        self.missed = 0;
+    }
+
+    /// Puts the doubt of an innovation, by itself and together with each of them, before that of those of the past.
+    fn pass(&mut self, own: f64) {
         let count = self.innovations.len();
         // One row and one column further; what stands in the first of them is written anew.
         if let Some(rest) = self.doubt.len().checked_sub(count + 1) {
@@ -200,30 +288,9 @@ impl Stepper {
             self.doubt[nth] = self.shared.0[nth - 1];
             self.doubt[nth * count] = self.shared.0[nth - 1];
         }
-        if let Some(own) = self.doubt.first_mut() {
-            *own = doubt;
+        if let Some(first) = self.doubt.first_mut() {
+            *first = own;
         }
-    }
-
-    /// The variance of predictions one sample ahead, two samples and so on, in that of an innovation: sums of the squares of
-    /// what an innovation leads to (Ljung 1999, section 3.2).
-    #[must_use]
-    pub fn variances(&self, most: usize) -> Vec<f64> {
-        let mut alone = Self::new(self.model.clone());
-        let mut sum = 0.0;
-        (0..most)
-            .map(|nth| {
-                let before = if nth == 0 {
-                    Some(self.model.level + 1.0)
-                } else {
-                    None
-                };
-                let expected = alone.step(|_| 0.0, before) - self.model.level;
-                let brought = if nth == 0 { 1.0 } else { expected };
-                sum += brought * brought;
-                sum
-            })
-            .collect()
     }
 
     /// Takes over where another stepper is, unless it has other orders.
@@ -247,6 +314,7 @@ impl Stepper {
         self.noise.copy_from_slice(&other.noise);
         self.innovations.copy_from_slice(&other.innovations);
         self.doubt.copy_from_slice(&other.doubt);
+        self.missed = other.missed;
         for (to, from) in self.inputs.iter_mut().zip(&other.inputs) {
             to.values.copy_from_slice(&from.values);
             to.filtered.copy_from_slice(&from.filtered);
@@ -266,3 +334,6 @@ fn push(past: &mut [f64], value: f64) {
         past[0] = value;
     }
 }
+
+#[cfg(test)]
+mod tests;

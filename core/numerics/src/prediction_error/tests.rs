@@ -1,17 +1,7 @@
 use super::residuals::{counted_from, derivatives, residuals, sum_of_squares};
 use super::search::remembered;
 use super::*;
-
-/// Numbers between −1 and 1 that nobody could guess.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / f64::from(1 << 30) - 1.0
-    }
-}
+use crate::draws::uniform as noise;
 
 /// What a model gives when it is fed noise, in two segments.
 fn simulated(model: &Polynomials, count: usize, spread: f64, seed: u64) -> Samples {
@@ -229,6 +219,13 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
         .unwrap();
     let edge = fit.model.inputs[1].f[0];
     assert!(fit.converged && (0.99..1.0).contains(&edge), "{fit:?}");
+    let errors = PredictionError::default().standard_errors(&fit, &samples);
+    // Both filters end there, and what they are multiplied by does not.
+    let errors = errors.unwrap();
+    assert!(errors.level.is_finite());
+    for input in errors.inputs {
+        assert!(input.f.is_empty() && input.b[0].is_finite(), "{input:?}");
+    }
     let (at, first) = (fit.model.flat(), counted_from(&orders(&grows), 0));
     let mut compared = 0;
     for (nth, by) in (0..at.len()).flat_map(|nth| [(nth, 1e-3), (nth, -1e-3)]) {
@@ -281,74 +278,10 @@ fn predictions_further_ahead_are_less_sure_and_in_the_end_as_sure_as_none() {
         differences: 0,
         level: 10.0,
     };
-    let variances = Stepper::new(model).variances(200);
+    let variances = model.variances(200);
     assert_eq!(variances[0], 1.0);
     assert!((variances[1] - (1.0 + 0.64)).abs() < 1e-12);
     assert!((variances[199] - 1.0 / (1.0 - 0.64)).abs() < 1e-9);
-}
-
-/// What `y` is expected to be next, if it is `C(q) e` and nothing is known but its past: least squares on its autocovariance.
-fn expected_of_moving_average(c: &[f64], past: &[f64]) -> f64 {
-    let c: Vec<f64> = std::iter::once(1.0).chain(c.iter().copied()).collect();
-    let covariance = |lag: usize| -> f64 {
-        c.iter()
-            .zip(&c[lag.min(c.len())..])
-            .map(|(a, b)| a * b)
-            .sum()
-    };
-    let count = past.len();
-    let of = |i: usize, j: usize| covariance(i.abs_diff(j));
-    let among = faer::Mat::from_fn(count, count, of);
-    let with_next = faer::Mat::from_fn(count, 1, |i, _| of(i, count));
-    let weights = faer::linalg::solvers::Solve::solve(&among.partial_piv_lu(), &with_next);
-    (0..count).map(|i| weights[(i, 0)] * past[i]).sum()
-}
-
-#[test]
-fn from_the_start_a_moving_average_is_followed_as_well_as_its_past_allows() {
-    for c in [vec![-1.0], vec![0.5], vec![-1.2, 0.4], vec![0.3, -0.2, 0.9]] {
-        let mut stepper = Stepper::new(Polynomials {
-            a: vec![],
-            inputs: vec![],
-            c: c.clone(),
-            d: vec![],
-            differences: 0,
-            level: 3.0,
-        });
-        stepper.rest(|_| 0.0);
-        let (mut noise, mut past) = (noise(5), Vec::new());
-        for _ in 0..12 {
-            let value = noise();
-            let expected = expected_of_moving_average(&c, &past);
-            let found = stepper.step(|_| 0.0, Some(3.0 + value)) - 3.0;
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{c:?}: {found}, not {expected}"
-            );
-            past.push(value);
-        }
-    }
-}
-
-#[test]
-fn what_has_a_level_but_is_taken_for_integrated_is_followed_as_a_mean() {
-    let mut stepper = Stepper::new(Polynomials {
-        a: vec![],
-        inputs: vec![],
-        c: vec![-1.0],
-        d: vec![],
-        differences: 1,
-        level: 0.0,
-    });
-    let values = [40.0, 1.0, -2.0, 3.0, 0.5, -1.5];
-    stepper.rest(|_| 0.0);
-    stepper.step(|_| 0.0, Some(values[0]));
-    stepper.settle_on(values[0]);
-    for count in 1..values.len() {
-        let mean = values[..count].iter().sum::<f64>() / count as f64;
-        let found = stepper.step(|_| 0.0, Some(values[count]));
-        assert!((found - mean).abs() < 1e-12, "{count}: {found}, not {mean}");
-    }
 }
 
 #[test]
@@ -369,6 +302,8 @@ fn what_a_short_record_cannot_tell_from_a_unit_root_is_not_told_as_one() {
         .fit(&asked(0, None, 1, 0, 0), &samples, 0)
         .unwrap();
     assert!((-0.95..-0.94).contains(&fit.model.c[0]), "{fit:?}");
+    let errors = PredictionError::default().standard_errors(&fit, &samples);
+    assert_eq!(errors.map(|errors| errors.c), Some(vec![]));
 }
 
 /// What `generate.py` wrote.
@@ -389,12 +324,17 @@ impl Oracle {
         }
     }
 
-    fn fit(&self, name: &str, orders: &Orders) -> PredictionErrorFit {
+    fn samples(&self, name: &str, orders: &Orders) -> Samples {
         let column = self.names.iter().position(|other| other == name).unwrap();
         let mut samples = Samples::new(orders.inputs.len());
         for row in &self.samples {
             samples.push(orders.inputs.iter().map(|_| row[0]), row[column]);
         }
+        samples
+    }
+
+    fn fit(&self, name: &str, orders: &Orders) -> PredictionErrorFit {
+        let samples = self.samples(name, orders);
         PredictionError::default().fit(orders, &samples, 0).unwrap()
     }
 
@@ -464,7 +404,10 @@ fn coefficients_equal_the_oracle_of_scipy() {
 fn standard_errors_equal_the_oracle_of_scipy() {
     let oracle = Oracle::read();
     for (name, orders) in of_oracle() {
-        let found = oracle.fit(name, &orders).errors.unwrap().flat();
+        let samples = oracle.samples(name, &orders);
+        let fit = oracle.fit(name, &orders);
+        let found = PredictionError::default().standard_errors(&fit, &samples);
+        let found = found.unwrap().flat();
         let expected = oracle.numbers(name, "scipy", "errors");
         assert_eq!(found.len(), expected.len());
         for (found, expected) in found.iter().zip(&expected) {
@@ -528,47 +471,4 @@ fn transfer_functions_are_near_the_oracle_of_another_search() {
                 .unwrap_or_default(),
         );
     }
-}
-
-#[test]
-fn right_after_a_start_predictions_of_a_moving_average_are_less_sure_by_what_came_before_it() {
-    let c = 0.8;
-    let mut stepper = Stepper::new(Polynomials {
-        c: vec![c],
-        ..Polynomials::zero(&Orders {
-            nc: 1,
-            ..Orders::default()
-        })
-    });
-    stepper.settle_on(1.0);
-    // The variances of the innovations algorithm (Brockwell and Davis 1991, example 5.2.1).
-    let mut variance = 1.0 + c * c;
-    for _ in 0..20 {
-        assert!((1.0 + stepper.doubt() - variance).abs() < 1e-12);
-        stepper.step(|_| 0.0, Some(0.3));
-        variance = 1.0 + c * c - c * c / variance;
-    }
-    for _ in 0..200 {
-        stepper.step(|_| 0.0, Some(0.3));
-    }
-    assert_eq!(stepper.doubt(), 0.0);
-}
-
-#[test]
-fn steppers_that_are_where_another_is_are_equal_whatever_way_they_came() {
-    let model = Polynomials {
-        c: vec![0.5, 0.2],
-        ..Polynomials::zero(&Orders {
-            nc: 2,
-            ..Orders::default()
-        })
-    };
-    let mut stepper = Stepper::new(model.clone());
-    stepper.settle_on(1.0);
-    stepper.step(|_| 0.0, Some(0.3));
-    let mut other = Stepper::new(model);
-    other.take(&stepper);
-    assert_eq!(other, stepper);
-    other.step(|_| 0.0, Some(0.3));
-    assert_ne!(other, stepper);
 }

@@ -258,6 +258,7 @@ fn a_recursion_that_was_written_and_read_goes_on_with_the_same_bits_if_its_parts
         assert!(error.to_string().starts_with(told), "{error}");
     }
     let mut back: Rls = serde_json::from_value(saved).unwrap();
+    assert_eq!(back, rls);
     for _ in 0..20 {
         let [a, b, c, y] = row();
         assert_eq!(

@@ -31,7 +31,7 @@ pub(super) struct Identified {
     pub(super) scaling: Scaling,
     /// On scaled inputs, in the unit of the truth.
     pub(super) model: Polynomials,
-    /// The standard error of each coefficient, in its place.
+    /// The standard error of each coefficient, in its place; of a polynomial that has none, an empty list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) errors: Option<Polynomials>,
     pub(super) step: Duration,
@@ -123,6 +123,8 @@ athermal_core::state!(Known, "identified/2");
 struct Following {
     known: Known,
     deviations: Vec<f64>,
+    /// Of the noise, for as many steps.
+    response: Vec<f64>,
     /// For predictions, which leave no trace.
     scratch: RefCell<Stepper>,
 }
@@ -146,6 +148,7 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
+            response: of.model.response(of.deviations.len()),
             scratch: RefCell::new(stepper),
         }
     }
@@ -319,21 +322,18 @@ impl Learner for Following {
 
     fn deviation(&self, _regressors: &[f64], of: Instant) -> f64 {
         let followed = self.known.nearest(of);
-        let steps = if followed.told > 0 {
-            self.known.steps(followed.at, of)
-        } else {
-            i64::MAX
-        };
+        let known = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
         let last = self.deviations.len().saturating_sub(1);
-        let nth = usize::try_from(steps - 1).unwrap_or(usize::MAX).min(last);
-        let of = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
+        if followed.told == 0 {
+            return known(last);
+        }
+        let steps = usize::try_from(self.known.steps(followed.at, of)).unwrap_or(usize::MAX);
+        let ahead = followed.stepper.missed().saturating_add(steps);
+        let mut scratch = self.scratch.borrow_mut();
+        scratch.take(&followed.stepper);
         // The first is that of an innovation.
-        let doubt = if followed.told > 0 {
-            followed.stepper.doubt()
-        } else {
-            0.0
-        };
-        (of(nth).powi(2) + doubt * of(0).powi(2)).sqrt()
+        let doubt = scratch.doubt(&self.response, steps) * known(0).powi(2);
+        (known(last.min(ahead - 1)).powi(2) + doubt).sqrt()
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
@@ -445,6 +445,19 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() {
+        let mut model = identified(Duration::from_ns(1_000_000_000));
+        model.model.a = vec![-0.9, 0.1];
+        for (errors, mistakes) in [(vec![], 0), (vec![0.1], 1), (vec![0.1, 0.2], 0)] {
+            model.errors = Some(Polynomials {
+                a: errors,
+                ..model.model.clone()
+            });
+            assert_eq!(model.mistakes().len(), mistakes);
+        }
+    }
+
     /// What it predicts of a truth of 0 around a pause of so many steps.
     fn around_a_pause(steps: i64) -> Vec<f64> {
         let step = Duration::from_ns(1_000_000_000);
@@ -483,6 +496,42 @@ mod tests {
             "{deviations:?}"
         );
         assert_eq!(deviations[59], 2.0);
+    }
+
+    /// The deviations of a moving average about each of the truths that follow so many, while none of them is told.
+    fn deviations_after(truths: i64, count: i64) -> Vec<f64> {
+        let step = Duration::from_ns(1_000_000_000);
+        let mut model = identified(step);
+        model.model.a.clear();
+        model.model.c = vec![0.8];
+        let variances = model.model.variances(10);
+        model.deviations = variances.iter().map(|variance| variance.sqrt()).collect();
+        let mut learner = Following::new(&model);
+        let deviations = (0..truths + count).map(|nth| {
+            let of = Instant::from_ns(0) + part(step, nth, 1);
+            learner.run(&[1.0], of, of - step);
+            let deviation = learner.deviation(&[1.0], of);
+            if nth < truths {
+                learner.learn(&[1.0], 0.0, of);
+            }
+            deviation
+        });
+        deviations.skip(truths as usize).collect()
+    }
+
+    #[test]
+    fn of_truths_that_are_not_told_the_deviation_is_that_of_as_many_steps() {
+        let spread = f64::sqrt(1.64);
+        let near = |found: Vec<f64>, expected: [f64; 3]| {
+            let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+            assert!(
+                off.fold(0.0, f64::max) < 1e-9,
+                "{found:?}, not {expected:?}"
+            );
+        };
+        near(deviations_after(200, 3), [1.0, spread, spread]);
+        // After one truth, what was not foreseen before it counts in the first of them alone.
+        near(deviations_after(1, 3), [spread, spread, spread]);
     }
 
     #[test]

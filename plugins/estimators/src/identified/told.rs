@@ -11,17 +11,20 @@ pub(super) fn mistakes(of: &Identified) -> Vec<Mistake> {
         return Vec::new();
     };
     let mut mistakes = Vec::new();
-    let mut check = |name: &str, wanted: usize, found: usize| {
-        mistakes.extend(Mistake::of_lengths(wanted, &[(name, found)]));
+    let mut check = |name: &str, of: &[f64], errors: &[f64]| {
+        if !errors.is_empty() {
+            mistakes.extend(Mistake::of_lengths(of.len(), &[(name, errors.len())]));
+        }
     };
-    check("errors.inputs", model.inputs.len(), errors.inputs.len());
-    check("errors.a", model.a.len(), errors.a.len());
-    check("errors.c", model.c.len(), errors.c.len());
-    check("errors.d", model.d.len(), errors.d.len());
+    check("errors.a", &model.a, &errors.a);
+    check("errors.c", &model.c, &errors.c);
+    check("errors.d", &model.d, &errors.d);
     for (input, errors) in model.inputs.iter().zip(&errors.inputs) {
-        check("errors.inputs.b", input.b.len(), errors.b.len());
-        check("errors.inputs.f", input.f.len(), errors.f.len());
+        check("errors.inputs.b", &input.b, &errors.b);
+        check("errors.inputs.f", &input.f, &errors.f);
     }
+    let inputs = [("errors.inputs", errors.inputs.len())];
+    mistakes.extend(Mistake::of_lengths(model.inputs.len(), &inputs));
     mistakes
 }
 

@@ -4,12 +4,13 @@ use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, Train
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
     InformationCriteria, Polynomials, PredictionError, PredictionErrorFit, Samples,
-    Standardization, Standardizer, Stepper,
+    Standardization, Standardizer,
 };
 
 use super::follow::{Identified, MOST_SERIES};
 use super::{Asked, Differences};
 use crate::conditioning::tell_rows;
+use crate::order::{Order, Tried};
 use crate::regression::told;
 use crate::scaling::Scaling;
 
@@ -45,7 +46,7 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
 #[derive(Debug)]
 pub(crate) struct Found {
     pub(crate) model: Polynomials,
-    /// The standard errors of its coefficients, where they are known.
+    /// The standard errors of its coefficients, where they are known; of a polynomial that has none, an empty list.
     pub(crate) errors: Option<Polynomials>,
     pub(crate) residual_sum_of_squares: f64,
     pub(crate) rows: usize,
@@ -180,8 +181,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         report.notes.push(pace.told());
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
-        let stepper = Stepper::new(found.model);
-        let variances = stepper.variances(STEPS_AHEAD);
+        let variances = found.model.variances(STEPS_AHEAD);
         Ok(Identified {
             regressors: self.names.clone(),
             scaling: Scaling {
@@ -193,7 +193,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 .iter()
                 .map(|sum| (variance * sum).sqrt())
                 .collect(),
-            model: stepper.model().clone(),
+            model: found.model,
             errors: found.errors,
             step: pace.step,
             series: pace.series,
@@ -218,9 +218,15 @@ impl Identify for Asked {
     ) -> Result<Found, TrainingError> {
         // In units of their spread, or the search would depend on the unit of the truth.
         let spread = samples.spread();
-        let mut fit = self.fit(&samples.divided(spread), spread, report)?;
+        let divided = samples.divided(spread);
+        let mut fit = self.fit(&divided, spread, report)?;
+        let search = PredictionError {
+            penalty: self.penalty,
+            ..PredictionError::default()
+        };
+        let mut errors = search.standard_errors(&fit, &divided);
         fit.model.rescale(spread);
-        if let Some(errors) = &mut fit.errors {
+        if let Some(errors) = &mut errors {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
@@ -235,7 +241,7 @@ impl Identify for Asked {
             rows: fit.rows,
             variance: fit.variance(),
             model: fit.model,
-            errors: fit.errors,
+            errors,
         })
     }
 }
@@ -247,13 +253,6 @@ impl Asked {
         spread: f64,
         report: &mut TrainingReport,
     ) -> Result<PredictionErrorFit, TrainingError> {
-        let search = |orders: &athermal_numerics::Orders| {
-            let most = MOST_WORK / orders.coefficients().max(1);
-            PredictionError {
-                penalty: self.penalty,
-                most_steps: most.clamp(20, 100),
-            }
-        };
         // By default no order is open.
         let order = self.order.unwrap_or_default();
         let mut candidates = Vec::new();
@@ -264,7 +263,10 @@ impl Asked {
         if let [(_, orders)] = &candidates[..]
             && self.order.is_none()
         {
-            return search(orders).fit(orders, samples, 0).map_err(told);
+            return self
+                .search(orders.coefficients())
+                .fit(orders, samples, 0)
+                .map_err(told);
         }
         let firsts = candidates.iter().map(|(_, orders)| orders.first());
         let first = firsts.max().unwrap_or(0);
@@ -272,34 +274,42 @@ impl Asked {
         let mut fits = Vec::new();
         let mut failed = None;
         for (candidate, orders) in candidates {
-            match search(&orders).fit(&orders, samples, first) {
+            let coefficients = orders.coefficients();
+            match self.search(coefficients).fit(&orders, samples, first) {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
-                    let coefficients = orders.coefficients();
-                    let figures = InformationCriteria::of(fit.rows, coefficients, squares);
-                    tried.push((candidate, coefficients, figures));
+                    tried.push(Tried {
+                        name: self.name(&order, &candidate, orders.differences),
+                        coefficients,
+                        figures: InformationCriteria::of(fit.rows, coefficients, squares),
+                    });
                     fits.push(fit);
                 }
                 Err(error) => failed = Some(error),
             }
         }
-        let Some((best, mut table)) = order.best(samples.counted(first), &tried) else {
+        let Some((best, table)) = order.best(samples.counted(first), tried) else {
             let reason = "no order could be fitted".to_owned();
             return Err(failed.map_or(unsolved(reason), told));
         };
-        if let Differences::Told = self.differences {
-            for (told, fit) in table.tried.iter_mut().zip(&fits) {
-                let differences = format!("differences {}", fit.model.differences);
-                let orders = (!told.order.is_empty()).then_some(&*told.order);
-                told.order = orders
-                    .into_iter()
-                    .chain([&*differences])
-                    .collect::<Vec<_>>()
-                    .join(", ");
-            }
-        }
         report.orders = Some(Box::new(table));
         Ok(fits.swap_remove(best))
+    }
+
+    fn search(&self, coefficients: usize) -> PredictionError {
+        let most = MOST_WORK / coefficients.max(1);
+        PredictionError {
+            penalty: self.penalty,
+            most_steps: most.clamp(20, 100),
+        }
+    }
+
+    /// What is open of an order, as a report tells it.
+    fn name(&self, order: &Order, orders: &[usize; 6], differences: usize) -> String {
+        let told = matches!(self.differences, Differences::Told);
+        let differences = told.then(|| format!("differences {differences}"));
+        let parts: Vec<String> = order.names(orders).chain(differences).collect();
+        parts.join(", ")
     }
 }
 
@@ -329,9 +339,20 @@ impl Pace {
     }
 
     fn told(self) -> String {
-        match self.series {
-            1 => format!("a step is {}", self.step),
-            series => format!("a step is {}, in {series} interleaved series", self.step),
+        let Self {
+            step,
+            truths,
+            series,
+        } = self;
+        match series {
+            1 => format!("a step is {step}"),
+            series if series == truths => {
+                format!("a step is {step}, in {series} interleaved series")
+            }
+            series => format!(
+                "a step is {step}, in {series} interleaved series of the {truths} truths within one; the others are \
+                 not used"
+            ),
         }
     }
 }
@@ -405,5 +426,7 @@ mod tests {
             assert!(apart.into_iter().all(|apart| apart == 100.0));
         }
         assert_eq!(series, MOST_SERIES);
+        let told = "16 interleaved series of the 50 truths within one; the others are not used";
+        assert!(pace.told().ends_with(told), "{}", pace.told());
     }
 }

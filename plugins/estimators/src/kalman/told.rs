@@ -12,12 +12,13 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
     let (filter, scales) = (&of.filter, &of.scaling.scales);
     let order = filter.state().len();
     let moving = order - scales.len();
-    let states = filter.state()[moving..].iter().zip(scales);
-    let values: Vec<f64> = states.map(|(b, scale)| b / scale).collect();
     let variances = filter.covariance().iter().step_by(order + 1).skip(moving);
-    let errors = variances.zip(scales);
-    let errors = errors.map(|(variance, scale)| variance.sqrt() / scale);
-    let errors: Vec<f64> = std::iter::once(f64::NAN).chain(errors).collect();
+    let states = filter.state()[moving..].iter().zip(variances).zip(scales);
+    let (mut values, mut errors) = (Vec::new(), vec![f64::NAN]);
+    for ((b, variance), scale) in states {
+        values.push(b / scale);
+        errors.push(variance.sqrt() / scale);
+    }
     let model = filter.model();
     let wandering = |name: &str, deviation: f64| Noise {
         name: name.to_owned(),
@@ -33,17 +34,14 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
     ];
     let trend = model.trend;
     noises.extend(trend.map(|trend| wandering("trend", (trend * PER_S).sqrt() * PER_S)));
-    let returns = Mode {
+    let returns = model.trend.is_none().then(|| Mode {
         of: "level".to_owned(),
         time_constant_s: 1.0 / model.returning,
         period_s: None,
-    };
+    });
     Coefficients {
         noises,
-        modes: Some(returns)
-            .filter(|_| model.trend.is_none())
-            .into_iter()
-            .collect(),
+        modes: returns.into_iter().collect(),
         ..Coefficients::linear(of.predict(&vec![0.0; scales.len()]), &values, Some(&errors))
     }
 }
