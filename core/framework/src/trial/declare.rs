@@ -506,5 +506,6 @@ fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
+        lacks: None,
     }
 }
