@@ -227,6 +227,7 @@ delay = "soon"
         (23, "ahead"),
         (24, "alpha"),
         (28, "no channel that matches `Z`"),
+        (29, "`first` is 1"),
         (30, "threshold"),
         (34, "soon"),
     ];
@@ -437,6 +438,7 @@ expect = [{ of = "thermal", rmse_below = "-1 nm" },
 "#;
     let expected = [
         (20, "drft"),
+        (24, "needs the key \"every\""),
         (25, "no key \"expects\""),
         (27, "\"a\""),
         (28, "die-testr"),
@@ -526,7 +528,7 @@ tpye = "delay"
 inputs.signal = { form = "temperature.d", maxage = "1min" }
 delay = "soon"
 [outputs]
-shown = { form = "one:slop" }
+shown = { form = "one" }
 "#;
     let expected = [
         (1, "schema"),
@@ -544,7 +546,6 @@ shown = { form = "one:slop" }
         (18, "maxage"),
         (19, "soon"),
         (21, "form"),
-        (21, "no output \"slop\""),
     ];
     assert_told("command-line-misspelt", text, &expected);
 }
