@@ -63,6 +63,9 @@ impl std::fmt::Display for RoleName {
     }
 }
 
+/// The parameters of a node, as far as they could be read; nothing where they are past all reading.
+pub type ReadSpec = Option<Decoded<Box<dyn NodeSpec>>>;
+
 /// A kind of node, as registered.
 #[derive(Debug)]
 pub struct Kind {
@@ -77,7 +80,7 @@ pub struct Kind {
     /// The input ports.
     pub inputs: fn() -> &'static [InputPort],
     /// Reads its parameters, telling every mistake in them; after one, what could be read beside it.
-    pub read: fn(&Value, &mut Diagnostics) -> Option<Decoded<Box<dyn NodeSpec>>>,
+    pub read: fn(&Value, &mut Diagnostics) -> ReadSpec,
     /// The JSON Schema of its parameters, with the documentation.
     pub schema: fn() -> schemars::Schema,
 }
@@ -118,7 +121,7 @@ inventory::collect!(Kind);
 pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     value: &Value,
     diagnostics: &mut Diagnostics,
-) -> Option<Decoded<Box<dyn NodeSpec>>> {
+) -> ReadSpec {
     let advice = |key: &str| {
         let schema = serde_json::Value::from(schemars::schema_for!(T));
         let description = schema["properties"][key]["description"].as_str()?;
