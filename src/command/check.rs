@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
-use athermal::core::compile::{Plan, Wanted, compile};
+use athermal::core::compile::{Plan, Wanted, compile_part};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk};
 use athermal::core::trial::{self, Trial};
@@ -36,10 +36,10 @@ pub(super) fn plan_and_tests(
 ) -> Option<(Plan, Vec<Trial>)> {
     let graph = document::load(path, &Disk, sources, diagnostics)
         .and_then(|read| document::declare(read, diagnostics))?;
-    let Some(plan) = compile(&graph, Wanted::default(), diagnostics) else {
-        trial::mistakes(&graph, &Disk, sources, diagnostics);
-        return None;
-    };
+    let compiled = compile_part(&graph, Wanted::default(), diagnostics);
+    let plan = compiled
+        .map_err(|part| trial::mistakes(&graph, &part, &Disk, sources, diagnostics))
+        .ok()?;
     let trials = trial::declare(&graph, &plan, &Disk, sources, diagnostics)?;
     Some((plan, trials))
 }

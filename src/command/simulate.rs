@@ -1,6 +1,5 @@
 //! `athermal simulate`: the recording of a simulated machine, as a file.
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -130,15 +129,13 @@ impl Simulate {
         columns.extend(axes.map(|axis| format!("{}_applied_nm", axis.name)));
         let mut writer = Writer::create(output, "time_s", &columns, Flush::Buffered)?;
         let mut row = Row::empty(channels);
-        let (mut values, mut rows, mut time) = (Vec::new(), 0, String::new());
+        let (mut values, mut rows) = (Vec::new(), 0);
         while simulation.next(&mut row) {
             values.clear();
             values.extend_from_slice(&row.values);
             values.extend(row.true_drift.iter().filter(|_| self.truth));
             values.extend_from_slice(simulation.applied());
-            time.clear();
-            let _ = write!(time, "{}", row.time_ns as f64 / 1e9);
-            writer.write_row(&time, row.time_ns, &values)?;
+            writer.write_row("", row.time_ns, &values)?;
             rows += 1;
         }
         writer.finish()?;

@@ -227,10 +227,98 @@ delay = "soon"
         (23, "ahead"),
         (24, "alpha"),
         (28, "no channel that matches `Z`"),
+        (29, "`first` is 1"),
         (30, "threshold"),
         (34, "soon"),
     ];
     assert_told("command-line-unreadable", &text, &expected);
+}
+
+#[test]
+fn a_parameter_that_cannot_be_read_hides_no_other_that_is_out_of_range() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "linear"
+inputs.features = "temperature"
+inputs.truth = "drift.X"
+ahead = "soon"
+learn = { outliers = 0.5, margn = 1.0 }
+solver = { type = "ridge", alpha = -1.0 }
+selection = { method = "forwrd", folds = 1 }
+[nodes.vote]
+type = "page_hinkley"
+inputs.voters = "thermal"
+inputs.truth = "drift.X"
+first = 1
+threshold = "much"
+factr = 2
+factor = 2.0
+[nodes.slow]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["5mn", "0s"]
+min_coverage = 3.0
+[nodes.safe]
+type = "safe_state"
+inputs.signal = "position.X"
+max_slew = "50 nm/s"
+refuge = "value"
+value = 3
+"#;
+    let expected = [
+        (22, "soon"),
+        (23, "`outliers` is 0.5"),
+        (23, "margn"),
+        (24, "alpha"),
+        (25, "forwrd"),
+        (30, "`first` is 1"),
+        (31, "threshold"),
+        (32, "factr"),
+        (37, "mn"),
+        (38, "`min_coverage` is 3"),
+        (44, "value"),
+    ];
+    assert_told("command-line-out-of-range", &text, &expected);
+}
+
+#[test]
+fn an_instance_of_a_module_that_cannot_be_expanded_hides_none_of_its_own_mistakes() {
+    let text = SOUND.to_owned()
+        + r#"[modules.pair]
+inputs = ["from"]
+required = ["window"]
+outputs = { slope = "slope" }
+nodes.slope = { type = "slope", inputs.signal = "{from}", windows = ["{window}"] }
+[nodes.one]
+module = "pair"
+each = "axs"
+inputs.from = "temperture"
+inputs.form = "position.{axis}"
+windw = "5min"
+[nodes.two]
+module = "par"
+each = "axs"
+inputs.from = "position.{axis}"
+[nodes.three]
+module = "pair"
+each = "axis"
+inputs.from = "position.{axes}"
+[nodes.thermal]
+type = "pick"
+inputs.signal = ["one", "two", "three", "for"]
+"#;
+    let expected = [
+        (25, "no set \"axs\""),
+        (26, "temperture"),
+        (27, "no key \"form\""),
+        (28, "no key \"windw\""),
+        (30, "no module \"par\""),
+        (31, "no set \"axs\""),
+        (33, "window"),
+        (36, "{axes}"),
+        (39, "`for`"),
+    ];
+    assert_told("command-line-unexpanded", &text, &expected);
 }
 
 #[test]
@@ -344,15 +432,20 @@ expects = []
 name = "a"
 on = { simulate = "die-testr", days = 1 }
 faults = [{ channel = "temperature.a", kind = "stick" }]
-expect = [{ of = "thermal", rmse_below = "-1 nm" }]
+expect = [{ of = "thermal", rmse_below = "-1 nm" },
+    { of = "thermal" },
+    { of = "thermal", within = 0.1 }]
 "#;
     let expected = [
         (20, "drft"),
+        (24, "needs the key \"every\""),
         (25, "no key \"expects\""),
         (27, "\"a\""),
         (28, "die-testr"),
         (29, "stick"),
         (30, "rmse_below"),
+        (31, "the expectation checks nothing"),
+        (32, "within"),
     ];
     assert_told("command-line-tests", &(SOUND.to_owned() + tests), &expected);
 }
@@ -411,4 +504,128 @@ fn a_text_in_place_of_a_list_and_a_port_behind_a_channel_are_shown_as_they_are_w
         "a port stands behind the node: `position:slope.X`",
     ];
     assert_eq!(helps, expected);
+}
+
+#[test]
+fn what_a_misspelt_key_was_meant_for_is_looked_at_under_its_right_name() {
+    let text = r#"schema = "1"
+[signals.temperature]
+unit = "Cel"
+chanels = ["a", "b"]
+column = "{chanel}"
+max_ago = "1min"
+[modules.pair]
+input = ["from"]
+require = ["window"]
+output = { slope = "slope" }
+nodes.slope = { type = "slope", inputs.signal = "{from}", windows = ["{windw}"] }
+[nodes.one]
+module = "pair"
+inputs.from = "temperature.c"
+window = "5min"
+[nodes.two]
+tpye = "delay"
+inputs.signal = { form = "temperature.d", maxage = "1min" }
+delay = "soon"
+[outputs]
+shown = { form = "one" }
+"#;
+    let expected = [
+        (1, "schema"),
+        (4, "chanels"),
+        (5, "{chanel}"),
+        (6, "max_ago"),
+        (8, "input"),
+        (9, "require"),
+        (10, "output"),
+        (11, "{windw}"),
+        (14, "no channel that matches `c`"),
+        (17, "tpye"),
+        (18, "form"),
+        (18, "no channel that matches `d`"),
+        (18, "maxage"),
+        (19, "soon"),
+        (21, "form"),
+    ];
+    assert_told("command-line-misspelt", text, &expected);
+}
+
+#[test]
+fn what_tests_say_of_sound_nodes_is_told_beside_the_mistakes_of_others() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "linear"
+inputs.features = "temperatur"
+inputs.truth = "drift.X"
+ahead = "0s"
+[[tests]]
+name = "a"
+inputs = { "temperature.c" = { constant = "20 Cel", for = "1min", every = "1s" } }
+faults = [{ channel = "position.X", kind = "offset", size = "3 K", from = "0s" }]
+expect = [{ of = "drift.Z", given_above = 0.5 }, { of = "drift.X", equals = "3 K" },
+    { of = "thermal.Q", given_above = 0.5 }, { of = "predicted.Q", given_above = 0.5 },
+    { of = "drft", beats = ["thermal", "zer"] }]
+"#;
+    let expected = [
+        (20, "temperatur"),
+        (25, "`c`"),
+        (26, "K"),
+        (27, "`Z`"),
+        (27, "K"),
+        (29, "drft"),
+        (29, "zer"),
+    ];
+    assert_told("command-line-tests-beside", &text, &expected);
+}
+
+const ONCE: &str = r#"error[A008]: expected a duration like "5min" for "max_age", found the number 5
+ --> wrong.toml:9:78
+  |
+9 | ... from = "{from}", max_age = 5 }, windws = ["5min"], min_samples = -1 }
+  |                                ^ expected a duration like "5min"
+  |
+  = note: node `one/slope`, and 1 more node
+  = help: a duration needs a unit, e.g. "5min"
+
+error[A006]: the node has no key "windws"
+ --> wrong.toml:9:83
+  |
+9 | ...= { from = "{from}", max_age = 5 }, windws = ["5min"], min_samples = -1 }
+  |                                        ^^^^^^ unknown key
+  |
+  = note: node `one/slope`, and 1 more node
+  = help: did you mean "windows"?
+
+error[A008]: expected a whole number, 0 or more for "min_samples", found the number -1
+ --> wrong.toml:9:116
+  |
+9 | ...= ["5min"], min_samples = -1 }
+  |                              ^^ expected a whole number, 0 or more
+  |
+  = note: node `one/slope`, and 1 more node
+3 errors
+"#;
+
+#[test]
+fn a_faulty_node_of_a_module_that_is_placed_twice_tells_each_mistake_once() {
+    let text = r#"schema = 1
+[signals.temperature]
+unit = "Cel"
+channels = ["a"]
+max_age = "1min"
+[modules.pair]
+inputs = ["from"]
+outputs = { slope = "slope" }
+nodes.slope = { type = "slope", inputs.signal = { from = "{from}", max_age = 5 }, windws = ["5min"], min_samples = -1 }
+[nodes]
+one = { module = "pair", inputs.from = "temperature" }
+two = { module = "pair", inputs.from = "temperature" }
+[outputs]
+slopes = ["one", "two"]
+"#;
+    let scratch = Scratch::new("command-line-twice");
+    let graph = scratch.file("wrong.toml", text);
+    let told = athermal(&[&"check", &graph]).ended(2).told;
+    let told = told.replace(&graph.display().to_string(), "wrong.toml");
+    assert_eq!(told, ONCE);
 }

@@ -357,19 +357,33 @@ impl fmt::Display for Duration {
             .into_iter()
             .find(|(_, scale)| ns >= scale.unsigned_abs())
             .unwrap_or(("s", NS_PER_S));
-        write_decimal(f, ns, scale.unsigned_abs(), name)
+        write_decimal(f, ns, scale.unsigned_abs())?;
+        f.write_str(name)
+    }
+}
+
+impl fmt::Display for Instant {
+    /// The exact number of seconds since the origin, without a unit: `1700000000.123456789`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0 < 0 {
+            f.write_str("-")?;
+        }
+        write_decimal(f, self.0.unsigned_abs(), NS_PER_S.unsigned_abs())
     }
 }
 
 /// `ns` in a unit of a power of ten nanoseconds, with as many decimals as it takes.
-fn write_decimal(f: &mut fmt::Formatter<'_>, ns: u64, scale: u64, name: &str) -> fmt::Result {
-    let (whole, rest) = (ns / scale, ns % scale);
+fn write_decimal(f: &mut fmt::Formatter<'_>, ns: u64, scale: u64) -> fmt::Result {
+    let (whole, mut rest) = (ns / scale, ns % scale);
+    write!(f, "{whole}")?;
     if rest == 0 {
-        return write!(f, "{whole}{name}");
+        return Ok(());
     }
-    let width = scale.ilog10() as usize;
-    let digits = format!("{rest:0width$}");
-    write!(f, "{whole}.{}{name}", digits.trim_end_matches('0'))
+    let mut width = scale.ilog10() as usize;
+    while rest.is_multiple_of(10) {
+        (rest, width) = (rest / 10, width - 1);
+    }
+    write!(f, ".{rest:0width$}")
 }
 
 impl Serialize for Duration {

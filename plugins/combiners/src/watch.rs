@@ -9,6 +9,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::mean::mean;
 
+/// What both kinds document of their answers.
+macro_rules! reasons {
+    () => {
+        "The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up,\n\
+         2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched."
+    };
+}
+
 /// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
 ///
 /// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the usual error:
@@ -21,8 +29,7 @@ use crate::mean::mean;
 /// overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much room: a bias as large as the
 /// usual error is told in some hours, one of half that size hardly ever.
 ///
-/// The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
-/// `hold`. Of several predictions the mean is watched.
+#[doc = reasons!()]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PageHinkley {
@@ -63,8 +70,7 @@ pub struct PageHinkley {
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///
-/// The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for
-/// `hold`. Of several predictions the mean is watched.
+#[doc = reasons!()]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adwin {
@@ -322,7 +328,6 @@ struct Seen<D> {
     /// The last alarm: when it became known, and whether the mean had gone up.
     alarm: Option<(Instant, bool)>,
     /// The alarm of a truth that has just been handed over.
-    #[serde(default)]
     found: Option<bool>,
     /// Up to when truths have been handed over.
     newest: Option<Instant>,

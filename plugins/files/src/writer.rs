@@ -1,9 +1,12 @@
 //! Rows written as CSV or JSON lines, in the shortest numbers that read back to the same bits. Not which columns there are.
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
+
+use athermal_core::time::Instant;
 
 use crate::cell::text_of;
 use crate::json_objects::JsonObjects;
@@ -147,7 +150,9 @@ impl Writer {
         }
         let time_text = match time_text {
             "" => {
-                decimal_seconds(time_ns, &mut self.instant);
+                self.instant.clear();
+                // Writing to a `String` cannot fail.
+                let _ = write!(self.instant, "{}", Instant::from_ns(time_ns));
                 self.instant.as_str()
             }
             text => text,
@@ -220,18 +225,6 @@ fn io_error(error: csv::Error) -> io::Error {
         csv::ErrorKind::Io(error) => error,
         other => io::Error::other(format!("{other:?}")),
     }
-}
-
-fn decimal_seconds(time_ns: i64, text: &mut String) {
-    use std::fmt::Write as _;
-    const SECOND: u64 = 1_000_000_000;
-    let size = time_ns.unsigned_abs();
-    let sign = if time_ns < 0 { "-" } else { "" };
-    text.clear();
-    // Writing to a `String` cannot fail.
-    let _ = write!(text, "{sign}{}.{:09}", size / SECOND, size % SECOND);
-    let kept = text.trim_end_matches('0').trim_end_matches('.').len();
-    text.truncate(kept);
 }
 
 #[cfg(test)]

@@ -1,12 +1,15 @@
 //! Decides what each node of a file says: its kind looked up, its parameters read, and where in the file each of them stands.
 
+use std::collections::HashSet;
 use std::ops::Deref;
 use std::sync::Arc;
 
 use super::keys::EstimatorKeys;
 use super::problem::CompileProblem;
 use crate::diagnostic::{Diagnostics, Place};
-use crate::document::{Data, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode};
+use crate::document::{
+    Data, Decoded, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode_rest,
+};
 use crate::node::{Kind, Mistake, NodeSpec, Role, kinds};
 
 /// A node whose kind and parameters have been read.
@@ -19,9 +22,9 @@ pub(crate) struct ReadNode {
 #[derive(Clone, Default)]
 pub(crate) struct ReadParts {
     /// The specification.
-    pub(super) spec: Option<Arc<dyn NodeSpec>>,
+    pub(super) spec: Option<Decoded<Arc<dyn NodeSpec>>>,
     /// The keys that the framework reads itself.
-    pub(super) estimator: Option<EstimatorKeys>,
+    pub(super) estimator: Option<Decoded<EstimatorKeys>>,
 }
 
 /// The specification of one instance, with the keys that the framework reads itself.
@@ -32,13 +35,21 @@ pub(crate) struct ReadInstance {
 
 impl ReadParts {
     fn is_whole(&self) -> bool {
-        self.spec.is_some() && self.estimator.is_some()
+        self.spec().is_some() && self.estimator().is_some()
+    }
+
+    fn spec(&self) -> Option<&Arc<dyn NodeSpec>> {
+        self.spec.as_ref()?.as_whole()
+    }
+
+    fn estimator(&self) -> Option<&EstimatorKeys> {
+        self.estimator.as_ref()?.as_whole()
     }
 
     pub(super) fn whole(&self) -> Option<ReadInstance> {
         Some(ReadInstance {
-            spec: self.spec.clone()?,
-            estimator: self.estimator.clone()?,
+            spec: self.spec()?.clone(),
+            estimator: self.estimator()?.clone(),
         })
     }
 }
@@ -46,7 +57,7 @@ impl ReadParts {
 impl ReadNode {
     /// Whether the node takes its inputs for later ticks only.
     pub(crate) fn closes_loops(&self) -> bool {
-        let mut specs = self.instances.iter().filter_map(|read| read.spec.as_ref());
+        let mut specs = self.instances.iter().filter_map(ReadParts::spec);
         specs.any(|spec| match spec.role() {
             Role::Feature(feature) => feature.closes_loops(),
             _ => false,
@@ -55,7 +66,7 @@ impl ReadNode {
 
     /// Whether it is known of all instances what they are.
     pub(crate) fn is_known(&self) -> bool {
-        self.kind.is_some() && self.instances.iter().all(|read| read.spec.is_some())
+        self.kind.is_some() && self.instances.iter().all(|read| read.spec().is_some())
     }
 }
 
@@ -91,7 +102,7 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
         instances.push(read);
     }
     if let Some(faulty) = &node.faulty {
-        let follows: Vec<_> = own
+        let follows: HashSet<_> = own
             .iter()
             .filter_map(|mistake| Some((mistake.code, mistake.place?)))
             .filter(|(code, place)| {
@@ -157,10 +168,11 @@ fn read_instance(
     }
     let context = context(node, instance);
     diagnostics.within(context, |diagnostics| {
-        let estimator = decode::<EstimatorKeys>(&framework, "the node", diagnostics);
+        let estimator =
+            decode_rest::<EstimatorKeys>(&framework, "the node", &|_| None, diagnostics);
         let spec = (kind.read)(&parameters, diagnostics);
         ReadParts {
-            spec: spec.map(Arc::from),
+            spec: spec.map(|spec| spec.map(Arc::from)),
             estimator,
         }
     })

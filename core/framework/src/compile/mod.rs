@@ -37,6 +37,8 @@ pub use provenance::smallest_lag;
 pub(crate) use reference::{Reference, is_pattern, matches};
 pub(crate) use scope::outermost;
 
+use std::collections::BTreeSet;
+
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
 
@@ -49,10 +51,48 @@ pub struct Wanted {
     pub intervals: bool,
 }
 
+/// What could be made of a graph that has mistakes: enough to look at its tests, not to run it.
+#[derive(Debug)]
+pub struct Part {
+    plan: Plan,
+    /// Nodes, signals and outputs of which something is missing.
+    broken: BTreeSet<String>,
+}
+
+impl Part {
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Whether something of a name may be missing, since a mistake in it, or in the module around it, has been told.
+    pub(crate) fn is_broken(&self, name: &str) -> bool {
+        let outer = name.split('/').next().unwrap_or_default();
+        self.broken.contains(name) || self.broken.contains(outer)
+    }
+}
+
 /// Compiles a graph. All mistakes are told; without one there is a plan.
 pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
+    compile_part(graph, wanted, diagnostics).ok()
+}
+
+/// As [`compile`], with what could be made of a graph that has mistakes.
+///
+/// # Errors
+///
+/// There are mistakes, all of which are told.
+pub fn compile_part(
+    graph: &GraphFile,
+    wanted: Wanted,
+    diagnostics: &mut Diagnostics,
+) -> Result<Plan, Box<Part>> {
     let nodes = instance::read_kinds(graph, diagnostics);
     let order = order::order(graph, &nodes, diagnostics);
-    let resolved = resolver::Resolver::new(graph, diagnostics).resolve(&nodes, &order, wanted);
-    (!diagnostics.has_errors()).then_some(resolved)
+    let resolver = resolver::Resolver::new(graph, diagnostics);
+    let (plan, mut broken) = resolver.resolve(&nodes, &order, wanted);
+    if !diagnostics.has_errors() {
+        return Ok(plan);
+    }
+    broken.extend(graph.outputs.iter().map(|output| output.name.clone()));
+    Err(Box::new(Part { plan, broken }))
 }

@@ -1,6 +1,6 @@
 //! Decides what each declaration of a graph stands for, in order: kinds read, inputs looked up, outputs given slots.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -78,7 +78,13 @@ impl<'g> Resolver<'g> {
         resolver
     }
 
-    pub(crate) fn resolve(mut self, read: &[ReadNode], order: &Order, wanted: Wanted) -> Plan {
+    /// The plan, and the names of which something is missing in it.
+    pub(crate) fn resolve(
+        mut self,
+        read: &[ReadNode],
+        order: &Order,
+        wanted: Wanted,
+    ) -> (Plan, BTreeSet<String>) {
         for node in &self.graph.nodes {
             self.scopes.declare(&node.name);
         }
@@ -92,15 +98,15 @@ impl<'g> Resolver<'g> {
             self.scopes.get_mut(&self.graph.nodes[node].name).broken = true;
         }
         let mut closing = Vec::new();
-        for &position in &order.nodes {
+        for &position in order.nodes.iter().chain(&order.looping) {
             let node = &self.graph.nodes[position];
             let closes = order.closing.contains(&position);
+            let sound = node.faulty.is_none() && !order.looping.contains(&position);
             for (parts, decl) in read[position].instances.iter().zip(&node.instances) {
-                let context = context(node, decl);
-                let outer = self.diagnostics.scope(Some(context));
+                let outer = self.diagnostics.scope(Some(context(node, decl)));
                 let kind = read[position].kind;
-                let whole = parts.whole().filter(|_| node.faulty.is_none());
-                let (Some(kind), Some(read)) = (kind, whole) else {
+                let whole = parts.whole().filter(|_| sound);
+                let Some((kind, read)) = kind.zip(whole) else {
                     self.scopes.get_mut(&node.name).broken = true;
                     self.survey(node, decl, kind, parts);
                     self.diagnostics.scope(outer);
@@ -118,14 +124,6 @@ impl<'g> Resolver<'g> {
                 }
             }
         }
-        for &position in &order.looping {
-            let node = &self.graph.nodes[position];
-            for (parts, decl) in read[position].instances.iter().zip(&node.instances) {
-                let outer = self.diagnostics.scope(Some(context(node, decl)));
-                self.survey(node, decl, read[position].kind, parts);
-                self.diagnostics.scope(outer);
-            }
-        }
         let has_loops = !closing.is_empty();
         for (index, instance) in closing {
             self.close(index, &instance);
@@ -136,7 +134,8 @@ impl<'g> Resolver<'g> {
         self.name_sensors();
         self.find_leaks();
         let outputs = self.outputs();
-        self.finish(outputs, wanted)
+        let broken = self.scopes.broken();
+        (self.finish(outputs, wanted), broken)
     }
 
     fn take_signals(&mut self) {

@@ -1,5 +1,7 @@
 //! Decides which slots a reference names.
 
+use std::collections::BTreeSet;
+
 use indexmap::{IndexMap, IndexSet};
 
 use super::problem::CompileProblem;
@@ -55,6 +57,12 @@ impl Scopes {
             let scope = self.get_mut(name);
             (scope.broken, scope.hidden) = (true, true);
         }
+    }
+
+    /// The names of which something is missing.
+    pub(crate) fn broken(&self) -> BTreeSet<String> {
+        let broken = self.scopes.iter().filter(|(_, scope)| scope.broken);
+        broken.map(|(name, _)| name.clone()).collect()
     }
 
     fn shown(&self) -> impl Iterator<Item = &str> {

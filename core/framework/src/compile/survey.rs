@@ -4,8 +4,8 @@ use super::instance::{Declared, ReadParts};
 use super::keys::Learn;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
-use crate::document::{InstanceDecl, NodeDecl};
-use crate::node::{InputPort, Kind, Read, Role};
+use crate::document::{Decoded, InstanceDecl, LeftOut, NodeDecl};
+use crate::node::{InputPort, Kind, Mistake, Read, Role};
 
 impl Resolver<'_> {
     /// Looks through an instance of which nobody will read anything.
@@ -25,18 +25,41 @@ impl Resolver<'_> {
         let declared = Declared { node, decl, kind };
         self.known_inputs(&declared);
         let ports = self.wired(&declared);
-        if let Some(Learn::Within(limits)) = parts.estimator.as_ref().and_then(|keys| keys.learn) {
-            self.mistakes(&declared, limits.mistakes());
+        if let Some((keys, left_out)) = parts.estimator.as_ref().map(Decoded::rest)
+            && let Some(Learn::Within(limits)) = keys.learn
+        {
+            self.own_mistakes(&declared, limits.mistakes(), left_out);
         }
-        let mistakes = match parts.spec.as_ref().map(|spec| spec.role()) {
-            Some(Role::Feature(feature)) if !feature.closes_loops() => ports
+        let Some((spec, left_out)) = parts.spec.as_ref().map(Decoded::rest) else {
+            return;
+        };
+        let mistakes = match spec.role() {
+            Role::Feature(feature) if !feature.closes_loops() => ports
                 .and_then(|ports| feature.outputs(&self.inputs(&declared, ports)).err())
                 .unwrap_or_default(),
-            Some(Role::Estimator(estimator)) => estimator.mistakes(),
-            Some(Role::Combiner(combiner)) => combiner.mistakes(),
-            Some(Role::Feature(_)) | None => Vec::new(),
+            Role::Feature(_) => Vec::new(),
+            Role::Estimator(estimator) => estimator.mistakes(),
+            Role::Combiner(combiner) => combiner.mistakes(),
         };
-        self.mistakes(&declared, mistakes);
+        self.own_mistakes(&declared, mistakes, left_out);
+    }
+
+    /// Tells those mistakes that do not follow from what was left out.
+    fn own_mistakes(
+        &mut self,
+        declared: &Declared<'_>,
+        mut mistakes: Vec<Mistake>,
+        left_out: &LeftOut,
+    ) {
+        mistakes.retain(|mistake| {
+            let words = format!(
+                "{} {}",
+                mistake.message,
+                mistake.help.as_deref().unwrap_or("")
+            );
+            !left_out.explains(&mistake.at, &words)
+        });
+        self.mistakes(declared, mistakes);
     }
 
     /// What each input port reads, where all of it is known; whatever is wrong with it is told.

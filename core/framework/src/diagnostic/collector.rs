@@ -96,16 +96,29 @@ impl Diagnostic {
 #[derive(Debug, Clone, Default)]
 pub struct Diagnostics {
     found: Vec<Diagnostic>,
-    known: HashMap<(&'static str, Option<Place>, String), Known>,
-    /// The first mistake of each code at each place.
-    first: HashMap<(&'static str, Option<Place>), Known>,
+    /// What is known of each place, in order of its codes' discovery.
+    known: HashMap<Option<Place>, Vec<Known>>,
     scope: Option<String>,
     errors: usize,
     reported: usize,
 }
 
+/// What is known of one code at one place.
 #[derive(Debug, Clone)]
 struct Known {
+    code: &'static str,
+    first: Counted,
+    /// Those of other words.
+    others: HashMap<String, Counted>,
+    /// One of them is an error.
+    is_error: bool,
+    /// One of them is an error of no member.
+    is_of_none: bool,
+}
+
+/// A mistake among those found.
+#[derive(Debug, Clone)]
+struct Counted {
     index: usize,
     /// The context that was counted last, so that one member is counted once.
     context: Option<String>,
@@ -132,12 +145,9 @@ impl Diagnostics {
 
     /// Whether an error of another code, or the same one of no member, stands at a place.
     pub(crate) fn is_told(&self, code: &str, place: Place) -> bool {
-        let errors = self
-            .found
-            .iter()
-            .filter(|of| of.severity == Severity::Error);
-        let mut there = errors.filter(|of| of.place == Some(place));
-        there.any(|of| of.code != code || of.context.is_none())
+        let there = self.known.get(&Some(place)).into_iter().flatten();
+        let mut errors = there.filter(|known| known.is_error);
+        errors.any(|known| known.code != code || known.is_of_none)
     }
 
     /// Notes a problem of one member, e.g. `in node "thermal", member "Z1"`.
@@ -174,14 +184,10 @@ impl Diagnostics {
         self.extend_where(other, |_| true);
     }
 
-    /// Takes over those that are wanted of what another collector found.
+    /// Takes over those that are wanted of what another collector found; what is known here already is counted with it.
     pub(crate) fn extend_where(&mut self, other: Self, wanted: impl Fn(&Diagnostic) -> bool) {
         for diagnostic in other.found.into_iter().filter(wanted) {
-            if diagnostic.severity == Severity::Error {
-                self.errors += 1;
-                self.reported += 1;
-            }
-            self.found.push(diagnostic);
+            self.take(diagnostic);
         }
     }
 
@@ -191,50 +197,80 @@ impl Diagnostics {
     }
 
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
-        let (code, message) = (problem.code(), problem.message());
-        if problem.severity() == Severity::Error {
-            self.reported += 1;
-        }
-        if let Some(known) = self.known.get_mut(&(code, place, message.clone())) {
-            if context.is_some() && known.context != context {
-                known.context = context;
-                self.found[known.index].repeats += 1;
-            }
-            return;
-        }
-        // The same mistake of another member may be worded with that member's names.
-        if let (Some(first), Some(_)) = (self.first.get_mut(&(code, place)), &context) {
-            let told = &mut self.found[first.index];
-            if told.context.is_some() && told.context != context {
-                if first.context != context {
-                    first.context = context;
-                    told.repeats += 1;
-                }
-                return;
-            }
-        }
-        let known = Known {
-            index: self.found.len(),
-            context: context.clone(),
-        };
-        self.first
-            .entry((code, place))
-            .or_insert_with(|| known.clone());
-        self.known.insert((code, place, message.clone()), known);
-        if problem.severity() == Severity::Error {
-            self.errors += 1;
-        }
-        self.found.push(Diagnostic {
-            code,
+        let new = self.take(Diagnostic {
+            code: problem.code(),
             severity: problem.severity(),
             place,
             context,
             repeats: 0,
-            message,
-            label: problem.label(),
-            help: problem.help(),
-            related: problem.related(),
+            message: problem.message(),
+            label: String::new(),
+            help: None,
+            related: Vec::new(),
         });
+        // What stands beside a mistake is worded once, however many members make it.
+        if let Some(new) = new {
+            new.label = problem.label();
+            new.help = problem.help();
+            new.related = problem.related();
+        }
+    }
+
+    /// Keeps a mistake and gives it, or counts it with the one that is known.
+    fn take(&mut self, diagnostic: Diagnostic) -> Option<&mut Diagnostic> {
+        let is_error = diagnostic.severity == Severity::Error;
+        self.reported += usize::from(is_error);
+        if self.counts(&diagnostic) {
+            return None;
+        }
+        let counted = Counted {
+            index: self.found.len(),
+            context: diagnostic.context.clone(),
+        };
+        let is_of_none = is_error && diagnostic.context.is_none();
+        let there = self.known.entry(diagnostic.place).or_default();
+        match there.iter_mut().find(|known| known.code == diagnostic.code) {
+            Some(known) => {
+                known.others.insert(diagnostic.message.clone(), counted);
+                known.is_error |= is_error;
+                known.is_of_none |= is_of_none;
+            }
+            None => there.push(Known {
+                code: diagnostic.code,
+                first: counted,
+                others: HashMap::new(),
+                is_error,
+                is_of_none,
+            }),
+        }
+        self.errors += usize::from(is_error);
+        self.found.push(diagnostic);
+        self.found.last_mut()
+    }
+
+    /// Whether a mistake is known, to which its members are then counted.
+    fn counts(&mut self, again: &Diagnostic) -> bool {
+        let there = self.known.get_mut(&again.place).into_iter().flatten();
+        let Some(known) = { there }.find(|known| known.code == again.code) else {
+            return false;
+        };
+        let first = &self.found[known.first.index];
+        // The same mistake of another member may be worded with that member's names.
+        let is_reworded = || {
+            let members = first.context.as_ref().zip(again.context.as_ref());
+            members.is_some_and(|(first, again)| first != again)
+        };
+        let counted = match known.others.get_mut(&again.message) {
+            _ if first.message == again.message => &mut known.first,
+            Some(counted) => counted,
+            None if is_reworded() => &mut known.first,
+            None => return false,
+        };
+        if again.context.is_some() && counted.context != again.context {
+            counted.context.clone_from(&again.context);
+            self.found[counted.index].repeats += 1 + again.repeats;
+        }
+        true
     }
 
     /// True if the file cannot be used.

@@ -17,11 +17,17 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
             continue;
         }
         let known = candidate.to_lowercase();
-        let longer = wanted.chars().count().max(known.chars().count());
-        let distance = strsim::damerau_levenshtein(&wanted, &known);
+        let (one, other) = (wanted.chars().count(), known.chars().count());
+        let longer = one.max(other);
+        let farthest = (longer / 3).max(1);
         let shorter = wanted.len().min(known.len());
         let continues = shorter >= 3 && (wanted.starts_with(&known) || known.starts_with(&wanted));
-        let near = distance <= (longer / 3).max(1) && distance < longer;
+        // Names whose lengths differ by more are farther apart, and a file of many names has many such.
+        if !continues && one.abs_diff(other) > farthest {
+            continue;
+        }
+        let distance = strsim::damerau_levenshtein(&wanted, &known);
+        let near = distance <= farthest && distance < longer;
         if (near || continues) && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, candidate));
         }

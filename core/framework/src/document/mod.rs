@@ -7,6 +7,7 @@ mod declare;
 mod decode;
 mod graph_file;
 mod json;
+mod lacks;
 mod merge;
 mod problem;
 mod read;
@@ -15,12 +16,13 @@ mod tree;
 
 pub use declare::declare;
 pub(crate) use declare::{TIME_UNITS, is_misspelt, known_keys};
-pub use decode::decode;
-pub(crate) use decode::decode_advised;
+pub use decode::{Decoded, decode};
+pub(crate) use decode::{LeftOut, decode_rest};
 pub use graph_file::{
     GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
 };
 pub use json::JsonError;
+pub use lacks::Lacks;
 pub use problem::DocumentProblem;
 pub(crate) use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, load, load_text};

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::lacks::Lacks;
 use crate::diagnostic::{Place, Problem, nearest};
 use crate::quantity::QuantityError;
 use crate::time::DurationError;
@@ -14,6 +15,8 @@ pub enum DocumentProblem {
     Syntax {
         /// What the TOML parser says.
         reason: String,
+        /// The value without quotes that it stumbled over, where it is one.
+        bare: Option<String>,
     },
     /// A file cannot be read.
     Unreadable {
@@ -75,6 +78,8 @@ pub enum DocumentProblem {
         expected: String,
         /// What was found.
         found: String,
+        /// What is near what was found, and right.
+        lacks: Option<Lacks>,
     },
     /// A text that is none of the choices.
     UnknownChoice {
@@ -320,7 +325,7 @@ impl Problem for DocumentProblem {
 
     fn message(&self) -> String {
         match self {
-            Self::Syntax { reason } => format!("this is not TOML: {reason}"),
+            Self::Syntax { reason, .. } => format!("this is not TOML: {reason}"),
             Self::Unreadable { path, reason } => format!("cannot read \"{path}\": {reason}"),
             Self::TooLarge { limit } => format!("the file is larger than {} MB", limit / 1_000_000),
             Self::TooDeep { limit } => format!("keys are nested more than {limit} deep"),
@@ -337,6 +342,7 @@ impl Problem for DocumentProblem {
                 key,
                 expected,
                 found,
+                ..
             } => format!(
                 "expected {expected}{}, found {found}",
                 for_key(key.as_ref())
@@ -467,25 +473,16 @@ impl Problem for DocumentProblem {
             Self::SchemaMissing | Self::SchemaUnknown { .. } => {
                 Some("begin the file with `schema = 1`".to_owned())
             }
+            Self::Syntax { bare, .. } => {
+                bare.as_ref()
+                    .map(|bare| match bare.to_ascii_lowercase().as_str() {
+                        truth @ ("true" | "false") => format!("write {truth} in small letters"),
+                        _ => format!("a text stands in quotes: \"{bare}\""),
+                    })
+            }
             Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
             Self::MissingKey { advice, .. } => advice.clone(),
-            Self::WrongType {
-                expected, found, ..
-            } if found.starts_with("the number") => {
-                if expected.starts_with("a duration") {
-                    Some("a duration needs a unit, e.g. \"5min\"".to_owned())
-                } else if expected.starts_with("a quantity") {
-                    Some("a quantity needs a unit, e.g. \"150 nm/min\"".to_owned())
-                } else {
-                    None
-                }
-            }
-            Self::WrongType {
-                expected, found, ..
-            } if expected.starts_with("a list") => {
-                let text = found.strip_prefix("the text ")?;
-                Some(format!("a list stands in brackets, e.g. [{text}]"))
-            }
+            Self::WrongType { lacks, .. } => lacks.as_ref().map(Lacks::help),
             Self::UnknownChoice { found, choices, .. } => {
                 suggestion(found, choices, "the choices are")
             }
@@ -498,6 +495,13 @@ impl Problem for DocumentProblem {
                 "a name begins with a letter or digit, then letters, digits, `_` and `-`"
                     .to_owned(),
             ),
+            Self::DuplicateName {
+                role: "parameter",
+                first_role,
+                ..
+            } if *first_role != "parameter" => {
+                Some("give the parameter a name that nothing else has".to_owned())
+            }
             Self::DuplicateName {
                 role, first_role, ..
             } if role != first_role => {

@@ -187,6 +187,10 @@ impl Chain<'_> {
             None => self
                 .diagnostics
                 .report(Place::new(source, 0, 0), DocumentProblem::SchemaMissing),
+            // Another schema may mean anything; 1 in another dress means 1.
+            Some((place, None, found)) => self
+                .diagnostics
+                .report(place, DocumentProblem::SchemaUnknown { found }),
             Some((place, _, found)) => self.fail(place, DocumentProblem::SchemaUnknown { found }),
         }
         let base = match table.remove("extends") {
@@ -277,6 +281,7 @@ impl Chain<'_> {
                     key,
                     expected,
                     found: extends.found(),
+                    lacks: None,
                 },
             );
             return None;

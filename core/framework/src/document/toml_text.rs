@@ -24,12 +24,24 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
             at(source, &span),
             DocumentProblem::Syntax {
                 reason: error.message().to_owned(),
+                bare: bare(text, &span),
             },
         );
     }
     let whole = Place::new(source, 0, 0);
     let table = table(source, root.into_inner(), diagnostics);
     Some(Value::new(whole, Data::Table(table)))
+}
+
+/// The text of a value that has no quotes, where it should have.
+fn bare(text: &str, span: &std::ops::Range<usize>) -> Option<String> {
+    let found = text.get(span.clone())?;
+    let is_value = text[..span.start].trim_end().ends_with(['=', '[', ',']);
+    let is_key = text[span.end..].trim_start().starts_with(['=', '.']);
+    let is_word = found.starts_with(char::is_alphanumeric)
+        && found.contains(char::is_alphabetic)
+        && !found.contains(['"', '\'', '\n']);
+    (is_value && !is_key && is_word).then(|| found.to_owned())
 }
 
 fn at(source: SourceId, span: &std::ops::Range<usize>) -> Place {

@@ -34,6 +34,13 @@ pub enum Data {
     Table(Table),
 }
 
+impl Data {
+    /// Whether it is a number of either sort.
+    pub(crate) fn is_number(&self) -> bool {
+        matches!(self, Self::Integer(_) | Self::Float(_))
+    }
+}
+
 /// A key of a table with its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {

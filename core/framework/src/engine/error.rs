@@ -47,9 +47,7 @@ impl fmt::Display for EngineError {
         match self {
             Self::NotAfter { time, last } => write!(
                 f,
-                "the tick at {} s is not after the last one at {} s: ticks must come in the order of time",
-                time.as_ns() as f64 / 1e9,
-                last.as_ns() as f64 / 1e9
+                "the tick at {time} s is not after the last one at {last} s: ticks must come in the order of time"
             ),
             Self::WrongWidth { found, expected } => {
                 write!(
@@ -81,3 +79,18 @@ impl fmt::Display for EngineError {
 }
 
 impl std::error::Error for EngineError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_that_are_a_nanosecond_apart_are_told_apart() {
+        let now = Instant::from_ns(1_700_000_000_123_456_789);
+        let (time, last) = (now, Instant::from_ns(now.as_ns() + 1));
+        let told = EngineError::NotAfter { time, last }.to_string();
+        let at =
+            "the tick at 1700000000.123456789 s is not after the last one at 1700000000.12345679 s";
+        assert!(told.starts_with(at), "{told}");
+    }
+}

@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Combiner, Estimator, Feature, InputPort, Read};
 use crate::diagnostic::Diagnostics;
-use crate::document::{Value, decode_advised};
+use crate::document::{Decoded, Value, decode_rest};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -63,6 +63,9 @@ impl std::fmt::Display for RoleName {
     }
 }
 
+/// The parameters of a node, as far as they could be read; nothing where they are past all reading.
+pub type ReadSpec = Option<Decoded<Box<dyn NodeSpec>>>;
+
 /// A kind of node, as registered.
 #[derive(Debug)]
 pub struct Kind {
@@ -76,8 +79,8 @@ pub struct Kind {
     pub version: &'static str,
     /// The input ports.
     pub inputs: fn() -> &'static [InputPort],
-    /// Reads its parameters, telling every mistake in them.
-    pub read: fn(&Value, &mut Diagnostics) -> Option<Box<dyn NodeSpec>>,
+    /// Reads its parameters, telling every mistake in them; after one, what could be read beside it.
+    pub read: fn(&Value, &mut Diagnostics) -> ReadSpec,
     /// The JSON Schema of its parameters, with the documentation.
     pub schema: fn() -> schemars::Schema,
 }
@@ -118,14 +121,14 @@ inventory::collect!(Kind);
 pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     value: &Value,
     diagnostics: &mut Diagnostics,
-) -> Option<Box<dyn NodeSpec>> {
+) -> ReadSpec {
     let advice = |key: &str| {
         let schema = serde_json::Value::from(schemars::schema_for!(T));
         let description = schema["properties"][key]["description"].as_str()?;
         Some(format!("add `{key}`: {}", first_paragraph(description)))
     };
-    decode_advised::<T>(value, "the node", &advice, diagnostics)
-        .map(|spec| Box::new(spec) as Box<dyn NodeSpec>)
+    let read = decode_rest::<T>(value, "the node", &advice, diagnostics)?;
+    Some(read.map(|spec| Box::new(spec) as Box<dyn NodeSpec>))
 }
 
 /// The first paragraph of a documentation, on one line.

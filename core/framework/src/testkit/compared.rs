@@ -58,8 +58,7 @@ impl Course {
                 if !alike(*one, *two) {
                     let slot = fixture.slots().start + number;
                     return Some(format!(
-                        "at tick {nth} ({} s) `{}` is {} in one run and {} in the other",
-                        now.as_ns() as f64 / 1e9,
+                        "at tick {nth} ({now} s) `{}` is {} in one run and {} in the other",
                         fixture.plan.channels[slot].name,
                         told(*one),
                         told(*two)
@@ -85,7 +84,7 @@ fn told(given: Given) -> String {
     match given {
         None => "not given".to_owned(),
         Some((value, _)) if value.is_nan() => "absent".to_owned(),
-        Some((value, stamp)) => format!("{value:?} (of {} s)", stamp.as_ns() as f64 / 1e9),
+        Some((value, stamp)) => format!("{value:?} (of {stamp} s)"),
     }
 }
 

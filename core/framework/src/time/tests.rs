@@ -161,6 +161,16 @@ fn durations_are_written_short() {
 }
 
 #[test]
+fn instants_are_written_as_exact_seconds() {
+    let written = |ns: i64| Instant::from_ns(ns).to_string();
+    assert_eq!(written(0), "0");
+    assert_eq!(written(20 * SECOND), "20");
+    assert_eq!(written(-300_000_000), "-0.3");
+    assert_eq!(written(1_700_000_000_000_000_001), "1700000000.000000001");
+    assert_eq!(written(i64::MIN), "-9223372036.854775808");
+}
+
+#[test]
 fn arithmetic_saturates() {
     let long = Duration::from_ns(i64::MAX);
     assert_eq!(Instant::MAX + long, Instant::MAX);

@@ -11,11 +11,11 @@ use super::problem::TrialProblem;
 use super::series::{Series, Synthetic};
 use super::shape;
 use super::table::SimulationTable;
-use crate::compile::{Plan, PlannedRole};
+use crate::compile::{CompileProblem, Part, Plan, PlannedRole, Reference};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{
-    Data, DocumentProblem, FileReader, GraphFile, Table, Value, decode, is_misspelt, known_keys,
-    unreadable,
+    Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode, is_misspelt,
+    known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
 use crate::machine::{LONGEST_DAYS, Machine, Schedule, UnknownMachine, machine};
@@ -58,22 +58,24 @@ pub fn declare(
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<Trial>> {
-    read(graph, Some(plan), reader, sources, diagnostics)
+    read(graph, (plan, None), reader, sources, diagnostics)
 }
 
-/// Tells what is wrong with the tests of a graph that has other mistakes, as far as it shows without a plan.
+/// Tells what is wrong with the tests of a graph that has other mistakes, as far as it shows beside them.
 pub fn mistakes(
     graph: &GraphFile,
+    part: &Part,
     reader: &dyn FileReader,
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
 ) {
-    read(graph, None, reader, sources, diagnostics);
+    let plan = (part.plan(), Some(part));
+    read(graph, plan, reader, sources, diagnostics);
 }
 
 fn read(
     graph: &GraphFile,
-    plan: Option<&Plan>,
+    (plan, part): (&Plan, Option<&Part>),
     reader: &dyn FileReader,
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
@@ -108,6 +110,7 @@ fn read(
         let trial = diagnostics.within(context, |diagnostics| {
             Declaring {
                 plan,
+                part,
                 reader,
                 sources,
                 schedules: &mut schedules,
@@ -148,8 +151,9 @@ type Schedules = BTreeMap<(PathBuf, &'static str), Option<Schedule>>;
 
 /// Reads one test; what it expects is read in a file of its own.
 pub(super) struct Declaring<'a> {
-    /// The graph; none where it has mistakes, so that nothing can be said of its channels.
-    pub(super) plan: Option<&'a Plan>,
+    pub(super) plan: &'a Plan,
+    /// What of a graph with mistakes is missing in the plan; none where it has no mistakes.
+    part: Option<&'a Part>,
     reader: &'a dyn FileReader,
     sources: &'a mut Sources,
     schedules: &'a mut Schedules,
@@ -229,7 +233,10 @@ impl Declaring<'_> {
         read: impl Fn(&mut Self, &Value) -> Option<T>,
     ) -> Option<Vec<T>> {
         let Some(list) = value.as_list() else {
-            let problem = wrong_type(key, "a list of tables", value);
+            let mut problem = wrong_type(key, "a list of tables", value);
+            if let DocumentProblem::WrongType { lacks, .. } = &mut problem {
+                *lacks = Lacks::for_tables(&value.data);
+            }
             self.diagnostics.report(value.place, problem);
             return None;
         };
@@ -268,6 +275,10 @@ impl Declaring<'_> {
         let what = format!("\"{key}\"");
         let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
         let place = value.place_of("simulate");
+        if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
+            let found = table.days.to_string();
+            self.range(value, "days", found, "above 0 and at most 3653");
+        }
         let known = match machine(&table.simulate) {
             Ok(known) => known,
             Err(unknown) => {
@@ -275,13 +286,7 @@ impl Declaring<'_> {
                 return None;
             }
         };
-        if let Some(plan) = self.plan {
-            self.measured_by(known.machine, plan, place);
-        }
-        if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
-            let found = table.days.to_string();
-            self.range(value, "days", found, "above 0 and at most 3653");
-        }
+        self.measured_by(known.machine, place);
         let schedule = match &table.schedule {
             Some(path) => Some(self.schedule(path, value.place_of("schedule"), known.machine)?),
             None => None,
@@ -295,7 +300,8 @@ impl Declaring<'_> {
     }
 
     /// Whether a machine measures what the graph reads, in units that convert.
-    fn measured_by(&mut self, machine: &dyn Machine, plan: &Plan, place: Place) {
+    fn measured_by(&mut self, machine: &dyn Machine, place: Place) {
+        let plan = self.plan;
         let channels = machine.channels();
         let measures = |name: &str| channels.iter().find(|channel| channel.reference() == name);
         let needed = plan.sources.iter().filter(|source| !source.optional);
@@ -372,7 +378,7 @@ impl Declaring<'_> {
         if table.is_empty() {
             self.diagnostics.report(value.place, TrialProblem::NoData);
         }
-        let plan = self.plan?;
+        let plan = self.plan;
         for (reference, entry) in table.iter() {
             let Some(slots) = self.measured(reference, entry.key) else {
                 continue;
@@ -413,7 +419,7 @@ impl Declaring<'_> {
             };
             self.diagnostics.report(value.place_of("size"), problem);
         }
-        let plan = self.plan?;
+        let plan = self.plan;
         let slots = self.measured(&spec.channel, value.place_of("channel"))?;
         let one = |slot: usize| {
             let name = plan.sources[slot].name.as_str();
@@ -447,13 +453,13 @@ impl Declaring<'_> {
     }
 
     pub(super) fn channels(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
-        look_up(self.plan?, reference)
-            .map_err(|problem| self.diagnostics.report(place, problem))
+        look_up(self.plan, reference)
+            .map_err(|problem| self.not_found(reference, place, problem))
             .ok()
     }
 
     fn measured(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
-        let plan = self.plan?;
+        let plan = self.plan;
         match look_up_measured(plan, reference) {
             Ok(Ok(slots)) => Some(slots),
             Ok(Err(channel)) => {
@@ -466,9 +472,17 @@ impl Declaring<'_> {
                 None
             }
             Err(problem) => {
-                self.diagnostics.report(place, problem);
+                self.not_found(reference, place, problem);
                 None
             }
+        }
+    }
+
+    /// Tells that a reference names nothing, unless what it names may be missing.
+    fn not_found(&mut self, reference: &str, place: Place, problem: CompileProblem) {
+        let name = Reference::parse(reference).whole_node();
+        if !self.part.is_some_and(|part| part.is_broken(&name)) {
+            self.diagnostics.report(place, problem);
         }
     }
 
@@ -506,5 +520,6 @@ fn wrong_type(key: &str, expected: &str, value: &Value) -> DocumentProblem {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
+        lacks: None,
     }
 }

@@ -15,14 +15,9 @@ impl Declaring<'_> {
     pub(super) fn expectation(&mut self, value: &Value) -> Option<Expectation> {
         let table = decode::<ExpectTable>(value, "the expectation", self.diagnostics)?;
         self.check_keys(value, &table);
-        let slots = self.channels(&table.of, value.place_of("of"))?;
+        let slots = self.channels(&table.of, value.place_of("of"));
         let checks = self.checks(value, &table);
-        if checks.is_empty() {
-            let what = "the expectation";
-            let problem = TrialProblem::NothingExpected { what };
-            self.diagnostics.report(value.place, problem);
-        }
-        let plan = self.plan?;
+        let (plan, slots) = (self.plan, slots?);
         for &slot in &slots {
             self.check_channel(value, &table, &checks, (plan, slot));
         }
@@ -83,10 +78,14 @@ impl Declaring<'_> {
             ("given_above", table.given_above.is_some()),
             ("rmse_below", table.rmse_below.is_some()),
             ("r2_above", table.r2_above.is_some()),
-            ("beats", table.beats.is_some()),
+            (
+                "beats",
+                table.beats.as_ref().is_some_and(|by| !by.is_empty()),
+            ),
         ];
         let absent = table.absent.is_some();
         let value_beside = of_values.iter().find(|(_, stated)| *stated);
+        let nothing = value_beside.is_none() && !absent;
         let one_value = table.equals.is_some() || table.between.is_some() || absent;
         let period = table.from.is_some() || table.to.is_some();
         let of_truths = table.rmse_below.is_some()
@@ -120,6 +119,12 @@ impl Declaring<'_> {
                 true,
             ),
         ];
+        // A key that needs one that checks something says so itself.
+        if nothing && !wrong.iter().any(|(wrong, ..)| *wrong) {
+            let what = "the expectation";
+            let problem = TrialProblem::NothingExpected { what };
+            self.diagnostics.report(value.place, problem);
+        }
         for (_, key, with, excluded) in wrong.into_iter().filter(|(wrong, ..)| *wrong) {
             let problem = TrialProblem::Keys {
                 key,

@@ -57,6 +57,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
                 key: None,
                 expected,
                 found: tree.found(),
+                lacks: None,
             },
         );
         return None;
@@ -96,6 +97,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
                 key: Some("tests".to_owned()),
                 expected,
                 found: tests.found(),
+                lacks: None,
             },
         );
     }

@@ -4,10 +4,10 @@ use super::each::{Each, Member, Total, own_each, room_for};
 use super::modules::{Expanded, Placed};
 use super::placeholder;
 use super::reading::{
-    in_samples, is_misspelt, known_keys, length, missing, one_or_more, samples, table, text,
+    in_samples, known_keys, length, meant, missing, one_or_more, samples, table, text,
 };
 use super::sets::Sets;
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Place, nearest};
 use crate::document::graph_file::{Faulty, InputDecl, InstanceDecl, NodeDecl};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
@@ -41,6 +41,7 @@ pub(super) fn declare(
         }
         if node.as_ref().is_none_or(|node| node.faulty.is_some()) {
             broken.push(placed.name.clone());
+            node.iter_mut().for_each(leave_out_open);
         }
         declared.extend(node);
     }
@@ -62,8 +63,11 @@ fn node(
     let before = diagnostics.reported();
     let keys = table(&entry.value, name, diagnostics)?;
     let what = format!("node \"{name}\"");
-    let kind = match keys.get("type") {
+    let type_key = type_key(keys, &what, diagnostics);
+    let kind = match keys.get(type_key) {
         Some(value) => text(value, "type", diagnostics).map(|kind| (kind.to_owned(), value.place)),
+        // Why it could not be expanded has been told.
+        None if keys.contains("module") => None,
         None => {
             missing(
                 &entry.value,
@@ -78,13 +82,25 @@ fn node(
     let own = own_each(keys, sets, diagnostics);
     let each = around_and_own(placed, own.sets, sets);
     if own.known {
-        check_placeholders(&entry.value, &each, &what, diagnostics);
+        let inside = placed.around.last();
+        let parameters = inside.map_or(&[][..], |around| &around.parameters);
+        let own = each.iter().map(|(set, _)| set);
+        let own = own.filter(|set| !set.contains('/')).chain(parameters);
+        let named = Named {
+            known: own.cloned().collect(),
+            each: &each,
+            what: &what,
+        };
+        named.check(&entry.value, diagnostics);
     }
     let inputs = match keys.get("inputs") {
         Some(value) => inputs(value, &what, sample, diagnostics),
         None => Vec::new(),
     };
-    let mut parameters = Value::new(entry.value.place, Data::Table(own_parameters(keys)));
+    let mut parameters = Value::new(
+        entry.value.place,
+        Data::Table(own_parameters(keys, type_key)),
+    );
     convert_samples(&mut parameters, sample, diagnostics);
     let members = if own.sound {
         let count = inputs.len();
@@ -169,30 +185,38 @@ fn scopes(placed: &Placed, member: &Member<'_>) -> Vec<(String, Option<String>)>
     scopes
 }
 
-fn check_placeholders(value: &Value, each: &Each<'_>, what: &str, diagnostics: &mut Diagnostics) {
-    match &value.data {
-        Data::Text(text) => {
-            for name in
-                placeholder::names(text).filter(|name| !each.iter().any(|(set, _)| set == name))
-            {
-                let own = each.iter().filter(|(set, _)| !set.contains('/'));
-                let known = own.map(|(set, _)| set.clone()).collect();
-                let problem = DocumentProblem::UnknownPlaceholder {
-                    name: name.to_owned(),
-                    known,
-                    what: what.to_owned(),
-                };
-                // Around a module it may have been told already.
-                diagnostics.report_unless_told(value.place, problem);
+/// What placeholders of a node may stand for.
+struct Named<'a> {
+    each: &'a Each<'a>,
+    /// What its author can name.
+    known: Vec<String>,
+    what: &'a str,
+}
+
+impl Named<'_> {
+    /// Tells of placeholders that stand for nothing.
+    fn check(&self, value: &Value, diagnostics: &mut Diagnostics) {
+        match &value.data {
+            Data::Text(text) => {
+                let is_set = |name: &&str| self.each.iter().any(|(set, _)| set == name);
+                for name in placeholder::names(text).filter(|name| !is_set(name)) {
+                    let problem = DocumentProblem::UnknownPlaceholder {
+                        name: name.to_owned(),
+                        known: self.known.clone(),
+                        what: self.what.to_owned(),
+                    };
+                    // Around a module it may have been told already.
+                    diagnostics.report_unless_told(value.place, problem);
+                }
             }
+            Data::List(values) => values
+                .iter()
+                .for_each(|value| self.check(value, diagnostics)),
+            Data::Table(table) => table
+                .iter()
+                .for_each(|(_, entry)| self.check(&entry.value, diagnostics)),
+            Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => {}
         }
-        Data::List(values) => values
-            .iter()
-            .for_each(|value| check_placeholders(value, each, what, diagnostics)),
-        Data::Table(table) => table
-            .iter()
-            .for_each(|(_, entry)| check_placeholders(&entry.value, each, what, diagnostics)),
-        Data::Integer(_) | Data::Float(_) | Data::Bool(_) | Data::Time(_) => {}
     }
 }
 
@@ -224,11 +248,11 @@ fn input(
         Data::Table(keys) => {
             let known = ["from", "max_age"];
             known_keys(keys, &known, &input, diagnostics);
-            let max_age = keys.get("max_age").and_then(|value| {
+            let max_age = meant(keys, "max_age", &known).and_then(|value| {
                 Some((length(value, "max_age", sample, diagnostics)?, value.place))
             });
-            let from = keys.get("from");
-            if from.is_none() && !is_misspelt(keys, "from", &known) {
+            let from = meant(keys, "from", &known);
+            if from.is_none() {
                 let advice = "name what it reads, e.g. from = \"gradients\"";
                 missing(&entry.value, "from", &input, Some(advice), diagnostics);
             }
@@ -245,9 +269,27 @@ fn input(
     }
 }
 
-fn own_parameters(keys: &Table) -> Table {
+/// The key that says the kind: without it, a misspelt one, of which is then told.
+fn type_key<'a>(keys: &'a Table, what: &str, diagnostics: &mut Diagnostics) -> &'a str {
+    let is_meant = |key: &str| nearest(key, OWN_KEYS) == Some("type");
+    let mut strange = keys.iter().filter(|(key, _)| !OWN_KEYS.contains(key));
+    match strange.find(|(key, _)| is_meant(key)) {
+        Some((key, entry)) if !keys.contains("type") && !keys.contains("module") => {
+            let problem = DocumentProblem::UnknownKey {
+                key: key.to_owned(),
+                what: what.to_owned(),
+                known: OWN_KEYS.map(str::to_owned).to_vec(),
+            };
+            diagnostics.report(entry.key, problem);
+            key
+        }
+        _ => "type",
+    }
+}
+
+fn own_parameters(keys: &Table, type_key: &str) -> Table {
     keys.iter()
-        .filter(|(key, _)| !OWN_KEYS.contains(key))
+        .filter(|(key, _)| !OWN_KEYS.contains(key) && *key != type_key)
         .map(|(key, entry)| (key.to_owned(), entry.clone()))
         .collect()
 }
@@ -295,19 +337,23 @@ pub(super) fn convert_samples_but(
     }
 }
 
+/// Leaves out the references with a placeholder that stands for nothing, of which has been told.
+fn leave_out_open(node: &mut NodeDecl) {
+    let inputs = node.instances.iter_mut().flat_map(|of| &mut of.inputs);
+    for input in inputs {
+        let open = |text: &str| placeholder::names(text).next().is_some();
+        input.references.retain(|(text, _)| !open(text));
+    }
+}
+
 fn filled_input(input: &InputDecl, members: &[(&str, &str)]) -> InputDecl {
-    let filled = input
-        .references
-        .iter()
-        .map(|(text, place)| (placeholder::fill(text, members), *place));
-    // Of a placeholder that stands for nothing has been told.
-    let references = filled
-        .filter(|(text, _)| placeholder::names(text).next().is_none())
-        .collect();
+    let references = input.references.iter();
     InputDecl {
         port: input.port.clone(),
         place: input.place,
-        references,
+        references: references
+            .map(|(text, place)| (placeholder::fill(text, members), *place))
+            .collect(),
         max_age: input.max_age,
     }
 }

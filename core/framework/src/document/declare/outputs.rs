@@ -1,7 +1,7 @@
 //! `[outputs]`: what comes out, and how it passes from an old graph to a new one; references are left to the compiler.
 
 use super::placeholder;
-use super::reading::{is_misspelt, known_keys, missing, one_or_more, quantity, table};
+use super::reading::{known_keys, meant, missing, one_or_more, quantity, table};
 use crate::diagnostic::Diagnostics;
 use crate::document::graph_file::OutputDecl;
 use crate::document::problem::DocumentProblem;
@@ -23,12 +23,10 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
         Data::Table(keys) => {
             let known = ["from", "blend"];
             known_keys(keys, &known, &what, diagnostics);
-            let blend = keys
-                .get("blend")
+            let blend = meant(keys, "blend", &known)
                 .and_then(|value| quantity(value, "blend", diagnostics));
-            match keys.get("from") {
+            match meant(keys, "from", &known) {
                 Some(from) => (from, blend),
-                None if is_misspelt(keys, "from", &known) => return None,
                 None => {
                     missing(
                         &entry.value,

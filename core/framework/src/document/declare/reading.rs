@@ -1,6 +1,7 @@
 //! How single values of a section are read and refused; what they are for is decided by the sections.
 
 use crate::diagnostic::{Diagnostics, Place, nearest};
+use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Table, Value};
 use crate::quantity::Quantity;
@@ -23,15 +24,34 @@ pub(crate) fn known_keys(table: &Table, known: &[&str], what: &str, diagnostics:
 
 /// Whether a key that is missing is there under a name that [`known_keys`] tells to be none.
 pub(crate) fn is_misspelt(table: &Table, key: &str, known: &[&str]) -> bool {
-    let mut strange = table.keys().filter(|given| !known.contains(given));
-    strange.any(|given| nearest(given, known.iter().copied()) == Some(key))
+    !table.contains(key) && meant(table, key, known).is_some()
+}
+
+/// The value of a key, or of a misspelt one of which [`known_keys`] tells, so that nothing follows from its spelling.
+pub(super) fn meant<'a>(table: &'a Table, key: &str, known: &[&str]) -> Option<&'a Value> {
+    let is_meant =
+        |given: &str| !known.contains(&given) && nearest(given, known.iter().copied()) == Some(key);
+    let misspelt = || table.iter().find(|(given, _)| is_meant(given));
+    let entry = || misspelt().map(|(_, entry)| &entry.value);
+    table.get(key).or_else(entry)
 }
 
 pub(super) fn wrong_type(value: &Value, key: &str, expected: &str, diagnostics: &mut Diagnostics) {
+    lacking(value, key, expected, None, diagnostics);
+}
+
+fn lacking(
+    value: &Value,
+    key: &str,
+    expected: &str,
+    lacks: Option<Lacks>,
+    diagnostics: &mut Diagnostics,
+) {
     let problem = DocumentProblem::WrongType {
         key: Some(key.to_owned()),
         expected: expected.to_owned(),
         found: value.found(),
+        lacks,
     };
     diagnostics.report(value.place, problem);
 }
@@ -83,7 +103,8 @@ pub(super) fn texts(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(String, Place)>> {
     let Data::List(values) = &value.data else {
-        wrong_type(value, key, expected, diagnostics);
+        let lacks = Lacks::for_texts(&value.data);
+        lacking(value, key, expected, lacks, diagnostics);
         return None;
     };
     let texts = values
@@ -123,7 +144,8 @@ pub(super) fn duration(
     diagnostics: &mut Diagnostics,
 ) -> Option<Duration> {
     let Some(text) = value.as_text() else {
-        wrong_type(value, key, "a duration like \"5min\"", diagnostics);
+        let lacks = Lacks::for_duration(&value.data);
+        lacking(value, key, "a duration like \"5min\"", lacks, diagnostics);
         return None;
     };
     let read = match samples(text) {
@@ -155,7 +177,8 @@ pub(super) fn quantity(
     diagnostics: &mut Diagnostics,
 ) -> Option<Quantity> {
     let Some(text) = value.as_text() else {
-        wrong_type(value, key, "a quantity like \"5 nm/s\"", diagnostics);
+        let lacks = Lacks::for_quantity(&value.data);
+        lacking(value, key, "a quantity like \"5 nm/s\"", lacks, diagnostics);
         return None;
     };
     text.parse()

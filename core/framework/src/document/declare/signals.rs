@@ -3,7 +3,7 @@
 use super::names::distinct;
 use super::placeholder;
 use super::reading::{
-    is_misspelt, known_keys, length, missing, quantity, table, text, texts, wrong_type,
+    known_keys, length, meant, missing, quantity, table, text, texts, wrong_type,
 };
 use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, Place};
@@ -47,13 +47,13 @@ fn signal(
     sample: Option<Duration>,
     diagnostics: &mut Diagnostics,
 ) -> Option<SignalDecl> {
-    let before = diagnostics.error_count();
     let keys = table(&entry.value, name, diagnostics)?;
     let what = format!("signal \"{name}\"");
     known_keys(keys, &KEYS, &what, diagnostics);
-    let unit = match keys.get("unit") {
+    let before = diagnostics.error_count();
+    let given = |key: &str| meant(keys, key, &KEYS);
+    let unit = match given("unit") {
         Some(value) => unit(value, diagnostics),
-        None if is_misspelt(keys, "unit", &KEYS) => None,
         None => {
             missing(
                 &entry.value,
@@ -65,9 +65,8 @@ fn signal(
             None
         }
     };
-    let channels = match keys.get("channels") {
+    let channels = match given("channels") {
         Some(value) => channels(value, &what, sets, diagnostics),
-        None if is_misspelt(keys, "channels", &KEYS) => None,
         None => {
             missing(
                 &entry.value,
@@ -80,18 +79,17 @@ fn signal(
         }
     };
     let known = diagnostics.error_count() == before;
-    let column = match keys.get("column") {
+    let column = match given("column") {
         Some(value) => column(value, channels.as_deref(), &what, diagnostics),
         None => Some(format!("{{{CHANNEL}}}")),
     };
-    let range = match (keys.get("range"), &unit) {
+    let range = match (given("range"), &unit) {
         (Some(value), unit) => range(value, unit.as_ref().map(|(unit, _)| unit), diagnostics),
         (None, _) => None,
     };
-    let max_age = keys
-        .get("max_age")
+    let max_age = given("max_age")
         .map(|value| length(value, "max_age", sample, diagnostics).unwrap_or(SOME_AGE));
-    let optional = match (keys.get("optional"), &channels) {
+    let optional = match (given("optional"), &channels) {
         (Some(value), Some(channels)) => optional(value, name, channels, diagnostics),
         _ => Vec::new(),
     };
@@ -163,11 +161,11 @@ fn column(
     diagnostics: &mut Diagnostics,
 ) -> Option<String> {
     let pattern = text(value, "column", diagnostics)?;
-    let mut names_channel = false;
-    for name in placeholder::names(pattern) {
-        if name == CHANNEL {
-            names_channel = true;
-        } else {
+    let mut named = placeholder::names(pattern).peekable();
+    // One that stands for nothing may be meant for the channel.
+    let names_channel = named.peek().is_some();
+    for name in named {
+        if name != CHANNEL {
             let known = vec![CHANNEL.to_owned()];
             let what = format!("a column of {what}");
             diagnostics.report(
@@ -216,6 +214,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
                 key: Some("range".to_owned()),
                 expected,
                 found,
+                lacks: None,
             },
         );
         return None;

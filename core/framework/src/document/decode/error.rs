@@ -5,6 +5,7 @@ use std::fmt;
 use serde::de::{self, Expected, Unexpected};
 
 use crate::diagnostic::{Diagnostics, Place, nearest};
+use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Value};
 use crate::quantity::Quantity;
@@ -40,14 +41,23 @@ impl Mistake {
         }
     }
 
+    /// The way to the key that an unknown one may be meant for.
+    pub(super) fn meant(&self) -> Option<Vec<Step>> {
+        let DocumentProblem::UnknownKey { key, known, .. } = &self.problem else {
+            return None;
+        };
+        let near = nearest(key, known.iter().map(String::as_str))?;
+        let (_, table) = self.path.split_last()?;
+        Some([table, &[Step::Key(near.to_owned())]].concat())
+    }
+
     /// Whether it is an unknown key that another finds missing under its right name.
     pub(super) fn is_meant_for(&self, missing: &Self) -> bool {
-        let (DocumentProblem::UnknownKey { key, known, .. }, Some(wanted), Some((_, table))) =
-            (&self.problem, missing.missing_key(), self.path.split_last())
-        else {
-            return false;
-        };
-        table == missing.path && nearest(key, known.iter().map(String::as_str)) == Some(wanted)
+        let meant = missing.missing_key().zip(self.meant());
+        meant.is_some_and(|(wanted, meant)| match meant.split_last() {
+            Some((key, table)) => table == missing.path && key.is_key(wanted),
+            None => false,
+        })
     }
 
     /// The same, with what to write where a key of the whole table is missing.
@@ -145,10 +155,25 @@ impl DecodeError {
     }
 
     pub(super) fn wrong_type(found: String, expected: &dyn Expected) -> Self {
+        Self::lacking(found, expected, |_| None)
+    }
+
+    /// Another type than the one of a value.
+    pub(super) fn not_of(found: &Value, expected: &dyn Expected) -> Self {
+        Self::lacking(found.found(), expected, |words| lacks(&found.data, words))
+    }
+
+    fn lacking(
+        found: String,
+        expected: &dyn Expected,
+        lacks: impl Fn(&str) -> Option<Lacks>,
+    ) -> Self {
+        let words = expected.to_string();
         Self::of(DocumentProblem::WrongType {
             key: None,
-            expected: plain(&expected.to_string()),
+            expected: plain(&words),
             found,
+            lacks: lacks(&words),
         })
     }
 }
@@ -243,11 +268,14 @@ impl de::Error for DecodeError {
     }
 
     fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::wrong_type(found_text(found), expected)
+        match data_of(found) {
+            Some(data) => Self::not_of(&Value::new(NOWHERE, data), expected),
+            None => Self::wrong_type(found_text(found), expected),
+        }
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::wrong_type(found_text(found), expected)
+        Self::invalid_type(found, expected)
     }
 
     fn invalid_length(length: usize, expected: &dyn Expected) -> Self {
@@ -292,14 +320,33 @@ impl de::Error for DecodeError {
     }
 }
 
-/// What serde found, in the words of [`Value::found`].
+/// What serde found, where it is no list or table.
+fn data_of(found: Unexpected<'_>) -> Option<Data> {
+    Some(match found {
+        Unexpected::Str(text) => Data::Text(text.to_owned()),
+        Unexpected::Signed(number) => Data::Integer(number),
+        Unexpected::Unsigned(number) => Data::Integer(i64::try_from(number).ok()?),
+        Unexpected::Float(number) => Data::Float(number),
+        Unexpected::Bool(truth) => Data::Bool(truth),
+        _ => return None,
+    })
+}
+
+/// What a value lacks. Serde hands on what a type expects in words alone, so that here, and nowhere else, they decide.
+fn lacks(found: &Data, words: &str) -> Option<Lacks> {
+    match words {
+        "a sequence" => Lacks::for_texts(found),
+        list if list.starts_with("a list of ") => Lacks::for_texts(found),
+        duration if duration.starts_with("a duration ") => Lacks::for_duration(found),
+        quantity if quantity.starts_with("a quantity ") => Lacks::for_quantity(found),
+        _ => None,
+    }
+}
+
+/// What else serde found, in the words of [`Value::found`].
 fn found_text(found: Unexpected<'_>) -> String {
     match found {
-        Unexpected::Str(text) => Value::new(NOWHERE, Data::Text(text.to_owned())).found(),
-        Unexpected::Signed(number) => format!("the number {number}"),
         Unexpected::Unsigned(number) => format!("the number {number}"),
-        Unexpected::Float(number) => format!("the number {number}"),
-        Unexpected::Bool(truth) => truth.to_string(),
         Unexpected::Seq => "a list".to_owned(),
         Unexpected::Map | Unexpected::StructVariant => "a table".to_owned(),
         Unexpected::UnitVariant => "a name alone".to_owned(),

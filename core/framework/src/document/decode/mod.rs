@@ -5,6 +5,7 @@
 //! `#[serde(deny_unknown_fields)]`. A mistake inside is shown at the value that it names where only one place fits, else at the enum's table.
 
 mod error;
+mod left_out;
 mod repair;
 mod tree;
 
@@ -15,6 +16,7 @@ use serde::de::DeserializeOwned;
 use super::tree::Value;
 use crate::diagnostic::Diagnostics;
 use error::{DecodeError, Mistake};
+pub use left_out::{Decoded, LeftOut};
 use repair::Repair;
 use tree::{Place, TreeDeserializer};
 
@@ -26,24 +28,22 @@ pub fn decode<T: DeserializeOwned>(
     what: &str,
     diagnostics: &mut Diagnostics,
 ) -> Option<T> {
-    decode_advised(value, what, &|_| None, diagnostics)
+    decode_rest(value, what, &|_| None, diagnostics)?.whole()
 }
 
-/// As [`decode`], with what to write where a key of the table itself is missing.
-pub(crate) fn decode_advised<T: DeserializeOwned>(
+/// As [`decode`], with what to write where a key of the table itself is missing, and with what could be read beside mistakes.
+pub(crate) fn decode_rest<T: DeserializeOwned>(
     value: &Value,
     what: &str,
     advice: &dyn Fn(&str) -> Option<String>,
     diagnostics: &mut Diagnostics,
-) -> Option<T> {
+) -> Option<Decoded<T>> {
     let mut repair: Option<Repair> = None;
-    let mut clean = true;
     let mut strange: Vec<Mistake> = Vec::new();
     // Each turn takes at least one value out of the tree; the limit only bounds the time that a hopeless file takes.
     for _ in 0..200 {
         let (result, unknown) = attempt::<T>(repair.as_ref().map_or(value, Repair::tree));
         if !unknown.is_empty() {
-            clean = false;
             let repair = repair.get_or_insert_with(|| Repair::of(value));
             for mistake in unknown {
                 repair.take_out(&mistake.path);
@@ -52,10 +52,14 @@ pub(crate) fn decode_advised<T: DeserializeOwned>(
             }
         }
         let mistake = match result {
-            Ok(decoded) => return clean.then_some(decoded),
+            Ok(value) => {
+                let meant = strange.iter().filter_map(Mistake::meant);
+                let touched = repair.as_ref().map_or(&[][..], Repair::touched);
+                let left_out = LeftOut::of(touched.iter().cloned().chain(meant));
+                return Some(Decoded::of(value, left_out));
+            }
             Err(error) => error.into_mistake(value.place),
         };
-        clean = false;
         let repair = repair.get_or_insert_with(|| Repair::of(value));
         let is_misspelt = strange.iter().any(|given| given.is_meant_for(&mistake));
         if !repair.explains(&mistake) && !is_misspelt {

@@ -25,6 +25,10 @@ impl Repair {
         &self.tree
     }
 
+    pub(super) fn touched(&self) -> &[Vec<Step>] {
+        &self.touched
+    }
+
     /// True if a mistake only follows from what was taken out or put in before.
     pub(super) fn explains(&self, mistake: &Mistake) -> bool {
         match mistake.missing_key() {

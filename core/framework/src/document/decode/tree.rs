@@ -55,7 +55,7 @@ impl<'a> TreeDeserializer<'a> {
     }
 
     fn wrong_type<T>(&self, expected: &dyn de::Expected) -> Result<T, DecodeError> {
-        self.located(Err(DecodeError::wrong_type(self.value.found(), expected)))
+        self.located(Err(DecodeError::not_of(self.value, expected)))
     }
 
     fn any<'de, V: Visitor<'de>>(&self, visitor: V) -> Result<V::Value, DecodeError> {

@@ -126,8 +126,8 @@ fn finite(subject: &Subject<'_>, course: &Course) -> Result<(), String> {
             .zip(course.values(number))
             .find(|(_, value)| value.is_infinite());
         if let Some((now, value)) = infinite {
-            let (name, at) = (subject.name(number), now.as_ns() as f64 / 1e9);
-            return Err(format!("`{name}` is {value} at {at} s"));
+            let name = subject.name(number);
+            return Err(format!("`{name}` is {value} at {now} s"));
         }
     }
     Ok(())

@@ -69,9 +69,8 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
             let close = (expected - found).abs() <= ROUNDING * largest;
             if !(close || (expected.is_nan() && found.is_nan())) {
                 return Err(format!(
-                    "with {told}, `{}` is {found} {unit} rather than {expected} {unit} at {} s",
-                    subject.name(number),
-                    now.as_ns() as f64 / 1e9
+                    "with {told}, `{}` is {found} {unit} rather than {expected} {unit} at {now} s",
+                    subject.name(number)
                 ));
             }
         }

@@ -39,7 +39,7 @@ use indexmap::IndexMap;
 
 use super::each::{MOST_INSTANCES, MOST_VALUES, own_each, weight};
 use super::placeholder;
-use super::reading::{is_misspelt, known_keys, missing, table, text};
+use super::reading::{known_keys, meant, missing, table, text};
 use super::sets::Sets;
 use crate::diagnostic::Diagnostics;
 use crate::document::problem::DocumentProblem;
@@ -68,6 +68,8 @@ pub(super) struct Around {
     pub(super) one: String,
     /// The sets of its `each`.
     pub(super) each: Vec<String>,
+    /// The parameters of its module.
+    pub(super) parameters: Vec<String>,
 }
 
 impl Around {
@@ -216,7 +218,9 @@ impl Expansion<'_> {
             return;
         }
         if is_instance(entry) {
-            self.instance(name, entry, level);
+            if self.instance(name, entry, level).is_none() {
+                self.unexpanded(name, entry, level);
+            }
             return;
         }
         let mut entry = entry.clone();
@@ -260,16 +264,26 @@ impl Expansion<'_> {
         });
     }
 
-    fn instance(&mut self, name: &str, entry: &Entry, level: &Level<'_>) {
-        let Some(keys) = entry.value.as_table() else {
-            return;
-        };
-        let Some(wanted) = keys.get("module") else {
-            return;
-        };
-        let Some(module_name) = text(wanted, "module", self.diagnostics) else {
-            return;
-        };
+    /// Leaves an instance of a module as it is, so that what it reads is looked at all the same.
+    fn unexpanded(&mut self, name: &str, entry: &Entry, level: &Level<'_>) {
+        let mut entry = entry.clone();
+        let keys = entry
+            .value
+            .as_table_mut()
+            .into_iter()
+            .flat_map(Table::iter_mut);
+        for (_, inputs) in keys.filter(|(key, _)| *key == "inputs") {
+            inputs.value = self.inputs(&inputs.value, level);
+        }
+        self.faulty = true;
+        self.place(name, entry, level);
+    }
+
+    /// Replaces an instance of a module by the module's nodes; `None` where that cannot be done, which has been told.
+    fn instance(&mut self, name: &str, entry: &Entry, level: &Level<'_>) -> Option<()> {
+        let keys = entry.value.as_table()?;
+        let wanted = keys.get("module")?;
+        let module_name = text(wanted, "module", self.diagnostics)?;
         let Some((found, sight)) = find(module_name, &level.modules) else {
             let known = level.modules.iter().rev();
             let known = known.flat_map(|modules| modules.keys().map(str::to_owned));
@@ -278,7 +292,7 @@ impl Expansion<'_> {
                 known: known.collect(),
             };
             self.diagnostics.report(wanted.place, problem);
-            return;
+            return None;
         };
         let here = (module_name.to_owned(), std::ptr::from_ref(found));
         if self.path.contains(&here) || self.path.len() >= DEEPEST {
@@ -288,23 +302,17 @@ impl Expansion<'_> {
                 limit: DEEPEST,
             };
             self.diagnostics.report(wanted.place, problem);
-            return;
+            return None;
         }
         // What is wrong with a module itself has been told where it stands.
-        let Some(module) = Module::read(module_name, found, &mut Diagnostics::new()) else {
-            return;
-        };
+        let module = Module::read(module_name, found, &mut Diagnostics::new())?;
         let each = own_each(keys, self.sets, self.diagnostics);
-        self.faulty |= !each.sound;
-        if !each.known {
-            return;
-        }
         let names = each.sets.into_iter().map(|(set, _)| set);
-        let around = self.around(name, names.collect(), level);
-        let given = self.given(name, entry, keys, &module, &around, level);
-        let Some(given) = given.filter(|_| each.sound) else {
-            return;
-        };
+        let around = self.around(name, names.collect(), &module, level);
+        // Where it is not known what the members are of, none that is named can be told to be strange.
+        let members = each.known.then_some(&around);
+        let given = self.given(name, entry, keys, &module, members, level);
+        let given = given.filter(|_| each.sound)?;
         let mut modules = level.modules[..=sight].to_vec();
         modules.extend(module.modules);
         let inside = Level {
@@ -321,9 +329,16 @@ impl Expansion<'_> {
             self.diagnostics.scope(outer);
         }
         self.path.pop();
+        Some(())
     }
 
-    fn around(&self, name: &str, each: Vec<String>, level: &Level<'_>) -> Around {
+    fn around(
+        &self,
+        name: &str,
+        each: Vec<String>,
+        module: &Module<'_>,
+        level: &Level<'_>,
+    ) -> Around {
         let path = level.name(name);
         let member: Vec<_> = each.iter().map(|set| format!("{{{path}/{set}}}")).collect();
         let one = format!("{}{name}", level.prefix());
@@ -332,7 +347,13 @@ impl Expansion<'_> {
         } else {
             format!("{one}[{}]", member.join("-"))
         };
-        Around { path, one, each }
+        let parameters = module.parameter_names().map(str::to_owned).collect();
+        Around {
+            path,
+            one,
+            each,
+            parameters,
+        }
     }
 
     /// The inputs and parameters of an instance; `None` where one is missing.
@@ -342,7 +363,7 @@ impl Expansion<'_> {
         entry: &Entry,
         keys: &Table,
         module: &Module<'_>,
-        around: &Around,
+        around: Option<&Around>,
         level: &Level<'_>,
     ) -> Option<Given> {
         let what = format!(
@@ -355,7 +376,6 @@ impl Expansion<'_> {
             .chain(module.parameter_names())
             .collect();
         known_keys(keys, &known, &what, self.diagnostics);
-        let misspelt = |parameter: &str| is_misspelt(keys, parameter, &known);
         let mut whole = true;
         let mut inputs = IndexMap::new();
         let empty = Table::new();
@@ -371,12 +391,11 @@ impl Expansion<'_> {
             self.diagnostics,
         );
         for input in &module.inputs {
-            match wired.get(input) {
+            match meant(wired, input, &ports) {
                 Some(value) => {
                     let value = self.input(value, level);
                     inputs.insert(input.clone(), self.outward(value, around, &what));
                 }
-                None if is_misspelt(wired, input, &ports) => whole = false,
                 None => {
                     whole = false;
                     let advice = format!("wire it, e.g. inputs.{input} = \"…\"");
@@ -390,7 +409,7 @@ impl Expansion<'_> {
             .map(|(name, entry)| (name.to_owned(), entry.value.clone()))
             .collect();
         for parameter in module.parameter_names() {
-            match keys.get(parameter) {
+            match meant(keys, parameter, &known) {
                 Some(value) => {
                     let value = match &level.given {
                         Some(given) => given.fill(value, self.diagnostics),
@@ -400,7 +419,6 @@ impl Expansion<'_> {
                     parameters.insert(parameter.to_owned(), value);
                 }
                 None if parameters.contains_key(parameter) => {}
-                None if misspelt(parameter) => whole = false,
                 None => {
                     whole = false;
                     missing(&entry.value, parameter, &what, None, self.diagnostics);
@@ -415,22 +433,25 @@ impl Expansion<'_> {
     }
 
     /// A value given to an instance, its members written so that no set inside the module can be meant.
-    fn outward(&mut self, value: Value, around: &Around, what: &str) -> Value {
+    fn outward(&mut self, value: Value, around: Option<&Around>, what: &str) -> Value {
+        let Some(within) = around else {
+            return value;
+        };
         let place = value.place;
         let data = match value.data {
             Data::Text(text) => {
                 let strange =
-                    |name: &&str| !name.contains('/') && !around.each.iter().any(|set| set == name);
+                    |name: &&str| !name.contains('/') && !within.each.iter().any(|set| set == name);
                 for name in placeholder::names(&text).filter(strange) {
                     let problem = DocumentProblem::UnknownPlaceholder {
                         name: name.to_owned(),
-                        known: around.each.clone(),
+                        known: within.each.clone(),
                         what: what.to_owned(),
                     };
                     self.diagnostics.report(place, problem);
                 }
-                let open = |set: &String| (set.clone(), format!("{{{}}}", around.placeholder(set)));
-                let open: Vec<_> = around.each.iter().map(open).collect();
+                let open = |set: &String| (set.clone(), format!("{{{}}}", within.placeholder(set)));
+                let open: Vec<_> = within.each.iter().map(open).collect();
                 let open: Vec<_> = open.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
                 Data::Text(placeholder::fill(&text, &open))
             }

@@ -2,7 +2,7 @@
 
 use crate::diagnostic::Diagnostics;
 use crate::document::declare::names::{distinct, name_rule};
-use crate::document::declare::reading::{known_keys, missing, table, text, texts};
+use crate::document::declare::reading::{known_keys, meant, missing, table, text, texts};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Entry, Table, Value};
 
@@ -40,8 +40,7 @@ impl<'a> Module<'a> {
         let what = format!("module \"{name}\"");
         known_keys(keys, &KEYS, &what, diagnostics);
         let mut list = |key: &str, role: &'static str| {
-            let names = keys
-                .get(key)
+            let names = meant(keys, key, &KEYS)
                 .and_then(|value| texts(value, key, "a list of names", diagnostics));
             let names = names.unwrap_or_default();
             distinct(&names, role, diagnostics);
@@ -49,14 +48,12 @@ impl<'a> Module<'a> {
         };
         let inputs = list("inputs", "input");
         let required = list("required", "parameter");
-        let parameters = keys
-            .get("parameters")
+        let parameters = meant(keys, "parameters", &KEYS)
             .and_then(|value| table(value, "parameters", diagnostics));
-        let outputs = keys
-            .get("outputs")
-            .and_then(|value| table(value, "outputs", diagnostics));
+        let outputs =
+            meant(keys, "outputs", &KEYS).and_then(|value| table(value, "outputs", diagnostics));
         let advice = "describe its nodes under it, e.g. nodes.slope = { type = \"slope\" }";
-        let nodes = match keys.get("nodes") {
+        let nodes = match meant(keys, "nodes", &KEYS) {
             Some(nodes) => table(nodes, "nodes", diagnostics)?,
             None => {
                 missing(value, "nodes", &what, Some(advice), diagnostics);

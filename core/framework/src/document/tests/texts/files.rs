@@ -41,6 +41,8 @@ error[A001]: this is not TOML: string values must be quoted, expected literal st
   |
 2 | name = x y
   |        ^^^ here
+  |
+  = help: a text stands in quotes: "x y"
 
 error[A001]: this is not TOML: unclosed table, expected `]`
  --> a.toml:3:6

@@ -1,0 +1,90 @@
+//! What was read of a value that has mistakes, and of which keys nothing more can be said.
+
+use super::error::Step;
+
+/// A value as its type, as far as it could be read: whole, or with mistakes, of which has been told.
+#[derive(Debug, Clone)]
+pub struct Decoded<T> {
+    value: T,
+    left_out: LeftOut,
+}
+
+impl<T> Decoded<T> {
+    pub(super) fn of(value: T, left_out: LeftOut) -> Self {
+        Self { value, left_out }
+    }
+
+    /// The value, if nothing was left out.
+    #[must_use]
+    pub fn whole(self) -> Option<T> {
+        self.is_whole().then_some(self.value)
+    }
+
+    /// The same of a reference.
+    pub(crate) fn as_whole(&self) -> Option<&T> {
+        self.is_whole().then_some(&self.value)
+    }
+
+    /// The value with defaults and stand-ins for what was left out, and what that is.
+    pub(crate) fn rest(&self) -> (&T, &LeftOut) {
+        (&self.value, &self.left_out)
+    }
+
+    /// The same with another value.
+    pub(crate) fn map<U>(self, of: impl FnOnce(T) -> U) -> Decoded<U> {
+        Decoded::of(of(self.value), self.left_out)
+    }
+
+    fn is_whole(&self) -> bool {
+        self.left_out.0.is_empty()
+    }
+}
+
+/// Ways to values that could not be read, by keys, up to a list of which an element could not.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LeftOut(Vec<Vec<String>>);
+
+impl LeftOut {
+    pub(super) fn of(ways: impl Iterator<Item = Vec<Step>>) -> Self {
+        let keys = |way: Vec<Step>| {
+            let keys = way.into_iter().map_while(|step| match step {
+                Step::Key(key) => Some(key),
+                Step::Index(_) => None,
+            });
+            keys.collect()
+        };
+        Self(ways.map(keys).collect())
+    }
+
+    /// Whether what is said of the value at `path`, such as `solver.alpha`, may only follow from what was left out: from
+    /// the value itself, from one above or below it, or from another of which the words speak.
+    pub(crate) fn explains(&self, path: &str, words: &str) -> bool {
+        self.0.iter().any(|left_out| {
+            let on_the_way = path.split('.').zip(left_out).all(|(a, b)| a == b);
+            let named = left_out
+                .last()
+                .is_none_or(|key| words.contains(key.as_str()));
+            on_the_way || named
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_left_out_explains_what_is_above_below_or_spoken_of_and_nothing_else() {
+        let way = ["solver", "alpha"].map(|key| Step::Key(key.to_owned()));
+        let left_out = LeftOut::of([way.to_vec()].into_iter());
+        assert!(left_out.explains("solver", "is wrong"));
+        assert!(left_out.explains("solver.alpha.0", "is wrong"));
+        assert!(left_out.explains("lags", "there are more than `alpha` allows"));
+        assert!(!left_out.explains("solver.folds", "is wrong"));
+        assert!(!left_out.explains("lags", "is wrong"));
+        assert!(!LeftOut::default().explains("lags", "is wrong"));
+        let element = [Step::Key("lags".to_owned()), Step::Index(1)];
+        let left_out = LeftOut::of([element.to_vec()].into_iter());
+        assert!(left_out.explains("lags.0", "is wrong"));
+    }
+}

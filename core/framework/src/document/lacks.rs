@@ -1,0 +1,56 @@
+//! What a value of another type lacks to be right, and how that is said; which types are needed is decided by who reads it.
+
+use super::tree::Data;
+
+/// What alone stands between a value and the type that its key needs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Lacks {
+    /// The unit of a duration.
+    UnitOfTime,
+    /// The unit of a quantity.
+    Unit,
+    /// The brackets of a list.
+    Brackets {
+        /// What stands in them.
+        around: String,
+    },
+}
+
+impl Lacks {
+    /// What a value that is found in the place of a duration lacks.
+    pub(super) fn for_duration(found: &Data) -> Option<Self> {
+        found.is_number().then_some(Self::UnitOfTime)
+    }
+
+    /// What a value that is found in the place of a quantity lacks.
+    pub(super) fn for_quantity(found: &Data) -> Option<Self> {
+        found.is_number().then_some(Self::Unit)
+    }
+
+    /// What a value that is found in the place of a list of texts lacks.
+    pub(super) fn for_texts(found: &Data) -> Option<Self> {
+        match found {
+            Data::Text(text) => Some(Self::Brackets {
+                around: format!("{text:?}"),
+            }),
+            _ => None,
+        }
+    }
+
+    /// What a value that is found in the place of a list of tables lacks.
+    pub(crate) fn for_tables(found: &Data) -> Option<Self> {
+        matches!(found, Data::Table(_)).then(|| Self::Brackets {
+            around: "{ … }".to_owned(),
+        })
+    }
+
+    pub(super) fn help(&self) -> String {
+        match self {
+            Self::UnitOfTime => "a duration needs a unit, e.g. \"5min\"".to_owned(),
+            Self::Unit => "a quantity needs a unit, e.g. \"150 nm/min\"".to_owned(),
+            Self::Brackets { around } => {
+                format!("a list stands in brackets, e.g. [{around}]")
+            }
+        }
+    }
+}
