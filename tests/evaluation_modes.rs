@@ -166,6 +166,46 @@ fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
 }
 
 #[test]
+fn what_follows_truths_predicts_from_as_many_steps_back_as_are_asked_for() {
+    let scratch = Scratch::new("modes-followed");
+    let rows = series(400);
+    let data = scratch.file("data.csv", csv(&rows));
+    let nodes = r#"
+        [nodes.followed]
+        type = "arma"
+        inputs.truth = "output.y"
+        ahead = "0s"
+        na = 1
+        nc = 0
+        [outputs]
+        followed = "followed"
+    "#;
+    let graph = GRAPH.replace("LEARN", "").replace("[outputs]", nodes);
+    let graph = scratch.file("graph.toml", graph);
+    let model = fitted(&scratch, "model.json", &graph, &data);
+    let told = athermal(&[&"show", &model, &"--format", &"json"]).ended(0);
+    let told = told.json();
+    let mut all = told["estimators"].as_array().unwrap().iter();
+    let followed = all.find(|of| of["node"] == "followed").unwrap();
+    let terms = followed["coefficients"].as_array().unwrap();
+    let value = |nth: usize| terms[nth]["value"].as_f64().unwrap();
+    let (level, kept) = (value(0), -value(1));
+    let ahead = |y: f64, steps: usize| level + kept.powi(steps as i32) * (y - level);
+    for steps in [1, 2, 3] {
+        let mode = ["--mode", "k-step", "--steps", &steps.to_string()];
+        let found = scores(&model, &data, &[&mode[..], &["--each-on-its-own"]].concat());
+        let errors = (steps..400).map(|t| ahead(rows[t - steps][1], steps) - rows[t][1]);
+        let expected = root_mean_square(errors);
+        let found = figure(&found, "followed", "rmse");
+        // The first predictions, of a model that has yet to be told of a truth, count too.
+        assert!(
+            (found / expected - 1.0).abs() < 0.01,
+            "{steps}: {found} {expected} {terms:?}"
+        );
+    }
+}
+
+#[test]
 fn deviations_are_those_of_as_many_steps_as_predictions_are_made_over() {
     let scratch = Scratch::new("modes-deviations");
     let data = scratch.file("data.csv", csv(&series(2000)));

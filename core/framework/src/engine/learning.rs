@@ -75,7 +75,12 @@ impl Learning {
 
     /// The newest arrival that a prediction made at `now` may know of.
     fn newest(&self, now: Instant) -> Instant {
-        self.withheld.newest(now) - self.mode.earlier(self.step.length())
+        let newest = self.withheld.newest(now);
+        match self.mode {
+            Mode::OneStep | Mode::FreeRun => newest,
+            // One step knows nothing of a truth of this tick, which several are counted back from.
+            mode => newest.min(now - Duration::from_ns(1)) - mode.earlier(self.step.length()),
+        }
     }
 
     pub(crate) fn predict(&self, row: &[f64], now: Instant) -> f64 {
