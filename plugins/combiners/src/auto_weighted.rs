@@ -110,7 +110,7 @@ impl Combiner for AutoWeighted {
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         let weigher = Weigher {
             parameters: self.clone(),
-            room: RefCell::new(vec![0.0; voters]),
+            last: RefCell::new(Weighed::new(voters)),
         };
         Box::new(ByErrors::new(weigher, voters, self.memory))
     }
@@ -119,8 +119,33 @@ impl Combiner for AutoWeighted {
 /// Weighs votes by the errors in memory.
 struct Weigher {
     parameters: AutoWeighted,
-    /// Room for the weights.
-    room: RefCell<Vec<f64>>,
+    last: RefCell<Weighed>,
+}
+
+/// The weights of votes, which are the same until a truth is told or another vote drops out.
+struct Weighed {
+    /// Of each vote; NaN where there was none.
+    weights: Vec<f64>,
+    /// What they are to be divided by.
+    total: f64,
+    /// Which errors they follow from.
+    changes: Option<u64>,
+}
+
+impl Weighed {
+    fn new(voters: usize) -> Self {
+        Self {
+            weights: vec![f64::NAN; voters],
+            total: f64::NAN,
+            changes: None,
+        }
+    }
+
+    fn is_of(&self, errors: &Errors, votes: Votes<'_>) -> bool {
+        let mut both = self.weights.iter().zip(votes.0);
+        self.changes == Some(errors.changes())
+            && both.all(|(weight, vote)| weight.is_nan() == vote.is_nan())
+    }
 }
 
 /// The mean squares of the voters that are there and known.
@@ -198,13 +223,19 @@ impl Rule for Weigher {
         if votes.present().next().is_none() {
             return f64::NAN;
         }
-        let weights = &mut *self.room.borrow_mut();
-        let total = self.weigh(errors, votes, weights);
-        let terms = votes.present().map(|(voter, vote)| weights[voter] * vote);
-        if total == 0.0 {
+        let last = &mut *self.last.borrow_mut();
+        if !last.is_of(errors, votes) {
+            last.weights.fill(f64::NAN);
+            last.total = self.weigh(errors, votes, &mut last.weights);
+            last.changes = Some(errors.changes());
+        }
+        let terms = votes
+            .present()
+            .map(|(voter, vote)| last.weights[voter] * vote);
+        if last.total == 0.0 {
             f64::NAN
         } else {
-            terms.fold(0.0, |sum, term| sum + term) / total
+            terms.fold(0.0, |sum, term| sum + term) / last.total
         }
     }
 

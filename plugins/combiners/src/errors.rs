@@ -85,6 +85,16 @@ pub(crate) struct Errors {
     /// For each voter how many errors a memory that fades comes to.
     #[serde(default)]
     counts: Vec<f64>,
+    /// How often the means have changed, so that what follows from them is worked out only then.
+    #[serde(skip)]
+    changes: u64,
+    /// An instant before which nothing in memory arrived.
+    #[serde(skip, default = "long_ago")]
+    oldest: Instant,
+}
+
+fn long_ago() -> Instant {
+    Instant::MIN
 }
 
 impl Errors {
@@ -95,12 +105,19 @@ impl Errors {
             sums: vec![0.0; voters],
             means: vec![None; voters],
             counts: vec![0.0; voters],
+            changes: 0,
+            oldest: long_ago(),
         }
     }
 
     /// The mean square error of each voter; none where nothing is in memory.
     pub(crate) fn means(&self) -> &[Option<f64>] {
         &self.means
+    }
+
+    /// A number that is another one once the means are.
+    pub(crate) fn changes(&self) -> u64 {
+        self.changes
     }
 
     /// How many errors of a voter are in memory.
@@ -124,6 +141,8 @@ impl Errors {
     }
 
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
+        self.changes += 1;
+        self.oldest = self.oldest.min(arrived);
         let squares = &mut self.squares[voter];
         match self.memory {
             Memory::Truths(last) if squares.len() >= last.truths => {
@@ -154,6 +173,9 @@ impl Errors {
             return;
         }
         let forgotten = newest - self.memory.longest();
+        if forgotten < self.oldest {
+            return;
+        }
         for voter in 0..self.squares.len() {
             let squares = &mut self.squares[voter];
             let before = squares.len();
@@ -167,6 +189,9 @@ impl Errors {
                 self.refresh(voter);
             }
         }
+        let fronts = self.squares.iter().filter_map(VecDeque::front);
+        let oldest = fronts.map(|&(arrived, _)| arrived).min();
+        self.oldest = oldest.unwrap_or(Instant::MAX);
     }
 
     /// Moves what is remembered to the clock of another segment.
@@ -174,6 +199,7 @@ impl Errors {
         for (arrived, _) in self.squares.iter_mut().flatten() {
             *arrived = *arrived + shift;
         }
+        self.oldest = Instant::MIN;
     }
 
     /// Goes on from what was remembered of the same voters, maybe for another time.
@@ -183,6 +209,8 @@ impl Errors {
             Err(cold) => return cold,
         };
         let voters = self.squares.len();
+        self.changes += 1;
+        self.oldest = Instant::MIN;
         if known.squares.len() != voters || known.means.len() != voters {
             return Restored::cold("the number of voters differs");
         }
@@ -196,7 +224,10 @@ impl Errors {
                 return Restored::cold("of errors that fade only the sum is known, not each");
             }
             (_, Memory::HalfLife(_)) => {
-                *self = Self::new(self.squares.len(), self.memory);
+                *self = Self {
+                    changes: self.changes,
+                    ..Self::new(voters, self.memory)
+                };
                 for (voter, squares) in known.squares.into_iter().enumerate() {
                     for (arrived, square) in squares {
                         self.remember(voter, arrived, square);
@@ -220,6 +251,7 @@ impl Errors {
 
     /// Takes the mean of what is in memory afresh, so that an error of 10⁹ leaves no trace once it is forgotten.
     fn refresh(&mut self, voter: usize) {
+        self.changes += 1;
         let squares = &self.squares[voter];
         let sum: f64 = squares.iter().map(|(_, square)| square).sum();
         self.sums[voter] = sum;

@@ -19,6 +19,7 @@ mod revision;
 mod running;
 mod slots;
 mod state;
+mod turn;
 mod vote;
 mod withheld;
 
@@ -37,12 +38,13 @@ pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
 pub(crate) use slots::Slots;
 
-use crate::compile::{Plan, PlannedRole, Step};
-use crate::node::{Outputs, Predictor, Tick};
+use crate::compile::{Plan, Step};
+use crate::node::{Predictor, Tick};
 use crate::time::{Duration, Instant};
 use blend::Blending;
 use estimate::Estimate;
 use running::{Running, running};
+use turn::Turn;
 
 /// What was fitted of a graph, estimators and features, by instance: `thermal.Z1`.
 pub type Fitted = BTreeMap<String, Arc<dyn Predictor>>;
@@ -174,7 +176,15 @@ impl Engine {
                         time,
                     );
                 }
-                Step::Run(node) => self.run(&plan, node, time),
+                Step::Run(node) => {
+                    let turn = Turn {
+                        now: time,
+                        slots: &mut self.slots,
+                        gathered: &self.gathered,
+                        frozen: self.frozen,
+                    };
+                    turn.of(&mut self.nodes[node], &plan.nodes[node]);
+                }
                 Step::Capture(node) => self.capture(node, time),
             }
         }
@@ -343,125 +353,6 @@ impl Engine {
                 self.slots.set(slot, sample, time);
             } else {
                 self.rejected[slot] += 1;
-            }
-        }
-    }
-
-    fn run(&mut self, plan: &Plan, index: usize, now: Instant) {
-        let node = &plan.nodes[index];
-        match &mut self.nodes[index] {
-            Running::Operator {
-                operator,
-                gathers,
-                every_tick,
-                closes_loops,
-            } => {
-                let inputs = &self.gathered;
-                if !*every_tick && !gathers.iter().any(|&gather| inputs[gather].fresh) {
-                    return;
-                }
-                let stamps = gathers
-                    .iter()
-                    .filter_map(|&gather| inputs[gather].oldest())
-                    .min();
-                let range = node.slots.clone();
-                let mut outputs = Outputs {
-                    values: &mut self.slots.values[range.clone()],
-                    stamps: &mut self.slots.stamps[range.clone()],
-                    written: &mut self.slots.written[range],
-                    tick: self.slots.tick,
-                    default_stamp: if *closes_loops {
-                        now
-                    } else {
-                        stamps.unwrap_or(now)
-                    },
-                };
-                operator.step(
-                    &Tick {
-                        now,
-                        gathered: inputs,
-                        ports: gathers,
-                    },
-                    &mut outputs,
-                );
-            }
-            Running::Estimate { estimate, trigger } => {
-                let on = !self.frozen;
-                if let Some(learning) = estimate.as_mut().and_then(Estimate::learning)
-                    && let Some((became, arrived)) = learning.release(now, &self.gathered, on)
-                {
-                    let slot = node.slots.start + 1;
-                    self.slots.set(slot, f64::from(became as u8), arrived);
-                }
-                if trigger.is_some_and(|gather| !self.gathered[gather].fresh) {
-                    return;
-                }
-                if let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback) {
-                    feedback.before_run(&self.slots, now);
-                }
-                let prediction = estimate
-                    .as_mut()
-                    .and_then(|estimate| estimate.run(&self.gathered, now, on));
-                let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
-                self.slots.set(node.slots.start, value, stamp);
-                if let (Some(estimate), Some(slot)) = (estimate, node.role.deviation()) {
-                    let known = if value.is_nan() {
-                        f64::NAN
-                    } else {
-                        estimate.deviation(now)
-                    };
-                    self.slots.set(slot, known, stamp);
-                }
-            }
-            Running::Vote(vote) => {
-                vote.release(now);
-                let PlannedRole::Combiner {
-                    voters,
-                    state,
-                    beside,
-                    ..
-                } = node.role
-                else {
-                    unreachable!("a vote is planned as a combiner")
-                };
-                let votes = &self.gathered[voters];
-                let mut fresh = votes.fresh;
-                if let Some(state) = state {
-                    vote.go_by(self.gathered[state].values[0], now);
-                    fresh |= self.gathered[state].fresh;
-                }
-                if !fresh {
-                    return;
-                }
-                let (value, stamp) = vote.run(votes, now);
-                self.slots.set(node.slots.start, value, stamp);
-                if beside.weights.is_some() || beside.deviation.is_some() {
-                    let weights = vote.weigh(votes);
-                    if let Some(first) = beside.weights {
-                        let slots = first..first + weights.len();
-                        self.slots.values[slots.clone()].copy_from_slice(weights);
-                        self.slots.stamps[slots.clone()].fill(stamp);
-                        self.slots.written[slots].fill(self.slots.tick);
-                    }
-                }
-                if let Some(slot) = beside.reason {
-                    self.slots.set(slot, vote.reason(votes), stamp);
-                }
-                if let Some((lower, upper)) = beside.bounds {
-                    let ends = vote.interval();
-                    self.slots.set(lower, ends[0], stamp);
-                    self.slots.set(upper, ends[1], stamp);
-                }
-                if let Some((slot, of_voters)) = beside.deviation {
-                    let of_voters = &self.gathered[of_voters].values;
-                    let deviation = vote.deviation(votes, of_voters, value);
-                    self.slots.set(slot, deviation, stamp);
-                }
-                for value in &mut self.slots.values[node.slots.clone()] {
-                    if value.is_infinite() {
-                        *value = f64::NAN;
-                    }
-                }
             }
         }
     }

@@ -2,6 +2,8 @@
 
 pub mod kernel;
 
+use std::ops::Range;
+
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
@@ -160,7 +162,9 @@ impl Feature for Slope {
             ),
             factors: from
                 .iter()
-                .map(|channel| self.factor(channel).unwrap_or(f64::NAN))
+                .flat_map(|channel| {
+                    std::iter::repeat_n(self.factor(channel).unwrap_or(f64::NAN), windows.len())
+                })
                 .collect(),
             windows: windows.len(),
             tells,
@@ -175,7 +179,7 @@ struct Sloping {
     /// What the kernel was made for; a state of another kernel is of no use.
     lengths: Vec<i64>,
     coverage: Coverage,
-    /// What a slope per second of each channel is multiplied by.
+    /// What each slope per second is multiplied by.
     factors: Vec<f64>,
     windows: usize,
     /// Whether somebody reads the standard errors, the values at the end, the coefficients of determination.
@@ -187,38 +191,32 @@ impl Sloping {
     /// Gives the results of the channels that have a new sample; the others keep what they had. `scaled` says whether they are per
     /// second of the channel and still have to be brought to the unit of the slopes.
     fn give(&self, tick: &Tick<'_>, outputs: &mut Outputs<'_>, port: usize, scaled: bool) {
-        let offset = port * self.results.len();
+        let first = port * self.results.len();
+        let mut give = |results: Range<usize>| {
+            let given = first + results.start..first + results.end;
+            let given = outputs.fill_stamped(given, tick.now);
+            given.copy_from_slice(&self.results[results.clone()]);
+            if scaled {
+                scale(given, &self.factors[results]);
+            }
+        };
         let samples = tick.port(0);
         if samples.iter().all(|sample| !sample.is_nan()) {
-            let given = outputs.fill_stamped(offset..offset + self.results.len(), tick.now);
-            let given = given.chunks_exact_mut(self.windows.max(1));
-            for (channel, given) in given.enumerate() {
-                self.scale(channel, given, scaled);
-            }
-            return;
+            return give(0..self.results.len());
         }
         for (channel, sample) in samples.iter().enumerate() {
             if !sample.is_nan() {
-                let first = offset + channel * self.windows;
-                let given = outputs.fill_stamped(first..first + self.windows, tick.now);
-                self.scale(channel, given, scaled);
+                give(channel * self.windows..(channel + 1) * self.windows);
             }
         }
     }
+}
 
-    /// The results of a channel, in the unit of the slopes.
-    #[inline(always)]
-    fn scale(&self, channel: usize, given: &mut [f64], scaled: bool) {
-        let factor = if scaled { self.factors[channel] } else { 1.0 };
-        let results = &self.results[channel * self.windows..];
-        for (given, &result) in given.iter_mut().zip(results) {
-            // A NaN says why there is no value, and must stay as it is.
-            *given = if result.is_nan() {
-                result
-            } else {
-                result * factor
-            };
-        }
+/// Multiplies values by factors. A NaN says why there is no value, and must stay as it is.
+fn scale(values: &mut [f64], factors: &[f64]) {
+    for (value, factor) in values.iter_mut().zip(factors) {
+        let scaled = *value * factor;
+        *value = if value.is_nan() { *value } else { scaled };
     }
 }
 
