@@ -198,3 +198,40 @@ fn a_great_error_leaves_no_trace_once_it_is_forgotten() {
         shocked.combine(votes).to_bits()
     );
 }
+
+/// Weights are kept from tick to tick; a node that has just been told all that there is has none that are kept.
+#[test]
+fn a_vote_that_has_run_for_long_weighs_as_one_that_has_just_begun() {
+    for memory in [
+        Memory::Time(Duration::from_ns(20_000_000_000)),
+        serde_json::from_str(r#"{ "truths": 4 }"#).unwrap(),
+        serde_json::from_str(r#"{ "half_life": "5s" }"#).unwrap(),
+    ] {
+        let parameters = AutoWeighted {
+            memory,
+            ..vote(1, 2.0, Weighting::InversePower)
+        };
+        let mut long = parameters.build(3);
+        let mut told: Vec<(i64, [f64; 3])> = Vec::new();
+        for t in 0..300_i64 {
+            let number = |nth: i64| ((t * (nth + 3) * 7919) % 101) as f64 / 7.0;
+            let votes = [0, 1, 2].map(|nth| match (t / 5 + nth) % 4 {
+                0 => f64::NAN,
+                _ => number(nth),
+            });
+            let mut short = parameters.build(3);
+            for (at, votes) in &told {
+                short.observe(Votes(votes), 1.0, s(*at));
+            }
+            for vote in [&mut long, &mut short] {
+                vote.advance(s(t));
+            }
+            let [kept, anew] = [&long, &short].map(|vote| vote.combine(Votes(&votes)));
+            assert_eq!(kept.to_bits(), anew.to_bits(), "at {t} s: {kept}, {anew}");
+            if t % 3 == 0 && t % 100 < 60 {
+                long.observe(Votes(&votes), 1.0, s(t));
+                told.push((t, votes));
+            }
+        }
+    }
+}
