@@ -8,6 +8,7 @@ mod workbench;
 
 mod columns;
 mod mistakes;
+mod mistakes_in_tests;
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

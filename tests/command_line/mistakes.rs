@@ -47,7 +47,7 @@ fn told(name: &str, text: &str) -> Vec<(u64, String)> {
 
 /// Told are these alone, in this order: a line, and a part of what is said of it.
 #[track_caller]
-fn assert_told(name: &str, text: &str, expected: &[(u64, &str)]) {
+pub(crate) fn assert_told(name: &str, text: &str, expected: &[(u64, &str)]) {
     let told = told(name, text);
     let fits = told.len() == expected.len()
         && told
@@ -180,7 +180,7 @@ both = ["one", "two:other.a"]
 }
 
 /// Signals, and slopes of them, to which nodes with mistakes are added.
-const SOUND: &str = r#"schema = 1
+pub(crate) const SOUND: &str = r#"schema = 1
 [sets]
 axis = ["X", "Y"]
 [signals.temperature]
@@ -419,73 +419,11 @@ expect = [{ of = "one", given_above = 0.5 }]
 }
 
 #[test]
-fn mistakes_in_tests_are_told_together_with_those_of_the_graph() {
-    let tests = r#"[nodes.thermal]
-type = "zero"
-inputs.truth = "drft.X"
-ahead = "0s"
-[[tests]]
-name = "a"
-inputs = { "temperature.a" = { ramp = "1 K/s" } }
-expects = []
-[[tests]]
-name = "a"
-on = { simulate = "die-testr", days = 1 }
-faults = [{ channel = "temperature.a", kind = "stick" }]
-expect = [{ of = "thermal", rmse_below = "-1 nm" },
-    { of = "thermal" },
-    { of = "thermal", within = 0.1 }]
-"#;
-    let expected = [
-        (20, "drft"),
-        (24, "needs the key \"every\""),
-        (25, "no key \"expects\""),
-        (27, "\"a\""),
-        (28, "die-testr"),
-        (29, "stick"),
-        (30, "rmse_below"),
-        (31, "the expectation checks nothing"),
-        (32, "within"),
-    ];
-    assert_told("command-line-tests", &(SOUND.to_owned() + tests), &expected);
-}
-
-#[test]
 fn a_file_without_schema_is_looked_through_all_the_same() {
     let text = WRONG.replace("schema = 1\n", "");
     let told = told("command-line-schema", &text);
     assert_eq!(told.len(), 6, "{told:#?}");
     assert!(told[0].1.contains("schema"), "{told:#?}");
-}
-
-#[test]
-fn a_fit_does_without_the_tests_of_a_graph_and_says_so() {
-    let scratch = Scratch::new("command-line-fit-tests");
-    let text = SOUND.to_owned()
-        + "[nodes.thermal]\ntype = \"linear\"\ninputs.features = \"temperature\"\ninputs.truth = \"drift.X\"\nahead = \"0s\"\n";
-    let mut rows = "time_s,a,b,X,Y\n".to_owned();
-    for row in 0..200 {
-        let t = f64::from(row) * 10.0;
-        let (a, b) = ((t / 300.0).sin(), (t / 700.0).cos());
-        rows += &format!("{t},{},{},{},{}\n", 20.0 + a, 20.0 + b, 50.0 * a, 70.0 * b);
-    }
-    let data = scratch.file("data.csv", &rows);
-    let fitted = |name: &str, text: &str| {
-        let graph = scratch.file(name, text);
-        let model = scratch.path("model.json");
-        athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model])
-            .ended(0)
-            .told
-    };
-    assert!(!fitted("sound.toml", &text).contains("the tests of"));
-    let wrong = text + "[[tests]]\nname = \"a\"\nexpcts = []\n";
-    let told = fitted("wrong.toml", &wrong);
-    assert!(
-        told.contains("the tests of")
-            && told.contains("2 mistakes")
-            && told.contains("athermal check"),
-        "{told}"
-    );
 }
 
 #[test]
@@ -548,34 +486,6 @@ shown = { form = "one" }
         (21, "form"),
     ];
     assert_told("command-line-misspelt", text, &expected);
-}
-
-#[test]
-fn what_tests_say_of_sound_nodes_is_told_beside_the_mistakes_of_others() {
-    let text = SOUND.to_owned()
-        + r#"[nodes.thermal]
-type = "linear"
-inputs.features = "temperatur"
-inputs.truth = "drift.X"
-ahead = "0s"
-[[tests]]
-name = "a"
-inputs = { "temperature.c" = { constant = "20 Cel", for = "1min", every = "1s" } }
-faults = [{ channel = "position.X", kind = "offset", size = "3 K", from = "0s" }]
-expect = [{ of = "drift.Z", given_above = 0.5 }, { of = "drift.X", equals = "3 K" },
-    { of = "thermal.Q", given_above = 0.5 }, { of = "predicted.Q", given_above = 0.5 },
-    { of = "drft", beats = ["thermal", "zer"] }]
-"#;
-    let expected = [
-        (20, "temperatur"),
-        (25, "`c`"),
-        (26, "K"),
-        (27, "`Z`"),
-        (27, "K"),
-        (29, "drft"),
-        (29, "zer"),
-    ];
-    assert_told("command-line-tests-beside", &text, &expected);
 }
 
 const ONCE: &str = r#"error[A008]: expected a duration like "5min" for "max_age", found the number 5

@@ -128,6 +128,8 @@ pub enum DocumentProblem {
         name: String,
         /// The sets that there are.
         known: Vec<String>,
+        /// What else to write, where something else than a set may be meant.
+        or: Option<String>,
     },
     /// `{x}` that stands for nothing.
     UnknownPlaceholder {
@@ -507,8 +509,12 @@ impl Problem for DocumentProblem {
             } if role != first_role => {
                 Some("nodes, sets and signals share one name space".to_owned())
             }
-            Self::UnknownSet { name, known } => suggestion(name, known, "the sets are")
-                .or_else(|| Some("declare it under `[sets]`".to_owned())),
+            Self::UnknownSet { name, known, or } => {
+                let help = suggestion(name, known, "the sets are");
+                let help = help.unwrap_or_else(|| "declare it under `[sets]`".to_owned());
+                let or = or.as_ref().filter(|_| !help.ends_with('?'));
+                Some(or.map_or(help.clone(), |or| format!("{help}, or {or}")))
+            }
             Self::UnknownPlaceholder { name, known, .. } => {
                 match nearest(name, known.iter().map(String::as_str)) {
                     Some(near) => Some(format!("did you mean \"{{{near}}}\"?")),

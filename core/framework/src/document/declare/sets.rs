@@ -68,10 +68,22 @@ impl Sets {
         place: Place,
         diagnostics: &mut Diagnostics,
     ) -> Option<&[String]> {
+        self.find_or(name, place, None, diagnostics)
+    }
+
+    /// As [`find`](Self::find), with what else to write where something else than a set may be meant.
+    pub(super) fn find_or(
+        &self,
+        name: &str,
+        place: Place,
+        or: Option<String>,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<&[String]> {
         if !self.members.contains_key(name) && !self.is_misspelt(name) {
             let problem = DocumentProblem::UnknownSet {
                 name: name.to_owned(),
                 known: self.members.keys().cloned().collect(),
+                or,
             };
             diagnostics.report(place, problem);
         }

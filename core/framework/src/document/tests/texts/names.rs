@@ -127,6 +127,30 @@ error[A013]: there is no set "axes"
 }
 
 #[test]
+fn a_text_for_channels_may_be_meant_for_one_channel() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[signals.position]
+unit = "nm"
+channels = "X"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A013]: there is no set "X"
+ --> a.toml:4:12
+  |
+4 | channels = "X"
+  |            ^^^ not a set
+  |
+  = help: declare it under `[sets]`, or write `["X"]` for a channel of that name
+"#
+    );
+}
+
+#[test]
 fn a_placeholder_is_a_set_of_the_node() {
     let files = [(
         "a.toml",

@@ -1,0 +1,148 @@
+use super::*;
+
+fn s(seconds: i64) -> Instant {
+    Instant::from_ns(seconds * 1_000_000_000)
+}
+
+/// Tells errors of size 1 and changing sign, then of another mean from a truth on; what was said after each.
+fn watched(mut node: Box<dyn Combine>, change: i64, gone: f64, truths: i64) -> Vec<f64> {
+    let vote = Votes(&[7.0]);
+    let mut said = Vec::new();
+    for nth in 0..truths {
+        let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+        let error = if nth < change { sign } else { sign + gone };
+        node.observe(vote, 7.0 + 5.0 * error, s(60 * nth));
+        node.advance(s(60 * nth));
+        assert_eq!(node.combine(vote), 7.0);
+        said.push(node.reason(vote));
+    }
+    said
+}
+
+/// With its defaults, but for truths that come every minute and do not overlap.
+fn page_hinkley() -> PageHinkley {
+    serde_json::from_str(r#"{ "every": "0s" }"#).unwrap()
+}
+
+fn adwin() -> Adwin {
+    serde_json::from_str("{}").unwrap()
+}
+
+#[test]
+fn a_mean_that_goes_up_or_down_is_told_for_an_hour() {
+    for (gone, reason) in [(2.0, reason::UP), (-2.0, reason::DOWN)] {
+        for node in [page_hinkley().build(1), adwin().build(1)] {
+            let said = watched(node, 200, gone, 500);
+            assert!(said[..29].iter().all(|&said| said == reason::UNKNOWN));
+            assert!(said[30..200].iter().all(|&said| said == reason::NONE));
+            let alarm = said.iter().position(|&said| said == reason).unwrap();
+            assert!((200..260).contains(&alarm), "{alarm}");
+            assert!(said[alarm..alarm + 60].iter().all(|&said| said == reason));
+        }
+    }
+}
+
+#[test]
+fn an_alarm_is_told_at_the_tick_at_which_it_becomes_known_however_short_its_hold() {
+    for hold in [0, 60] {
+        let hold = Duration::from_ns(hold * 1_000_000_000);
+        let test = PageHinkley {
+            hold,
+            ..page_hinkley()
+        };
+        let window = Adwin { hold, ..adwin() };
+        for mut node in [test.build(1), window.build(1)] {
+            let mut said = Vec::new();
+            for nth in 0..400_i64 {
+                let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+                let gone = if nth < 200 { 0.0 } else { 4.0 };
+                node.observe(Votes(&[7.0]), 7.0 + sign + gone, s(60 * nth));
+                node.advance(s(60 * (nth + 1)));
+                said.push(node.reason(Votes(&[7.0])));
+            }
+            let alarm = said.iter().position(|&said| said == reason::UP);
+            let alarm = alarm.expect("the alarm shows");
+            assert!((200..260).contains(&alarm), "{alarm}");
+            assert_eq!(said[alarm + 1], reason::NONE);
+        }
+    }
+}
+
+#[test]
+fn a_model_that_gets_worse_without_bias_is_told_by_the_size_of_its_errors() {
+    let size = PageHinkley {
+        watch: Watched::Size,
+        ..page_hinkley()
+    };
+    let mut node = size.build(1);
+    let vote = Votes(&[0.0]);
+    let mut alarm = None;
+    for nth in 0..600_i64 {
+        let size = if nth < 300 { 1.0 } else { 3.0 };
+        let error = if nth % 2 == 0 { size } else { -size };
+        node.observe(vote, error, s(60 * nth));
+        node.advance(s(60 * nth));
+        if node.reason(vote) == reason::UP {
+            alarm.get_or_insert(nth);
+        }
+    }
+    assert!(
+        alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
+        "{alarm:?}"
+    );
+}
+
+#[test]
+fn what_was_seen_of_errors_is_of_no_use_for_their_sizes() {
+    let size = PageHinkley {
+        watch: Watched::Size,
+        ..page_hinkley()
+    };
+    let mut errors = page_hinkley().build(1);
+    for nth in 0..40 {
+        errors.observe(Votes(&[0.0]), 1.0, s(nth));
+    }
+    let seen = || errors.snapshot().unwrap();
+    assert_eq!(page_hinkley().build(1).restore(seen()), Restored::Accepted);
+    assert!(matches!(
+        size.build(1).restore(seen()),
+        Restored::Cold { .. }
+    ));
+}
+
+#[test]
+fn a_glitch_is_no_alarm_and_leaves_the_test_as_sensitive_as_it_was() {
+    let mut node = page_hinkley().build(1);
+    let vote = Votes(&[0.0]);
+    let mut alarm = None;
+    for nth in 0..400_i64 {
+        let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+        let error = match nth {
+            150 => 1e9,
+            0..300 => sign,
+            _ => sign + 2.0,
+        };
+        node.observe(vote, error, s(60 * nth));
+        node.advance(s(60 * nth));
+        if node.reason(vote) == reason::UP {
+            alarm.get_or_insert(nth);
+        }
+    }
+    assert!(
+        alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
+        "{alarm:?}"
+    );
+}
+
+#[test]
+fn with_every_only_some_truths_are_taken() {
+    let seldom = PageHinkley {
+        every: Duration::from_ns(300_000_000_000),
+        ..page_hinkley()
+    };
+    let said = watched(seldom.build(1), 200, 2.0, 200);
+    assert_eq!(
+        said.iter().position(|&said| said == reason::NONE),
+        Some(29 * 5)
+    );
+}
