@@ -4,6 +4,8 @@
 
 mod workbench;
 
+use std::path::Path;
+
 use athermal::Model;
 use athermal::core::fit::{FitOptions, fit};
 use athermal::core::recording::{Event, Table};
@@ -47,36 +49,45 @@ fn alarms(model: &Model, table: &Table, creep: f64) -> Vec<Option<f64>> {
 #[test]
 fn watches_are_quiet_on_a_machine_that_stays_as_it_is_and_tell_of_one_that_does_not() {
     let Some(data) = data() else { return };
-    let scratch = Scratch::new("watches");
-    for machine in ["die-tester", "linear-axis"] {
-        let text = format!(
-            "schema = 1\nextends = {:?}\nname = \"watched\"\n[nodes.watch]\ntype = \"page_hinkley\"\neach = \"axis\"\n\
+    for kind in ["page_hinkley", "adwin"] {
+        for machine in ["die-tester", "linear-axis"] {
+            assert_quiet_until_it_changes(kind, machine, &data);
+        }
+    }
+}
+
+fn assert_quiet_until_it_changes(kind: &str, machine: &str, data: &Path) {
+    let scratch = Scratch::new(&format!("watches-{kind}-{machine}"));
+    let text = format!(
+        "schema = 1\nextends = {:?}\nname = \"watched\"\n[nodes.watch]\ntype = {kind:?}\neach = \"axis\"\n\
              inputs.voters = \"thermal.{{axis}}\"\ninputs.truth = \"drift.{{axis}}\"\n\
-             [nodes.vote_watch]\ntype = \"page_hinkley\"\neach = \"axis\"\n\
+             [nodes.vote_watch]\ntype = {kind:?}\neach = \"axis\"\n\
              inputs.voters = \"vote.{{axis}}\"\ninputs.truth = \"drift.{{axis}}\"\n\
              [outputs]\nof_thermal = \"watch:reason\"\nof_vote = \"vote_watch:reason\"\n",
-            graph(machine)
+        graph(machine)
+    );
+    let mut model = Model::load(scratch.file(&format!("{machine}.toml"), text)).unwrap();
+    let recorded = |name: &str| {
+        let file = data.join(machine).join(name);
+        Table::read(&Dataset::new(vec![file], Options::default()), &model.plan).unwrap()
+    };
+    let (train, test) = (recorded("train.csv"), recorded("test.csv"));
+    let (fitted, _) = fit(&model.plan, &train, &FitOptions::default(), &mut |_| {}).unwrap();
+    model.fitted = fitted;
+    for clean in [&train, &test] {
+        let first = alarms(&model, clean, 0.0);
+        assert!(
+            first.iter().all(Option::is_none),
+            "{kind}, {machine}: {first:?}"
         );
-        let mut model = Model::load(scratch.file(&format!("{machine}.toml"), text)).unwrap();
-        let recorded = |name: &str| {
-            let file = data.join(machine).join(name);
-            Table::read(&Dataset::new(vec![file], Options::default()), &model.plan).unwrap()
-        };
-        let (train, test) = (recorded("train.csv"), recorded("test.csv"));
-        let (fitted, _) = fit(&model.plan, &train, &FitOptions::default(), &mut |_| {}).unwrap();
-        model.fitted = fitted;
-        for clean in [&train, &test] {
-            let first = alarms(&model, clean, 0.0);
-            assert!(first.iter().all(Option::is_none), "{machine}: {first:?}");
-        }
-        let outputs = model.plan.outputs.iter();
-        let first = alarms(&model, &train, 60.0);
-        for (output, first) in outputs
-            .zip(first)
-            .filter(|(of, _)| of.name.starts_with("of_thermal"))
-        {
-            let soon = first.is_some_and(|at| (CHANGED_S..CHANGED_S + SOON_S).contains(&at));
-            assert!(soon, "{machine}, {}: {first:?}", output.name);
-        }
+    }
+    let outputs = model.plan.outputs.iter();
+    let first = alarms(&model, &train, 60.0);
+    for (output, first) in outputs
+        .zip(first)
+        .filter(|(of, _)| of.name.starts_with("of_thermal"))
+    {
+        let soon = first.is_some_and(|at| (CHANGED_S..CHANGED_S + SOON_S).contains(&at));
+        assert!(soon, "{kind}, {machine}, {}: {first:?}", output.name);
     }
 }

@@ -96,8 +96,9 @@ pub struct Adwin {
     #[serde(default = "five")]
     #[schemars(range(min = 1))]
     pub shortest: u64,
-    /// The time from one truth that is taken to the next; with none, all are.
-    #[serde(default)]
+    /// The time from one truth that is taken to the next; with none, all are. It should be no shorter than the span of a truth and
+    /// the horizon, so that errors do not overlap much.
+    #[serde(default = "five_minutes")]
     pub every: Duration,
     /// How long an alarm stands.
     #[serde(default = "hour")]
@@ -140,7 +141,7 @@ fn factor() -> f64 {
 }
 
 fn confidence() -> f64 {
-    AdwinOptions::default().confidence
+    1e-5
 }
 
 fn five_minutes() -> Duration {

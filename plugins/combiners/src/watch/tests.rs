@@ -25,7 +25,7 @@ fn page_hinkley() -> PageHinkley {
 }
 
 fn adwin() -> Adwin {
-    serde_json::from_str("{}").unwrap()
+    serde_json::from_str(r#"{ "every": "0s" }"#).unwrap()
 }
 
 #[test]
