@@ -41,6 +41,16 @@ features = "features"
 level = "level"
 "#;
 
+/// An estimator that follows truths, to stand behind a graph.
+const FOLLOWED: &str = r#"
+[nodes.followed]
+type = "arma"
+inputs.truth = "output.y"
+ahead = "0s"
+na = 1
+nc = 0
+"#;
+
 /// Numbers without a pattern that a model of these could learn by heart.
 fn series(length: usize) -> Vec<[f64; 2]> {
     let mut state = 12_345_u64;
@@ -170,18 +180,8 @@ fn what_follows_truths_predicts_from_as_many_steps_back_as_are_asked_for() {
     let scratch = Scratch::new("modes-followed");
     let rows = series(400);
     let data = scratch.file("data.csv", csv(&rows));
-    let nodes = r#"
-        [nodes.followed]
-        type = "arma"
-        inputs.truth = "output.y"
-        ahead = "0s"
-        na = 1
-        nc = 0
-        [outputs]
-        followed = "followed"
-    "#;
-    let graph = GRAPH.replace("LEARN", "").replace("[outputs]", nodes);
-    let graph = scratch.file("graph.toml", graph);
+    let text = GRAPH.replace("LEARN", "") + "followed = \"followed\"\n" + FOLLOWED;
+    let graph = scratch.file("graph.toml", text);
     let model = fitted(&scratch, "model.json", &graph, &data);
     let told = athermal(&[&"show", &model, &"--format", &"json"]).ended(0);
     let told = told.json();
@@ -216,16 +216,10 @@ fn deviations_are_those_of_as_many_steps_as_predictions_are_made_over() {
         ahead = "10s"
         lags = ["0s"]
         solver = { type = "ols" }
-        [nodes.followed]
-        type = "arma"
-        inputs.truth = "output.y"
-        ahead = "0s"
-        na = 1
-        nc = 0
         [outputs]
     "#;
     let text = GRAPH.replace("LEARN", "").replace("[outputs]", nodes);
-    let text = text + "past = \"past\"\nfollowed = \"followed\"\n";
+    let text = text + "past = \"past\"\nfollowed = \"followed\"\n" + FOLLOWED;
     let graph = scratch.file("graph.toml", text);
     let model = fitted(&scratch, "model.json", &graph, &data);
     let widths = |mode: &[&str]| {

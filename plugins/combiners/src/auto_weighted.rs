@@ -1,6 +1,6 @@
 //! The vote that weighs each estimator by its recent error.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
 
 use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Votes};
 use athermal_core::time::Duration;
@@ -156,6 +156,17 @@ fn known<'a>(errors: &'a Errors, votes: Votes<'a>) -> impl Iterator<Item = f64> 
 }
 
 impl Weigher {
+    /// The weights of these votes, worked out anew where they are not those of the last.
+    fn weighed(&self, errors: &Errors, votes: Votes<'_>) -> RefMut<'_, Weighed> {
+        let mut last = self.last.borrow_mut();
+        if !last.is_of(errors, votes) {
+            last.weights.fill(f64::NAN);
+            last.total = self.weigh(errors, votes, &mut last.weights);
+            last.changes = Some(errors.changes());
+        }
+        last
+    }
+
     /// Gives each vote that is there its weight; what they are to be divided by.
     fn weigh(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) -> f64 {
         let (power, form) = (self.parameters.power, self.parameters.weights);
@@ -223,12 +234,7 @@ impl Rule for Weigher {
         if votes.present().next().is_none() {
             return f64::NAN;
         }
-        let last = &mut *self.last.borrow_mut();
-        if !last.is_of(errors, votes) {
-            last.weights.fill(f64::NAN);
-            last.total = self.weigh(errors, votes, &mut last.weights);
-            last.changes = Some(errors.changes());
-        }
+        let last = self.weighed(errors, votes);
         let terms = votes
             .present()
             .map(|(voter, vote)| last.weights[voter] * vote);
@@ -240,9 +246,9 @@ impl Rule for Weigher {
     }
 
     fn weights(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) {
-        let total = self.weigh(errors, votes, weights);
+        let last = self.weighed(errors, votes);
         for (voter, _) in votes.present() {
-            weights[voter] /= total;
+            weights[voter] = last.weights[voter] / last.total;
         }
     }
 }

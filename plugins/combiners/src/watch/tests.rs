@@ -19,6 +19,16 @@ fn watched(mut node: Box<dyn Combine>, change: i64, gone: f64, truths: i64) -> V
     said
 }
 
+/// At which of so many errors, one a minute, it was first said that they have gone up.
+fn first_alarm(mut node: Box<dyn Combine>, errors: i64, error: impl Fn(i64) -> f64) -> Option<i64> {
+    let vote = Votes(&[0.0]);
+    (0..errors).find(|&nth| {
+        node.observe(vote, error(nth), s(60 * nth));
+        node.advance(s(60 * nth));
+        node.reason(vote) == reason::UP
+    })
+}
+
 /// With its defaults, but for truths that come every minute and do not overlap.
 fn page_hinkley() -> PageHinkley {
     serde_json::from_str(r#"{ "every": "0s" }"#).unwrap()
@@ -74,18 +84,10 @@ fn a_model_that_gets_worse_without_bias_is_told_by_the_size_of_its_errors() {
         watch: Watched::Size,
         ..page_hinkley()
     };
-    let mut node = size.build(1);
-    let vote = Votes(&[0.0]);
-    let mut alarm = None;
-    for nth in 0..600_i64 {
+    let alarm = first_alarm(size.build(1), 600, |nth| {
         let size = if nth < 300 { 1.0 } else { 3.0 };
-        let error = if nth % 2 == 0 { size } else { -size };
-        node.observe(vote, error, s(60 * nth));
-        node.advance(s(60 * nth));
-        if node.reason(vote) == reason::UP {
-            alarm.get_or_insert(nth);
-        }
-    }
+        if nth % 2 == 0 { size } else { -size }
+    });
     assert!(
         alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
         "{alarm:?}"
@@ -112,22 +114,14 @@ fn what_was_seen_of_errors_is_of_no_use_for_their_sizes() {
 
 #[test]
 fn a_glitch_is_no_alarm_and_leaves_the_test_as_sensitive_as_it_was() {
-    let mut node = page_hinkley().build(1);
-    let vote = Votes(&[0.0]);
-    let mut alarm = None;
-    for nth in 0..400_i64 {
+    let alarm = first_alarm(page_hinkley().build(1), 400, |nth| {
         let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
-        let error = match nth {
+        match nth {
             150 => 1e9,
             0..300 => sign,
             _ => sign + 2.0,
-        };
-        node.observe(vote, error, s(60 * nth));
-        node.advance(s(60 * nth));
-        if node.reason(vote) == reason::UP {
-            alarm.get_or_insert(nth);
         }
-    }
+    });
     assert!(
         alarm.is_some_and(|alarm| (300..350).contains(&alarm)),
         "{alarm:?}"

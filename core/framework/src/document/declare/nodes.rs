@@ -84,11 +84,9 @@ fn node(
     if own.known {
         let inside = placed.around.last();
         let parameters = inside.map_or(&[][..], |around| &around.parameters);
-        let own = each.iter().map(|(set, _)| set);
-        let own = own.filter(|set| !set.contains('/')).chain(parameters);
         let named = Named {
-            known: own.cloned().collect(),
             each: &each,
+            parameters,
             what: &what,
         };
         named.check(&entry.value, diagnostics);
@@ -188,12 +186,19 @@ fn scopes(placed: &Placed, member: &Member<'_>) -> Vec<(String, Option<String>)>
 /// What placeholders of a node may stand for.
 struct Named<'a> {
     each: &'a Each<'a>,
-    /// What its author can name.
-    known: Vec<String>,
+    /// Those of the module in which it stands.
+    parameters: &'a [String],
     what: &'a str,
 }
 
 impl Named<'_> {
+    /// What the node's author can name.
+    fn known(&self) -> Vec<String> {
+        let own = self.each.iter().map(|(set, _)| set);
+        let own = own.filter(|set| !set.contains('/'));
+        own.chain(self.parameters).cloned().collect()
+    }
+
     /// Tells of placeholders that stand for nothing.
     fn check(&self, value: &Value, diagnostics: &mut Diagnostics) {
         match &value.data {
@@ -202,7 +207,7 @@ impl Named<'_> {
                 for name in placeholder::names(text).filter(|name| !is_set(name)) {
                     let problem = DocumentProblem::UnknownPlaceholder {
                         name: name.to_owned(),
-                        known: self.known.clone(),
+                        known: self.known(),
                         what: self.what.to_owned(),
                     };
                     // Around a module it may have been told already.
@@ -271,20 +276,20 @@ fn input(
 
 /// The key that says the kind: without it, a misspelt one, of which is then told.
 fn type_key<'a>(keys: &'a Table, what: &str, diagnostics: &mut Diagnostics) -> &'a str {
-    let is_meant = |key: &str| nearest(key, OWN_KEYS) == Some("type");
-    let mut strange = keys.iter().filter(|(key, _)| !OWN_KEYS.contains(key));
-    match strange.find(|(key, _)| is_meant(key)) {
-        Some((key, entry)) if !keys.contains("type") && !keys.contains("module") => {
-            let problem = DocumentProblem::UnknownKey {
-                key: key.to_owned(),
-                what: what.to_owned(),
-                known: OWN_KEYS.map(str::to_owned).to_vec(),
-            };
-            diagnostics.report(entry.key, problem);
-            key
-        }
-        _ => "type",
+    if keys.contains("type") || keys.contains("module") {
+        return "type";
     }
+    let is_meant = |key: &str| !OWN_KEYS.contains(&key) && nearest(key, OWN_KEYS) == Some("type");
+    let Some((key, entry)) = keys.iter().find(|(key, _)| is_meant(key)) else {
+        return "type";
+    };
+    let problem = DocumentProblem::UnknownKey {
+        key: key.to_owned(),
+        what: what.to_owned(),
+        known: OWN_KEYS.map(str::to_owned).to_vec(),
+    };
+    diagnostics.report(entry.key, problem);
+    key
 }
 
 fn own_parameters(keys: &Table, type_key: &str) -> Table {

@@ -128,7 +128,7 @@ fn channels(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(String, Place)>> {
     if let Some(set) = value.as_text() {
-        let or = format!("write `[\"{set}\"]` for a channel of that name");
+        let or = format!("write `[{set:?}]` for a channel of that name");
         let members = sets.find_or(set, value.place, Some(or), diagnostics)?;
         return Some(
             members
