@@ -63,6 +63,17 @@ impl Part {
     }
 }
 
+/// What comes out where something was predicted at `now` from values of which the oldest has a stamp: nothing without a
+/// finite prediction.
+#[inline]
+fn given(prediction: f64, oldest: Instant, now: Instant) -> (f64, Instant) {
+    if prediction.is_finite() {
+        (prediction, oldest)
+    } else {
+        (f64::NAN, now)
+    }
+}
+
 /// A fitted estimator in a running plan.
 #[derive(Debug)]
 pub(crate) struct Estimate {
@@ -152,19 +163,37 @@ impl Estimate {
         self.feedback.as_deref_mut()
     }
 
-    /// The prediction and its stamp, the oldest among the values used; none where one of them is missing that is needed.
+    /// The prediction and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.
     ///
     /// `on` says whether learning goes on.
-    pub(crate) fn run(
-        &mut self,
-        gathered: &[Gathered],
-        now: Instant,
-        on: bool,
-    ) -> Option<(f64, Instant)> {
+    #[inline]
+    pub(crate) fn run(&mut self, gathered: &[Gathered], now: Instant, on: bool) -> (f64, Instant) {
         let (mut whole, mut oldest) = self.read(gathered);
         if self.parts.is_empty() {
             oldest = now;
         }
+        if self.learning.is_some() || self.feedback.is_some() {
+            return self.run_beyond_the_fit(whole, oldest, gathered, now, on);
+        }
+        whole |= self.takes_absent;
+        // Where none of several regressors is there, none had a stamp.
+        whole &= oldest < Instant::MAX;
+        if !whole {
+            return (f64::NAN, now);
+        }
+        given(self.predictor.predict(&self.row), oldest, now)
+    }
+
+    /// The same for an estimator that goes on learning, or reads predictions in place of past truths.
+    #[inline(never)]
+    fn run_beyond_the_fit(
+        &mut self,
+        mut whole: bool,
+        mut oldest: Instant,
+        gathered: &[Gathered],
+        now: Instant,
+        on: bool,
+    ) -> (f64, Instant) {
         if let Some(feedback) = &mut self.feedback {
             let (learning, predictor) = (&self.learning, &self.predictor);
             feedback.replace(&mut self.row, now, |row, at| match learning {
@@ -175,7 +204,6 @@ impl Estimate {
             oldest = oldest.min(now);
         }
         whole |= self.takes_absent;
-        // Where none of several regressors is there, none had a stamp.
         whole &= oldest < Instant::MAX;
         if let Some(learning) = &mut self.learning {
             if !whole {
@@ -192,7 +220,7 @@ impl Estimate {
         if self.feedback.is_some() {
             self.feed_back(prediction, now);
         }
-        prediction.is_finite().then_some((prediction, oldest))
+        given(prediction, oldest, now)
     }
 
     /// Writes a run down for those that read its prediction in place of the truth.
@@ -209,6 +237,7 @@ impl Estimate {
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.
+    #[inline]
     fn read(&mut self, gathered: &[Gathered]) -> (bool, Instant) {
         let (mut whole, mut oldest) = (true, Instant::MAX);
         let mut row = &mut self.row[..];

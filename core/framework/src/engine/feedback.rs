@@ -97,7 +97,7 @@ impl Feedback {
     pub(crate) fn before_run(&mut self, slots: &Slots, now: Instant) {
         let slot = self.link.slot;
         if self.link.ahead > Duration::ZERO && slots.ran(slot) {
-            self.observe(slots.values[slot], slots.stamps[slot], now);
+            self.observe(slots.values[slot], slots.given[slot].stamp, now);
         }
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
 use super::estimate::Estimate;
+use super::slots::Given;
 use super::state::{NodeState, SlotState};
 use super::{Engine, EngineState, RestoreError, Running};
 use crate::compile::PlannedRole;
@@ -116,8 +117,8 @@ impl Engine {
     fn slot_state(&self, slot: usize) -> SlotState {
         SlotState {
             value: self.slots.values[slot],
-            stamp: self.slots.stamps[slot],
-            written: self.slots.written[slot],
+            stamp: self.slots.given[slot].stamp,
+            written: self.slots.given[slot].tick,
         }
     }
 
@@ -209,8 +210,10 @@ impl Engine {
             }
             if let Some(was) = state.slots.get(&channel.name) {
                 self.slots.values[slot] = was.value;
-                self.slots.stamps[slot] = was.stamp;
-                self.slots.written[slot] = was.written;
+                self.slots.given[slot] = Given {
+                    stamp: was.stamp,
+                    tick: was.written,
+                };
             }
             if let (Some(history), Some(was)) = (
                 &mut self.histories[slot],

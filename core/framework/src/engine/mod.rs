@@ -36,7 +36,7 @@ pub use state::{EngineState, RestoreError};
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
-pub(crate) use slots::Slots;
+pub(crate) use slots::{Given, Slots};
 
 use crate::compile::{Plan, Step};
 use crate::node::{Predictor, Tick};
@@ -165,31 +165,45 @@ impl Engine {
         self.last = time;
         self.slots.tick += 1;
         self.take_in(time, samples);
-        let plan = Arc::clone(&self.plan);
+        let Self {
+            plan,
+            slots,
+            gathered,
+            histories,
+            nodes,
+            frozen,
+            ..
+        } = self;
         for step in &plan.steps {
             match *step {
                 Step::Gather(gather) => {
-                    self.gathered[gather].read(
-                        &plan.gathers[gather],
-                        &self.slots,
-                        &self.histories,
-                        time,
-                    );
+                    gathered[gather].read(&plan.gathers[gather], slots, histories, time);
                 }
                 Step::Run(node) => {
                     let turn = Turn {
                         now: time,
-                        slots: &mut self.slots,
-                        gathered: &self.gathered,
-                        frozen: self.frozen,
+                        slots,
+                        gathered,
+                        frozen: *frozen,
                     };
-                    turn.of(&mut self.nodes[node], &plan.nodes[node]);
+                    turn.of(&mut nodes[node], &plan.nodes[node]);
                 }
-                Step::Capture(node) => self.capture(node, time),
+                Step::Capture(node) => {
+                    if let Running::Operator {
+                        operator, gathers, ..
+                    } = &mut nodes[node]
+                    {
+                        operator.capture(&Tick {
+                            now: time,
+                            gathered,
+                            ports: gathers,
+                        });
+                    }
+                }
             }
         }
         self.remember(time);
-        self.put_out(&plan, time);
+        self.put_out(time);
         Ok(&self.outputs)
     }
 
@@ -314,7 +328,7 @@ impl Engine {
     /// The stamp of a slot's last value.
     #[must_use]
     pub fn stamp(&self, slot: usize) -> Instant {
-        self.slots.stamps[slot]
+        self.slots.given[slot].stamp
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.
@@ -323,11 +337,11 @@ impl Engine {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
     }
 
-    fn put_out(&mut self, plan: &Plan, now: Instant) {
+    fn put_out(&mut self, now: Instant) {
         let shown = self
             .outputs
             .iter_mut()
-            .zip(&plan.outputs)
+            .zip(&self.plan.outputs)
             .zip(&mut self.blending);
         for ((shown, output), (rate, blending)) in shown {
             let value = if self.slots.ran(output.slot) {
@@ -357,26 +371,13 @@ impl Engine {
         }
     }
 
-    fn capture(&mut self, index: usize, now: Instant) {
-        if let Running::Operator {
-            operator, gathers, ..
-        } = &mut self.nodes[index]
-        {
-            operator.capture(&Tick {
-                now,
-                gathered: &self.gathered,
-                ports: gathers,
-            });
-        }
-    }
-
     /// Writes down what later ticks will ask for, and tells truths, now that all outputs of the tick are there.
     fn remember(&mut self, now: Instant) {
         for &slot in &self.recorded {
             if let Some(history) = &mut self.histories[slot]
                 && self.slots.ran(slot)
             {
-                history.push(now, self.slots.values[slot], self.slots.stamps[slot]);
+                history.push(now, self.slots.values[slot], self.slots.given[slot].stamp);
             }
         }
         for &(node, slot) in &self.fed_back {
@@ -384,7 +385,7 @@ impl Engine {
                 && let Some(feedback) = estimate.as_mut().and_then(Estimate::feedback)
                 && self.slots.ran(slot)
             {
-                feedback.observe(self.slots.values[slot], self.slots.stamps[slot], now);
+                feedback.observe(self.slots.values[slot], self.slots.given[slot].stamp, now);
             }
         }
         for &(node, slot) in &self.told {

@@ -5,6 +5,7 @@ use super::gather::Gathered;
 use super::running::Running;
 use super::slots::Slots;
 use super::vote::Vote;
+use crate::channel::ABSENT;
 use crate::compile::{PlannedNode, PlannedRole};
 use crate::node::{Operator, Outputs, Tick};
 use crate::time::Instant;
@@ -62,8 +63,7 @@ impl Turn<'_> {
         let range = node.slots.clone();
         let mut outputs = Outputs {
             values: &mut slots.values[range.clone()],
-            stamps: &mut slots.stamps[range.clone()],
-            written: &mut slots.written[range],
+            given: &mut slots.given[range],
             tick: slots.tick,
             default_stamp: stamp.unwrap_or(now),
         };
@@ -75,6 +75,7 @@ impl Turn<'_> {
         operator.step(&tick, &mut outputs);
     }
 
+    #[inline]
     fn estimate(
         self,
         mut estimate: Option<&mut Estimate>,
@@ -103,15 +104,19 @@ impl Turn<'_> {
         if let Some(feedback) = estimate.feedback() {
             feedback.before_run(slots, now);
         }
-        let prediction = estimate.run(gathered, now, !frozen);
-        let (value, stamp) = prediction.unwrap_or((f64::NAN, now));
+        let (value, stamp) = estimate.run(gathered, now, !frozen);
         slots.set(slot, value, stamp);
         if let Some(slot) = node.role.deviation() {
-            let known = prediction.map_or(f64::NAN, |_| estimate.deviation(now));
+            let known = if value.is_nan() {
+                f64::NAN
+            } else {
+                estimate.deviation(now)
+            };
             slots.set(slot, known, stamp);
         }
     }
 
+    #[inline]
     fn vote(self, vote: &mut Vote, node: &PlannedNode) {
         let Self {
             now,
@@ -143,28 +148,27 @@ impl Turn<'_> {
         if beside.weights.is_some() || beside.deviation.is_some() {
             let weights = vote.weigh(votes);
             if let Some(first) = beside.weights {
-                let range = first..first + weights.len();
-                slots.values[range.clone()].copy_from_slice(weights);
-                slots.stamps[range.clone()].fill(stamp);
-                slots.written[range].fill(slots.tick);
+                for (slot, &weight) in (first..).zip(weights) {
+                    slots.set(slot, finite(weight), stamp);
+                }
             }
         }
         if let Some(slot) = beside.reason {
-            slots.set(slot, vote.reason(votes), stamp);
+            slots.set(slot, finite(vote.reason(votes)), stamp);
         }
         if let Some((lower, upper)) = beside.bounds {
             let ends = vote.interval();
-            slots.set(lower, ends[0], stamp);
-            slots.set(upper, ends[1], stamp);
+            slots.set(lower, finite(ends[0]), stamp);
+            slots.set(upper, finite(ends[1]), stamp);
         }
         if let Some((slot, of_voters)) = beside.deviation {
             let of_voters = &gathered[of_voters].values;
             slots.set(slot, vote.deviation(votes, of_voters, value), stamp);
         }
-        for value in &mut slots.values[node.slots.clone()] {
-            if value.is_infinite() {
-                *value = f64::NAN;
-            }
-        }
     }
+}
+
+/// What is infinite is no value.
+fn finite(value: f64) -> f64 {
+    if value.is_infinite() { ABSENT } else { value }
 }

@@ -42,6 +42,7 @@ impl Vote {
     }
 
     /// Hands over what the embargo lets through at `now`.
+    #[inline]
     pub(crate) fn release(&mut self, now: Instant) {
         let Self {
             combine,
@@ -59,6 +60,7 @@ impl Vote {
     }
 
     /// Combines the votes of this tick: the result and its stamp.
+    #[inline]
     pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
         let combined = self.combine.combine(Votes(&votes.values));
         let combined = if combined.is_infinite() {

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
 use crate::channel::ABSENT;
-use crate::engine::Gathered;
+use crate::engine::{Gathered, Given};
 use crate::time::{Duration, Instant};
 
 /// A node that computes channels from channels: slopes, filters, delays.
@@ -176,8 +176,7 @@ impl<'a> Tick<'a> {
 #[derive(Debug)]
 pub struct Outputs<'a> {
     pub(crate) values: &'a mut [f64],
-    pub(crate) stamps: &'a mut [Instant],
-    pub(crate) written: &'a mut [u64],
+    pub(crate) given: &'a mut [Given],
     pub(crate) tick: u64,
     pub(crate) default_stamp: Instant,
 }
@@ -191,15 +190,19 @@ impl Outputs<'_> {
     /// Gives a value with a stamp of its own, such as a window's newest sample. What is infinite is no value.
     pub fn set_stamped(&mut self, index: usize, value: f64, stamp: Instant) {
         self.values[index] = if value.is_infinite() { ABSENT } else { value };
-        self.stamps[index] = stamp;
-        self.written[index] = self.tick;
+        self.given[index] = self.given_now(stamp);
     }
 
     /// Gives values with one stamp to channels side by side: the answer is to be filled with them, none of them infinite.
     pub fn fill_stamped(&mut self, range: Range<usize>, stamp: Instant) -> &mut [f64] {
-        self.stamps[range.clone()].fill(stamp);
-        self.written[range.clone()].fill(self.tick);
+        let given = self.given_now(stamp);
+        self.given[range.clone()].fill(given);
         &mut self.values[range]
+    }
+
+    fn given_now(&self, stamp: Instant) -> Given {
+        let tick = self.tick;
+        Given { stamp, tick }
     }
 
     /// The number of output channels, over all ports.
