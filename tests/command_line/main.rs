@@ -7,6 +7,7 @@
 mod workbench;
 
 mod columns;
+mod gaps;
 mod mistakes;
 mod mistakes_in_tests;
 
