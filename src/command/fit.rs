@@ -214,21 +214,7 @@ const BEST_ORDERS: usize = 8;
 /// What is told of orders that were compared: the best first.
 fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
-    let mut ranks: Vec<usize> = (0..orders.tried.len()).collect();
-    let figure = |nth: usize| {
-        let tried = &orders.tried[nth];
-        match orders.by.as_str() {
-            "AIC" => tried.aic,
-            "BIC" => tried.bic,
-            "FPE" => tried.fpe,
-            _ => tried.aicc,
-        }
-    };
-    let rank = |a: usize, b: usize| {
-        let chosen = (b == orders.chosen).cmp(&(a == orders.chosen));
-        chosen.then(figure(a).total_cmp(&figure(b)))
-    };
-    ranks.sort_by(|&a, &b| rank(a, b));
+    let ranks = orders.ranked();
     let shown = if all {
         ranks.len()
     } else {
