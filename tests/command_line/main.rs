@@ -10,6 +10,7 @@ mod columns;
 mod gaps;
 mod mistakes;
 mod mistakes_in_tests;
+mod next;
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
