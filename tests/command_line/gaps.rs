@@ -26,6 +26,8 @@ type = "auto_weighted"
 power = 99
 shrinkage = 0.5
 weights = "as_printed_rw"
+[nodes]
+inherited = false
 [nodes.fast]
 type = "slpe"
 [nodes.gone]
@@ -46,9 +48,9 @@ expect = [{ of = "vote.Z1", given_above = 0.5, rmse_belw = "1 nm" }]
         (15, "no key \"windws\""),
         (19, "`power` is 99"),
         (21, "as_printed_rw"),
-        (23, "slpe"),
-        (29, "no key \"form\""),
-        (32, "no key \"rmse_belw\""),
+        (25, "slpe"),
+        (31, "no key \"form\""),
+        (34, "no key \"rmse_belw\""),
     ];
     assert_told("command-line-no-parent", text, &expected);
 }

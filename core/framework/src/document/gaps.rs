@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::salvage::Lost;
+use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Place, SourceId};
 
 /// What may be missing in a file, since a mistake in its form has been told.
@@ -17,10 +18,6 @@ pub(crate) struct Gaps {
 }
 
 impl Gaps {
-    pub(super) fn is_empty(&self) -> bool {
-        !self.anywhere && self.places.is_empty()
-    }
-
     /// Adds what a syntax error cost.
     pub(super) fn add(&mut self, source: SourceId, lost: &Lost) {
         let byte = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
@@ -42,9 +39,31 @@ impl Gaps {
         }
     }
 
+    /// Adds where the named things stand in a merged tree: what they inherit may have been changed by what is lost.
+    pub(super) fn spread(&mut self, tree: &Table) {
+        for section in ["sets", "signals", "nodes"] {
+            let named = tree.get(section).and_then(Value::as_table);
+            for name in &self.names {
+                if let Some(entry) = named.and_then(|named| named.entry(name)) {
+                    places(entry, &mut self.places);
+                }
+            }
+        }
+    }
+
     /// Whether something of a name may be missing.
     pub(super) fn concern(&self, name: &str) -> bool {
         let outer = name.split('/').next().unwrap_or_default();
         self.anywhere || self.names.contains(outer)
+    }
+}
+
+/// Where a key and all below it stand.
+fn places(entry: &Entry, found: &mut Vec<Place>) {
+    found.extend([entry.key, entry.value.place]);
+    match &entry.value.data {
+        Data::Table(table) => table.iter().for_each(|(_, entry)| places(entry, found)),
+        Data::List(values) => found.extend(values.iter().map(|value| value.place)),
+        _ => {}
     }
 }

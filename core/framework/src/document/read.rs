@@ -135,15 +135,14 @@ pub fn load_text(
     };
     let root = SourceId(chain.sources.count());
     let table = chain.read(name.as_ref(), text.into());
-    let (gaps, hopeless) = (chain.gaps, chain.hopeless);
+    let (mut gaps, hopeless) = (chain.gaps, chain.hopeless);
     let mut table = table.filter(|_| !hopeless)?;
+    gaps.spread(&table);
     if gaps.anywhere {
         // A module of which something is missing says nothing sure of those that use it.
         table.remove("modules");
     }
-    if !gaps.is_empty() {
-        diagnostics.leave_open(gaps.anywhere, &gaps.places);
-    }
+    diagnostics.leave_open(gaps.anywhere, &gaps.places);
     let tree = Value::new(Place::new(root, 0, 0), Data::Table(table));
     Some(Document { root, tree, gaps })
 }
@@ -211,6 +210,7 @@ impl Chain<'_> {
             None => None,
         };
         self.borrow_modules(&mut table);
+        self.diagnostics.leave_open(self.gaps.anywhere, &[]);
         Some(merge(base, table, self.diagnostics))
     }
 

@@ -4,7 +4,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::problem::DocumentProblem;
-use super::salvage::{self, Lost, salvage};
+use super::salvage::{self, Lost, SyntaxError, salvage};
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 
@@ -34,8 +34,12 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
     let mut left = salvage(text);
     let told = left.as_mut().map(|left| std::mem::take(&mut left.errors));
     let told = told.filter(|told| !told.is_empty());
-    for (bytes, reason) in told.unwrap_or_else(|| salvage::errors(text, 0)) {
-        let bare = bare(text, &bytes);
+    for error in told.unwrap_or_else(|| salvage::errors(text, 0)) {
+        let SyntaxError {
+            bytes,
+            reason,
+            bare,
+        } = error;
         let problem = DocumentProblem::Syntax { reason, bare };
         diagnostics.report(at(source, &bytes), problem);
     }
@@ -44,17 +48,6 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
     let table = table(source, root.into_inner(), diagnostics);
     let lost = left.lost;
     Some(Parsed { table, lost })
-}
-
-/// The text of a value that has no quotes, where it should have.
-fn bare(text: &str, span: &std::ops::Range<usize>) -> Option<String> {
-    let found = text.get(span.clone())?;
-    let is_value = text[..span.start].trim_end().ends_with(['=', '[', ',']);
-    let is_key = text[span.end..].trim_start().starts_with(['=', '.']);
-    let is_word = found.starts_with(char::is_alphanumeric)
-        && found.contains(char::is_alphabetic)
-        && !found.contains(['"', '\'', '\n']);
-    (is_value && !is_key && is_word).then(|| found.to_owned())
 }
 
 fn at(source: SourceId, span: &std::ops::Range<usize>) -> Place {
