@@ -36,6 +36,7 @@ window = "5min"
 [outputs]
 vote = "vote"
 extra = { form = "extra" }
+reason = "watch:reason.{axis}"
 [[tests]]
 name = "a"
 expect = [{ of = "vote.Z1", given_above = 0.5, rmse_belw = "1 nm" }]
@@ -50,7 +51,8 @@ expect = [{ of = "vote.Z1", given_above = 0.5, rmse_belw = "1 nm" }]
         (21, "as_printed_rw"),
         (25, "slpe"),
         (31, "no key \"form\""),
-        (34, "no key \"rmse_belw\""),
+        (32, "\"{axis}\" stands for nothing"),
+        (35, "no key \"rmse_belw\""),
     ];
     assert_told("command-line-no-parent", text, &expected);
 }

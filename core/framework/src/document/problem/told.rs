@@ -339,7 +339,8 @@ impl Problem for DocumentProblem {
             self,
             Self::MissingKey { .. }
                 | Self::UnknownSet { .. }
-                | Self::UnknownPlaceholder { .. }
+                // In an output none has a meaning.
+                | Self::UnknownPlaceholder { instead: None, .. }
                 | Self::NothingToRemove { .. }
                 | Self::SamplesWithoutClock { .. }
                 | Self::UnknownChannel { .. }
