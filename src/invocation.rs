@@ -23,9 +23,19 @@ pub fn quoted(word: &str) -> String {
 /// A command for a shell, in lines of at most 80 columns.
 #[must_use]
 pub fn command(words: &[&str]) -> String {
+    led(" ", words)
+}
+
+/// What a user would type next, said in a line where it fits.
+#[must_use]
+pub fn next(words: &[&str]) -> String {
+    led("next:", words)
+}
+
+fn led(by: &str, words: &[&str]) -> String {
     const WIDTH: usize = 78;
-    let mut text = String::from(" ");
-    let mut column = 1;
+    let mut text = by.to_owned();
+    let mut column = by.len();
     for (position, word) in words.iter().enumerate() {
         let length = word.chars().count() + 1;
         if position > 0 && column + length > WIDTH {
@@ -41,7 +51,7 @@ pub fn command(words: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{command, quoted};
+    use super::{command, next, quoted};
 
     #[test]
     fn long_commands_go_on_in_the_next_line() {
@@ -49,6 +59,13 @@ mod tests {
         let words: Vec<&str> = long.iter().map(String::as_str).collect();
         let text = command(&words);
         assert_eq!(text, format!("  {} \\\n      {}", long[0], long[1]));
+    }
+
+    #[test]
+    fn what_comes_next_stands_in_a_line_where_it_fits() {
+        assert_eq!(next(&["athermal", "check"]), "next: athermal check");
+        let long = "x".repeat(80);
+        assert_eq!(next(&["run", &long]), format!("next: run \\\n      {long}"));
     }
 
     #[test]

@@ -325,3 +325,39 @@ fn the_unchanged_graphs_have_no_mistake() {
         );
     }
 }
+
+/// The codes of all errors in a graph and its tests.
+fn errors(text: &str) -> Vec<&'static str> {
+    let files = Memory::new().with("a.toml", text).with("b.toml", MODULES);
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let document = load(Path::new("a.toml"), &files, &mut sources, &mut diagnostics);
+    if let Some(graph) = document.and_then(|document| declare(document, &mut diagnostics))
+        && let Err(part) = compile_part(&graph, Wanted::default(), &mut diagnostics)
+    {
+        trial::mistakes(&graph, &part, &files, &mut sources, &mut diagnostics);
+    }
+    let found = diagnostics.iter();
+    let found = found.filter(|found| found.severity == Severity::Error);
+    found.map(|found| found.code).collect()
+}
+
+#[test]
+fn a_mark_that_is_missing_brings_no_mistake_about_but_those_of_the_syntax() {
+    const SYNTAX: &str = "A001";
+    let mut wrong = 0;
+    for graph in GRAPHS {
+        for (at, mark) in graph.match_indices(['"', '[', ']', '{', '}', '=', ',', '\n']) {
+            let text = [&graph[..at], &graph[at + mark.len()..]].concat();
+            let errors = errors(&text);
+            // A comment or a text may bear to lose one.
+            if !errors.contains(&SYNTAX) {
+                continue;
+            }
+            wrong += 1;
+            let line = graph[..at].lines().count();
+            let strange = errors.iter().any(|code| *code != SYNTAX);
+            assert!(!strange, "{mark:?} in line {line}: {errors:?}\n{text}");
+        }
+    }
+    assert!(wrong > 1_000, "{wrong}");
+}

@@ -62,6 +62,14 @@ impl Data {
         words.chain(files).collect()
     }
 
+    /// A name for other data, with the ending of these.
+    #[must_use]
+    pub fn unseen(&self) -> String {
+        let kind = self.files.first().and_then(|file| file.extension());
+        let kind = kind.map_or("csv".into(), |kind| kind.to_string_lossy());
+        format!("OTHER.{kind}")
+    }
+
     /// What a model's card says of the files.
     ///
     /// # Errors

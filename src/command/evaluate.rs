@@ -13,6 +13,7 @@ use serde_json::json;
 
 use super::data::{self, Data};
 use crate::figures::{count, number, or_dash, table};
+use crate::invocation::{next, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Score a model's predictions on recorded data
@@ -134,8 +135,22 @@ impl Evaluate {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to score",
             );
+        } else if terminal.format == Format::Table {
+            terminal.note(self.next());
         }
         Ok(Answer::Fine)
+    }
+
+    /// What to type next: why the scores are what they are.
+    fn next(&self) -> String {
+        let (program, model) = (program(), quoted(&self.model.display().to_string()));
+        let data = self.data.words();
+        let words = [&*program, "diagnose", &model].into_iter();
+        next(
+            &words
+                .chain(data.iter().map(String::as_str))
+                .collect::<Vec<_>>(),
+        )
     }
 
     fn mode(&self) -> Result<Mode, Failure> {

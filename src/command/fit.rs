@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use athermal::Model;
-use athermal::core::compile::Wanted;
+use athermal::core::compile::{PlannedChannel, Wanted};
 use athermal::core::diagnostic::Sources;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
@@ -16,6 +16,7 @@ use serde_json::json;
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use crate::figures::{count, number, paragraph, table};
+use crate::invocation::{next, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit a graph on recorded data
@@ -73,6 +74,7 @@ impl Fit {
             write_aside(&self.output, &text)?;
             if terminal.format == Format::Table {
                 terminal.note(format_args!("wrote {}", self.output.display()));
+                terminal.note(self.next(&model));
             }
         }
         let failed = report
@@ -80,6 +82,24 @@ impl Fit {
             .iter()
             .any(|fit| matches!(fit.outcome, Outcome::Failed(_)));
         Ok(if failed { Answer::No } else { Answer::Fine })
+    }
+
+    /// What to type next: a score on data that the fit has not seen; a run, where there is nothing to score.
+    fn next(&self, model: &Model) -> String {
+        let (program, output) = (program(), quoted(&self.output.display().to_string()));
+        let unseen = self.data.unseen();
+        let predicts = |channel: &PlannedChannel| channel.predicts.is_some();
+        if !model.plan.channels.iter().any(predicts) {
+            return next(&[&program, "run", &output, "--input", &unseen]);
+        }
+        let words = self.data.others(vec![unseen.into()]).words();
+        let words = words.iter().map(String::as_str);
+        next(
+            &[&*program, "evaluate", &output]
+                .into_iter()
+                .chain(words)
+                .collect::<Vec<_>>(),
+        )
     }
 
     /// Tells of mistakes in the tests of a graph file. They take nothing from the fit, and those of a file that is extended may
@@ -214,21 +234,7 @@ const BEST_ORDERS: usize = 8;
 /// What is told of orders that were compared: the best first.
 fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
     let header = ["  order", "coefficients", "AIC", "AICc", "BIC", "FPE"];
-    let mut ranks: Vec<usize> = (0..orders.tried.len()).collect();
-    let figure = |nth: usize| {
-        let tried = &orders.tried[nth];
-        match orders.by.as_str() {
-            "AIC" => tried.aic,
-            "BIC" => tried.bic,
-            "FPE" => tried.fpe,
-            _ => tried.aicc,
-        }
-    };
-    let rank = |a: usize, b: usize| {
-        let chosen = (b == orders.chosen).cmp(&(a == orders.chosen));
-        chosen.then(figure(a).total_cmp(&figure(b)))
-    };
-    ranks.sort_by(|&a, &b| rank(a, b));
+    let ranks = orders.ranked();
     let shown = if all {
         ranks.len()
     } else {

@@ -99,7 +99,7 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         .map(|&node| plan.nodes[node].slots.start)
         .collect();
     let of_truth = of_truths(plan);
-    let Some(probe) = Probe::new(model, observation, &slots)? else {
+    let Some(mut probe) = Probe::new(model, observation, &slots)? else {
         return Ok(Vec::new());
     };
     let mut sensors: Vec<Vec<Response>> = vec![Vec::new(); slots.len()];
@@ -116,7 +116,7 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
                 down: &down.values,
                 size,
             };
-            if let Some(response) = answer.response(plan, source, ahead, probe.step) {
+            if let Some(response) = answer.response(plan, source, ahead, probe.clock.step) {
                 sensors[nth].push(response);
             }
         }
@@ -151,10 +151,10 @@ struct Probe<'a> {
     slots: &'a [usize],
     /// The mean of every measured channel.
     rest: Vec<f64>,
-    step: Duration,
-    /// So many ticks at rest, and at least as many after the step.
-    ticks: i64,
-    /// Of each tick after those at rest, what the slots are where nothing steps.
+    clock: Clock,
+    /// What goes on at rest.
+    resting: Engine,
+    /// Of each tick after those at rest, what the slots are where nothing steps, as far as somebody has asked.
     undisturbed: Vec<Vec<f64>>,
 }
 
@@ -177,64 +177,81 @@ impl<'a> Probe<'a> {
         let rest = sources
             .iter()
             .map(|of| if of.samples > 0 { of.mean } else { f64::NAN });
-        let mut probe = Self {
+        let rest: Vec<f64> = rest.collect();
+        let clock = Clock { step, ticks };
+        Ok(Some(Self {
+            resting: clock.engine_at_rest(model, &rest)?,
+            undisturbed: Vec::new(),
             model,
             slots,
-            rest: rest.collect(),
-            step,
-            ticks,
-            undisturbed: Vec::new(),
-        };
-        let mut engine = probe.engine_at_rest()?;
-        for tick in 0..MOST_INSTANTS {
-            probe.advance(&mut engine, tick, &probe.rest)?;
-            let values = slots.iter().map(|&slot| engine.value(slot)).collect();
-            probe.undisturbed.push(values);
-        }
-        Ok(Some(probe))
+            rest,
+            clock,
+        }))
     }
 
-    /// An engine that has seen all sensors at rest until the tick before the step.
-    fn engine_at_rest(&self) -> Result<Engine, EngineError> {
-        let mut engine = Engine::new(Arc::clone(&self.model.plan), &self.model.fitted)?;
-        // Nothing has been measured that could be learned from.
-        engine.freeze(true);
-        engine.predict_in(Mode::FreeRun);
-        for tick in -self.ticks..0 {
-            self.advance(&mut engine, tick, &self.rest)?;
+    /// What the slots are at a tick where nothing steps.
+    fn undisturbed(&mut self, tick: usize) -> Result<&[f64], EngineError> {
+        for next in self.undisturbed.len()..=tick {
+            self.clock
+                .advance(&mut self.resting, next as i64, &self.rest)?;
+            let values = self.slots.iter().map(|&slot| self.resting.value(slot));
+            self.undisturbed.push(values.collect());
         }
-        Ok(engine)
-    }
-
-    /// Steps an engine; the tick of the step is 0.
-    fn advance(&self, engine: &mut Engine, tick: i64, samples: &[f64]) -> Result<(), EngineError> {
-        let at = Instant::from_ns((self.ticks + tick) * self.step.as_ns());
-        engine.step(at, samples).map(|_| ())
+        Ok(&self.undisturbed[tick])
     }
 
     /// How the slots change from the instant on at which a source steps up and down by `size`, tick by tick, against a run in which
     /// it rests; NaN where there is no value.
-    fn run(&self, source: usize, size: f64) -> Result<Vec<[Course; 2]>, EngineError> {
+    fn run(&mut self, source: usize, size: f64) -> Result<Vec<[Course; 2]>, EngineError> {
         let mut runs = Vec::new();
         for change in [size, -size] {
             let mut samples = self.rest.clone();
             samples[source] += change;
-            runs.push((self.engine_at_rest()?, samples));
+            runs.push((self.clock.engine_at_rest(self.model, &self.rest)?, samples));
         }
         let mut found = vec![<[Course; 2]>::default(); self.slots.len()];
-        for (tick, undisturbed) in (0..).zip(&self.undisturbed) {
+        let (clock, slots) = (self.clock, self.slots);
+        for tick in 0..MOST_INSTANTS {
+            let undisturbed = self.undisturbed(tick as usize)?;
             for (side, (engine, samples)) in runs.iter_mut().enumerate() {
-                self.advance(engine, tick, samples)?;
-                let slots = self.slots.iter().zip(undisturbed);
+                clock.advance(engine, tick, samples)?;
+                let slots = slots.iter().zip(undisturbed);
                 for ((&slot, rest), courses) in slots.zip(&mut found) {
                     courses[side].push(engine.value(slot) - rest);
                 }
             }
-            if tick >= self.ticks && found.iter().flatten().all(Course::is_at_rest) {
+            if tick >= clock.ticks && found.iter().flatten().all(Course::is_at_rest) {
                 break;
             }
         }
         Ok(found)
+    }
+}
+
+/// When the ticks are; that of the step is 0.
+#[derive(Clone, Copy)]
+struct Clock {
+    step: Duration,
+    /// So many at rest, and at least as many after the step.
+    ticks: i64,
+}
+
+impl Clock {
+    /// An engine that has seen all sensors at rest until the tick before the step.
+    fn engine_at_rest(self, model: &Model, rest: &[f64]) -> Result<Engine, EngineError> {
+        let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted)?;
+        // Nothing has been measured that could be learned from.
+        engine.freeze(true);
+        engine.predict_in(Mode::FreeRun);
+        for tick in -self.ticks..0 {
+            self.advance(&mut engine, tick, rest)?;
+        }
+        Ok(engine)
+    }
+
+    fn advance(self, engine: &mut Engine, tick: i64, samples: &[f64]) -> Result<(), EngineError> {
+        let at = Instant::from_ns((self.ticks + tick) * self.step.as_ns());
+        engine.step(at, samples).map(|_| ())
     }
 }
 

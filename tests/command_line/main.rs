@@ -7,8 +7,10 @@
 mod workbench;
 
 mod columns;
+mod gaps;
 mod mistakes;
 mod mistakes_in_tests;
+mod next;
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

@@ -93,7 +93,8 @@ impl Combiner for AutoWeighted {
             } else if value > 0.0 && self.weights == Weighting::AsPrintedRaw {
                 let message = format!("`{name}` is for weights that add up to 1");
                 let help = "leave it out, or use `weights = \"as_printed\"`";
-                mistakes.push(Mistake::at(name, message).help(help));
+                let mistake = Mistake::at(name, message).help(help);
+                mistakes.push(mistake.rests_on("weights"));
             }
         }
         mistakes

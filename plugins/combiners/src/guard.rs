@@ -64,7 +64,7 @@ impl Combiner for Guard {
                 "`min_truths` is {} and the memory holds {} at most",
                 self.min_truths, last.truths
             );
-            mistakes.push(Mistake::at("min_truths", message));
+            mistakes.push(Mistake::at("min_truths", message).rests_on("memory.truths"));
         }
         mistakes
     }

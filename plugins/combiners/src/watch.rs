@@ -15,8 +15,8 @@ use crate::mean::mean;
 /// What both kinds document of their answers.
 macro_rules! reasons {
     () => {
-        "The port `reason`, written `watch:reason.{axis}` of a node `watch`, says: 0 no change, 1 the mean has gone up,\n\
-         2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched."
+        "The port `reason`, written `watch:reason` of a node `watch` (in a node with `each`, `watch:reason.{axis}` is that of its\n\
+         member), says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched."
     };
 }
 

@@ -129,15 +129,14 @@ impl Compensate {
                 "`max_slew` ({}) is slower than `max_rate` ({}), so the correction would fall behind",
                 self.max_slew, self.max_rate
             );
-            mistakes.push(Mistake::at("max_slew", message).help("allow at least the largest rate"));
+            let mistake = Mistake::at("max_slew", message).help("allow at least the largest rate");
+            mistakes.push(mistake.rests_on("max_rate"));
         }
         if let (Some(below), Some(above)) = (below, above)
             && above < below
         {
-            mistakes.push(Mistake::at(
-                "stop.above",
-                "`stop.above` lies under `stop.below`",
-            ));
+            let message = "`stop.above` lies under `stop.below`";
+            mistakes.push(Mistake::at("stop.above", message).rests_on("stop.below"));
         }
         match (range, max_rate, slew) {
             (Some(range), Some(rate), Some(slew)) if mistakes.is_empty() => Ok(Limits {
@@ -203,7 +202,9 @@ impl Feature for Compensate {
         if !self.stop_in.is_empty() && inputs.port("state").is_empty() {
             let message = "`stop_in` needs to know the state";
             mistakes.push(
-                Mistake::at("stop_in", message).help("add `inputs.state`, a `stability` node"),
+                Mistake::at("stop_in", message)
+                    .help("add `inputs.state`, a `stability` node")
+                    .rests_on("inputs.state"),
             );
         }
         if !mistakes.is_empty() {

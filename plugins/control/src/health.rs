@@ -131,10 +131,8 @@ impl Health {
         let most =
             read(self.noise_below.as_ref(), &difference, "noise_below").unwrap_or(f64::INFINITY);
         if least > most {
-            mistakes.push(Mistake::at(
-                "noise_below",
-                "`noise_below` lies under `noise_above`",
-            ));
+            let message = "`noise_below` lies under `noise_above`";
+            mistakes.push(Mistake::at("noise_below", message).rests_on("noise_above"));
         }
         if mistakes.is_empty() {
             Ok(Limits {

@@ -83,12 +83,13 @@ impl OpticalLoss {
         match (&self.radii, self.preset) {
             (Some(_), Some(_)) => {
                 let message = "`radii` and `preset` both say how wide the beam is";
-                mistakes.push(Mistake::at("preset", message).help("leave one of them out"));
+                let mistake = Mistake::at("preset", message).help("leave one of them out");
+                mistakes.push(mistake.rests_on("radii"));
             }
             (None, None) => {
                 let message = "nothing says how wide the beam is";
                 let help = "give `radii = [\"2 um\"]`, or `preset = \"mandelli\"`";
-                mistakes.push(Mistake::at("radii", message).help(help));
+                mistakes.push(Mistake::at("radii", message).help(help).rests_on("preset"));
             }
             (Some(_), None) if count != 1 && count != drift.len() => {
                 let message = format!("there are {count} `radii` for {} axes", drift.len());

@@ -76,7 +76,8 @@ impl SafeState {
             }
             (Refuge::Value, None) => {
                 let mistake = Mistake::at("refuge", "`refuge = \"value\"` needs to know which");
-                mistakes.push(mistake.help(format!("add `value = \"0 {}\"`", channel.unit)));
+                let help = format!("add `value = \"0 {}\"`", channel.unit);
+                mistakes.push(mistake.help(help).rests_on("value"));
                 None
             }
             (Refuge::Hold | Refuge::Zero, Some(_)) => {
@@ -84,7 +85,7 @@ impl SafeState {
                     "value",
                     "`value` has a meaning only with `refuge = \"value\"`",
                 );
-                mistakes.push(mistake);
+                mistakes.push(mistake.rests_on("refuge"));
                 None
             }
         };
@@ -96,7 +97,7 @@ impl SafeState {
             Ok(slew) if mistakes.is_empty() => Ok((refuge, slew)),
             Ok(_) => Err(mistakes),
             Err(mistake) => {
-                mistakes.push(mistake);
+                mistakes.push(mistake.rests_on("refuge"));
                 Err(mistakes)
             }
         }

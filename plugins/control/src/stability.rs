@@ -73,11 +73,13 @@ impl Stability {
                     "`transient_above` ({}) lies below `stable_below` ({})",
                     self.transient_above, self.stable_below
                 );
-                mistakes.push(Mistake::at("transient_above", message));
+                mistakes.push(Mistake::at("transient_above", message).rests_on("stable_below"));
             } else if hysteresis >= stable && hysteresis > 0.0 {
                 let message = "with such a `hysteresis` an axis can never become stable again";
                 mistakes.push(
-                    Mistake::at("hysteresis", message).help("it must be below `stable_below`"),
+                    Mistake::at("hysteresis", message)
+                        .help("it must be below `stable_below`")
+                        .rests_on("stable_below"),
                 );
             } else if mistakes.is_empty() {
                 return Ok(Limits {

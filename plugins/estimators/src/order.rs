@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use athermal_core::node::{Mistake, OrderTable, TriedOrder};
+use athermal_core::node::{Mistake, OrderFigure, OrderTable, TriedOrder};
 use athermal_numerics::{Criterion, InformationCriteria};
 use schemars::JsonSchema;
 use serde::de::Visitor;
@@ -78,12 +78,12 @@ impl Figure {
         }
     }
 
-    fn name(self) -> &'static str {
+    fn told(self) -> OrderFigure {
         match self {
-            Self::Aic => "AIC",
-            Self::Aicc => "AICc",
-            Self::Bic => "BIC",
-            Self::Fpe => "FPE",
+            Self::Aic => OrderFigure::Aic,
+            Self::Aicc => OrderFigure::Aicc,
+            Self::Bic => OrderFigure::Bic,
+            Self::Fpe => OrderFigure::Fpe,
         }
     }
 }
@@ -226,7 +226,7 @@ impl Order {
             fpe: tried.figures.fpe,
         });
         let table = OrderTable {
-            by: self.by.name().to_owned(),
+            by: self.by.told(),
             rows,
             chosen: best,
             tried: told.collect(),

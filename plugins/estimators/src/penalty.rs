@@ -111,10 +111,13 @@ impl Penalty {
         };
         let fits = smallest > 0.0 && smallest.is_finite();
         check("smallest", smallest, fits, "above 0");
-        let fits = largest > smallest && largest.is_finite();
-        check("largest", largest, fits, "above `smallest`");
         let fits = (1..=1000).contains(&per_decade);
         check("per_decade", f64::from(per_decade), fits, "from 1 to 1000");
+        if !(largest > smallest && largest.is_finite()) {
+            let message = format!("`largest` is {largest} and must be above `smallest`");
+            let mistake = Mistake::at(format!("{place}.largest"), message);
+            mistakes.push(mistake.rests_on(format!("{place}.smallest")));
+        }
         mistakes
     }
 

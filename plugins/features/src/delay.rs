@@ -114,7 +114,9 @@ impl Feature for Delay {
                     "a delay that closes a loop must say its unit",
                 );
                 return Err(vec![
-                    mistake.help("add `unit = \"nm\"`, the unit of what it delays"),
+                    mistake
+                        .help("add `unit = \"nm\"`, the unit of what it delays")
+                        .rests_on("unit"),
                 ]);
             }
             (Some(unit), channels) => {

@@ -81,7 +81,7 @@ pub(crate) fn read_kinds(graph: &GraphFile, diagnostics: &mut Diagnostics) -> Ve
 
 fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
     let kind = (node.kind.as_ref()).and_then(|(name, place)| find(name, *place, diagnostics));
-    let mut own = Diagnostics::new();
+    let mut own = diagnostics.aside();
     // Instances of a module share places: a mistake in all of them is told once only where it is told beside the others.
     let told = if node.faulty.is_some() {
         &mut own
@@ -247,19 +247,31 @@ impl Declared<'_> {
         }
     }
 
+    /// Whether an input such as `inputs.signal` or a parameter such as `selection.folds` is given.
+    pub(super) fn states(&self, way: &str) -> bool {
+        match way.strip_prefix("inputs.") {
+            Some(port) => self.input(port).is_some(),
+            None => self.parameter(way).all(|inner| inner.is_some()),
+        }
+    }
+
+    /// The values on the way to a parameter, up to the first that is not given.
+    fn parameter<'v>(&'v self, path: &'v str) -> impl Iterator<Item = Option<&'v Value>> {
+        path.split('.')
+            .scan(Some(&self.decl.parameters), |value, key| {
+                let outer = (*value)?;
+                *value = match &outer.data {
+                    Data::Table(table) => table.get(key),
+                    Data::List(values) => key.parse::<usize>().ok().and_then(|nth| values.get(nth)),
+                    _ => None,
+                };
+                Some(*value)
+            })
+    }
+
     /// The place of a parameter such as `selection.folds` or `lags.0`, as near as the file has it.
     pub(crate) fn parameter_place(&self, path: &str) -> Place {
-        let mut place = self.node.place;
-        let mut value = &self.decl.parameters;
-        for key in path.split('.') {
-            let inner = match &value.data {
-                Data::Table(table) => table.get(key),
-                Data::List(values) => key.parse::<usize>().ok().and_then(|nth| values.get(nth)),
-                _ => None,
-            };
-            let Some(inner) = inner else { break };
-            (place, value) = (inner.place, inner);
-        }
-        place
+        let given = self.parameter(path).flatten();
+        given.last().map_or(self.node.place, |inner| inner.place)
     }
 }

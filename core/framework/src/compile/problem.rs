@@ -208,6 +208,16 @@ impl Problem for CompileProblem {
         }
     }
 
+    fn may_follow_from_a_gap(&self) -> bool {
+        !matches!(
+            self,
+            Self::UnknownKind { .. }
+                | Self::KindTwice { .. }
+                | Self::UnknownInput { .. }
+                | Self::Parameter { .. }
+        )
+    }
+
     fn message(&self) -> String {
         match self {
             Self::UnknownKind { kind, .. } => format!("there is no node type `{kind}`"),

@@ -51,13 +51,11 @@ impl Resolver<'_> {
         mut mistakes: Vec<Mistake>,
         left_out: &LeftOut,
     ) {
+        // Where something that could not be read may be missing, only what stands there is sure.
+        let open = self.diagnostics.is_open(declared.node.place);
         mistakes.retain(|mistake| {
-            let words = format!(
-                "{} {}",
-                mistake.message,
-                mistake.help.as_deref().unwrap_or("")
-            );
-            !left_out.explains(&mistake.at, &words)
+            let mut behind = std::iter::once(&mistake.at).chain(&mistake.rests_on);
+            behind.all(|way| !left_out.explains(way) && (!open || declared.states(way)))
         });
         self.mistakes(declared, mistakes);
     }

@@ -50,6 +50,11 @@ pub trait Problem {
     fn related(&self) -> Vec<(Place, String)> {
         Vec::new()
     }
+
+    /// Whether it may only follow from something else that is missing, so that it is not told where parts of a file could not be read.
+    fn may_follow_from_a_gap(&self) -> bool {
+        false
+    }
 }
 
 /// A problem at a place.
@@ -101,6 +106,10 @@ pub struct Diagnostics {
     scope: Option<String>,
     errors: usize,
     reported: usize,
+    /// Where something is missing that could not be read.
+    gaps: Vec<Place>,
+    /// Something may be missing anywhere.
+    open: bool,
 }
 
 /// What is known of one code at one place.
@@ -179,6 +188,15 @@ impl Diagnostics {
         std::mem::replace(&mut self.scope, context)
     }
 
+    /// An empty collector for the same files.
+    pub(crate) fn aside(&self) -> Self {
+        Self {
+            open: self.open,
+            gaps: self.gaps.clone(),
+            ..Self::default()
+        }
+    }
+
     /// Takes over what another collector found.
     pub fn extend(&mut self, other: Self) {
         self.extend_where(other, |_| true);
@@ -196,7 +214,25 @@ impl Diagnostics {
         self.reported
     }
 
+    /// Notes where parts of files could not be read: at `places`, or anywhere. What may only follow from that is not told.
+    pub(crate) fn leave_open(&mut self, anywhere: bool, places: &[Place]) {
+        self.open |= anywhere;
+        self.gaps.extend(places);
+    }
+
+    /// Whether something that could not be read may be missing at a place.
+    pub(crate) fn is_open(&self, place: Place) -> bool {
+        let around =
+            |gap: &Place| gap.source == place.source && (gap.start..gap.end).contains(&place.start);
+        self.open || self.gaps.iter().any(around)
+    }
+
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
+        if problem.may_follow_from_a_gap() && place.map_or(self.open, |place| self.is_open(place)) {
+            // Whoever counts learns that something is wrong here.
+            self.reported += usize::from(problem.severity() == Severity::Error);
+            return;
+        }
         let new = self.take(Diagnostic {
             code: problem.code(),
             severity: problem.severity(),

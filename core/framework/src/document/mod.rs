@@ -5,12 +5,14 @@
 
 mod declare;
 mod decode;
+mod gaps;
 mod graph_file;
 mod json;
 mod lacks;
 mod merge;
 mod problem;
 mod read;
+mod salvage;
 mod toml_text;
 mod tree;
 

@@ -4,8 +4,10 @@ use std::collections::HashMap;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
+use super::gaps::Gaps;
 use super::merge::{lay, merge};
 use super::problem::DocumentProblem;
+use super::salvage::Lost;
 use super::toml_text;
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Place, SourceId, Sources};
@@ -75,18 +77,23 @@ pub struct Document {
     pub root: SourceId,
     /// The merged tree: a table without `extends`.
     pub tree: Value,
+    /// What mistakes in reading have left open.
+    pub(super) gaps: Gaps,
 }
 
 impl Document {
     /// A tree that comes from elsewhere than files, e.g. from a model.
     pub fn new(root: SourceId, tree: Value) -> Self {
-        Document { root, tree }
+        let gaps = Gaps::default();
+        Document { root, tree, gaps }
     }
 }
 
 /// Reads the file at `path` and all that it extends.
 ///
-/// `None` if any of them is missing, too large or not TOML; the diagnostics say which. Every file read is added to `sources`.
+/// `None` if it is missing, or nothing of it can be read for sure; the diagnostics say why. Where a file that it extends is
+/// missing, or the syntax of one is wrong, that is told, and the document is what could be read: diagnostics then keep to themselves
+/// what may only follow. Every file read is added to `sources`.
 pub fn load(
     path: &Path,
     reader: &dyn FileReader,
@@ -123,16 +130,21 @@ pub fn load_text(
         diagnostics,
         paths: Vec::new(),
         lent: HashMap::new(),
-        broken: false,
+        hopeless: false,
+        gaps: Gaps::default(),
     };
     let root = SourceId(chain.sources.count());
     let table = chain.read(name.as_ref(), text.into());
-    let broken = chain.broken;
-    let tree = Value::new(
-        Place::new(root, 0, 0),
-        Data::Table(table.filter(|_| !broken)?),
-    );
-    Some(Document { root, tree })
+    let (mut gaps, hopeless) = (chain.gaps, chain.hopeless);
+    let mut table = table.filter(|_| !hopeless)?;
+    gaps.spread(&table);
+    if gaps.anywhere {
+        // A module of which something is missing says nothing sure of those that use it.
+        table.remove("modules");
+    }
+    diagnostics.leave_open(gaps.anywhere, &gaps.places);
+    let tree = Value::new(Place::new(root, 0, 0), Data::Table(table));
+    Some(Document { root, tree, gaps })
 }
 
 struct Chain<'a> {
@@ -142,8 +154,9 @@ struct Chain<'a> {
     paths: Vec<PathBuf>,
     /// Files that modules come from, read once.
     lent: HashMap<PathBuf, Option<Table>>,
-    /// Something could not be read, so that checks of the rest would report what follows from it.
-    broken: bool,
+    /// A file says of itself that it may mean anything.
+    hopeless: bool,
+    gaps: Gaps,
 }
 
 impl Chain<'_> {
@@ -151,9 +164,7 @@ impl Chain<'_> {
         self.paths.push(normal(path));
         let table = self.read_and_merge(path, text);
         self.paths.pop();
-        if table.is_none() {
-            self.broken = true;
-        }
+        self.gaps.anywhere |= table.is_none();
         table
     }
 
@@ -169,21 +180,18 @@ impl Chain<'_> {
         }
         let text: std::sync::Arc<str> = text.into();
         let source = self.sources.add(shown, text.clone());
-        let before = self.diagnostics.error_count();
-        let tree = toml_text::parse(source, &text, self.diagnostics)?;
-        if self.diagnostics.error_count() > before {
-            self.broken = true;
+        let parsed = toml_text::parse(source, &text, self.diagnostics)?;
+        let mut table = parsed.table;
+        for lost in &parsed.lost {
+            self.gaps.add(source, lost);
         }
-        let Data::Table(mut table) = tree.data else {
-            return None;
-        };
         let schema = table
             .get("schema")
             .map(|value| (value.place, value.as_integer(), value.found()));
         match schema {
             Some((_, Some(1), _)) => {}
-            // A missing schema in a broken file may be what broke.
-            None if self.broken => {}
+            // It may be what a syntax error cost.
+            None if parsed.lost.iter().any(Lost::may_be_schema) => {}
             None => self
                 .diagnostics
                 .report(Place::new(source, 0, 0), DocumentProblem::SchemaMissing),
@@ -191,13 +199,18 @@ impl Chain<'_> {
             Some((place, None, found)) => self
                 .diagnostics
                 .report(place, DocumentProblem::SchemaUnknown { found }),
-            Some((place, _, found)) => self.fail(place, DocumentProblem::SchemaUnknown { found }),
+            Some((place, _, found)) => {
+                self.hopeless = true;
+                self.diagnostics
+                    .report(place, DocumentProblem::SchemaUnknown { found });
+            }
         }
         let base = match table.remove("extends") {
             Some(entry) => self.other(&entry.value, "extends"),
             None => None,
         };
         self.borrow_modules(&mut table);
+        self.diagnostics.leave_open(self.gaps.anywhere, &[]);
         Some(merge(base, table, self.diagnostics))
     }
 
@@ -323,7 +336,7 @@ impl Chain<'_> {
     }
 
     fn fail(&mut self, place: Place, problem: DocumentProblem) {
-        self.broken = true;
+        self.gaps.anywhere = true;
         self.diagnostics.report(place, problem);
     }
 }

@@ -4,44 +4,50 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::problem::DocumentProblem;
+use super::salvage::{self, Lost, SyntaxError, salvage};
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 
 /// How deep keys may nest; the stack of a thread bears several times as much.
 const DEEPEST: usize = 64;
 
-/// Reads `text`. After a syntax error the tree holds what could be made out.
-pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics) -> Option<Value> {
+/// What could be read of a text.
+pub(super) struct Parsed {
+    pub(super) table: Table,
+    /// What syntax errors cost, of which has been told.
+    pub(super) lost: Vec<Lost>,
+}
+
+/// Reads `text`. After a syntax error the tree holds what the error does not touch; `None` where that cannot be told.
+pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics) -> Option<Parsed> {
     if let Some(place) = too_deep(source, text) {
         // The parser does not limit dotted keys, and everything behind it is recursive.
         diagnostics.report(place, DocumentProblem::TooDeep { limit: DEEPEST });
         return None;
     }
     let (root, errors) = DeTable::parse_recoverable(text);
-    for error in &errors {
-        let span = error.span().unwrap_or(text.len()..text.len());
-        diagnostics.report(
-            at(source, &span),
-            DocumentProblem::Syntax {
-                reason: error.message().to_owned(),
-                bare: bare(text, &span),
-            },
-        );
+    if errors.is_empty() {
+        let table = table(source, root.into_inner(), diagnostics);
+        let lost = Vec::new();
+        return Some(Parsed { table, lost });
     }
-    let whole = Place::new(source, 0, 0);
+    let mut left = salvage(text);
+    let told = left.as_mut().map(|left| std::mem::take(&mut left.errors));
+    let told = told.filter(|told| !told.is_empty());
+    for error in told.unwrap_or_else(|| salvage::errors(text, 0)) {
+        let SyntaxError {
+            bytes,
+            reason,
+            bare,
+        } = error;
+        let problem = DocumentProblem::Syntax { reason, bare };
+        diagnostics.report(at(source, &bytes), problem);
+    }
+    let left = left?;
+    let (root, _) = DeTable::parse_recoverable(&left.text);
     let table = table(source, root.into_inner(), diagnostics);
-    Some(Value::new(whole, Data::Table(table)))
-}
-
-/// The text of a value that has no quotes, where it should have.
-fn bare(text: &str, span: &std::ops::Range<usize>) -> Option<String> {
-    let found = text.get(span.clone())?;
-    let is_value = text[..span.start].trim_end().ends_with(['=', '[', ',']);
-    let is_key = text[span.end..].trim_start().starts_with(['=', '.']);
-    let is_word = found.starts_with(char::is_alphanumeric)
-        && found.contains(char::is_alphabetic)
-        && !found.contains(['"', '\'', '\n']);
-    (is_value && !is_key && is_word).then(|| found.to_owned())
+    let lost = left.lost;
+    Some(Parsed { table, lost })
 }
 
 fn at(source: SourceId, span: &std::ops::Range<usize>) -> Place {

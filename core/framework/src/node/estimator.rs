@@ -272,14 +272,70 @@ pub struct TrainingReport {
 /// Orders of a model, compared on the same rows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OrderTable {
-    /// The figure that chose: `AICc`.
-    pub by: String,
+    /// The figure that chose.
+    pub by: OrderFigure,
     /// The rows on which each was fitted.
     pub rows: usize,
     /// Which one was chosen.
     pub chosen: usize,
     /// All of them.
     pub tried: Vec<TriedOrder>,
+}
+
+/// A figure by which orders are compared; the smallest is the best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum OrderFigure {
+    /// Akaike's information criterion.
+    #[serde(rename = "AIC")]
+    Aic,
+    /// The same, corrected for few rows.
+    #[default]
+    #[serde(rename = "AICc")]
+    Aicc,
+    /// The Bayesian information criterion.
+    #[serde(rename = "BIC")]
+    Bic,
+    /// The final prediction error.
+    #[serde(rename = "FPE")]
+    Fpe,
+}
+
+impl std::fmt::Display for OrderFigure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Aic => "AIC",
+            Self::Aicc => "AICc",
+            Self::Bic => "BIC",
+            Self::Fpe => "FPE",
+        })
+    }
+}
+
+impl OrderTable {
+    /// The orders by their places in [`tried`](Self::tried): the chosen one, then the others from the best to the worst.
+    #[must_use]
+    pub fn ranked(&self) -> Vec<usize> {
+        let mut ranked: Vec<usize> = (0..self.tried.len()).collect();
+        ranked.sort_by(|&a, &b| {
+            let chosen = (b == self.chosen).cmp(&(a == self.chosen));
+            let figure = |nth: usize| self.tried[nth].figure(self.by);
+            chosen.then(figure(a).total_cmp(&figure(b)))
+        });
+        ranked
+    }
+}
+
+impl TriedOrder {
+    /// What it is worth by one of the figures.
+    #[must_use]
+    pub fn figure(&self, by: OrderFigure) -> f64 {
+        match by {
+            OrderFigure::Aic => self.aic,
+            OrderFigure::Aicc => self.aicc,
+            OrderFigure::Bic => self.bic,
+            OrderFigure::Fpe => self.fpe,
+        }
+    }
 }
 
 /// An order of a model, and what it is worth: small is good.

@@ -26,8 +26,9 @@ pub use combiner::{Combine, Combiner, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, OrderTable, Predictor, Regressor, Regressors, SelectionStep,
-    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
+    CandidateScore, Estimator, OrderFigure, OrderTable, Predictor, Regressor, Regressors,
+    SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder,
+    TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use forms::Forms;

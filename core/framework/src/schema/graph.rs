@@ -126,7 +126,8 @@ pub fn graph_schema() -> Value {
             "runtime": {
                 "description": "How the graph runs live.",
                 "type": "object",
-                "properties": { "heartbeat": described(&duration, "The time between two empty ticks, so that silence is noticed.") }
+                "properties": { "heartbeat": described(&duration, "The time between two empty ticks, so that silence is noticed.") },
+                "additionalProperties": false
             },
             "model": { "description": "The fitted model that runs, relative to this file.", "type": "string" }
         },

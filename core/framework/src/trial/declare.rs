@@ -11,7 +11,7 @@ use super::problem::TrialProblem;
 use super::series::{Series, Synthetic};
 use super::shape;
 use super::table::SimulationTable;
-use crate::compile::{CompileProblem, Part, Plan, PlannedRole, Reference};
+use crate::compile::{CompileProblem, Part, Plan, PlannedRole, Reference, SourceChannel};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{
     Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode, is_misspelt,
@@ -305,7 +305,13 @@ impl Declaring<'_> {
         let channels = machine.channels();
         let measures = |name: &str| channels.iter().find(|channel| channel.reference() == name);
         let needed = plan.sources.iter().filter(|source| !source.optional);
+        // A signal with mistakes may be optional.
+        let sure = |source: &&SourceChannel| {
+            let signal = Reference::parse(&source.name).node;
+            !self.part.is_some_and(|part| part.is_broken(signal))
+        };
         let missing: Vec<String> = needed
+            .filter(sure)
             .filter(|source| measures(&source.name).is_none())
             .map(|source| source.name.clone())
             .collect();

@@ -110,6 +110,20 @@ impl Problem for TrialProblem {
         }
     }
 
+    fn may_follow_from_a_gap(&self) -> bool {
+        !matches!(
+            self,
+            Self::TwoData { .. }
+                | Self::DuplicateName { .. }
+                | Self::UnknownMachine { .. }
+                | Self::MachineTwice { .. }
+                | Self::ScheduleUnreadable { .. }
+                | Self::Schedule(_)
+                | Self::Keys { excluded: true, .. }
+                | Self::Range { .. }
+        )
+    }
+
     fn message(&self) -> String {
         match self {
             Self::NoData => "the test has nothing to run over".to_owned(),

@@ -189,7 +189,8 @@ impl Noises {
                 let message = "a level with a trend does not return to a mean";
                 mistakes.push(
                     Mistake::at("noises.returns", message)
-                        .help("leave `returns` out, or say `trend = false`"),
+                        .help("leave `returns` out, or say `trend = false`")
+                        .rests_on("trend"),
                 );
             }
         }
@@ -199,11 +200,13 @@ impl Noises {
                     "noises",
                     "the level has a trend, and `noises` lacks `trend`",
                 )
-                .help("0 of the unit of the level is a trend that stays as it is"),
+                .help("0 of the unit of the level is a trend that stays as it is")
+                .rests_on("trend"),
             ),
             (Some(_), false) => mistakes.push(
                 Mistake::at("noises.trend", "the level has no trend that could wander")
-                    .help("say `trend = true` beside `noises`"),
+                    .help("say `trend = true` beside `noises`")
+                    .rests_on("trend"),
             ),
             _ => {}
         }

@@ -1,6 +1,8 @@
 //! From the merged tree to declarations: which sections there are and in which order they are read; each section has a file of its own.
 
+mod deployment;
 mod each;
+mod misspelt;
 mod modules;
 mod names;
 mod nodes;
@@ -11,8 +13,6 @@ mod sets;
 mod signals;
 mod time_base;
 
-use indexmap::IndexMap;
-
 use super::graph_file::GraphFile;
 use super::problem::DocumentProblem;
 use super::read::Document;
@@ -22,7 +22,7 @@ use reading::text;
 pub(crate) use reading::{is_misspelt, known_keys};
 pub(crate) use time_base::UNITS as TIME_UNITS;
 
-const SECTIONS: [&str; 14] = [
+const SECTIONS: [&str; 15] = [
     "schema",
     "name",
     "description",
@@ -34,13 +34,11 @@ const SECTIONS: [&str; 14] = [
     "nodes",
     "outputs",
     "tests",
-    "source",
-    "sinks",
-    "runtime",
+    deployment::SOURCE,
+    deployment::SINKS,
+    deployment::RUNTIME,
+    deployment::MODEL,
 ];
-const MODEL: &str = "model";
-/// Sections that only a running machine needs; they are handed on as they stand.
-const DEPLOYMENT: [&str; 4] = ["source", "sinks", "runtime", MODEL];
 
 /// Sections that say which names there are.
 const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
@@ -48,7 +46,10 @@ const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
 /// Checks names, expands sets and `each`, and gives what the file declares. All mistakes are reported; `None` where they leave open
 /// which names there are.
 pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
-    let tree = document.tree;
+    let Document { mut tree, gaps, .. } = document;
+    if let Data::Table(root) = &mut tree.data {
+        misspelt::right_inputs(root, diagnostics);
+    }
     let Data::Table(root) = &tree.data else {
         let expected = "a table".to_owned();
         diagnostics.report(
@@ -62,14 +63,14 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         );
         return None;
     };
-    let known: Vec<&str> = SECTIONS.into_iter().chain([MODEL]).collect();
-    known_keys(root, &known, "a graph file", diagnostics);
+    known_keys(root, &SECTIONS, "a graph file", diagnostics);
     let name = text_of(root, "name", diagnostics);
     let description = text_of(root, "description", diagnostics);
     // Whoever refers to what stands in a section that is none has been told of the section.
-    let strange = root.iter().filter(|(key, _)| !known.contains(key));
+    let strange = root.iter().filter(|(key, _)| !SECTIONS.contains(key));
     let below = strange.filter_map(|(_, section)| section.value.as_table());
-    let elsewhere: Vec<String> = below.flat_map(Table::keys).map(str::to_owned).collect();
+    let elsewhere = below.flat_map(Table::keys).map(str::to_owned);
+    let elsewhere: Vec<String> = elsewhere.chain(gaps.names.iter().cloned()).collect();
     let mut broken = Vec::new();
     let shared = names::check(root, &mut broken, diagnostics);
     let sets = sets::declare(root.get("sets"), &elsewhere, diagnostics);
@@ -82,6 +83,13 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
     signals.retain(|signal| !shared.contains(&signal.name));
     nodes.retain(|node| !shared.contains(&node.name));
     broken.extend(shared);
+    // Of what has gaps, its own mistakes are told, and nothing of those who read it.
+    let gapped = signals.iter().map(|signal| &signal.name);
+    broken.extend(gapped.filter(|name| gaps.concern(name)).cloned());
+    for node in nodes.iter_mut().filter(|node| gaps.concern(&node.name)) {
+        node.faulty.get_or_insert_default();
+        broken.push(node.name.clone());
+    }
     let outputs = outputs::declare(expanded.outputs.as_ref(), diagnostics);
     let mut tests = expanded.tests;
     if let Some(tests) = &mut tests {
@@ -101,10 +109,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
             },
         );
     }
-    let deployment: IndexMap<_, _> = DEPLOYMENT
-        .iter()
-        .filter_map(|key| Some(((*key).to_owned(), root.get(key)?.clone())))
-        .collect();
+    let deployment = deployment::declare(root, sample, diagnostics);
     let mut naming = NAMING.iter().filter_map(|section| root.get(section));
     let whole = naming.all(|section| section.as_table().is_some());
     if expanded.cut || !whole {

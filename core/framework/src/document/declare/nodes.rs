@@ -14,7 +14,7 @@ use crate::document::tree::{Data, Entry, Table, Value};
 use crate::time::Duration;
 
 /// Keys that the framework reads; all others are the node's own.
-const OWN_KEYS: [&str; 3] = ["type", "each", "inputs"];
+pub(super) const OWN_KEYS: [&str; 3] = ["type", "each", "inputs"];
 
 pub(super) fn declare(
     expanded: &Expanded,
@@ -209,6 +209,7 @@ impl Named<'_> {
                         name: name.to_owned(),
                         known: self.known(),
                         what: self.what.to_owned(),
+                        instead: None,
                     };
                     // Around a module it may have been told already.
                     diagnostics.report_unless_told(value.place, problem);

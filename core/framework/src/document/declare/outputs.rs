@@ -48,6 +48,7 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
                 name: placeholder.to_owned(),
                 known: Vec::new(),
                 what: what.clone(),
+                instead: Some(for_all_members(text)),
             };
             diagnostics.report(*place, problem);
         }
@@ -58,4 +59,19 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
         from,
         blend,
     })
+}
+
+/// A reference to one member, as one to all of them: `watch:reason.{axis}` is `watch:reason`.
+fn for_all_members(text: &str) -> String {
+    let open: Vec<String> = placeholder::names(text)
+        .map(|name| format!("{{{name}}}"))
+        .collect();
+    let mut all = text.to_owned();
+    for placeholder in open {
+        all = match all.strip_suffix(&placeholder) {
+            Some(before) if before.ends_with('.') => before.trim_end_matches('.').to_owned(),
+            _ => all.replace(&placeholder, "*"),
+        };
+    }
+    all
 }

@@ -175,6 +175,7 @@ fn column(
                     name: name.to_owned(),
                     known,
                     what,
+                    instead: None,
                 },
             );
         }

@@ -379,7 +379,7 @@ impl Expansion<'_> {
         let mut whole = true;
         let mut inputs = IndexMap::new();
         let empty = Table::new();
-        let wired = match keys.get("inputs") {
+        let wired = match meant(keys, "inputs", &known) {
             Some(value) => table(value, "inputs", self.diagnostics)?,
             None => &empty,
         };
@@ -447,6 +447,7 @@ impl Expansion<'_> {
                         name: name.to_owned(),
                         known: within.each.clone(),
                         what: what.to_owned(),
+                        instead: None,
                     };
                     self.diagnostics.report(place, problem);
                 }

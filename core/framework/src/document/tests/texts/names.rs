@@ -212,6 +212,7 @@ fn an_output_has_no_placeholders() {
 axis = ["X", "Y"]
 [outputs]
 x = "n.{axis}"
+y = "n:reason.{axis}/value"
 "#,
     )];
     assert_eq!(
@@ -223,7 +224,15 @@ error[A014]: "{axis}" stands for nothing in output "x"
 5 | x = "n.{axis}"
   |     ^^^^^^^^^^ stands for nothing
   |
-  = help: only a node with `each` has members to stand for
+  = help: here a reference stands for all members: write "n"
+
+error[A014]: "{axis}" stands for nothing in output "y"
+ --> a.toml:6:5
+  |
+6 | y = "n:reason.{axis}/value"
+  |     ^^^^^^^^^^^^^^^^^^^^^^^ stands for nothing
+  |
+  = help: here a reference stands for all members: write "n:reason.*/value"
 "#
     );
 }

@@ -1,0 +1,363 @@
+//! How each mistake in reading a graph file is told; which there are stands above.
+
+use std::fmt::Write;
+
+use super::DocumentProblem;
+use crate::diagnostic::{Place, Problem, nearest};
+use crate::document::lacks::Lacks;
+use crate::quantity::QuantityError;
+
+/// At most twelve names in quotes, for a list of what there is.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 12;
+    let mut text = String::new();
+    for (index, name) in names.iter().take(SHOWN).enumerate() {
+        let _ = write!(text, "{}\"{name}\"", if index == 0 { "" } else { ", " });
+    }
+    if names.len() > SHOWN {
+        let _ = write!(text, " and {} more", names.len() - SHOWN);
+    }
+    text
+}
+
+/// "did you mean" or a list of what there is.
+fn suggestion(name: &str, known: &[String], there_are: &str) -> Option<String> {
+    match nearest(name, known.iter().map(String::as_str)) {
+        Some(near) => Some(format!("did you mean \"{near}\"?")),
+        None if known.is_empty() => None,
+        None if known.len() == 1 => Some(format!("there is only {}", listed(known))),
+        None => Some(format!("{there_are} {}", listed(known))),
+    }
+}
+
+fn for_key(key: Option<&String>) -> String {
+    key.map_or_else(String::new, |key| format!(" for \"{key}\""))
+}
+
+impl Problem for DocumentProblem {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Syntax { .. } => "A001",
+            Self::Unreadable { .. } => "A002",
+            Self::TooLarge { .. } | Self::TooDeep { .. } | Self::LongChain { .. } => "A003",
+            Self::SchemaMissing | Self::SchemaUnknown { .. } => "A004",
+            Self::ExtendsLoop { .. } => "A005",
+            Self::UnknownKey { .. } => "A006",
+            Self::MissingKey { .. } => "A007",
+            Self::WrongType { .. } => "A008",
+            Self::UnknownChoice { .. } => "A009",
+            Self::Refused { .. }
+            | Self::NumberTooLarge { .. }
+            | Self::NoLength { .. }
+            | Self::StepNotPositive => "A010",
+            Self::BadName { .. } => "A011",
+            Self::DuplicateName { .. } => "A012",
+            Self::UnknownSet { .. } => "A013",
+            Self::UnknownPlaceholder { .. } => "A014",
+            Self::EmptyList { .. } => "A015",
+            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => "A016",
+            Self::Unit(_) => "A017",
+            Self::Duration(_) | Self::Quantity(_) => "A018",
+            Self::NothingToRemove { .. } => "A019",
+            Self::SamplesWithoutClock { .. } => "A020",
+            Self::OneColumn { .. } => "A021",
+            Self::RangeUnit { .. } | Self::RangeOrder { .. } => "A022",
+            Self::UnknownChannel { .. } => "A023",
+            Self::TimeContradiction { .. } => "A024",
+            Self::UnknownModule { .. } => "A025",
+            Self::ModuleLoop { .. } => "A026",
+            Self::OutOfReach { .. } => "A027",
+            Self::UnknownOutput { .. } => "A028",
+        }
+    }
+
+    fn message(&self) -> String {
+        match self {
+            Self::Syntax { reason, .. } => format!("this is not TOML: {reason}"),
+            Self::Unreadable { path, reason } => format!("cannot read \"{path}\": {reason}"),
+            Self::TooLarge { limit } => format!("the file is larger than {} MB", limit / 1_000_000),
+            Self::TooDeep { limit } => format!("keys are nested more than {limit} deep"),
+            Self::LongChain { limit } => format!("more than {limit} files extend one another"),
+            Self::ExtendsLoop { chain } => format!(
+                "`extends` comes back to its own file: {}",
+                chain.join(" → ")
+            ),
+            Self::SchemaMissing => "the file does not say which schema it follows".to_owned(),
+            Self::SchemaUnknown { found } => format!("the schema is 1, found {found}"),
+            Self::UnknownKey { key, what, .. } => format!("{what} has no key \"{key}\""),
+            Self::MissingKey { key, what, .. } => format!("{what} needs the key \"{key}\""),
+            Self::WrongType {
+                key,
+                expected,
+                found,
+                ..
+            } => format!(
+                "expected {expected}{}, found {found}",
+                for_key(key.as_ref())
+            ),
+            Self::UnknownChoice { key, found, .. } => {
+                format!("\"{found}\" is not a choice{}", for_key(key.as_ref()))
+            }
+            Self::Refused {
+                key: Some(key),
+                reason,
+            } => format!("\"{key}\" is refused: {reason}"),
+            Self::Refused { key: None, reason } => reason.clone(),
+            Self::NumberTooLarge { number } => format!("the number {number} is too large"),
+            Self::BadName { role, name, .. } => {
+                format!("\"{name}\" cannot be the name of a {role}")
+            }
+            Self::DuplicateName {
+                role,
+                name,
+                first_role,
+                ..
+            } => {
+                let article = if role == first_role { "another" } else { "a" };
+                format!("the {role} \"{name}\" has the name of {article} {first_role}")
+            }
+            Self::UnknownSet { name, .. } => format!("there is no set \"{name}\""),
+            Self::UnknownPlaceholder { name, what, .. } => {
+                format!("\"{{{name}}}\" stands for nothing in {what}")
+            }
+            Self::EmptyList { what } => format!("{what} has no entries"),
+            Self::TooManyInstances {
+                node,
+                instances,
+                limit,
+            } => {
+                format!(
+                    "with node \"{node}\" the graph has {instances} instances, more than {limit}"
+                )
+            }
+            Self::TooLargeExpanded { node, limit } => {
+                format!("with node \"{node}\" the expanded graph has more than {limit} values")
+            }
+            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error.reason(),
+            Self::Duration(error) => error.to_string(),
+            Self::Quantity(error) => error.to_string(),
+            Self::NothingToRemove { node, .. } => {
+                format!("there is no inherited node \"{node}\" to remove")
+            }
+            Self::SamplesWithoutClock { text } => {
+                format!("\"{text}\" counts samples, and the time of this graph does not")
+            }
+            Self::OneColumn { pattern, channels } => {
+                format!("{channels} channels would all be read from the column \"{pattern}\"")
+            }
+            Self::RangeUnit { found, unit } => format!(
+                "the range is in \"{found}\", which does not convert to the signal's unit \"{unit}\""
+            ),
+            Self::RangeOrder { low, high, unit } => {
+                format!("the range from {low} {unit} to {high} {unit} contains nothing")
+            }
+            Self::UnknownChannel { name, signal, .. } => {
+                format!("signal \"{signal}\" has no channel \"{name}\"")
+            }
+            Self::TimeContradiction { key, with } => format!("`{key}` has no meaning with {with}"),
+            Self::NoLength { key } => format!("`{key}` must be longer than 0"),
+            Self::StepNotPositive => {
+                "the step from one sample to the next is longer than 0".to_owned()
+            }
+            Self::UnknownModule { name, .. } => format!("there is no module \"{name}\""),
+            Self::ModuleLoop { path, limit } => {
+                let (last, before) = path.split_last().map_or(("", &[][..]), |(l, b)| (l, b));
+                if before.iter().any(|name| name == last) {
+                    format!("a module is part of itself: {}", path.join(" → "))
+                } else {
+                    format!("modules are nested more than {limit} deep")
+                }
+            }
+            Self::OutOfReach { name, module, .. } => {
+                format!("\"{name}\" is not a node of module \"{module}\"")
+            }
+            Self::UnknownOutput { output, module, .. } if output.is_empty() => {
+                format!("module \"{module}\" has no outputs")
+            }
+            Self::UnknownOutput {
+                node,
+                output,
+                module,
+                ..
+            } => format!(
+                "\"{node}\" has no output \"{output}\": it is an instance of module \"{module}\""
+            ),
+        }
+    }
+
+    fn label(&self) -> String {
+        match self {
+            Self::Syntax { .. } => "here".to_owned(),
+            Self::Unreadable { .. } => "named here".to_owned(),
+            Self::ExtendsLoop { .. } | Self::LongChain { .. } => "extends this file".to_owned(),
+            Self::SchemaMissing => "`schema = 1` is missing".to_owned(),
+            Self::SchemaUnknown { .. } => "not 1".to_owned(),
+            Self::UnknownKey { .. } => "unknown key".to_owned(),
+            Self::MissingKey { key, .. } => format!("\"{key}\" is missing"),
+            Self::WrongType { expected, .. } => format!("expected {expected}"),
+            Self::UnknownChoice { .. } => "not a choice".to_owned(),
+            Self::Refused { .. } => "refused".to_owned(),
+            Self::BadName { .. } => "not a name".to_owned(),
+            Self::DuplicateName { .. } => "this name is taken".to_owned(),
+            Self::UnknownSet { .. } => "not a set".to_owned(),
+            Self::UnknownPlaceholder { .. } => "stands for nothing".to_owned(),
+            Self::EmptyList { .. } => "empty".to_owned(),
+            Self::Unit(_) => "not a unit".to_owned(),
+            Self::Duration(_) => "not a duration".to_owned(),
+            Self::Quantity(QuantityError::Unit(_)) => "the unit is not known".to_owned(),
+            Self::Quantity(_) => "not a quantity".to_owned(),
+            Self::UnknownChannel { .. } => "not a channel".to_owned(),
+            Self::RangeUnit { unit, .. } => format!("does not convert to {unit}"),
+            Self::UnknownModule { .. } => "not a module".to_owned(),
+            Self::ModuleLoop { .. } => "comes back here".to_owned(),
+            Self::OutOfReach { .. } => "out of the module's reach".to_owned(),
+            Self::UnknownOutput { .. } => "no such output".to_owned(),
+            _ => String::new(),
+        }
+    }
+
+    fn help(&self) -> Option<String> {
+        match self {
+            Self::SchemaMissing | Self::SchemaUnknown { .. } => {
+                Some("begin the file with `schema = 1`".to_owned())
+            }
+            Self::Syntax { bare, .. } => {
+                bare.as_ref()
+                    .map(|bare| match bare.to_ascii_lowercase().as_str() {
+                        truth @ ("true" | "false") => format!("write {truth} in small letters"),
+                        _ => format!("a text stands in quotes: \"{bare}\""),
+                    })
+            }
+            Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
+            Self::MissingKey { advice, .. } => advice.clone(),
+            Self::WrongType { lacks, .. } => lacks.as_ref().map(Lacks::help),
+            Self::UnknownChoice { found, choices, .. } => {
+                suggestion(found, choices, "the choices are")
+            }
+            Self::BadName {
+                digit_first: false, ..
+            } => Some("a name begins with a letter, then letters, digits, `_` and `-`".to_owned()),
+            Self::BadName {
+                digit_first: true, ..
+            } => Some(
+                "a name begins with a letter or digit, then letters, digits, `_` and `-`"
+                    .to_owned(),
+            ),
+            Self::DuplicateName {
+                role: "parameter",
+                first_role,
+                ..
+            } if *first_role != "parameter" => {
+                Some("give the parameter a name that nothing else has".to_owned())
+            }
+            Self::DuplicateName {
+                role, first_role, ..
+            } if role != first_role => {
+                Some("nodes, sets and signals share one name space".to_owned())
+            }
+            Self::UnknownSet { name, known, or } => {
+                let help = suggestion(name, known, "the sets are");
+                let help = help.unwrap_or_else(|| "declare it under `[sets]`".to_owned());
+                let or = or.as_ref().filter(|_| !help.ends_with('?'));
+                Some(or.map_or(help.clone(), |or| format!("{help}, or {or}")))
+            }
+            Self::UnknownPlaceholder {
+                instead: Some(instead),
+                ..
+            } => Some(format!(
+                "here a reference stands for all members: write \"{instead}\""
+            )),
+            Self::UnknownPlaceholder { name, known, .. } => {
+                match nearest(name, known.iter().map(String::as_str)) {
+                    Some(near) => Some(format!("did you mean \"{{{near}}}\"?")),
+                    None if known.is_empty() => {
+                        Some("only a node with `each` has members to stand for".to_owned())
+                    }
+                    None => Some(format!(
+                        "it may be {}",
+                        known
+                            .iter()
+                            .map(|name| format!("\"{{{name}}}\""))
+                            .collect::<Vec<_>>()
+                            .join(", ")
+                    )),
+                }
+            }
+            Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => {
+                Some("use fewer members, or split the graph into several".to_owned())
+            }
+            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error
+                .advice()
+                .map(|advice| format!("write the unit as \"{advice}\"")),
+            Self::NothingToRemove { node, inherited } => {
+                suggestion(node, inherited, "the inherited nodes are")
+                    .or_else(|| Some("leave it out; nothing is inherited here".to_owned()))
+            }
+            Self::SamplesWithoutClock { .. } => Some(
+                "write a duration like \"5min\", or count samples: `[time] unit = \"sample\"`"
+                    .to_owned(),
+            ),
+            Self::OneColumn { .. } => Some("put `{channel}` into the pattern".to_owned()),
+            Self::RangeUnit { unit, .. } => Some(match unit.as_str() {
+                "C" => "degrees Celsius are \"Cel\"; \"C\" is the coulomb".to_owned(),
+                "F" => "degrees Fahrenheit are \"[degF]\"; \"F\" is the farad".to_owned(),
+                _ => format!("write it in {unit}, or correct the signal's unit"),
+            }),
+            Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
+            Self::UnknownChannel { name, known, .. } => suggestion(name, known, "its channels are"),
+            Self::EmptyList { .. } => Some("name at least one".to_owned()),
+            Self::TimeContradiction { key, .. } => {
+                Some(format!("leave out `{key}`, or write `unit = \"sample\"`"))
+            }
+            Self::ExtendsLoop { .. } => {
+                Some("one of these files must extend none of the others".to_owned())
+            }
+            Self::UnknownModule { name, known } => suggestion(name, known, "the modules are")
+                .or_else(|| Some(format!("describe it under `[modules.{name}]`"))),
+            Self::ModuleLoop { .. } => Some("take one of the modules apart".to_owned()),
+            Self::OutOfReach { name, known, .. } => {
+                let near = nearest(name, known.iter().map(String::as_str));
+                Some(match near {
+                    Some(near) => format!("did you mean \"{near}\"?"),
+                    None => format!(
+                        "name it under the module's `inputs`; there it has {}",
+                        listed(known)
+                    ),
+                })
+            }
+            Self::UnknownOutput { output, known, .. } => {
+                suggestion(output, known, "its outputs are").or_else(|| {
+                    Some("say which, e.g. `outputs = { predicted = \"vote\" }`".to_owned())
+                })
+            }
+            _ => None,
+        }
+    }
+
+    fn may_follow_from_a_gap(&self) -> bool {
+        matches!(
+            self,
+            Self::MissingKey { .. }
+                | Self::UnknownSet { .. }
+                // In an output none has a meaning.
+                | Self::UnknownPlaceholder { instead: None, .. }
+                | Self::NothingToRemove { .. }
+                | Self::SamplesWithoutClock { .. }
+                | Self::UnknownChannel { .. }
+                | Self::UnknownModule { .. }
+                | Self::OutOfReach { .. }
+                | Self::UnknownOutput { .. }
+        )
+    }
+
+    fn related(&self) -> Vec<(Place, String)> {
+        match self {
+            Self::DuplicateName {
+                first: Some(place),
+                first_role,
+                ..
+            } => vec![(*place, format!("the {first_role} is here"))],
+            _ => Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Who has fitted or scored is told what to type next, with the names as they were given; programs and the quiet are not.
+
+use crate::workbench::{Scratch, athermal};
+
+#[test]
+fn a_fit_leads_to_a_score_and_a_score_to_a_diagnosis() {
+    let scratch = Scratch::new("command-line-next");
+    let graph = concat!(env!("CARGO_MANIFEST_DIR"), "/graphs/die-tester.toml");
+    let (data, model) = (scratch.path("my data.csv"), scratch.path("model.json"));
+    athermal(&[&"simulate", &"die-tester", &"--days", &"0.5", &"-o", &data]).ended(0);
+    let fit = [
+        &"fit" as &dyn AsRef<std::ffi::OsStr>,
+        &graph,
+        &"--data",
+        &data,
+        &"-o",
+        &model,
+    ];
+    let (model_name, data_name) = (model.display(), data.display());
+    let flat = |told: &str| told.replace(" \\\n      ", " ");
+    let told = flat(&athermal(&fit).ended(0).told);
+    let next = format!("athermal evaluate {model_name} --data OTHER.csv\n");
+    assert!(told.contains("next: ") && told.ends_with(&next), "{told}");
+    let evaluate = [
+        &"evaluate" as &dyn AsRef<std::ffi::OsStr>,
+        &model,
+        &"--lenient",
+        &"--data",
+        &data,
+    ];
+    let told = flat(&athermal(&evaluate).ended(0).told);
+    let next = format!("athermal diagnose {model_name} --lenient --data '{data_name}'\n");
+    assert!(told.contains("next: ") && told.ends_with(&next), "{told}");
+    for command in [&fit[..], &evaluate] {
+        for more in [&["--format", "json"][..], &["--quiet"]] {
+            let more = more.iter().map(|word| word as &dyn AsRef<std::ffi::OsStr>);
+            let words: Vec<_> = command.iter().copied().chain(more).collect();
+            let silent = athermal(&words).ended(0);
+            assert!(!silent.told.contains("next:"), "{}", silent.told);
+            assert!(!silent.out.contains("next:"), "{}", silent.out);
+        }
+    }
+}
+
+#[test]
+fn a_fit_that_predicts_nothing_leads_to_a_run() {
+    let scratch = Scratch::new("command-line-next-run");
+    let text = "schema = 1\n[signals.position]\nunit = \"nm\"\nchannels = [\"X1\"]\ncolumn = \"{channel}_nm\"\nmax_age = \"3min\"\n\
+         [time]\ncolumn = \"time_s\"\n[nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"5min\"]\n\
+         [outputs]\ndrift = \"drift\"\n";
+    let (graph, data) = (scratch.file("plain.toml", text), scratch.path("data.csv"));
+    athermal(&[&"simulate", &"die-tester", &"--days", &"0.1", &"-o", &data]).ended(0);
+    let model = scratch.path("m.json");
+    let fit = athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(0);
+    let told = fit.told.replace(" \\\n      ", " ");
+    let next = format!("athermal run {} --input OTHER.csv\n", model.display());
+    assert!(told.ends_with(&next), "{told}");
+    assert!(
+        !athermal(&[&"evaluate", &model, &"--data", &data])
+            .ended(0)
+            .told
+            .contains("next:")
+    );
+}
