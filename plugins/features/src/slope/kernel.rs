@@ -349,15 +349,16 @@ impl RollingSlope {
     /// digits, and marks the channels with too few samples or too close together.
     #[cold]
     fn mend(&self, group: usize, slopes: &mut [Lanes]) {
+        let groups = self.blocks.groups(group);
         let windows = self.windows.iter().zip(slopes);
         for (window, slopes) in windows.filter(|(window, _)| window.kind == Kind::Gaps) {
-            let moments = window.parts.moments(self.blocks.groups(group));
+            let (n, thin) = window.parts.samples_and_thin(groups);
             for (i, slope) in slopes.iter_mut().enumerate() {
-                if moments.thin(i) {
+                if thin[i] {
                     *slope = self.line(window, LANES * group + i).slope();
                 }
             }
-            self.mark_absent(window, group, &moments.n, slopes);
+            self.mark_absent(window, group, &n, slopes);
         }
     }
 

@@ -142,6 +142,15 @@ impl Parts {
         rest.plus(now).plus(&head.shifted(self.by))
     }
 
+    /// How many samples there are of channels that may be absent from some rows, and whether so many digits were lost that the sums
+    /// must be computed from them.
+    #[inline(always)]
+    pub(super) fn samples_and_thin(&self, groups: [&Group; 3]) -> (Lanes, [bool; LANES]) {
+        let Times { n, t, tt } = self.times_with_gaps(groups);
+        let thin = from_fn(|i| n[i] * tt[i] - t[i] * t[i] < THIN * (n[i] * tt[i]));
+        (n, thin)
+    }
+
     /// Sums of channels that may be absent from some rows.
     pub(super) fn moments(&self, groups: [&Group; 3]) -> Moments {
         self.moments_with(groups, &self.times_with_gaps(groups))

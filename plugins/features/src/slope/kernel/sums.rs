@@ -129,6 +129,7 @@ impl Common {
     /// Adds a row, and says how long after the origin it is.
     #[inline(always)]
     fn add_time(&mut self, t_ns: i64) -> f64 {
+        // Rows too far apart for a difference are in no window together, and sums over them are of no use.
         let t = t_ns.wrapping_sub(self.origin) as f64;
         self.rows = self.rows.plus(&Times {
             n: [1.0],
