@@ -17,9 +17,10 @@ pub(crate) const ROUNDING_SHARE: f64 = 1e-12;
 /// first panel, since the last ones would waste most of a vector on it.
 const PANEL_COLUMNS: usize = 8;
 
-/// Rows are centred and multiplied so many at a time: with 64 regressors they stay in the first-level cache (measured: 22 µs for
-/// 256 rows instead of 26).
+/// Rows are centred and multiplied so many at a time, or more while they have no more than so many values: so they stay in the
+/// first-level cache (measured with 65 columns: 22 µs for 256 rows instead of 26).
 const BATCH_ROWS: usize = 64;
+const BATCH_VALUES: usize = 64 * 65;
 
 /// Centred sums over rows of regressors `x` (width `p`) and a target `y`, which is kept as column `p`.
 ///
@@ -129,7 +130,8 @@ impl Gram {
             self.shift = rows[..order].to_vec();
         }
         self.count += count as u64;
-        for (batch, rows) in rows.chunks(BATCH_ROWS * order).enumerate() {
+        let batch_rows = (BATCH_VALUES / order).max(BATCH_ROWS);
+        for (batch, rows) in rows.chunks(batch_rows * order).enumerate() {
             if scratch.len() < rows.len() {
                 scratch.resize(rows.len(), 0.0);
             }
@@ -140,7 +142,7 @@ impl Gram {
                     self.weight += (rows.len() / order) as f64;
                 }
                 Some(weights) => {
-                    self.centre_weighted(rows, &weights[batch * BATCH_ROWS..], centred);
+                    self.centre_weighted(rows, &weights[batch * batch_rows..], centred);
                 }
             }
             self.add_products(centred);
