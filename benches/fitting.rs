@@ -92,7 +92,7 @@ fn least_squares_from_rows(bencher: Bencher) {
     });
     let columns: Vec<_> = (0..CANDIDATES).collect();
     bencher.bench_local(|| {
-        let mut blocks = GramBlocks::new(CANDIDATES);
+        let mut blocks = GramBlocks::new(CANDIDATES).expecting(ROWS as u64);
         for row in rows.chunks_exact(CANDIDATES + 1) {
             blocks.push(&row[..CANDIDATES], row[CANDIDATES]);
         }

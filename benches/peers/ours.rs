@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn blocks(rows: &[(&[f64], f64)], width: usize) -> GramBlocks {
-    let mut blocks = GramBlocks::new(width);
+    let mut blocks = GramBlocks::new(width).expecting(rows.len() as u64);
     for (x, y) in rows {
         blocks.push(x, *y);
     }

@@ -12,9 +12,15 @@ mod packed;
 /// A sum of squares below this share of the sum about the shift is rounding, not variance.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-12;
 
-/// The lower triangle is accumulated in panels of so many of its rows: faster than the triangular product, which splits
-/// into squares (measured with 64 columns, 256 rows: 26 against 36 µs).
-const PANEL_ROWS: usize = 8;
+/// The lower triangle is accumulated in panels of so many of its columns: faster than the triangular product, which splits
+/// into squares (measured with 65 columns, 256 rows: 13 against 18 µs; panels of rows take 17). What is left over makes the
+/// first panel, since the last ones would waste most of a vector on it.
+const PANEL_COLUMNS: usize = 8;
+
+/// Rows are centred and multiplied so many at a time, or more while they have no more than so many values: so they stay in the
+/// first-level cache (measured with 65 columns: 22 µs for 256 rows instead of 26).
+const BATCH_ROWS: usize = 64;
+const BATCH_VALUES: usize = 64 * 65;
 
 /// Centred sums over rows of regressors `x` (width `p`) and a target `y`, which is kept as column `p`.
 ///
@@ -115,53 +121,74 @@ impl Gram {
         let order = self.width + 1;
         assert_eq!(rows.len() % order, 0, "rows are whole");
         let count = rows.len() / order;
+        let weighed = weights.is_none_or(|weights| weights.len() == count);
+        assert!(weighed, "each row has a weight");
         if count == 0 {
             return;
         }
         if self.shift.is_empty() {
             self.shift = rows[..order].to_vec();
         }
-        if scratch.len() < rows.len() {
-            scratch.resize(rows.len(), 0.0);
-        }
-        let scratch = &mut scratch[..rows.len()];
-        match weights {
-            None => {
-                centre(rows, &self.shift, scratch, &mut self.sum);
-                self.weight += count as f64;
+        self.count += count as u64;
+        let batch_rows = (BATCH_VALUES / order).max(BATCH_ROWS);
+        for (batch, rows) in rows.chunks(batch_rows * order).enumerate() {
+            if scratch.len() < rows.len() {
+                scratch.resize(rows.len(), 0.0);
             }
-            Some(weights) => {
-                assert_eq!(weights.len(), count, "each row has a weight");
-                let lines = rows
-                    .chunks_exact(order)
-                    .zip(scratch.chunks_exact_mut(order));
-                for ((row, out), weight) in lines.zip(weights) {
-                    let root = weight.sqrt();
-                    let columns = row.iter().zip(&self.shift).zip(out).zip(&mut self.sum);
-                    for (((z, c), d), sum) in columns {
-                        *d = root * (z - c);
-                        *sum += root * *d;
-                    }
-                    self.weight += weight;
+            let centred = &mut scratch[..rows.len()];
+            match weights {
+                None => {
+                    centre(rows, &self.shift, centred, &mut self.sum);
+                    self.weight += (rows.len() / order) as f64;
+                }
+                Some(weights) => {
+                    self.centre_weighted(rows, &weights[batch * batch_rows..], centred);
                 }
             }
+            self.add_products(centred);
         }
-        self.count += count as u64;
-        let centred = MatRef::from_column_major_slice(scratch, order, count);
-        for start in (0..order).step_by(PANEL_ROWS) {
-            let end = order.min(start + PANEL_ROWS);
+    }
+
+    /// Writes `√v·(rows − shift)`, and adds to the sums.
+    fn centre_weighted(&mut self, rows: &[f64], weights: &[f64], centred: &mut [f64]) {
+        let order = self.width + 1;
+        let lines = rows
+            .chunks_exact(order)
+            .zip(centred.chunks_exact_mut(order));
+        for ((row, out), weight) in lines.zip(weights) {
+            let root = weight.sqrt();
+            let columns = row.iter().zip(&self.shift).zip(out).zip(&mut self.sum);
+            for (((z, c), d), sum) in columns {
+                *d = root * (z - c);
+                *sum += root * *d;
+            }
+            self.weight += weight;
+        }
+    }
+
+    /// Adds the products of centred rows with themselves.
+    fn add_products(&mut self, centred: &[f64]) {
+        let order = self.width + 1;
+        let centred = MatRef::from_column_major_slice(centred, order, centred.len() / order);
+        let mut start = 0;
+        while start < order {
+            let wide = match (order - start) % PANEL_COLUMNS {
+                0 => PANEL_COLUMNS,
+                left_over => left_over,
+            };
             let cross = MatMut::from_column_major_slice_mut(&mut self.cross, order, order);
             matmul(
-                cross.submatrix_mut(start, 0, end - start, end),
+                cross.submatrix_mut(start, start, order - start, wide),
                 Accum::Add,
-                centred.subrows(start, end - start),
-                centred.subrows(0, end).transpose(),
+                centred.subrows(start, order - start),
+                centred.subrows(start, wide).transpose(),
                 1.0,
                 Par::Seq,
             );
-            for j in start..end {
+            for j in start..start + wide {
                 self.cross[j * order + start..j * order + j].fill(0.0);
             }
+            start += wide;
         }
     }
 

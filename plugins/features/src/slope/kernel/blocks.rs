@@ -5,7 +5,7 @@ use std::array::from_fn;
 
 use super::parts::Parts;
 use super::rows::Rows;
-use super::sums::{Quad, Table, quads};
+use super::sums::{Group, LANES, Lanes, Table, group_count};
 
 /// Blocks that restored ones have room for, beside as many again.
 const SPARE_BLOCKS: usize = 16;
@@ -29,7 +29,7 @@ pub(super) struct Blocks {
     /// First rows of the blocks.
     starts: Vec<u64>,
     /// What is subtracted from the samples of each channel before they are summed.
-    origins: Vec<Quad>,
+    origins: Vec<Lanes>,
     /// Rows until these are chosen anew when a block closes, and rows still to come at which they are chosen anew at once.
     until_rebase: u64,
     settling: u64,
@@ -49,7 +49,7 @@ impl Blocks {
     pub(super) fn new(channels: usize, windows: usize, squares: bool) -> Blocks {
         Blocks {
             starts: vec![0],
-            origins: vec![[0.0; 4]; quads(channels)],
+            origins: vec![[0.0; LANES]; group_count(channels)],
             until_rebase: 0,
             settling: 0,
             tails: Table::new(channels, squares, 0),
@@ -62,7 +62,7 @@ impl Blocks {
     pub(super) fn reset(&mut self) {
         self.starts.clear();
         self.starts.push(0);
-        self.origins.fill([0.0; 4]);
+        self.origins.fill([0.0; LANES]);
         self.until_rebase = 0;
         self.settling = 0;
         self.gaps = false;
@@ -75,7 +75,7 @@ impl Blocks {
         &self.starts
     }
 
-    pub(super) fn origins(&self) -> &[Quad] {
+    pub(super) fn origins(&self) -> &[Lanes] {
         &self.origins
     }
 
@@ -169,7 +169,7 @@ impl Blocks {
                 self.now.clear(0, rows.time(row));
             }
             let (t_ns, samples) = (rows.time(row), rows.samples(row));
-            self.now.add_row([0, 0], t_ns, samples, &self.origins);
+            self.now.add_row(0, t_ns, samples, &self.origins);
         }
     }
 
@@ -182,7 +182,7 @@ impl Blocks {
         self.now.clear(slot, rows.time(first));
         for row in first..rows.next() {
             let (t_ns, samples) = (rows.time(row), rows.samples(row));
-            self.now.add_row([slot, slot], t_ns, samples, &self.origins);
+            self.now.add_row(slot, t_ns, samples, &self.origins);
         }
     }
 
@@ -226,16 +226,8 @@ impl Blocks {
 
     /// Newest row first: whatever an older row of the block holds is not in the sums of the later ones.
     fn sum_tails(&mut self, rows: &Rows, block: usize) {
-        let (first, last) = (self.starts[block], self.starts[block + 1] - 1);
-        self.tails.clear(rows.slot(last), rows.time(last));
-        let mut later = rows.slot(last);
-        for row in (first..=last).rev() {
-            let slot = rows.slot(row);
-            let (t_ns, samples) = (rows.time(row), rows.samples(row));
-            self.tails
-                .add_row([later, slot], t_ns, samples, &self.origins);
-            later = slot;
-        }
+        let numbers = self.starts[block]..self.starts[block + 1];
+        self.tails.sum_tails(rows, numbers, &self.origins);
     }
 
     fn sum_rest(&mut self, rows: &Rows, origin: i64) {
@@ -243,24 +235,21 @@ impl Blocks {
         if current >= self.rest.slots() {
             self.rest.resize((current + 1).next_power_of_two());
         }
-        self.rest.clear(current, origin);
-        for block in (0..current).rev() {
-            let slot = rows.slot(self.starts[block]);
-            self.rest.add_run([block + 1, block], &self.tails, slot);
-        }
+        let firsts = self.starts[..current].iter().map(|start| rows.slot(*start));
+        self.rest.sum_from_end(origin, &self.tails, firsts);
     }
 
     /// The origin of a channel is the median of its newest samples, up to five in the last block's worth of rows, so that it is near them and
     /// no spike.
     fn choose_origins(&mut self, rows: &Rows) {
         let oldest = self.oldest().max(rows.next().saturating_sub(MOST_ROWS));
-        for (quad, origins) in self.origins.iter_mut().enumerate() {
+        for (group, origins) in self.origins.iter_mut().enumerate() {
             *origins = from_fn(|i| {
                 let mut newest = [0.0; 5];
                 let mut found = 0;
                 let samples = (oldest..rows.next())
                     .rev()
-                    .map(|row| rows.samples(row)[quad][i]);
+                    .map(|row| rows.samples(row)[group][i]);
                 for (kept, y) in newest.iter_mut().zip(samples.filter(|y| !y.is_nan())) {
                     *kept = y;
                     found += 1;
@@ -278,23 +267,24 @@ impl Blocks {
     #[inline]
     pub(super) fn parts(&self, rows: &Rows, window: usize, head: u64, block: usize) -> Parts {
         let current = self.starts.len() - 1;
-        let slots = if block < current {
+        let places = if block < current {
             [rows.slot(head), block + 1, 0]
         } else {
             let whole = head > self.starts[current];
             [rows.capacity(), current, if whole { window + 1 } else { 0 }]
         };
-        let [head, rest, now] = slots;
+        let [head, rest, now] = places;
         let common = [
             &self.tails.common[head],
             &self.rest.common[rest],
             &self.now.common[now],
         ];
-        Parts::new(common, slots.map(|slot| slot * self.origins.len()))
+        Parts::new(common, places)
     }
 
-    /// The sums within closed blocks, over them and of the current one.
-    pub(super) fn tables(&self) -> [&Table; 3] {
-        [&self.tails, &self.rest, &self.now]
+    /// The sums of a group of channels within closed blocks, over them and of the current one.
+    #[inline]
+    pub(super) fn groups(&self, group: usize) -> [&Group; 3] {
+        [&self.tails, &self.rest, &self.now].map(|table| &table.groups[group])
     }
 }

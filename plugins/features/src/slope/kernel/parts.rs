@@ -2,9 +2,11 @@
 
 use std::array::from_fn;
 
-use super::sums::{Common, Quad, Table, Times, Values};
+use super::sums::{Common, Group, LANES, Lanes, Times, Values};
 
 const NS_PER_S: f64 = 1e9;
+
+const HALF: usize = LANES / 2;
 
 /// Where Σ(t − t̄)² is a smaller part of Σt² than this, the samples lie closer together than they lie to the origin of time,
 /// and too many digits are lost. Samples that span half of a window are above it up to thousands of samples.
@@ -16,7 +18,7 @@ const FLAT: f64 = 1e-6;
 /// The end of a closed block, the whole blocks after it and the current block: where their sums lie, and how they are weighed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
-    /// The first groups of the three runs in their tables.
+    /// The three runs in their tables.
     places: [usize; 3],
     /// What times are measured from.
     origin: i64,
@@ -61,82 +63,120 @@ impl Parts {
         }
     }
 
-    /// Rows in the window.
-    pub(super) fn rows(&self) -> f64 {
-        self.times.n[0]
+    /// Slopes per second of channels that are present in every row of the window.
+    #[inline(always)]
+    pub(super) fn slopes(&self, [head, rest, now]: [&[Values]; 3], slopes: &mut Lanes) {
+        let [h, r, w] = self.places;
+        self.slopes_of(&head[h], &rest[r], &now[w], slopes);
     }
 
-    /// Slopes per second of four channels that are present in every row of the window.
-    #[inline(always)]
-    pub(super) fn slopes(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Quad {
-        let head = &head.values[self.places[0] + quad];
-        let rest = &rest.values[self.places[1] + quad];
-        let now = &now.values[self.places[2] + quad];
-        from_fn(|i| {
+    /// Not inlined, so that the compiler keeps in mind how the sums are aligned.
+    #[inline(never)]
+    fn slopes_of(&self, head: &Values, rest: &Values, now: &Values, slopes: &mut Lanes) {
+        *slopes = from_fn(|i| {
             self.of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
                 - self.of_y * (rest.y[i] + now.y[i])
                 - self.of_head_y * head.y[i]
-        })
+        });
     }
 
-    /// Slopes per second of four channels that may be absent from some rows: for each the very operations of
+    /// Slopes per second of channels that may be absent from some rows: for each the very operations of
     /// [`slopes`](Self::slopes), so that a channel keeps its bits while another is absent.
+    /// What must not be too little is noted in `least`.
     #[inline(always)]
-    pub(super) fn slopes_with_gaps(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Quad {
-        let [h, r, w] = self.places.map(|place| place + quad);
-        let (h, r, w) = (&head.times[h], &rest.times[r], &now.times[w]);
-        let Times { n, t, tt } = r.plus(w).plus(&h.shifted(self.by));
-        let head = &head.values[self.places[0] + quad];
-        let rest = &rest.values[self.places[1] + quad];
-        let now = &now.values[self.places[2] + quad];
-        from_fn(|i| {
-            let scale = NS_PER_S / (n[i] * tt[i] - t[i] * t[i]);
+    pub(super) fn slopes_with_gaps(
+        &self,
+        [head, rest, now]: [&Group; 3],
+        slopes: &mut Lanes,
+        least: &mut Least,
+    ) {
+        let [h, r, w] = self.places;
+        let times = [&head.times[h], &rest.times[r], &now.times[w]];
+        let values = [&head.values[h], &rest.values[r], &now.values[w]];
+        // In halves, which fit into the registers.
+        for first in [0, HALF] {
+            self.half_with_gaps(first, values, times, slopes, least);
+        }
+    }
+
+    #[inline(always)]
+    fn half_with_gaps(
+        &self,
+        first: usize,
+        [head, rest, now]: [&Values; 3],
+        times: [&Times<LANES>; 3],
+        slopes: &mut Lanes,
+        least: &mut Least,
+    ) {
+        let half = |of: &Lanes| -> [f64; HALF] { from_fn(|i| of[first + i]) };
+        let [h, r, w] = times.map(|times| Times {
+            n: half(&times.n),
+            t: half(&times.t),
+            tt: half(&times.tt),
+        });
+        let Times { n, t, tt } = r.plus(&w).plus(&h.shifted(self.by));
+        let n_tt: [f64; HALF] = from_fn(|i| n[i] * tt[i]);
+        let n_sxx: [f64; HALF] = from_fn(|i| n_tt[i] - t[i] * t[i]);
+        for (i, lane) in (first..first + HALF).enumerate() {
+            least.n[lane] = lesser(least.n[lane], n[i]);
+        }
+        for (i, lane) in (first..first + HALF).enumerate() {
+            let above_thin = n_sxx[i] - THIN * n_tt[i];
+            least.above_thin[lane] = lesser(least.above_thin[lane], above_thin);
+        }
+        for (i, lane) in (first..first + HALF).enumerate() {
+            let scale = NS_PER_S / n_sxx[i];
             let (of_ty, of_y) = (n[i] * scale, t[i] * scale);
             let of_head_y = of_y - of_ty * self.by;
-            of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
-                - of_y * (rest.y[i] + now.y[i])
-                - of_head_y * head.y[i]
-        })
+            slopes[lane] = of_ty * (head.ty[lane] + (rest.ty[lane] + now.ty[lane]))
+                - of_y * (rest.y[lane] + now.y[lane])
+                - of_head_y * head.y[lane];
+        }
     }
 
-    /// Sums of four channels that may be absent from some rows.
     #[inline(always)]
-    pub(super) fn moments(&self, [head, rest, now]: [&Table; 3], quad: usize) -> Moments {
-        let places = self.places.map(|place| place + quad);
-        let (h, r, w) = (
-            &head.times[places[0]],
-            &rest.times[places[1]],
-            &now.times[places[2]],
-        );
-        let times = r.plus(w).plus(&h.shifted(self.by));
-        self.moments_with([head, rest, now], quad, &times)
+    fn times_with_gaps(&self, [head, rest, now]: [&Group; 3]) -> Times<LANES> {
+        let head = &head.times[self.places[0]];
+        let rest = &rest.times[self.places[1]];
+        let now = &now.times[self.places[2]];
+        rest.plus(now).plus(&head.shifted(self.by))
+    }
+
+    /// How many samples there are of channels that may be absent from some rows, and whether so many digits were lost that the sums
+    /// must be computed from them.
+    #[inline(always)]
+    pub(super) fn samples_and_thin(&self, groups: [&Group; 3]) -> (Lanes, [bool; LANES]) {
+        let Times { n, t, tt } = self.times_with_gaps(groups);
+        let thin = from_fn(|i| n[i] * tt[i] - t[i] * t[i] < THIN * (n[i] * tt[i]));
+        (n, thin)
+    }
+
+    /// Sums of channels that may be absent from some rows.
+    pub(super) fn moments(&self, groups: [&Group; 3]) -> Moments {
+        self.moments_with(groups, &self.times_with_gaps(groups))
     }
 
     /// The same of channels that are present in every row.
-    pub(super) fn moments_of_complete(&self, tables: [&Table; 3], quad: usize) -> Moments {
+    pub(super) fn moments_of_complete(&self, groups: [&Group; 3]) -> Moments {
         let Times { n, t, tt } = self.times;
         let times = Times {
-            n: [n[0]; 4],
-            t: [t[0]; 4],
-            tt: [tt[0]; 4],
+            n: [n[0]; LANES],
+            t: [t[0]; LANES],
+            tt: [tt[0]; LANES],
         };
-        self.moments_with(tables, quad, &times)
+        self.moments_with(groups, &times)
     }
 
     #[inline(always)]
     fn moments_with(
         &self,
-        [head, rest, now]: [&Table; 3],
-        quad: usize,
-        &Times { n, t, tt }: &Times<4>,
+        [head, rest, now]: [&Group; 3],
+        &Times { n, t, tt }: &Times<LANES>,
     ) -> Moments {
-        let places = self.places.map(|place| place + quad);
-        let (h, r, w) = (
-            &head.values[places[0]],
-            &rest.values[places[1]],
-            &now.values[places[2]],
-        );
-        let Values { y, ty } = r.plus(w).plus(&h.shifted(self.by));
+        let head = &head.values[self.places[0]];
+        let rest = &rest.values[self.places[1]];
+        let now = &now.values[self.places[2]];
+        let Values { y, ty } = rest.plus(now).plus(&head.shifted(self.by));
         Moments {
             n,
             n_tt: from_fn(|i| n[i] * tt[i]),
@@ -147,15 +187,15 @@ impl Parts {
         }
     }
 
-    /// Centred sums of one of four channels, from tables that keep squares; the window ends at `end_ns`.
+    /// Centred sums of one channel of a group, from runs that keep squares; the window ends at `end_ns`.
     pub(super) fn line(
         &self,
-        tables: [&Table; 3],
-        (quad, i): (usize, usize),
+        groups: [&Group; 3],
+        i: usize,
         moments: &Moments,
         end_ns: i64,
     ) -> Line {
-        let place = |part: usize| tables[part].squares[self.places[part] + quad][i];
+        let place = |part: usize| groups[part].squares[self.places[part]][i];
         let (n, t, y) = (moments.n[i], moments.t[i], moments.y[i]);
         Line {
             n,
@@ -168,16 +208,52 @@ impl Parts {
     }
 }
 
-/// Sums of products of deviations from the means, times the number of samples, of four channels.
+/// The least over windows, for each channel of a group.
+pub(super) struct Least {
+    /// Samples.
+    n: Lanes,
+    /// What N·Σ(t − t̄)² lies above the part of N·Σt² at which digits are lost.
+    above_thin: Lanes,
+    /// What the samples span beyond what they must, in nanoseconds.
+    span: Lanes,
+}
+
+impl Least {
+    pub(super) const NONE: Least = Least {
+        n: [f64::INFINITY; LANES],
+        above_thin: [f64::INFINITY; LANES],
+        span: [f64::INFINITY; LANES],
+    };
+
+    #[inline(always)]
+    pub(super) fn add_span(&mut self, beyond: &Lanes) {
+        self.span = from_fn(|i| lesser(self.span[i], beyond[i]));
+    }
+
+    /// Whether each channel has at least `min_samples`, which span enough, and sums that have kept their digits, in every window.
+    #[inline(always)]
+    pub(super) fn suffices(&self, min_samples: f64) -> bool {
+        let least = |of: Lanes| of.into_iter().fold(f64::INFINITY, lesser);
+        least(self.n) >= min_samples && least(self.above_thin) >= 0.0 && least(self.span) >= 0.0
+    }
+}
+
+/// One instruction, as opposed to [`f64::min`], which minds NaN.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// Sums of products of deviations from the means, times the number of samples, of the channels of a group.
 pub(super) struct Moments {
-    pub(super) n: Quad,
+    pub(super) n: Lanes,
     /// N·Σt².
-    n_tt: Quad,
-    n_sxx: Quad,
-    n_sxy: Quad,
+    n_tt: Lanes,
+    n_sxx: Lanes,
+    n_sxy: Lanes,
     /// Σt and Σy.
-    t: Quad,
-    y: Quad,
+    t: Lanes,
+    y: Lanes,
 }
 
 impl Moments {
@@ -185,11 +261,6 @@ impl Moments {
     #[inline(always)]
     pub(super) fn thin(&self, i: usize) -> bool {
         self.n_sxx[i] < THIN * self.n_tt[i]
-    }
-
-    #[inline(always)]
-    pub(super) fn any_thin(&self) -> bool {
-        self.thin(0) | self.thin(1) | self.thin(2) | self.thin(3)
     }
 }
 

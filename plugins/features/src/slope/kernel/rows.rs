@@ -1,54 +1,52 @@
 //! The rows that some window still holds, and how long each channel has been there, silent or awaited.
 //! It does not decide which rows a window holds, nor when there is a value.
 
-use std::array::from_fn;
-
-use super::sums::{Quad, quads};
+use super::sums::{LANES, Lanes, group_count};
 
 /// Rows in a ring whose length is a power of two, counted from the last reset.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     channels: usize,
-    quads: usize,
+    groups: usize,
     time: Vec<i64>,
-    samples: Vec<Quad>,
+    samples: Vec<Lanes>,
     /// Nanoseconds from each row to the channel's next sample, 0 where it has one, infinite where none has come yet.
-    wait: Vec<Quad>,
+    wait: Vec<Lanes>,
     next: u64,
     /// The first row after the last one from which a sample is missing.
     complete_from: u64,
     /// Nanoseconds since each channel's newest sample, infinite before its first.
-    silent: Vec<Quad>,
-    /// Nanoseconds since each channel's first sample, negative infinite before it.
-    open: Vec<Quad>,
-    least_open: f64,
+    silent: Vec<Lanes>,
+    /// Time of each channel's first sample, and the latest of them.
+    first: Vec<Option<i64>>,
+    latest_first: Option<i64>,
 }
 
 const INITIAL_CAPACITY: usize = 64;
 
 impl Rows {
     pub(super) fn new(channels: usize) -> Rows {
-        let quads = quads(channels);
+        let groups = group_count(channels);
         Rows {
             channels,
-            quads,
+            groups,
             time: vec![0; INITIAL_CAPACITY],
-            samples: vec![[0.0; 4]; INITIAL_CAPACITY * quads],
-            wait: vec![[0.0; 4]; INITIAL_CAPACITY * quads],
+            samples: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
+            wait: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
             next: 0,
             complete_from: 0,
-            silent: vec![[f64::INFINITY; 4]; quads],
-            open: vec![[f64::NEG_INFINITY; 4]; quads],
-            least_open: f64::NEG_INFINITY,
+            silent: vec![[f64::INFINITY; LANES]; groups],
+            first: vec![None; channels],
+            latest_first: None,
         }
     }
 
     pub(super) fn reset(&mut self) {
         self.next = 0;
         self.complete_from = 0;
-        self.silent.fill([f64::INFINITY; 4]);
-        self.open.fill([f64::NEG_INFINITY; 4]);
-        self.least_open = f64::NEG_INFINITY;
+        self.silent.fill([f64::INFINITY; LANES]);
+        self.first.fill(None);
+        self.latest_first = None;
     }
 
     /// The number that the next row will have.
@@ -75,11 +73,17 @@ impl Rows {
         (self.next > 0).then(|| self.time(self.next - 1))
     }
 
-    /// The samples of a row in groups of four channels, NaN where absent.
+    /// The samples of a row by groups of channels, NaN where absent.
     #[inline]
-    pub(super) fn samples(&self, row: u64) -> &[Quad] {
+    pub(super) fn samples(&self, row: u64) -> &[Lanes] {
         let slot = self.slot(row);
-        &self.samples[slot * self.quads..(slot + 1) * self.quads]
+        &self.samples[slot * self.groups..(slot + 1) * self.groups]
+    }
+
+    /// Those of one group.
+    #[inline]
+    pub(super) fn sample(&self, row: u64, group: usize) -> &Lanes {
+        &self.samples[self.slot(row) * self.groups + group]
     }
 
     /// The first row after the last one from which a sample is missing.
@@ -88,48 +92,45 @@ impl Rows {
         self.complete_from
     }
 
-    /// Nanoseconds from a row to the next sample of each channel.
+    /// Nanoseconds from a row to the next sample of each channel of a group.
     #[inline]
-    pub(super) fn wait(&self, row: u64) -> &[Quad] {
-        let slot = self.slot(row);
-        &self.wait[slot * self.quads..(slot + 1) * self.quads]
+    pub(super) fn wait(&self, row: u64, group: usize) -> &Lanes {
+        &self.wait[self.slot(row) * self.groups + group]
     }
 
     /// Nanoseconds since each channel's newest sample.
-    pub(super) fn silent(&self) -> &[Quad] {
+    pub(super) fn silent(&self) -> &[Lanes] {
         &self.silent
     }
 
-    /// Nanoseconds since each channel's first sample.
-    pub(super) fn open(&self) -> &[Quad] {
-        &self.open
+    /// Time of each channel's first sample.
+    pub(super) fn first(&self) -> &[Option<i64>] {
+        &self.first
     }
 
-    /// Nanoseconds since the latest of the channels' first samples.
-    pub(super) fn least_open(&self) -> f64 {
-        self.least_open
+    /// The latest of the channels' first samples.
+    pub(super) fn latest_first(&self) -> Option<i64> {
+        self.latest_first
     }
 
-    /// Times of a channel's first and newest sample.
-    pub(super) fn first_and_newest(&self, channel: usize) -> [Option<i64>; 2] {
-        let ago = |ns: &[Quad]| {
-            let ns = *ns.as_flattened()[..self.channels].get(channel)?;
-            let last = self.last_time()?;
-            ns.is_finite().then(|| last.saturating_sub(ns as i64))
-        };
-        [ago(&self.open), ago(&self.silent)]
+    /// Time of a channel's newest sample.
+    pub(super) fn newest(&self, channel: usize) -> Option<i64> {
+        let silent = *self.silent.as_flattened()[..self.channels].get(channel)?;
+        let last = self.last_time()?;
+        silent
+            .is_finite()
+            .then(|| last.saturating_sub(silent as i64))
     }
 
-    /// Sets what [`first_and_newest`](Self::first_and_newest) answers, after the rows have been appended.
-    pub(super) fn set_first_and_newest(&mut self, channel: usize, times: [Option<i64>; 2]) {
+    /// Sets what [`first`](Self::first) and [`newest`](Self::newest) answer, after the rows have been appended.
+    pub(super) fn set_first_and_newest(&mut self, first: &[Option<i64>], newest: &[Option<i64>]) {
+        self.first.copy_from_slice(first);
+        self.latest_first = first.iter().copied().max().flatten();
         let last = self.last_time();
-        let ago = |t: Option<i64>| Some(last?.saturating_sub(t?) as f64);
-        let [first, newest] = times.map(ago);
-        self.open.as_flattened_mut()[channel] = first.unwrap_or(f64::NEG_INFINITY);
-        self.silent.as_flattened_mut()[channel] = newest.unwrap_or(f64::INFINITY);
-        let open = self.open.as_flattened()[..self.channels].iter().copied();
-        let begun = open.filter(|open| *open >= 0.0);
-        self.least_open = begun.fold(f64::INFINITY, f64::min);
+        for (silent, newest) in self.silent.as_flattened_mut().iter_mut().zip(newest) {
+            let ago = last.zip(*newest).map(|(last, t)| last.saturating_sub(t));
+            *silent = ago.map_or(f64::INFINITY, |ago| ago as f64);
+        }
     }
 
     /// Makes room for one more row if all from `oldest` on are kept; says whether rows have changed their slots.
@@ -150,10 +151,10 @@ impl Rows {
 
     fn grow(&mut self, oldest: u64) {
         let old = self.time.len();
-        let width = self.quads;
+        let width = self.groups;
         self.time.resize(2 * old, 0);
-        self.samples.resize(2 * old * width, [0.0; 4]);
-        self.wait.resize(2 * old * width, [0.0; 4]);
+        self.samples.resize(2 * old * width, [0.0; LANES]);
+        self.wait.resize(2 * old * width, [0.0; LANES]);
         for row in oldest..self.next {
             let (from, to) = (row as usize & (old - 1), self.slot(row));
             self.time[to] = self.time[from];
@@ -169,31 +170,29 @@ impl Rows {
         let passed = self.last_time().map_or(0, |last| t_ns.saturating_sub(last)) as f64;
         let slot = self.slot(self.next);
         self.time[slot] = t_ns;
-        let groups = slot * self.quads..(slot + 1) * self.quads;
-        let row = &mut self.samples[groups.clone()];
-        let (there, missing) =
-            row.as_flattened_mut()[..self.channels].split_at_mut(y.len().min(self.channels));
-        for (kept, &y) in there.iter_mut().zip(y) {
+        let places = slot * self.groups..(slot + 1) * self.groups;
+        let row = &mut self.samples[places.clone()];
+        let row = &mut row.as_flattened_mut()[..self.channels];
+        let y = &y[..y.len().min(self.channels)];
+        let (there, missing) = row.split_at_mut(y.len());
+        let mut absent = !missing.is_empty();
+        let (wholes, rest) = there.as_chunks_mut::<LANES>();
+        let (of_wholes, of_rest) = y.as_chunks::<LANES>();
+        for (kept, y) in wholes.iter_mut().zip(of_wholes) {
+            *kept = y.map(|y| if y.abs() < limit { y } else { f64::NAN });
+            absent |= kept.iter().fold(false, |absent, y| absent | y.is_nan());
+        }
+        for (kept, &y) in rest.iter_mut().zip(of_rest) {
             *kept = if y.abs() < limit { y } else { f64::NAN };
+            absent |= kept.is_nan();
         }
         missing.fill(f64::NAN);
-        let mut absent = false;
-        for (quad, y) in row.iter().enumerate() {
-            let (silent, open) = (&mut self.silent[quad], &mut self.open[quad]);
-            *open = from_fn(|i| open[i] + passed);
-            *silent = from_fn(|i| {
-                if y[i].is_nan() {
-                    silent[i] + passed
-                } else {
-                    0.0
-                }
-            });
-            absent |= y[0].is_nan() | y[1].is_nan() | y[2].is_nan() | y[3].is_nan();
-        }
-        self.least_open += passed;
-        self.wait[groups].fill([0.0; 4]);
-        let follow = absent || self.complete_from == self.next;
-        let begun = follow && self.follow_absence(oldest);
+        self.wait[places].fill([0.0; LANES]);
+        // Where this row and the last are complete nobody is silent or awaited.
+        let begun = (absent || self.complete_from == self.next) && {
+            self.follow_silence(passed);
+            self.follow_absence(oldest)
+        };
         self.next += 1;
         if absent {
             self.complete_from = self.next;
@@ -201,22 +200,31 @@ impl Rows {
         begun
     }
 
+    /// Counts how long each channel has been silent at the new row.
+    fn follow_silence(&mut self, passed: f64) {
+        let slot = self.slot(self.next);
+        let row = &self.samples[slot * self.groups..(slot + 1) * self.groups];
+        let silent = self.silent.as_flattened_mut().iter_mut();
+        for (silent, y) in silent.zip(row.as_flattened()) {
+            *silent = if y.is_nan() { *silent + passed } else { 0.0 };
+        }
+    }
+
     /// Marks where the new row's channels are awaited and ends the wait of those that have come back; says whether one has begun.
     fn follow_absence(&mut self, oldest: u64) -> bool {
         let mut begun = false;
-        let width = 4 * self.quads;
+        let width = LANES * self.groups;
         let (slot, t_ns) = (self.slot(self.next), self.time(self.next));
         let mask = self.time.len() - 1;
         let wait = self.wait.as_flattened_mut();
-        for channel in 0..self.channels {
+        for (channel, first) in self.first.iter_mut().enumerate() {
             let place = slot * width + channel;
             if self.samples.as_flattened()[place].is_nan() {
                 wait[place] = f64::INFINITY;
                 continue;
             }
-            let open = &mut self.open.as_flattened_mut()[channel];
-            if *open == f64::NEG_INFINITY {
-                *open = 0.0;
+            if first.is_none() {
+                *first = Some(t_ns);
                 begun = true;
             }
             for row in (oldest..self.next).rev() {
@@ -229,7 +237,7 @@ impl Rows {
             }
         }
         if begun {
-            self.least_open = 0.0;
+            self.latest_first = Some(t_ns);
         }
         begun
     }

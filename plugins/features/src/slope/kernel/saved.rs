@@ -50,8 +50,6 @@ impl From<RollingSlope> for Saved {
     fn from(kernel: RollingSlope) -> Saved {
         let (rows, blocks) = (&kernel.rows, &kernel.blocks);
         let (channels, oldest) = (kernel.channels, blocks.oldest());
-        let times = (0..channels).map(|channel| rows.first_and_newest(channel));
-        let (first_ns, newest_ns) = times.map(|[first, newest]| (first, newest)).unzip();
         Saved {
             windows_ns: kernel.windows.iter().map(|w| w.width_ns).collect(),
             coverage: kernel.coverage,
@@ -68,8 +66,8 @@ impl From<RollingSlope> for Saved {
                 .collect(),
             origins: blocks.origins().as_flattened()[..channels].to_vec(),
             rebases: blocks.rebases(),
-            first_ns,
-            newest_ns,
+            first_ns: rows.first().to_vec(),
+            newest_ns: (0..channels).map(|channel| rows.newest(channel)).collect(),
         }
     }
 }
@@ -108,19 +106,16 @@ impl TryFrom<Saved> for RollingSlope {
             kernel.rows.append(t_ns, &samples, LIMIT, 0);
         }
         kernel.rows.make_room();
-        for channel in 0..channels {
-            let times = [saved.first_ns[channel], saved.newest_ns[channel]];
-            kernel.rows.set_first_and_newest(channel, times);
-        }
+        let rows = &mut kernel.rows;
+        rows.set_first_and_newest(&saved.first_ns, &saved.newest_ns);
         let (cuts, origins) = (&saved.cuts, &saved.origins);
         let blocks = &mut kernel.blocks;
         blocks.restore(&kernel.rows, cuts, origins, saved.rebases);
         if let Some(t_ns) = kernel.rows.last_time() {
             for window in &mut kernel.windows {
-                window.advance(&kernel.rows, t_ns);
-                window.block = kernel.blocks.find(window.head, 0);
+                window.begin(kernel.rows.time(0));
             }
-            kernel.find_parts(t_ns);
+            kernel.advance(t_ns);
         }
         Ok(kernel)
     }

@@ -4,17 +4,23 @@
 //! Times are nanoseconds after the run's origin, values lie about an origin that is the same for all runs. Nothing is
 //! ever subtracted from a sum: a sample leaves by not being in the runs that remain.
 //! While no sample is missing, count and times are the same for all channels: sums of them per channel are kept only on demand.
-//! Channels lie in groups of four, so that the loops over them become vector instructions; the last group is filled up
+//! Channels lie in groups of eight, so that the loops over them become vector instructions; the last group is filled up
 //! with channels that are always present.
 
 use std::array::from_fn;
+use std::ops::Range;
 
-/// One value for each of four channels.
-pub(super) type Quad = [f64; 4];
+use super::rows::Rows;
 
-/// How many groups of four channels there are.
-pub(super) fn quads(channels: usize) -> usize {
-    channels.div_ceil(4)
+/// Channels in a group.
+pub(super) const LANES: usize = 8;
+
+/// One value for each channel of a group.
+pub(super) type Lanes = [f64; LANES];
+
+/// How many groups there are.
+pub(super) fn group_count(channels: usize) -> usize {
+    channels.div_ceil(LANES)
 }
 
 /// Sums of `L` channels that concern the times of their samples: Σ1, Σt, Σt².
@@ -23,6 +29,19 @@ pub(super) struct Times<const L: usize> {
     pub(super) n: [f64; L],
     pub(super) t: [f64; L],
     pub(super) tt: [f64; L],
+}
+
+impl Times<LANES> {
+    /// Of one row, at `t` after the origin.
+    #[inline(always)]
+    fn of(t: f64, y: &Lanes) -> Times<LANES> {
+        let present = |sum: f64| y.map(|y| if y.is_nan() { 0.0 } else { sum });
+        Times {
+            n: present(1.0),
+            t: present(t),
+            tt: present(t * t),
+        }
+    }
 }
 
 impl<const L: usize> Times<L> {
@@ -52,18 +71,29 @@ impl<const L: usize> Times<L> {
     }
 }
 
-/// Sums of four channels that concern their values: Σy, Σty.
+/// Sums of a group that concern the values of its channels: Σy, Σty. They fill lines of the cache.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Values {
-    pub(super) y: Quad,
-    pub(super) ty: Quad,
+    pub(super) y: Lanes,
+    pub(super) ty: Lanes,
 }
 
 impl Values {
     const NONE: Values = Values {
-        y: [0.0; 4],
-        ty: [0.0; 4],
+        y: [0.0; LANES],
+        ty: [0.0; LANES],
     };
+
+    /// Of one row, at `t` after the origin of time.
+    #[inline(always)]
+    fn of(t: f64, y: &Lanes, origin: &Lanes) -> Values {
+        let y = about(y, origin);
+        Values {
+            y,
+            ty: y.map(|y| t * y),
+        }
+    }
 
     #[inline(always)]
     pub(super) fn plus(&self, other: &Values) -> Values {
@@ -90,30 +120,58 @@ pub(super) struct Common {
     pub(super) rows: Times<1>,
 }
 
-/// Runs by slot number. Group `slot * quads + quad` belongs to channels `4 * quad` and on.
+impl Common {
+    const NONE: Common = Common {
+        origin: 0,
+        rows: Times::NONE,
+    };
+
+    /// Adds a row, and says how long after the origin it is.
+    #[inline(always)]
+    fn add_time(&mut self, t_ns: i64) -> f64 {
+        // Rows too far apart for a difference are in no window together, and sums over them are of no use.
+        let t = t_ns.wrapping_sub(self.origin) as f64;
+        self.rows = self.rows.plus(&Times {
+            n: [1.0],
+            t: [t],
+            tt: [t * t],
+        });
+        t
+    }
+}
+
+/// Runs by slot number.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
-    quads: usize,
+    pub(super) common: Vec<Common>,
+    /// By group of channels.
+    pub(super) groups: Vec<Group>,
+}
+
+/// The runs of a group of channels.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
     keeps_squares: bool,
     /// Whether the sums of time per channel are kept.
     keeps_times: bool,
-    pub(super) common: Vec<Common>,
     pub(super) values: Vec<Values>,
-    pub(super) times: Vec<Times<4>>,
+    pub(super) times: Vec<Times<LANES>>,
     /// Σy².
-    pub(super) squares: Vec<Quad>,
+    pub(super) squares: Vec<Lanes>,
 }
 
 impl Table {
     pub(super) fn new(channels: usize, squares: bool, slots: usize) -> Table {
-        let mut table = Table {
-            quads: quads(channels),
+        let group = Group {
             keeps_squares: squares,
             keeps_times: false,
-            common: Vec::new(),
             values: Vec::new(),
             times: Vec::new(),
             squares: Vec::new(),
+        };
+        let mut table = Table {
+            common: Vec::new(),
+            groups: vec![group; group_count(channels)],
         };
         table.resize(slots);
         table
@@ -125,20 +183,20 @@ impl Table {
 
     /// From now on sums of time are kept per channel or not; runs must be computed anew when this is switched on.
     pub(super) fn keep_times(&mut self, keep: bool) {
-        self.keeps_times = keep;
+        for group in &mut self.groups {
+            group.keeps_times = keep;
+        }
     }
 
     /// Changes the number of slots; the runs must be computed anew.
     pub(super) fn resize(&mut self, slots: usize) {
-        let none = Common {
-            origin: 0,
-            rows: Times::NONE,
-        };
-        self.common.resize(slots, none);
-        self.values.resize(slots * self.quads, Values::NONE);
-        self.times.resize(slots * self.quads, Times::NONE);
-        if self.keeps_squares {
-            self.squares.resize(slots * self.quads, [0.0; 4]);
+        self.common.resize(slots, Common::NONE);
+        for group in &mut self.groups {
+            group.values.resize(slots, Values::NONE);
+            group.times.resize(slots, Times::NONE);
+            if group.keeps_squares {
+                group.squares.resize(slots, [0.0; LANES]);
+            }
         }
     }
 
@@ -146,82 +204,123 @@ impl Table {
     pub(super) fn clear(&mut self, slot: usize, origin: i64) {
         self.common[slot] = Common {
             origin,
-            rows: Times::NONE,
+            ..Common::NONE
         };
-        let groups = slot * self.quads..(slot + 1) * self.quads;
-        self.values[groups.clone()].fill(Values::NONE);
-        self.times[groups.clone()].fill(Times::NONE);
-        if self.keeps_squares {
-            self.squares[groups].fill([0.0; 4]);
+        for group in &mut self.groups {
+            group.values[slot] = Values::NONE;
+            group.times[slot] = Times::NONE;
+            if group.keeps_squares {
+                group.squares[slot] = [0.0; LANES];
+            }
         }
     }
 
-    /// Sets run `to` to run `from` and one more row: its time, its samples less the origins of the channels.
+    /// Adds a row to a run: its time, its samples less the origins of the channels.
     #[inline]
-    pub(super) fn add_row(
-        &mut self,
-        [from, to]: [usize; 2],
-        t_ns: i64,
-        row: &[Quad],
-        origins: &[Quad],
-    ) {
-        let before = self.common[from];
-        let t = t_ns.saturating_sub(before.origin) as f64;
-        let this = Times {
-            n: [1.0],
-            t: [t],
-            tt: [t * t],
-        };
-        self.common[to] = Common {
-            origin: before.origin,
-            rows: before.rows.plus(&this),
-        };
-        let (from, to) = (from * self.quads, to * self.quads);
-        for (quad, (y, origin)) in row.iter().zip(origins).enumerate() {
-            let y: Quad = from_fn(|i| if y[i].is_nan() { 0.0 } else { y[i] - origin[i] });
-            let this = Values {
-                y,
-                ty: from_fn(|i| t * y[i]),
-            };
-            self.values[to + quad] = self.values[from + quad].plus(&this);
-            if self.keeps_squares {
-                let squares = self.squares[from + quad];
-                self.squares[to + quad] = from_fn(|i| squares[i] + y[i] * y[i]);
+    pub(super) fn add_row(&mut self, slot: usize, t_ns: i64, row: &[Lanes], origins: &[Lanes]) {
+        let common = &mut self.common[slot];
+        let t = common.add_time(t_ns);
+        let samples = row.iter().zip(origins);
+        for (group, (y, origin)) in self.groups.iter_mut().zip(samples) {
+            group.values[slot] = group.values[slot].plus(&Values::of(t, y, origin));
+            if group.keeps_squares {
+                let squares = squares(y, origin);
+                let run = &mut group.squares[slot];
+                *run = from_fn(|i| run[i] + squares[i]);
             }
-        }
-        if self.keeps_times {
-            for (quad, y) in row.iter().enumerate() {
-                let present = |sum: f64| from_fn(|i| if y[i].is_nan() { 0.0 } else { sum });
-                let this = Times {
-                    n: present(1.0),
-                    t: present(t),
-                    tt: present(t * t),
-                };
-                self.times[to + quad] = self.times[from + quad].plus(&this);
+            if group.keeps_times {
+                group.times[slot] = group.times[slot].plus(&Times::of(t, y));
             }
         }
     }
 
-    /// Sets run `to` to run `from` and a run of another table.
-    pub(super) fn add_run(&mut self, [from, to]: [usize; 2], table: &Table, slot: usize) {
-        let (before, common) = (self.common[from], &table.common[slot]);
-        let by = common.origin.saturating_sub(before.origin) as f64;
-        self.common[to] = Common {
-            origin: before.origin,
-            rows: before.rows.plus(&common.rows.shifted(by)),
+    /// Sets the run of each of these rows to the rows from it on, about the time of the last.
+    pub(super) fn sum_tails(&mut self, rows: &Rows, numbers: Range<u64>, origins: &[Lanes]) {
+        let origin = rows.time(numbers.end - 1);
+        let mut common = Common {
+            origin,
+            ..Common::NONE
         };
-        let [from, to, slot] = [from, to, slot].map(|slot| slot * self.quads);
-        for quad in 0..self.quads {
-            let values = table.values[slot + quad].shifted(by);
-            self.values[to + quad] = self.values[from + quad].plus(&values);
-            if self.keeps_squares {
-                let (a, b) = (self.squares[from + quad], table.squares[slot + quad]);
-                self.squares[to + quad] = from_fn(|i| a[i] + b[i]);
+        for row in numbers.clone().rev() {
+            common.add_time(rows.time(row));
+            self.common[rows.slot(row)] = common;
+        }
+        for (index, (group, about)) in self.groups.iter_mut().zip(origins).enumerate() {
+            let samples = numbers.clone().rev().map(|row| {
+                let t = rows.time(row).wrapping_sub(origin) as f64;
+                (rows.slot(row), t, rows.sample(row, index))
+            });
+            let mut values = Values::NONE;
+            for (slot, t, y) in samples.clone() {
+                values = values.plus(&Values::of(t, y, about));
+                group.values[slot] = values;
             }
-            if self.keeps_times {
-                let times = table.times[slot + quad].shifted(by);
-                self.times[to + quad] = self.times[from + quad].plus(&times);
+            if group.keeps_squares {
+                let mut sum = [0.0; LANES];
+                for (slot, _, y) in samples.clone() {
+                    let squares = squares(y, about);
+                    sum = from_fn(|i| sum[i] + squares[i]);
+                    group.squares[slot] = sum;
+                }
+            }
+            if group.keeps_times {
+                let mut times = Times::NONE;
+                for (slot, t, y) in samples {
+                    times = times.plus(&Times::of(t, y));
+                    group.times[slot] = times;
+                }
             }
         }
     }
+
+    /// Sets runs 0 on to the sums of the runs of another table from the one with the same place in `slots` on, about an origin;
+    /// the run after them is an empty one.
+    pub(super) fn sum_from_end(
+        &mut self,
+        origin: i64,
+        table: &Table,
+        slots: impl DoubleEndedIterator<Item = usize> + ExactSizeIterator + Clone,
+    ) {
+        self.clear(slots.len(), origin);
+        let by = |slot: usize| table.common[slot].origin.wrapping_sub(origin) as f64;
+        let mut rows = Times::NONE;
+        for (to, slot) in slots.clone().enumerate().rev() {
+            rows = rows.plus(&table.common[slot].rows.shifted(by(slot)));
+            self.common[to] = Common { origin, rows };
+        }
+        for (group, other) in self.groups.iter_mut().zip(&table.groups) {
+            let mut values = Values::NONE;
+            for (to, slot) in slots.clone().enumerate().rev() {
+                values = values.plus(&other.values[slot].shifted(by(slot)));
+                group.values[to] = values;
+            }
+            if group.keeps_squares {
+                let mut sum = [0.0; LANES];
+                for (to, slot) in slots.clone().enumerate().rev() {
+                    sum = from_fn(|i| sum[i] + other.squares[slot][i]);
+                    group.squares[to] = sum;
+                }
+            }
+            if group.keeps_times {
+                let mut times = Times::NONE;
+                for (to, slot) in slots.clone().enumerate().rev() {
+                    times = times.plus(&other.times[slot].shifted(by(slot)));
+                    group.times[to] = times;
+                }
+            }
+        }
+    }
+}
+
+/// Squares of samples less the origins of their channels.
+#[inline(always)]
+fn squares(y: &Lanes, origin: &Lanes) -> Lanes {
+    about(y, origin).map(|y| y * y)
+}
+
+/// Samples less the origins of their channels; nothing is added for one that is absent.
+#[inline(always)]
+fn about(y: &Lanes, origin: &Lanes) -> Lanes {
+    let about: Lanes = from_fn(|i| y[i] - origin[i]);
+    about.map(|y| if y.is_nan() { 0.0 } else { y })
 }
