@@ -10,12 +10,12 @@ pub const BLOCK_ROWS: usize = 256;
 pub const DEFAULT_ROW_MEMORY: usize = 64 << 20;
 const MOST_BLOCKS: usize = 1024;
 const FEWEST_BLOCKS: usize = 64;
-const BLOCK_MEMORY: usize = 64 << 20;
+const BLOCK_MEMORY: usize = 16 << 20;
 
 /// Rows of regressors and a target, streamed into blocks of 256 rows.
 ///
 /// The rows themselves are kept while they fit a stated memory. Then fold edges are exact and a solver can go back to the
-/// rows. Beyond it only the blocks stay: at most 1,024 of them (fewer, but at least 64, when they would take more than 64 MB),
+/// rows. Beyond it only the blocks stay: at most 1,024 of them (fewer, but at least 64, when they would take more than 16 MB),
 /// since neighbours are merged in pairs when there are more. So memory is bounded for any number of rows.
 /// All blocks share the first row as their shift. The same rows in the same order give the same bits.
 #[derive(Debug, Clone)]
