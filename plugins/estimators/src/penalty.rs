@@ -114,7 +114,7 @@ impl Penalty {
         let fits = (1..=1000).contains(&per_decade);
         check("per_decade", f64::from(per_decade), fits, "from 1 to 1000");
         if !(largest > smallest && largest.is_finite()) {
-            let message = format!("`largest` is {largest} and must be above `smallest`");
+            let message = format!("`largest` is {largest} and must be finite and above `smallest`");
             let mistake = Mistake::at(format!("{place}.largest"), message);
             mistakes.push(mistake.rests_on(format!("{place}.smallest")));
         }
