@@ -92,7 +92,7 @@ fn least_squares_from_rows(bencher: Bencher) {
     });
     let columns: Vec<_> = (0..CANDIDATES).collect();
     bencher.bench_local(|| {
-        let mut blocks = GramBlocks::new(CANDIDATES).expecting(ROWS as u64);
+        let mut blocks = GramBlocks::with_row_memory(CANDIDATES, 0);
         for row in rows.chunks_exact(CANDIDATES + 1) {
             blocks.push(&row[..CANDIDATES], row[CANDIDATES]);
         }

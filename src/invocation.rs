@@ -22,28 +22,28 @@ pub fn quoted(word: &str) -> String {
 
 /// A command for a shell, in lines of at most 80 columns.
 #[must_use]
-pub fn command(words: &[&str]) -> String {
+pub fn command(words: &[impl AsRef<str>]) -> String {
     led(" ", words)
 }
 
 /// What a user would type next, said in a line where it fits.
 #[must_use]
-pub fn next(words: &[&str]) -> String {
+pub fn next(words: &[impl AsRef<str>]) -> String {
     led("next:", words)
 }
 
-fn led(by: &str, words: &[&str]) -> String {
+fn led(by: &str, words: &[impl AsRef<str>]) -> String {
     const WIDTH: usize = 78;
     let mut text = by.to_owned();
     let mut column = by.len();
     for (position, word) in words.iter().enumerate() {
-        let length = word.chars().count() + 1;
+        let length = word.as_ref().chars().count() + 1;
         if position > 0 && column + length > WIDTH {
             text.push_str(" \\\n     ");
             column = 5;
         }
         text.push(' ');
-        text.push_str(word);
+        text.push_str(word.as_ref());
         column += length;
     }
     text

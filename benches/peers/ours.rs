@@ -43,8 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn blocks(rows: &[(&[f64], f64)], width: usize) -> GramBlocks {
-    let mut blocks = GramBlocks::new(width).expecting(rows.len() as u64);
+fn filled(mut blocks: GramBlocks, rows: &[(&[f64], f64)]) -> GramBlocks {
     for (x, y) in rows {
         blocks.push(x, *y);
     }
@@ -53,7 +52,7 @@ fn blocks(rows: &[(&[f64], f64)], width: usize) -> GramBlocks {
 
 /// The columns chosen, in order.
 fn forward_selection(rows: &[(&[f64], f64)], width: usize) -> Found {
-    let blocks = blocks(rows, width);
+    let blocks = filled(GramBlocks::new(width), rows);
     let scales = Standardization::of(&blocks.total()).scales;
     let search = Search {
         alpha: 1.0,
@@ -70,7 +69,7 @@ fn forward_selection(rows: &[(&[f64], f64)], width: usize) -> Found {
 
 /// The best penalty of 37, and the coefficients with it.
 fn ridge_penalty(rows: &[(&[f64], f64)], width: usize) -> Found {
-    let blocks = blocks(rows, width);
+    let blocks = filled(GramBlocks::new(width), rows);
     let total = blocks.total();
     let scales = Standardization::of(&total).scales;
     let columns: Vec<_> = (0..width).collect();
@@ -89,7 +88,7 @@ fn ridge_penalty(rows: &[(&[f64], f64)], width: usize) -> Found {
 
 /// The coefficients.
 fn least_squares(rows: &[(&[f64], f64)], width: usize) -> Found {
-    let blocks = blocks(rows, width);
+    let blocks = filled(GramBlocks::with_row_memory(width, 0), rows);
     let total = blocks.total();
     let scales = Standardization::of(&total).scales;
     let columns: Vec<_> = (0..width).collect();

@@ -177,6 +177,6 @@ packages = ", ".join(f"{package} {version(package)}" for package in ["numpy", "s
     f"{ROUNDS} rounds, reading the rows not counted. `peers.py` makes this page and checks that both sides find the same.\n\n"
     f"Python {platform.python_version()}, {packages}; {platform.machine()}, {os.cpu_count()} cores.\n\n"
     "| work | here | peer | there | ratio |\n|---|---|---|---|---|\n" + "\n".join(lines) + "\n\n"
-    "Selection, penalty and least squares here begin with rows in memory, and know how many, as there. river has no recursive least squares; its Bayesian\n"
+    "Selection, penalty and least squares here begin with rows in memory, and least squares keeps none of them, as there. river has no recursive least squares; its Bayesian\n"
     "regression does much the same arithmetic with another smoothing and on a dictionary for each row.\n"
 )

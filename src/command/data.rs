@@ -1,13 +1,13 @@
 //! Decides how recorded data are named on the command line, and what is told of them after reading.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Options, Report};
 use clap::Args;
 
 use crate::figures::count;
-use crate::invocation::quoted;
+use crate::invocation::{program, quoted};
 use crate::terminal::{Failure, Terminal};
 
 /// Recorded data.
@@ -60,6 +60,15 @@ impl Data {
         let files = files.map(|path| quoted(&path.display().to_string()));
         let words = lenient.into_iter().chain(["--data".to_owned()]);
         words.chain(files).collect()
+    }
+
+    /// The words of a command that takes a model and these data; more of them may follow.
+    #[must_use]
+    pub fn words_with(&self, command: &str, model: &Path) -> Vec<String> {
+        let model = quoted(&model.display().to_string());
+        let mut words = vec![program(), command.to_owned(), model];
+        words.extend(self.words());
+        words
     }
 
     /// A name for other data, with the ending of these.

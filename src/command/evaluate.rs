@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::data::{self, Data};
 use crate::figures::{count, number, or_dash, table};
-use crate::invocation::{next, program, quoted};
+use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Score a model's predictions on recorded data
@@ -136,21 +136,10 @@ impl Evaluate {
                 "the graph has no prediction of a measured truth, so there is nothing to score",
             );
         } else if terminal.format == Format::Table {
-            terminal.note(self.next());
+            // Why the scores are what they are.
+            terminal.note(next(&self.data.words_with("diagnose", &self.model)));
         }
         Ok(Answer::Fine)
-    }
-
-    /// What to type next: why the scores are what they are.
-    fn next(&self) -> String {
-        let (program, model) = (program(), quoted(&self.model.display().to_string()));
-        let data = self.data.words();
-        let words = [&*program, "diagnose", &model].into_iter();
-        next(
-            &words
-                .chain(data.iter().map(String::as_str))
-                .collect::<Vec<_>>(),
-        )
     }
 
     fn mode(&self) -> Result<Mode, Failure> {

@@ -86,20 +86,14 @@ impl Fit {
 
     /// What to type next: a score on data that the fit has not seen; a run, where there is nothing to score.
     fn next(&self, model: &Model) -> String {
-        let (program, output) = (program(), quoted(&self.output.display().to_string()));
         let unseen = self.data.unseen();
         let predicts = |channel: &PlannedChannel| channel.predicts.is_some();
         if !model.plan.channels.iter().any(predicts) {
-            return next(&[&program, "run", &output, "--input", &unseen]);
+            let output = quoted(&self.output.display().to_string());
+            return next(&[&program(), "run", &output, "--input", &unseen]);
         }
-        let words = self.data.others(vec![unseen.into()]).words();
-        let words = words.iter().map(String::as_str);
-        next(
-            &[&*program, "evaluate", &output]
-                .into_iter()
-                .chain(words)
-                .collect::<Vec<_>>(),
-        )
+        let unseen = self.data.others(vec![unseen.into()]);
+        next(&unseen.words_with("evaluate", &self.output))
     }
 
     /// Tells of mistakes in the tests of a graph file. They take nothing from the fit, and those of a file that is extended may

@@ -8,6 +8,12 @@ use crate::unit::Unit;
 /// Every NaN means absent; this one is the form that the framework writes.
 pub const ABSENT: f64 = f64::NAN;
 
+/// What a node gives: what is infinite is no value.
+#[inline]
+pub(crate) fn unless_infinite(value: f64) -> f64 {
+    if value.is_infinite() { ABSENT } else { value }
+}
+
 /// No value *yet*: the window or lag of the channel reaches back before its first value of the segment.
 ///
 /// It is a NaN with a payload of its own, so that whoever only asks "is there a value" need not know it. Fitting tells

@@ -73,20 +73,6 @@ impl GramBlocks {
         }
     }
 
-    /// The same where it is known that at least so many rows will come: ones that will not fit the memory stated for rows are
-    /// not kept until they no longer do. To write them to fresh memory costs a third as much as to sum them.
-    pub fn expecting(mut self, rows: u64) -> Self {
-        if self.exceeds_memory(rows - rows % BLOCK_ROWS as u64) {
-            self.kept = None;
-        }
-        self
-    }
-
-    fn exceeds_memory(&self, rows: u64) -> bool {
-        let row_bytes = (self.width + 1) * size_of::<f64>();
-        rows.saturating_mul(row_bytes as u64) > self.row_memory as u64
-    }
-
     /// The number of regressors.
     pub fn width(&self) -> usize {
         self.width
@@ -150,7 +136,8 @@ impl GramBlocks {
                 self.halve_blocks();
             }
         }
-        if self.exceeds_memory(self.pending_start()) {
+        let bytes = self.pending_start() as usize * order * size_of::<f64>();
+        if bytes > self.row_memory {
             self.kept = None;
         }
         match &mut self.kept {
@@ -420,22 +407,6 @@ mod tests {
         let bytes_per_row = 3 * size_of::<f64>();
         assert!(filled(512, 512 * bytes_per_row + 511).exact_folds());
         assert!(!filled(512, 512 * bytes_per_row - 1).exact_folds());
-    }
-
-    #[test]
-    fn rows_of_which_too_many_are_expected_are_not_kept_and_give_the_same_bits() {
-        let (rows, memory) = (5000, 4864 * 3 * size_of::<f64>());
-        let expecting = |expected| {
-            let mut blocks = GramBlocks::with_row_memory(2, memory).expecting(expected);
-            for i in 0..rows {
-                let (x, y) = row(i);
-                blocks.push(&x, y);
-            }
-            blocks
-        };
-        assert!(expecting(4864 + 255).exact_folds());
-        assert!(!expecting(4864 + 256).exact_folds());
-        assert_eq!(expecting(5120).total(), expecting(0).total());
     }
 
     #[test]

@@ -18,11 +18,9 @@ impl Diagnose {
     }
 
     fn command(&self, name: &str, more: &[&str]) -> String {
-        let (program, model) = (program(), quoted(&self.model.display().to_string()));
-        let data = self.data.words();
-        let words = [&*program, name, &model].into_iter();
-        let words = words.chain(data.iter().map(String::as_str));
-        command(&words.chain(more.iter().copied()).collect::<Vec<_>>())
+        let mut words = self.data.words_with(name, &self.model);
+        words.extend(more.iter().map(|&word| word.to_owned()));
+        command(&words)
     }
 
     /// A feature tells something of what a prediction leaves: does no estimator use it, or is it of little use there?

@@ -318,11 +318,7 @@ impl Engine {
     /// The value that a slot was given at the present tick; NaN where its node did not run or gave nothing.
     #[must_use]
     pub fn value(&self, slot: usize) -> f64 {
-        if self.slots.ran(slot) {
-            self.slots.values[slot]
-        } else {
-            f64::NAN
-        }
+        self.slots.now(slot)
     }
 
     /// The stamp of a slot's last value.
@@ -344,11 +340,7 @@ impl Engine {
             .zip(&self.plan.outputs)
             .zip(&mut self.blending);
         for ((shown, output), (rate, blending)) in shown {
-            let value = if self.slots.ran(output.slot) {
-                self.slots.values[output.slot]
-            } else {
-                f64::NAN
-            };
+            let value = self.slots.now(output.slot);
             *shown = if value.is_nan() {
                 value
             } else {

@@ -56,6 +56,16 @@ impl Slots {
         self.given[slot].tick == self.tick
     }
 
+    /// The value that the slot was given at the present tick; NaN where its node did not run or gave nothing.
+    #[inline]
+    pub(crate) fn now(&self, slot: usize) -> f64 {
+        if self.ran(slot) {
+            self.values[slot]
+        } else {
+            f64::NAN
+        }
+    }
+
     /// Whether the slot has a new value at the present tick.
     #[inline]
     pub(crate) fn fresh(&self, slot: usize) -> bool {

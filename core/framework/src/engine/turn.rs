@@ -5,7 +5,7 @@ use super::gather::Gathered;
 use super::running::Running;
 use super::slots::Slots;
 use super::vote::Vote;
-use crate::channel::ABSENT;
+use crate::channel::unless_infinite;
 use crate::compile::{PlannedNode, PlannedRole};
 use crate::node::{Operator, Outputs, Tick};
 use crate::time::Instant;
@@ -149,26 +149,21 @@ impl Turn<'_> {
             let weights = vote.weigh(votes);
             if let Some(first) = beside.weights {
                 for (slot, &weight) in (first..).zip(weights) {
-                    slots.set(slot, finite(weight), stamp);
+                    slots.set(slot, unless_infinite(weight), stamp);
                 }
             }
         }
         if let Some(slot) = beside.reason {
-            slots.set(slot, finite(vote.reason(votes)), stamp);
+            slots.set(slot, unless_infinite(vote.reason(votes)), stamp);
         }
         if let Some((lower, upper)) = beside.bounds {
             let ends = vote.interval();
-            slots.set(lower, finite(ends[0]), stamp);
-            slots.set(upper, finite(ends[1]), stamp);
+            slots.set(lower, unless_infinite(ends[0]), stamp);
+            slots.set(upper, unless_infinite(ends[1]), stamp);
         }
         if let Some((slot, of_voters)) = beside.deviation {
             let of_voters = &gathered[of_voters].values;
             slots.set(slot, vote.deviation(votes, of_voters, value), stamp);
         }
     }
-}
-
-/// What is infinite is no value.
-fn finite(value: f64) -> f64 {
-    if value.is_infinite() { ABSENT } else { value }
 }

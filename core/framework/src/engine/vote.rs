@@ -3,7 +3,7 @@
 use super::gather::Gathered;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
-use crate::channel::ABSENT;
+use crate::channel::unless_infinite;
 use crate::compile::TruthLink;
 use crate::node::{Combine, Combiner, Restored, Votes};
 use crate::time::{Duration, Instant};
@@ -62,12 +62,7 @@ impl Vote {
     /// Combines the votes of this tick: the result and its stamp.
     #[inline]
     pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
-        let combined = self.combine.combine(Votes(&votes.values));
-        let combined = if combined.is_infinite() {
-            ABSENT
-        } else {
-            combined
-        };
+        let combined = unless_infinite(self.combine.combine(Votes(&votes.values)));
         if let Some(ends) = &mut self.interval {
             *ends = self.combine.interval(Votes(&votes.values));
         }

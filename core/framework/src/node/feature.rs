@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::ops::Range;
 
 use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
-use crate::channel::ABSENT;
+use crate::channel::unless_infinite;
 use crate::engine::{Gathered, Given};
 use crate::time::{Duration, Instant};
 
@@ -189,7 +189,7 @@ impl Outputs<'_> {
 
     /// Gives a value with a stamp of its own, such as a window's newest sample. What is infinite is no value.
     pub fn set_stamped(&mut self, index: usize, value: f64, stamp: Instant) {
-        self.values[index] = if value.is_infinite() { ABSENT } else { value };
+        self.values[index] = unless_infinite(value);
         self.given[index] = self.given_now(stamp);
     }
 
