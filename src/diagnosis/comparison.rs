@@ -200,7 +200,7 @@ fn column(
 ) -> Column {
     let first = entries[0];
     let channel = &first.contender.plan.channels[first.truth.slot].channel;
-    let limit = below.and_then(|below| below.in_unit(&channel.unit));
+    let limit = below.and_then(|below| below.as_difference(&channel.unit));
     let counted = instants(entries, limit);
     let value = |entry: usize, places: &[usize]| entries[entry].of.values[places[entry]];
     let valid: Vec<f64> = (0..entries.len())

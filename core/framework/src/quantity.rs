@@ -21,6 +21,13 @@ impl Quantity {
     pub fn in_unit(&self, unit: &Unit) -> Option<f64> {
         self.unit.convert(self.value, unit)
     }
+
+    /// The value as a difference, or as a size about zero, in another unit, or `None` if the two do not measure the same: 2 Cel
+    /// are 2 K.
+    pub fn as_difference(&self, unit: &Unit) -> Option<f64> {
+        let factor = self.unit.factor_to(unit)?;
+        Some(self.value * factor)
+    }
 }
 
 /// Why a text is not a quantity.

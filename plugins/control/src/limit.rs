@@ -6,14 +6,12 @@ use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 
-/// A limit of a size: 0 or more, in `unit`. Of temperatures it is a difference, given in K.
+/// A limit of a size: 0 or more, in `unit`. Of temperatures it is a difference.
 pub(crate) fn size(limit: &Quantity, unit: &Unit, at: &str) -> Result<f64, Mistake> {
-    let factor = limit.unit.factor_to(unit);
-    let Some(factor) = factor.filter(|_| !limit.unit.is_temperature_point()) else {
+    let Some(value) = limit.as_difference(unit) else {
         let message = format!("`{at}` is in {}, which cannot be in {unit}", limit.unit);
         return Err(Mistake::at(at, message).help(format!("give it in {unit}")));
     };
-    let value = limit.value * factor;
     if value >= 0.0 && value.is_finite() {
         Ok(value)
     } else {

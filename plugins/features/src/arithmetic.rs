@@ -202,7 +202,7 @@ impl Scale {
         let gain = from.unit.factor_to(&unit);
         let (gain, shift) = gain.zip(shift).unwrap_or((1.0, 0.0));
         let offset = self.offset.as_ref();
-        let offset = offset.and_then(|offset| offset.in_unit(&unit.difference()));
+        let offset = offset.and_then(|offset| offset.as_difference(&unit));
         (
             self.factor * gain,
             self.factor * shift + offset.unwrap_or(0.0),
@@ -225,7 +225,7 @@ impl Feature for Scale {
         for channel in &mut channels {
             let unit = self.unit_of(channel);
             if let Some(offset) = &self.offset
-                && offset.in_unit(&unit.difference()).is_none()
+                && offset.as_difference(&unit).is_none()
                 && mistakes.is_empty()
             {
                 let message = format!("`offset` is in {} and the result in {unit}", offset.unit);

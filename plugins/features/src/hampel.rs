@@ -13,6 +13,7 @@ use athermal_core::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::rounding::rounding;
 use crate::slope::kernel::LIMIT;
 use crate::sorted::Sorted;
 use crate::windows::three;
@@ -74,7 +75,7 @@ impl Hampel {
             return Ok(0.0);
         };
         let unit = of.unit.difference();
-        match floor.in_unit(&unit) {
+        match floor.as_difference(&unit) {
             Some(size) if size >= 0.0 && size.is_finite() => Ok(size),
             Some(_) => {
                 let message = format!("`floor` is {floor} and must not be negative");
@@ -201,7 +202,7 @@ impl Watched {
     fn judge(&self, value: f64, spec: &Hampel) -> Option<(bool, f64)> {
         let median = self.sorted.median();
         let allowed = spec.threshold * TO_DEVIATION * self.sorted.deviation(median);
-        let is_outlier = (value - median).abs() > allowed.max(self.floor);
+        let is_outlier = (value - median).abs() > allowed.max(self.floor) + rounding(value, median);
         (self.samples.len() >= spec.min_samples).then_some((is_outlier, median))
     }
 }

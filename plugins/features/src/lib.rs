@@ -11,6 +11,7 @@ mod moving;
 mod past;
 mod pick;
 mod resample;
+mod rounding;
 mod sample_at;
 pub mod slope;
 mod sorted;

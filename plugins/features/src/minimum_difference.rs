@@ -9,6 +9,8 @@ use athermal_core::quantity::Quantity;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::rounding::rounding;
+
 /// A filter that takes changes below a minimum difference for noise: each channel keeps its last value until a sample differs
 /// from it by at least that much.
 ///
@@ -28,7 +30,7 @@ impl MinimumDifference {
     /// The least change in the unit of a channel.
     fn least(&self, of: &Channel) -> Result<f64, Mistake> {
         let unit = of.unit.difference();
-        match self.difference.in_unit(&unit) {
+        match self.difference.as_difference(&unit) {
             Some(least) if least > 0.0 && least.is_finite() => Ok(least),
             Some(_) => {
                 let message = format!("`difference` is {} and must be above 0", self.difference);
@@ -91,7 +93,9 @@ impl Operator for Keeping {
                 continue;
             }
             let kept = match self.kept[nth] {
-                Some(kept) if (value - kept).abs() < self.least[nth] => kept,
+                Some(kept) if (value - kept).abs() < self.least[nth] - rounding(value, kept) => {
+                    kept
+                }
                 _ => value,
             };
             self.kept[nth] = Some(kept);

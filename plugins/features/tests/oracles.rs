@@ -22,12 +22,16 @@ struct Bench {
 impl Bench {
     /// A node that is called `n`; `ports` are all that is read of it.
     fn new(node: &str, ports: &[&str]) -> Self {
+        Self::in_unit("mm", node, ports)
+    }
+
+    fn in_unit(unit: &str, node: &str, ports: &[&str]) -> Self {
         let outputs: String = ports
             .iter()
             .map(|port| format!("{port} = \"n:{port}\"\n"))
             .collect();
         let text = format!(
-            "schema = 1\n[signals.s]\nunit = \"mm\"\nchannels = [\"y\", \"z\"]\nmax_age = \"10s\"\n\
+            "schema = 1\n[signals.s]\nunit = \"{unit}\"\nchannels = [\"y\", \"z\"]\nmax_age = \"10s\"\n\
              [nodes.n]\ninputs.signal = \"s\"\n{node}\n[outputs]\n{outputs}"
         );
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
@@ -410,5 +414,55 @@ fn a_change_below_the_minimum_difference_is_kept_back_and_a_slow_one_comes_in_st
         }
         assert_eq!(bench.output("signal.y"), y_kept, "row {nth}");
         assert_eq!(bench.output("signal.z"), z_kept, "row {nth}");
+    }
+}
+
+/// Steps as a coarse sensor takes them: as binary numbers most of them are a little more or less than 0.01.
+fn staircase() -> impl Iterator<Item = f64> {
+    (0..200).map(|step| f64::from(2000 + step) / 100.0)
+}
+
+#[test]
+fn a_step_of_just_the_minimum_difference_is_passed_on() {
+    let mut bench = Bench::new(
+        "type = \"minimum_difference\"\ndifference = \"10 um\"",
+        &["signal"],
+    );
+    for (nth, y) in staircase().enumerate() {
+        bench.tick(&[nth as f64, y, f64::NAN]);
+        assert_eq!(bench.output("signal.y"), y, "row {nth}");
+    }
+}
+
+#[test]
+fn a_step_of_just_the_floor_is_no_outlier() {
+    let node = "type = \"hampel\"\nwindow = \"8s\"\nfloor = \"10 um\"";
+    let mut bench = Bench::new(node, &["outlier"]);
+    let stairs = staircase().flat_map(|y| [y; 8]);
+    for (nth, y) in stairs.enumerate() {
+        let spike = if nth % 50 == 49 { 0.0101 } else { 0.0 };
+        bench.tick(&[nth as f64, y, y + spike]);
+        assert_ne!(bench.output("outlier.y"), 1.0, "row {nth}");
+    }
+}
+
+#[test]
+fn a_difference_of_temperatures_may_be_given_in_their_own_unit() {
+    for (unit, one) in [("Cel", "1 Cel"), ("Cel", "1 K"), ("[degF]", "1 [degF]")] {
+        let scaled = |node: &str, port: &str, rows: &[f64]| {
+            let mut bench = Bench::in_unit(unit, node, &[port]);
+            for (nth, &y) in rows.iter().enumerate() {
+                bench.tick(&[nth as f64, y, f64::NAN]);
+            }
+            bench.output(&format!("{port}.y"))
+        };
+        let offset = format!("type = \"scale\"\noffset = \"{one}\"");
+        assert!((scaled(&offset, "scaled", &[20.0]) - 21.0).abs() < 1e-9);
+        let difference = format!("type = \"minimum_difference\"\ndifference = \"{one}\"");
+        assert_eq!(scaled(&difference, "signal", &[20.0, 20.9]), 20.0);
+        assert_eq!(scaled(&difference, "signal", &[20.0, 21.1]), 21.1);
+        let floor = format!("type = \"hampel\"\nwindow = \"9s\"\nfloor = \"{one}\"");
+        assert_eq!(scaled(&floor, "outlier", &[20.0, 20.0, 20.0, 20.9]), 0.0);
+        assert_eq!(scaled(&floor, "outlier", &[20.0, 20.0, 20.0, 21.1]), 1.0);
     }
 }

@@ -332,7 +332,7 @@ impl Resolver<'_> {
         let mut whole = true;
         let mut size = |limit: Option<Quantity>, default: f64, key: &str| match limit {
             None => default,
-            Some(limit) => limit.in_unit(&unit).unwrap_or_else(|| {
+            Some(limit) => limit.as_difference(&unit).unwrap_or_else(|| {
                 let problem = CompileProblem::LimitUnit {
                     found: limit.unit.clone(),
                     expected: unit.clone(),

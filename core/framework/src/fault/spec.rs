@@ -81,10 +81,7 @@ impl FaultSpec {
         } else {
             difference
         };
-        // A size is a difference, so that "2 Cel" are 2 K.
-        size.unit
-            .factor_to(&wanted)
-            .map(|factor| size.value * factor)
+        size.as_difference(&wanted)
             .ok_or_else(|| FaultError::SizeUnit {
                 channel: self.channel.clone(),
                 found: Box::new(size.unit.clone()),

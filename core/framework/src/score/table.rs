@@ -107,7 +107,7 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
     let limit = options
         .abs_truth_below
         .as_ref()
-        .and_then(|limit| limit.in_unit(&of.channel.unit));
+        .and_then(|limit| limit.as_difference(&of.channel.unit));
     let counted: Vec<usize> = (0..truth.values.len())
         .filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit))
         .collect();

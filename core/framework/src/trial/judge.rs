@@ -5,7 +5,6 @@ use std::fmt;
 use super::expect::rival_of;
 use super::expectation::{Check, Expectation, Rival, Tolerance};
 use super::observed::Observed;
-use super::shape::as_difference;
 use crate::compile::Plan;
 use crate::quantity::Quantity;
 use crate::time::Duration;
@@ -128,8 +127,7 @@ impl Pairs {
 impl Judge<'_> {
     fn check(&self, check: &Check) -> Vec<Finding> {
         let of = &self.plan.channels[self.slot].channel.unit;
-        let size =
-            |quantity: &Quantity| as_difference(quantity, &of.difference()).unwrap_or(f64::NAN);
+        let size = |quantity: &Quantity| quantity.as_difference(of).unwrap_or(f64::NAN);
         let value = |quantity: &Quantity| quantity.in_unit(of).unwrap_or(f64::NAN);
         let finding = match check {
             Check::RmseBelow(limit) => {
@@ -284,8 +282,9 @@ impl Judge<'_> {
     fn counted(&self) -> impl Iterator<Item = usize> {
         let truth = self.plan.channels[self.slot].predicts;
         let limit = self.expectation.abs_truth_below.as_ref().zip(truth);
-        let limit =
-            limit.and_then(|(limit, truth)| limit.in_unit(&self.plan.channels[truth].channel.unit));
+        let limit = limit.and_then(|(limit, truth)| {
+            limit.as_difference(&self.plan.channels[truth].channel.unit)
+        });
         let truths = self.observed.truths(self.slot).unwrap_or_default();
         let times = self.observed.truth_times(self.slot).unwrap_or_default();
         let counts = move |nth: &usize| {

@@ -169,9 +169,7 @@ impl Shaping<'_> {
 
     /// A change as a number in `unit`; 0 for none, and after a mistake.
     fn difference(&mut self, key: &'static str, quantity: Option<&Quantity>, unit: &Unit) -> f64 {
-        self.converted(key, quantity, unit, |quantity| {
-            as_difference(quantity, unit)
-        })
+        self.converted(key, quantity, unit, |quantity| quantity.as_difference(unit))
     }
 
     fn converted(
@@ -213,12 +211,4 @@ impl Shaping<'_> {
         };
         self.diagnostics.report(self.value.place_of(key), problem);
     }
-}
-
-/// A difference as a number in `unit`: of temperatures, 2 Cel are 2 K.
-pub(super) fn as_difference(quantity: &Quantity, unit: &Unit) -> Option<f64> {
-    quantity
-        .unit
-        .factor_to(unit)
-        .map(|factor| quantity.value * factor)
 }

@@ -227,7 +227,7 @@ impl Noises {
             .map_err(|_| unsolvable("the unit of the truth is not known"))?;
         let in_unit = |given: &Quantity| {
             given
-                .in_unit(&of_truth.difference())
+                .as_difference(&of_truth)
                 .ok_or_else(|| unsolvable("a noise is in another unit than the truth"))
         };
         let per = self.per.secs();

@@ -147,7 +147,7 @@ impl Noises {
         let unit = truth.difference();
         let other = self
             .each()
-            .filter(|(_, given)| given.in_unit(&unit).is_none());
+            .filter(|(_, given)| given.as_difference(&unit).is_none());
         let mistake = |(name, given): (&str, &Quantity)| {
             let found = &given.unit;
             let message = format!("`{name}` is in {found}, and the truth in {truth}");
