@@ -253,6 +253,41 @@ fn deviations_are_those_of_as_many_steps_as_predictions_are_made_over() {
 }
 
 #[test]
+fn what_learns_and_reads_past_truths_predicts_several_steps_from_those_that_were_measured() {
+    let scratch = Scratch::new("modes-recursive");
+    let rows = series(1500);
+    let data = scratch.file("data.csv", csv(&rows));
+    let nodes = |learn: &str| {
+        let nodes = format!(
+            "[nodes.past]\ntype = \"arx\"\ninputs.features = \"input.a\"\ninputs.truth = \"output.y\"\n\
+             ahead = \"10s\"\nlags = [\"0s\"]\nsolver = {{ type = \"sgd\", eta0 = 0.01 }}\n{learn}\n[outputs]\n"
+        );
+        GRAPH.replace("LEARN", "").replace("[outputs]", &nodes) + "past = \"past\"\n"
+    };
+    let learns = scratch.file("learns.toml", nodes("learn = true"));
+    let still = scratch.file("still.toml", nodes("learn = false"));
+    let learns = fitted(&scratch, "learns.json", &learns, &data);
+    let still = fitted(&scratch, "still.json", &still, &data);
+    for steps in ["2", "5"] {
+        let mode = ["--mode", "k-step", "--steps", steps, "--each-on-its-own"];
+        let of = |model: &Path, more: &[&str]| {
+            let scores = scores(model, &data, &[&mode[..], more].concat());
+            assert!(figure(&scores, "past", "valid") > 0.99, "{scores:?}");
+            figure(&scores, "past", "rmse")
+        };
+        let expected = of(&still, &[]);
+        near(of(&learns, &["--frozen"]), expected);
+        // What it learns is of the same series that it was fitted on.
+        let learned = of(&learns, &[]);
+        assert!(
+            (learned / expected - 1.0).abs() < 0.02,
+            "{learned}, {expected}"
+        );
+        assert_ne!(learned, expected);
+    }
+}
+
+#[test]
 fn steps_are_asked_for_and_refused_where_they_mean_nothing() {
     let scratch = Scratch::new("modes-steps");
     let data = scratch.file("data.csv", csv(&series(20)));

@@ -109,3 +109,57 @@ fn votes_for_another_instant_than_the_stack_predicts_are_told() {
         "{told}"
     );
 }
+
+/// Two temperatures that know of different parts of a position, 600 rows.
+fn parts() -> Table {
+    let mut table = Table::default();
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) as f64 / f64::from(1 << 30) - 1.0
+    };
+    for row in 0..600 {
+        let (one, other) = (random(), random());
+        let position = 3.0 * one + 4.0 * other + 0.5 * random();
+        table.push(
+            Instant::from_ns(row * 10_000_000_000),
+            &[one, other, position],
+        );
+    }
+    table
+}
+
+#[test]
+fn a_stack_of_stacks_of_stacks_trusts_the_one_that_knows_most() {
+    let mut text = format!("{SAMPLES}\n");
+    for (name, of) in [("one", "temperature.room"), ("other", "temperature.chuck")] {
+        text += &format!(
+            "[nodes.{name}]\ntype = \"linear\"\ninputs.features = \"{of}\"\ninputs.truth = \"position.Z\"\nahead = \"0s\"\n"
+        );
+    }
+    for (name, voters) in [
+        ("first", ["one", "other"]),
+        ("second", ["one", "first"]),
+        ("third", ["one", "second"]),
+    ] {
+        text += &format!(
+            "[nodes.{name}]\ntype = \"stack\"\ninputs.voters = {voters:?}\ninputs.truth = \"position.Z\"\nahead = \"0s\"\n"
+        );
+    }
+    let plan = plan(&(text + "[outputs]\nout = \"third\"\n"));
+    let (_, report) = fit(&plan, &parts(), &FitOptions::default(), &mut |_| {}).unwrap();
+    let error = |node: &str| {
+        let fit = report.estimators.iter().find(|fit| fit.node == node);
+        match &fit.unwrap().outcome {
+            Outcome::Fitted(report) => report.in_sample_rmse.unwrap(),
+            Outcome::Failed(error) => panic!("{node}: {error}"),
+        }
+    };
+    // Out of fold each of them errs as the one below it does.
+    let [first, second, third] = ["first", "second", "third"].map(error);
+    assert!(first < 0.6 * error("other"), "{first}");
+    assert!((second / first - 1.0).abs() < 0.05, "{first}, {second}");
+    assert!((third / first - 1.0).abs() < 0.05, "{first}, {third}");
+}

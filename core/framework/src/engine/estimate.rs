@@ -194,23 +194,20 @@ impl Estimate {
         now: Instant,
         on: bool,
     ) -> (f64, Instant) {
+        whole |= self.takes_absent;
+        whole &= oldest < Instant::MAX;
+        if let Some(learning) = &mut self.learning {
+            // What is learned from was measured, whatever stands in for it in a prediction.
+            learning.run(whole.then_some(&*self.row), now, gathered, on);
+        }
         if let Some(feedback) = &mut self.feedback {
             let (learning, predictor) = (&self.learning, &self.predictor);
             feedback.replace(&mut self.row, now, |row, at| match learning {
                 Some(learning) => learning.predict(row, at),
                 None => predictor.predict(row),
             });
-            whole = self.row.iter().all(|value| !value.is_nan());
+            whole = self.takes_absent || self.row.iter().all(|value| !value.is_nan());
             oldest = oldest.min(now);
-        }
-        whole |= self.takes_absent;
-        whole &= oldest < Instant::MAX;
-        if let Some(learning) = &mut self.learning {
-            if !whole {
-                // Nothing of earlier runs may stand in it.
-                self.row.fill(f64::NAN);
-            }
-            learning.run(&self.row, now, gathered, on);
         }
         let prediction = match &self.learning {
             _ if !whole => f64::NAN,

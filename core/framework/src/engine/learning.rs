@@ -21,6 +21,8 @@ pub(crate) struct Learning {
     freeze: Option<usize>,
     mode: Mode,
     step: Step,
+    /// A row in which nothing is there.
+    nothing: Vec<f64>,
 }
 
 /// What became of a truth that the embargo let through, as the port `learning` tells it.
@@ -65,6 +67,7 @@ impl Learning {
             },
             mode: Mode::OneStep,
             step: Step::new(truth.ahead.max(truth.span)),
+            nothing: vec![f64::NAN; width],
         })
     }
 
@@ -97,8 +100,15 @@ impl Learning {
         self.withheld.link().slot
     }
 
-    /// Writes the regressors of a run down.
-    pub(crate) fn run(&mut self, row: &[f64], now: Instant, gathered: &[Gathered], on: bool) {
+    /// Writes the regressors of a run down, where all that are needed were there.
+    pub(crate) fn run(
+        &mut self,
+        row: Option<&[f64]>,
+        now: Instant,
+        gathered: &[Gathered],
+        on: bool,
+    ) {
+        let row = row.unwrap_or(&self.nothing);
         let frozen = [self.frozen(gathered, on)];
         self.withheld.run(now, [row, &frozen]);
         let of = now + self.withheld.link().ahead;

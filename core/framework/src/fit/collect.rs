@@ -28,6 +28,45 @@ impl Share {
     fn contains(&self, tick: u64) -> bool {
         self.within.contains(&tick) && !self.without.iter().any(|range| range.contains(&tick))
     }
+
+    /// The ticks of the share, of which there are `ticks` in all, cut into so many parts of about the same size. A part may reach
+    /// across ticks that are not in the share.
+    pub(super) fn cut(&self, ticks: u64, parts: u64) -> Vec<Range<u64>> {
+        let within = self.within.start..self.within.end.min(ticks);
+        // Where the share begins or ends, in order.
+        let edges = self
+            .without
+            .iter()
+            .flat_map(|range| [range.start, range.end]);
+        let mut edges: Vec<u64> = edges.filter(|edge| within.contains(edge)).collect();
+        edges.extend([within.start, within.end]);
+        edges.sort_unstable();
+        let runs: Vec<Range<u64>> = edges
+            .windows(2)
+            .map(|edge| edge[0]..edge[1])
+            .filter(|run| self.contains(run.start))
+            .collect();
+        let count: u64 = runs.iter().map(|run| run.end - run.start).sum();
+        // The tick before which so many of the share lie.
+        let after = |mut before: u64| {
+            for run in &runs {
+                let length = run.end - run.start;
+                if before < length {
+                    return run.start + before;
+                }
+                before -= length;
+            }
+            within.end
+        };
+        let edge = |nth: u64| {
+            if nth == 0 {
+                within.start
+            } else {
+                after(count * nth / parts)
+            }
+        };
+        (0..parts).map(|nth| edge(nth)..edge(nth + 1)).collect()
+    }
 }
 
 /// The runs of a gather, as several estimators may share them.
@@ -254,5 +293,31 @@ impl Collector {
         for trainee in &mut self.trainees {
             trainee.segment_pending = true;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_of_a_share_is_cut_into_parts_of_the_same_size() {
+        let all = Share::all();
+        assert_eq!(all.cut(600, 3), [0..200, 200..400, 400..600]);
+        let mut without = all.clone();
+        without.without.push(200..400);
+        // The part in the middle reaches across what is not there.
+        let parts = without.cut(600, 3);
+        assert_eq!(parts, [0..133, 133..466, 466..600]);
+        without.without.push(parts[1].clone());
+        assert_eq!(without.cut(600, 2), [0..466, 466..600]);
+        let count = |part: &Range<u64>| part.clone().filter(|&tick| without.contains(tick)).count();
+        let cut = without.cut(600, 4);
+        assert!(
+            cut.iter().all(|part| (66..=67).contains(&count(part))),
+            "{cut:?}"
+        );
+        assert_eq!(all.cut(2, 3).len(), 3, "some of them are empty");
+        assert_eq!(all.cut(0, 2), [0..0, 0..0]);
     }
 }

@@ -125,13 +125,9 @@ impl<'a> Fitting<'a> {
                 encoders.insert(node.instance(), Arc::clone(fit));
             }
         }
-        let ticks = self.report.ticks;
-        let (first, end) = (share.within.start, share.within.end.min(ticks));
         let folds = self.options.folds.max(2) as u64;
         let mut parts = Vec::new();
-        for fold in 0..folds {
-            let edge = |nth: u64| first + (end - first) * nth / folds;
-            let fold = edge(fold)..edge(fold + 1);
+        for fold in share.cut(self.report.ticks, folds) {
             let mut without = share.clone();
             without.without.push(fold.clone());
             let (fitted, _) = self.fit_up_to(level - 1, &without, &encoders)?;
