@@ -195,6 +195,29 @@ fn a_choice_has_the_deviation_of_what_it_chose() {
 }
 
 #[test]
+fn a_watch_passes_the_deviation_of_what_it_watches_on() {
+    for watch in ["page_hinkley", "adwin"] {
+        let text = voting(
+            &format!("{watch}\"\ninputs.truth = \"drift"),
+            &["vote", "vote:deviation", "vote:reason"],
+        )
+        .replace("[\"one\", \"other\"]", "\"one\"");
+        let fitted = [
+            ("one", linear(5.0, 4.0, 0.0)),
+            ("other", linear(7.0, 9.0, 0.0)),
+        ];
+        let mut bench = Bench::new(&text, &fitted);
+        let found = bench.tick(0.0, &[("temperature.room", 30.0)]);
+        assert_eq!(found[0], 5.0);
+        assert!(
+            (found[1] - (4.0_f64 * 1.01).sqrt()).abs() < 1e-12,
+            "{watch}: {found:?}"
+        );
+        assert_eq!(found[2], 3.0, "not yet known");
+    }
+}
+
+#[test]
 fn a_vote_is_unsure_of_what_its_voters_are_and_of_what_they_disagree_about() {
     let vote = r#"auto_weighted"
         inputs.truth = "drift"

@@ -12,7 +12,8 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 
 /// The vote of the voter with the smallest recent root mean square error.
 ///
-/// A voter without errors in memory is taken only while none has any, the first one first. The port `weights` shows whose vote it is.
+/// A voter without errors in memory is taken only while none has any, the first one first. The port `weights` shows whose vote it is,
+/// and the port `deviation` its standard deviation where all voters tell theirs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Best {
@@ -21,7 +22,8 @@ pub struct Best {
     pub memory: Memory,
 }
 
-/// The first vote that is there, in the order of the voters. The port `weights` shows whose it is.
+/// The first vote that is there, in the order of the voters. The port `weights` shows whose it is, and the port
+/// `deviation` its standard deviation where all voters tell theirs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fallback {}

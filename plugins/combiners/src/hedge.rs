@@ -28,6 +28,7 @@ use crate::share::raise;
 ///
 /// A voter without a prediction drops out, the rest are renormalised, and what it is owed neither grows nor shrinks while it is away (Freund, Schapire,
 /// Singer and Warmuth 1997). Before the first truth all weights are equal. The port `weights` shows them.
+/// Where all voters tell their standard deviation, the port `deviation` is that of their mixture, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hedge {

@@ -5,6 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The mean of the votes that are there. The port `weights` shows an equal one for each of them.
+///
+/// Where all voters tell their standard deviation, the port `deviation` is that of their mixture, as of `auto_weighted`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mean {}
@@ -31,6 +33,14 @@ pub(crate) fn mean(votes: Votes<'_>) -> f64 {
     if count > 0.0 { sum / count } else { f64::NAN }
 }
 
+/// Gives each vote that is there what it counts in the mean.
+pub(crate) fn equal(votes: Votes<'_>, weights: &mut [f64]) {
+    let count = votes.present().count() as f64;
+    for (voter, _) in votes.present() {
+        weights[voter] = 1.0 / count;
+    }
+}
+
 struct Average;
 
 impl Combine for Average {
@@ -39,10 +49,7 @@ impl Combine for Average {
     }
 
     fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
-        let count = votes.present().count() as f64;
-        for (voter, _) in votes.present() {
-            weights[voter] = 1.0 / count;
-        }
+        equal(votes, weights);
     }
 }
 

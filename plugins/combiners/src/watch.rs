@@ -10,13 +10,14 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::mean::mean;
+use crate::mean::{equal, mean};
 
 /// What both kinds document of their answers.
 macro_rules! reasons {
     () => {
         "The port `reason`, written `watch:reason` of a node `watch` (in a node with `each`, `watch:reason.{axis}` is that of its\n\
-         member), says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched."
+         member), says: 0 no change, 1 the mean has gone up, 2 it has gone down, 3 not yet known. An alarm stands for `hold`. Of several predictions the mean is watched.\n\
+         The port `deviation` passes the standard deviation of the prediction on, where it has one."
     };
 }
 
@@ -221,6 +222,10 @@ impl Combiner for PageHinkley {
         checks.0
     }
 
+    fn weighs(&self) -> bool {
+        true
+    }
+
     fn reasons(&self) -> bool {
         true
     }
@@ -266,6 +271,10 @@ impl Combiner for Adwin {
         checks.check("clock", clock, clock >= 1, "1 or more");
         checks.check("shortest", shortest, shortest >= 1, "1 or more");
         checks.0
+    }
+
+    fn weighs(&self) -> bool {
+        true
     }
 
     fn reasons(&self) -> bool {
@@ -386,6 +395,10 @@ where
 {
     fn combine(&self, votes: Votes<'_>) -> f64 {
         mean(votes)
+    }
+
+    fn weights(&self, votes: Votes<'_>, weights: &mut [f64]) {
+        equal(votes, weights);
     }
 
     fn reason(&self, votes: Votes<'_>) -> f64 {

@@ -205,7 +205,8 @@ impl Resolver<'_> {
         agree
     }
 
-    /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant.
+    /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant. The second is another
+    /// vote, or the truth.
     pub(super) fn agree(
         &mut self,
         instance: &Instance<'_>,
@@ -230,6 +231,17 @@ impl Resolver<'_> {
                 first_ahead: a.channel.ahead,
                 second: b.name.clone(),
                 second_ahead: b.channel.ahead,
+            }
+        } else if let Some(of_first) = a.predicts
+            && let Some(of_second) = if votes { b.predicts } else { Some(second) }
+            && of_first != of_second
+        {
+            let name = |slot: usize| self.channels[slot].name.clone();
+            CompileProblem::Truths {
+                first: a.name.clone(),
+                first_truth: name(of_first),
+                second: b.name.clone(),
+                second_truth: name(of_second),
             }
         } else {
             return true;

@@ -81,6 +81,13 @@ pub enum CompileProblem {
         second: String,
         second_ahead: Duration,
     },
+    /// Two predictions that must be of the same truth, or one and the truth that it is judged by.
+    Truths {
+        first: String,
+        first_truth: String,
+        second: String,
+        second_truth: String,
+    },
     /// A loop without a delay.
     Cycle { path: Vec<String> },
     /// A regressor that contains part of the answer.
@@ -194,6 +201,7 @@ impl Problem for CompileProblem {
             Self::PointOrDifference { .. } => "A063",
             Self::NoRows { .. } => "A064",
             Self::Doubt { .. } => "A065",
+            Self::Truths { .. } => "A066",
             Self::NeverLearns { .. } => "A110",
             Self::EndlessTruth { .. } => "A160",
         }
@@ -268,6 +276,20 @@ impl Problem for CompileProblem {
             } => {
                 format!("`{first}` looks {first_ahead} ahead and `{second}` {second_ahead}")
             }
+            Self::Truths {
+                first,
+                first_truth,
+                second,
+                second_truth,
+            } => {
+                if second == second_truth {
+                    format!("`{first}` predicts `{first_truth}` and is to be judged by `{second}`")
+                } else {
+                    format!(
+                        "`{first}` predicts `{first_truth}` and `{second}` `{second_truth}`"
+                    )
+                }
+            }
             Self::Cycle { path } => {
                 format!("these nodes wait for each other: {}", path.join(" → "))
             }
@@ -338,6 +360,7 @@ impl Problem for CompileProblem {
             Self::Units { .. } => "units differ",
             Self::Spans { .. } => "spans differ",
             Self::Horizons { .. } => "horizons differ",
+            Self::Truths { .. } => "truths differ",
             Self::Cycle { .. } => "part of a loop",
             Self::Leak { .. } => "sees the future",
             Self::NoMaxAge { .. } => "held without a maximum age",
@@ -387,6 +410,9 @@ impl Problem for CompileProblem {
             }
             Self::Spans { .. } => "compute both over windows of the same length".to_owned(),
             Self::Horizons { .. } => "give both the same `ahead`".to_owned(),
+            Self::Truths { .. } => {
+                "combine predictions of one channel; where there is one for each axis, `each` makes a node for each".to_owned()
+            }
             Self::Cycle { .. } => "let the feedback go through a `delay` node".to_owned(),
             Self::Leak {
                 lag,

@@ -303,6 +303,11 @@ pub const CODES: &[Code] = &[
         "The node works as it is written, but not as it is meant to be used: its documentation says what it wants."
     ),
     code!(
+        "A066",
+        "predictions of different truths",
+        "All voters of a combiner predict the same channel, and that is the one they are judged by. A prediction of X is none of Y, however alike the two are."
+    ),
+    code!(
         "A070",
         "nothing to run over",
         "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."
