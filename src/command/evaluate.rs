@@ -135,7 +135,7 @@ impl Evaluate {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to score",
             );
-        } else if terminal.format == Format::Table {
+        } else if terminal.format == Format::Table && scores.scores.iter().any(|of| of.n > 0) {
             // Why the scores are what they are.
             terminal.note(next(&self.data.words_with("diagnose", &self.model)));
         }
@@ -271,20 +271,35 @@ fn describe(scores: &Scores, mode: Mode) -> String {
 
 fn interval(score: &Score) -> Option<Vec<String>> {
     let interval = score.interval.as_ref()?;
-    let percent = |share: f64| format!("{:.1}%", 100.0 * share);
     Some(vec![
         format!("  {}", score.output),
         interval.from.to_owned(),
-        percent(interval.stated),
-        percent(interval.covered),
+        percent(100.0 * interval.stated),
+        percent(100.0 * interval.covered),
         number(interval.width),
         number(interval.score),
     ])
 }
 
+/// How much of a truth is told, 1 being all of it. What is far off is not written out.
+fn share(value: f64) -> String {
+    if value.abs() < 1e3 {
+        format!("{value:.3}")
+    } else {
+        number(value)
+    }
+}
+
+fn percent(value: f64) -> String {
+    if value.abs() < 1e5 {
+        format!("{value:.1}%")
+    } else {
+        format!("{}%", number(value))
+    }
+}
+
 fn line(score: &Score) -> Vec<String> {
-    let ratio =
-        |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+    let ratio = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), share);
     let ahead =
         athermal::Duration::from_secs_f64(score.ahead_s).unwrap_or(athermal::Duration::ZERO);
     let mut cells = vec![
@@ -293,20 +308,22 @@ fn line(score: &Score) -> Vec<String> {
         or_dash(score.rmse),
         ratio(score.r2_zero),
         ratio(score.r2_mean),
-        score
-            .fit
-            .map_or_else(|| "-".to_owned(), |fit| format!("{fit:.1}%")),
+        score.fit.map_or_else(|| "-".to_owned(), percent),
         or_dash(score.bias),
         or_dash(score.max_abs),
         score
             .valid
-            .map_or_else(|| "-".to_owned(), |valid| format!("{:.1}%", 100.0 * valid)),
+            .map_or_else(|| "-".to_owned(), |valid| percent(100.0 * valid)),
     ];
     let mut remarks = Vec::new();
     if score.is_worse_than_nothing() {
         remarks.push("worse than no model".to_owned());
     }
-    if score.own_instants {
+    if score.valid.is_none() {
+        remarks.push("no truth to compare with".to_owned());
+    } else if score.n == 0 {
+        remarks.push("no prediction of any truth".to_owned());
+    } else if score.own_instants {
         remarks.push(format!(
             "on its own {} instants (no model {})",
             score.n,

@@ -62,3 +62,39 @@ fn a_fit_that_predicts_nothing_leads_to_a_run() {
             .contains("next:")
     );
 }
+
+#[test]
+fn where_nothing_could_be_scored_the_reason_is_told_and_no_diagnosis() {
+    let scratch = Scratch::new("command-line-next-nothing");
+    let text = "schema = 1\n[time]\ncolumn = \"s\"\n[signals.in]\nunit = \"V\"\nchannels = [\"u\"]\nmax_age = \"1s\"\n\
+         [signals.out]\nunit = \"V\"\nchannels = [\"y\"]\nmax_age = \"1s\"\n[nodes.m]\ntype = \"linear\"\n\
+         inputs = { features = \"in\", truth = \"out\" }\nahead = \"0s\"\n[outputs]\nm = \"m\"\n";
+    let graph = scratch.file("graph.toml", text);
+    let table = |row: &dyn Fn(f64) -> String| {
+        let rows: String = (0..50)
+            .map(|s| format!("{s},{}\n", row(f64::from(s))))
+            .collect();
+        format!("s,u,y\n{rows}")
+    };
+    let train = scratch.file(
+        "train.csv",
+        table(&|s| format!("{},{}", s.sin(), 2.0 * s.sin())),
+    );
+    let model = scratch.path("m.json");
+    athermal(&[&"fit", &graph, &"--data", &train, &"-o", &model]).ended(0);
+    let silent = table(&|s| format!("{s},"));
+    let dead = table(&|s| format!(",{s}"));
+    let wild = table(&|s| format!("{}e150,{s}", s - 25.0));
+    for (data, remark, next) in [
+        (silent, "no truth to compare with", false),
+        (dead, "no prediction of any truth", false),
+        (wild, "worse than no model", true),
+    ] {
+        let data = scratch.file("data.csv", data);
+        let scored = athermal(&[&"evaluate", &model, &"--data", &data]).ended(0);
+        assert!(scored.out.contains(remark), "{}", scored.out);
+        assert_eq!(scored.told.contains("next:"), next, "{}", scored.told);
+        let widest = scored.out.lines().map(|line| line.chars().count()).max();
+        assert!(widest.unwrap() < 110, "{}", scored.out);
+    }
+}

@@ -285,9 +285,7 @@ impl Problem for CompileProblem {
                 if second == second_truth {
                     format!("`{first}` predicts `{first_truth}` and is to be judged by `{second}`")
                 } else {
-                    format!(
-                        "`{first}` predicts `{first_truth}` and `{second}` `{second_truth}`"
-                    )
+                    format!("`{first}` predicts `{first_truth}` and `{second}` `{second_truth}`")
                 }
             }
             Self::Cycle { path } => {
