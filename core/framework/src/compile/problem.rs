@@ -209,13 +209,36 @@ impl Problem for CompileProblem {
     }
 
     fn may_follow_from_a_gap(&self) -> bool {
-        !matches!(
-            self,
+        match self {
+            Self::UnknownNode { .. }
+            | Self::UnknownPort { .. }
+            | Self::UnknownChannel { .. }
+            | Self::MissingInput { .. }
+            | Self::ChannelCount { .. }
+            | Self::Units { .. }
+            | Self::PointOrDifference { .. }
+            | Self::NoRows { .. }
+            | Self::Spans { .. }
+            | Self::Horizons { .. }
+            | Self::Cycle { .. }
+            | Self::Leak { .. }
+            | Self::NoMaxAge { .. }
+            | Self::Doubt { .. }
+            | Self::NeverLearns { .. }
+            | Self::NoHorizon { .. }
+            | Self::PredictedTruth { .. }
+            | Self::EndlessTruth { .. }
+            | Self::LimitUnit { .. }
+            | Self::DuplicateName { .. }
+            | Self::UnusedNode { .. }
+            | Self::UnusedSignal { .. }
+            | Self::Unreachable { .. }
+            | Self::NoOutputs => true,
             Self::UnknownKind { .. }
-                | Self::KindTwice { .. }
-                | Self::UnknownInput { .. }
-                | Self::Parameter { .. }
-        )
+            | Self::KindTwice { .. }
+            | Self::UnknownInput { .. }
+            | Self::Parameter { .. } => false,
+        }
     }
 
     fn message(&self) -> String {

@@ -52,9 +52,7 @@ pub trait Problem {
     }
 
     /// Whether it may only follow from something else that is missing, so that it is not told where parts of a file could not be read.
-    fn may_follow_from_a_gap(&self) -> bool {
-        false
-    }
+    fn may_follow_from_a_gap(&self) -> bool;
 }
 
 /// A problem at a place.
