@@ -2,6 +2,7 @@
 
 mod codes;
 mod collector;
+mod gaps;
 mod nearest;
 mod place;
 mod render;
