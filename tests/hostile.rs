@@ -361,3 +361,31 @@ fn a_mark_that_is_missing_brings_no_mistake_about_but_those_of_the_syntax() {
     }
     assert!(wrong > 1_000, "{wrong}");
 }
+
+#[test]
+fn twenty_thousand_unknown_references_are_told_soon() {
+    let mut text = "schema = 1\n[signals.t]\nunit = \"Cel\"\nchannels = [\"a\"]\n".to_owned();
+    for nth in 0..10_000 {
+        let node = format!(
+            "[nodes.slope_{nth:04}]\ntype = \"slope\"\nwindows = [\"5min\"]\n\
+             inputs.signal = [\"slop_{nth:04}\", \"epols_{nth:04}\"]\n"
+        );
+        text.push_str(&node);
+    }
+    text.push_str("[outputs]\nfirst = \"slope_0000\"\n");
+    let files = Memory::new().with("a.toml", text);
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let started = Instant::now();
+    let document = load(Path::new("a.toml"), &files, &mut sources, &mut diagnostics);
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
+    let taken = started.elapsed();
+    assert!(plan.is_none());
+    assert_eq!(diagnostics.error_count(), 20_000);
+    let one = diagnostics
+        .iter()
+        .find(|told| told.message.contains("slop_9999"));
+    let help = one.and_then(|told| told.help.as_deref());
+    assert_eq!(help, Some("did you mean `slope_9999`?"));
+    assert!(taken < 6 * TOO_LONG, "{taken:?}");
+}

@@ -196,15 +196,21 @@ pub fn check_limit(limit: &Quantity, model: &Model) -> Result<(), Failure> {
 /// When it cannot be loaded, or is a graph that needs fitting.
 pub fn load_fitted(path: &std::path::Path, wanted: Wanted) -> Result<Model, Failure> {
     let model = Model::load_for(path, wanted)?;
-    let nodes = model.unfitted();
-    if model.card.is_none() && !nodes.is_empty() {
-        return Err(ModelError::NotFitted {
-            path: path.to_owned(),
-            nodes,
-        }
-        .into());
-    }
+    check_fitted(&model, path)?;
     Ok(model)
+}
+
+/// Refuses a graph in which something needs fitting.
+///
+/// # Errors
+/// When it is one.
+pub fn check_fitted(model: &Model, path: &std::path::Path) -> Result<(), Failure> {
+    let nodes = model.unfitted();
+    if model.card.is_some() || nodes.is_empty() {
+        return Ok(());
+    }
+    let path = path.to_owned();
+    Err(ModelError::NotFitted { path, nodes }.into())
 }
 
 fn describe(scores: &Scores, mode: Mode) -> String {

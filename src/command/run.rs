@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair};
 use athermal::core::recording::Event;
@@ -11,7 +10,7 @@ use athermal::{Engine, Model};
 use clap::Args;
 
 use super::data;
-use super::evaluate::load_fitted;
+use super::evaluate::check_fitted;
 use super::swap;
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
@@ -43,13 +42,31 @@ pub struct Run {
     swap: swap::Options,
 }
 
+/// What a machine file may say and is not read here: its key, how it is written, and what to do instead.
+const UNREAD: [(&str, &str, &str); 4] = [
+    ("source", "`[source]`", "give the input with `--input`"),
+    ("sinks", "`[sinks]`", "give the output with `--output`"),
+    (
+        "runtime",
+        "`[runtime]`",
+        "do without heartbeats, since every tick is a row",
+    ),
+    (
+        "model",
+        "`model`",
+        "name the fitted model in place of the graph",
+    ),
+];
+
 impl Run {
     /// Runs until the input ends.
     ///
     /// # Errors
     /// When the model or the input cannot be used, or the output not written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let model = load_fitted(&self.model, Wanted::default())?;
+        let model = Model::load(&self.model)?;
+        self.tell_unread(terminal, &model);
+        check_fitted(&model, &self.model)?;
         if self.swap.any() {
             return self.run_replaceable(terminal, model);
         }
@@ -146,6 +163,23 @@ impl Run {
         let engine = stepper.engine();
         self.tell(terminal, engine, &reader);
         Ok(Answer::Fine)
+    }
+
+    /// Tells which sections of a machine file are not read, since whoever wrote them expects them to work.
+    fn tell_unread(&self, terminal: &Terminal, model: &Model) {
+        let written = |(key, ..): &&(&str, &str, &str)| model.graph.deployment.contains_key(*key);
+        let unread: Vec<_> = UNREAD.iter().filter(written).collect();
+        if unread.is_empty() {
+            return;
+        }
+        let sections: Vec<_> = unread.iter().map(|(_, section, _)| *section).collect();
+        let instead: Vec<_> = unread.iter().map(|(.., instead)| *instead).collect();
+        terminal.warning(format_args!(
+            "{}: `athermal run` does not yet read {}: {}",
+            self.model.display(),
+            sections.join(", "),
+            instead.join("; ")
+        ));
     }
 
     fn flush(&self) -> Flush {

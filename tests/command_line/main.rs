@@ -8,6 +8,7 @@ mod workbench;
 
 mod columns;
 mod gaps;
+mod machine_file;
 mod mistakes;
 mod mistakes_in_tests;
 mod next;

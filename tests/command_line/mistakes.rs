@@ -264,6 +264,16 @@ inputs.signal = "position.X"
 max_slew = "50 nm/s"
 refuge = "value"
 value = 3
+[nodes.other]
+type = "linear"
+inputs.features = "temperature"
+inputs.truth = "drift.X"
+ahead = "5min"
+solver = { type = "rigde", alpha = -1.0 }
+[nodes.other.selection]
+method = 5
+folds = 1
+most = 0
 "#;
     let expected = [
         (22, "soon"),
@@ -271,12 +281,18 @@ value = 3
         (23, "margn"),
         (24, "alpha"),
         (25, "forwrd"),
+        (25, "fold"),
         (30, "`first` is 1"),
         (31, "threshold"),
         (32, "factr"),
         (37, "mn"),
         (38, "`min_coverage` is 3"),
         (44, "value"),
+        (50, "rigde"),
+        (50, "alpha"),
+        (52, "found the number 5"),
+        (53, "fold"),
+        (54, "`most` is 0"),
     ];
     assert_told("command-line-out-of-range", &text, &expected);
 }

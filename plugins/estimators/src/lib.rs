@@ -50,7 +50,7 @@ pub use linear::Linear;
 pub use narx::{Narx, NarxPredictor};
 pub use oe::Oe;
 pub use online::OnlinePredictor;
-pub use order::{Figure, Order, OrderRange};
+pub use order::{Order, OrderRange};
 pub use penalty::{Choice, Penalty};
 pub use persistence::Persistence;
 pub use polynomial::{Polynomial, PolynomialPredictor};

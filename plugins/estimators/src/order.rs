@@ -3,7 +3,7 @@
 use std::fmt;
 
 use athermal_core::node::{Mistake, OrderFigure, OrderTable, TriedOrder};
-use athermal_numerics::{Criterion, InformationCriteria};
+use athermal_numerics::InformationCriteria;
 use schemars::JsonSchema;
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -53,41 +53,6 @@ impl<'de> Deserialize<'de> for OrderRange {
     }
 }
 
-/// Which figure chooses the order; the smallest is the best.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Figure {
-    /// Akaike's information criterion.
-    Aic,
-    /// The same, corrected for few rows.
-    #[default]
-    Aicc,
-    /// The Bayesian information criterion, which takes the fewest coefficients.
-    Bic,
-    /// The final prediction error.
-    Fpe,
-}
-
-impl Figure {
-    fn criterion(self) -> Criterion {
-        match self {
-            Self::Aic => Criterion::Aic,
-            Self::Aicc => Criterion::Aicc,
-            Self::Bic => Criterion::Bic,
-            Self::Fpe => Criterion::Fpe,
-        }
-    }
-
-    fn told(self) -> OrderFigure {
-        match self {
-            Self::Aic => OrderFigure::Aic,
-            Self::Aicc => OrderFigure::Aicc,
-            Self::Bic => OrderFigure::Bic,
-            Self::Fpe => OrderFigure::Fpe,
-        }
-    }
-}
-
 /// Which orders are compared, and by what. All are fitted on the same rows.
 ///
 /// With `N` rows, `V` the mean square of the residuals, `p` coefficients and `k = p + 1`: AIC `N ln V + 2k`, AICc
@@ -98,7 +63,7 @@ impl Figure {
 pub struct Order {
     /// The figure that chooses: `aic`, `aicc`, `bic` or `fpe`.
     #[serde(default)]
-    pub by: Figure,
+    pub by: OrderFigure,
     /// How many past values of the truth, such as `"1..6"`; for `ar` and `arx`, how many of the first `lags`.
     #[serde(default)]
     pub na: Option<OrderRange>,
@@ -212,11 +177,6 @@ impl Order {
 
     /// The best of what was tried, and the table of all.
     pub(crate) fn best(&self, rows: usize, tried: Vec<Tried>) -> Option<(usize, OrderTable)> {
-        let by = |tried: &Tried| tried.figures.by(self.by.criterion());
-        let worth = tried.iter().map(by).enumerate();
-        let (best, _) = worth
-            .filter(|(_, worth)| worth.is_finite())
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
         let told = tried.into_iter().map(|tried| TriedOrder {
             order: tried.name,
             coefficients: tried.coefficients,
@@ -225,11 +185,16 @@ impl Order {
             bic: tried.figures.bic,
             fpe: tried.figures.fpe,
         });
+        let tried: Vec<_> = told.collect();
+        let worth = tried.iter().map(|tried| tried.figure(self.by)).enumerate();
+        let (best, _) = worth
+            .filter(|(_, worth)| worth.is_finite())
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
         let table = OrderTable {
-            by: self.by.told(),
+            by: self.by,
             rows,
             chosen: best,
-            tried: told.collect(),
+            tried,
         };
         Some((best, table))
     }

@@ -1,16 +1,21 @@
 //! The columns that a file has against those that are wanted: the delimiter, missing and doubled names. Not their cells.
 
+use std::collections::HashSet;
+
 use csv::{ByteRecord, ReaderBuilder};
 
 use crate::cell::trim;
 use crate::error::excerpt;
-use crate::{FileError, Place};
+use crate::{FileError, MissingColumn, Place};
 
 /// What may stand between cells, the most usual first.
 const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
 
 /// How alike two names must be for one to be suggested for the other (Jaro–Winkler, 0 to 1).
 const ALIKE: f64 = 0.8;
+
+/// How many missing columns are compared with those found. A file that lacks more is another file.
+const COMPARED: usize = 50;
 
 /// The delimiter under which a header line shows the most of the wanted columns, then the most columns.
 pub(crate) fn choose_delimiter<'a>(
@@ -75,21 +80,37 @@ pub(crate) fn check_unique(
     }
 }
 
-/// The error for a column that is not among the names found.
-pub(crate) fn missing(place: Place, column: &str, found: &[String]) -> FileError {
-    let wanted = column.to_lowercase();
-    let alike = |name: &String| strsim::jaro_winkler(&wanted, &name.to_lowercase());
-    let nearest = found
-        .iter()
-        .filter(|name| !name.is_empty())
-        .map(|name| (alike(name), name))
-        .filter(|(alike, _)| *alike >= ALIKE)
-        .max_by(|(a, _), (b, _)| a.total_cmp(b));
-    FileError::MissingColumn {
+/// The error for columns that are not among the names found.
+pub(crate) fn missing<'a>(
+    place: Place,
+    columns: impl Iterator<Item = &'a str>,
+    found: &[String],
+) -> FileError {
+    let lower: Vec<_> = found.iter().map(|name| name.to_lowercase()).collect();
+    let nearest = |column: &str| {
+        let wanted = column.to_lowercase();
+        let named = lower.iter().zip(found).filter(|(_, name)| !name.is_empty());
+        named
+            .map(|(lower, name)| (strsim::jaro_winkler(&wanted, lower), name))
+            .filter(|(alike, _)| *alike >= ALIKE)
+            .max_by(|(a, _), (b, _)| a.total_cmp(b))
+            .map(|(_, name)| name.clone())
+    };
+    let mut missing: Vec<MissingColumn> = Vec::new();
+    let mut told = HashSet::new();
+    // Two channels may have one column.
+    for column in columns.filter(|column| told.insert(*column)) {
+        missing.push(MissingColumn {
+            name: column.to_owned(),
+            nearest: (missing.len() < COMPARED)
+                .then(|| nearest(column))
+                .flatten(),
+        });
+    }
+    FileError::MissingColumns {
         place,
-        column: column.to_owned(),
+        missing,
         found: found.iter().map(|name| excerpt(name.as_bytes())).collect(),
-        nearest: nearest.map(|(_, name)| name.clone()),
     }
 }
 
@@ -128,8 +149,8 @@ mod tests {
             file: "a".into(),
             line: 1,
         };
-        let nearest = |wanted: &str| match missing(place.clone(), wanted, &found) {
-            FileError::MissingColumn { nearest, .. } => nearest,
+        let nearest = |wanted: &str| match missing(place.clone(), [wanted].into_iter(), &found) {
+            FileError::MissingColumns { missing, .. } => missing[0].nearest.clone(),
             other => panic!("{other}"),
         };
         assert_eq!(nearest("Room_degc").as_deref(), Some("room_degC"));

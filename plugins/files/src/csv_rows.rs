@@ -31,20 +31,25 @@ impl CsvRows {
     /// Reads the header and finds the wanted columns in it.
     pub fn new(lines: Lines, layout: &Layout, delimiter: Option<u8>) -> Result<Self, FileError> {
         let mut rows = Self::headed(lines, delimiter, layout.names())?;
-        let names = &rows.names;
-        let missing = |name: &str| columns::missing(rows.place(), name, names);
-        let time = &layout.time.column;
-        let time_at = columns::position(names, time).ok_or_else(|| missing(time))?;
-        let channels =
-            layout
-                .channels
-                .iter()
-                .map(|channel| match columns::position(names, &channel.column) {
-                    None if !channel.optional => Err(missing(&channel.column)),
-                    found => Ok(found),
-                });
-        rows.channels = channels.collect::<Result<_, _>>()?;
-        rows.time = time_at;
+        let at = |name: &str| columns::position(&rows.names, name);
+        let time = at(&layout.time.column);
+        let channels: Vec<_> = layout
+            .channels
+            .iter()
+            .map(|channel| at(&channel.column))
+            .collect();
+        let lacks_time = time.is_none().then_some(layout.time.column.as_str());
+        let lacking = layout.channels.iter().zip(&channels);
+        let lacking = lacking.filter(|(channel, at)| at.is_none() && !channel.optional);
+        let mut missing = lacks_time
+            .into_iter()
+            .chain(lacking.map(|(channel, _)| channel.column.as_str()))
+            .peekable();
+        if missing.peek().is_some() {
+            return Err(columns::missing(rows.place(), missing, &rows.names));
+        }
+        rows.channels = channels;
+        rows.time = time.unwrap_or_default();
         Ok(rows)
     }
 
@@ -329,6 +334,18 @@ mod tests {
         assert!(
             error("time,a,b\n")
                 .starts_with("f.csv:1: there is no column `t`; found `time`, `a`, `b`")
+        );
+    }
+
+    #[test]
+    fn all_missing_columns_are_told_at_once_and_an_optional_one_is_not() {
+        let mut layout = Layout::new("t", TimeForm::SECONDS, ["room", "plate", "chuck", "room"]);
+        layout.channels[1].optional = true;
+        let file = &b"time,chuk,rooms\n0,1,2\n"[..];
+        let error = Reader::from_read("f.csv", file, layout, Options::default()).err();
+        assert_eq!(
+            error.unwrap().to_string(),
+            "f.csv:1: there are no columns `t`, `room`, `chuck`; found `time`, `chuk`, `rooms`; did you mean `rooms` for `room`, `chuk` for `chuck`? otherwise correct the names, or make optional those that are channels"
         );
     }
 

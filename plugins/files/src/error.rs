@@ -22,6 +22,15 @@ impl fmt::Display for Place {
     }
 }
 
+/// A column that is needed and not there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MissingColumn {
+    /// Its name.
+    pub name: String,
+    /// The most similar of the names that are there, if one is similar.
+    pub nearest: Option<String>,
+}
+
 /// What went wrong while a recording was read or written.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -80,16 +89,14 @@ pub enum FileError {
         /// Where the columns stand, counted from 1.
         positions: [usize; 2],
     },
-    /// A column that is needed is not there.
-    MissingColumn {
+    /// Columns that are needed are not there.
+    MissingColumns {
         /// The header, or the last line looked at.
         place: Place,
-        /// The name of the column.
-        column: String,
+        /// All that are missing; never none.
+        missing: Vec<MissingColumn>,
         /// The names that are there.
         found: Vec<String>,
-        /// The most similar of them, if one is similar.
-        nearest: Option<String>,
     },
     /// A cell that is neither a number nor "no value".
     BadCell {
@@ -197,22 +204,11 @@ impl fmt::Display for FileError {
                 f,
                 "{place}: the name `{column}` stands at columns {first} and {second}; give each column a name of its own"
             ),
-            Self::MissingColumn {
+            Self::MissingColumns {
                 place,
-                column,
+                missing,
                 found,
-                nearest,
-            } => {
-                write!(f, "{place}: there is no column `{column}`; found ")?;
-                list(f, found)?;
-                match nearest {
-                    Some(nearest) => write!(f, "; did you mean `{nearest}`?"),
-                    None => write!(
-                        f,
-                        "; correct the name, or make it optional if it is a channel"
-                    ),
-                }
-            }
+            } => lacking(f, place, missing, found),
             Self::BadCell {
                 place,
                 column,
@@ -287,15 +283,55 @@ pub(crate) fn excerpt(bytes: &[u8]) -> String {
     short
 }
 
-fn list(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
-    if names.is_empty() {
-        return write!(f, "no columns");
+/// Which columns are missing, what is there, and what each may be called there.
+fn lacking(
+    f: &mut fmt::Formatter<'_>,
+    place: &Place,
+    missing: &[MissingColumn],
+    found: &[String],
+) -> fmt::Result {
+    let quoted = |name: &str| format!("`{name}`");
+    let names: Vec<_> = missing.iter().map(|column| quoted(&column.name)).collect();
+    let there = match found {
+        [] => "no columns".to_owned(),
+        found => found
+            .iter()
+            .map(|name| quoted(name))
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    let (is, correct) = match missing {
+        [_] => (
+            "is no column",
+            "correct the name, or make it optional if it is a channel",
+        ),
+        _ => (
+            "are no columns",
+            "correct the names, or make optional those that are channels",
+        ),
+    };
+    write!(
+        f,
+        "{place}: there {is} {}; found {there}; ",
+        names.join(", ")
+    )?;
+    let near = missing
+        .iter()
+        .filter_map(|column| Some((column, column.nearest.as_deref()?)));
+    let meant: Vec<_> = near
+        .map(|(column, nearest)| match missing {
+            [_] => quoted(nearest),
+            _ => format!("{} for {}", quoted(nearest), quoted(&column.name)),
+        })
+        .collect();
+    if !meant.is_empty() {
+        write!(f, "did you mean {}?", meant.join(", "))?;
     }
-    for (index, name) in names.iter().enumerate() {
-        let comma = if index == 0 { "" } else { ", " };
-        write!(f, "{comma}`{name}`")?;
+    match meant.len() {
+        all if all == missing.len() => Ok(()),
+        0 => write!(f, "{correct}"),
+        _ => write!(f, " otherwise {correct}"),
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -320,16 +356,6 @@ mod tests {
             bad.to_string(),
             "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently to take it as absent"
         );
-        let missing = FileError::MissingColumn {
-            place: place(),
-            column: "rom".into(),
-            found: vec!["time_s".into(), "room".into()],
-            nearest: Some("room".into()),
-        };
-        assert_eq!(
-            missing.to_string(),
-            "run.csv:12: there is no column `rom`; found `time_s`, `room`; did you mean `room`?"
-        );
         let time = FileError::BadTime {
             place: place(),
             column: "time_s".into(),
@@ -348,6 +374,43 @@ mod tests {
         assert_eq!(
             count.to_string(),
             "run.csv:12: 2 cells where the header has 3; correct the row, or read leniently to leave it out"
+        );
+    }
+
+    #[test]
+    fn all_missing_columns_stand_in_one_message() {
+        let told = |missing: &[(&str, Option<&str>)]| {
+            let column = |(name, nearest): &(&str, Option<&str>)| MissingColumn {
+                name: (*name).into(),
+                nearest: nearest.map(Into::into),
+            };
+            let error = FileError::MissingColumns {
+                place: place(),
+                missing: missing.iter().map(column).collect(),
+                found: vec!["time_s".into(), "room".into()],
+            };
+            error.to_string()
+        };
+        let (time, room, plate) = (
+            ("tme_s", Some("time_s")),
+            ("rom", Some("room")),
+            ("plate", None),
+        );
+        assert_eq!(
+            told(&[room]),
+            "run.csv:12: there is no column `rom`; found `time_s`, `room`; did you mean `room`?"
+        );
+        assert_eq!(
+            told(&[plate]),
+            "run.csv:12: there is no column `plate`; found `time_s`, `room`; correct the name, or make it optional if it is a channel"
+        );
+        assert_eq!(
+            told(&[time, room]),
+            "run.csv:12: there are no columns `tme_s`, `rom`; found `time_s`, `room`; did you mean `time_s` for `tme_s`, `room` for `rom`?"
+        );
+        assert_eq!(
+            told(&[plate, room]),
+            "run.csv:12: there are no columns `plate`, `rom`; found `time_s`, `room`; did you mean `room` for `rom`? otherwise correct the names, or make optional those that are channels"
         );
     }
 

@@ -78,11 +78,17 @@ impl JsonRows {
         Ok(())
     }
 
-    /// A key that no object has is most likely misspelt, which a stream only shows at its end.
+    /// Keys that no object has are most likely misspelt, which a stream only shows at its end.
     fn check_all_seen(&self) -> Result<(), FileError> {
-        let never = self.keys.iter().find(|key| !key.ever_seen && !key.optional);
-        match (never, &self.found) {
-            (Some(key), Some(found)) => Err(columns::missing(self.lines.place(), &key.name, found)),
+        let never = self
+            .keys
+            .iter()
+            .filter(|key| !key.ever_seen && !key.optional);
+        let mut never = never.map(|key| key.name.as_str()).peekable();
+        match &self.found {
+            Some(found) if never.peek().is_some() => {
+                Err(columns::missing(self.lines.place(), never, found))
+            }
             _ => Ok(()),
         }
     }
@@ -104,13 +110,11 @@ impl Cells for JsonRows {
         while self.lines.advance_to_content()? {
             match self.read_object() {
                 Ok(()) if self.keys[0].ever_seen => return Ok(true),
+                // The time must stand in every object; what else this one lacks may stand in the next.
                 Ok(()) => {
                     let found = self.found.as_deref().unwrap_or_default();
-                    return Err(columns::missing(
-                        self.lines.place(),
-                        &self.keys[0].name,
-                        found,
-                    ));
+                    let time = std::iter::once(self.keys[0].name.as_str());
+                    return Err(columns::missing(self.lines.place(), time, found));
                 }
                 Err(_) if !self.lines.is_complete() => {
                     ledger.report.truncated = Some(self.lines.place());
@@ -411,6 +415,10 @@ mod tests {
         assert_eq!(
             error("{\"t\":0,\"a\":1,\"bb\":1}\n{\"t\":1}\n"),
             "standard input:2: there is no column `b`; found `t`, `a`, `bb`; did you mean `bb`?"
+        );
+        assert_eq!(
+            error("{\"t\":0,\"aa\":1,\"bb\":1}\n{\"t\":1}\n"),
+            "standard input:2: there are no columns `a`, `b`; found `t`, `aa`, `bb`; did you mean `aa` for `a`, `bb` for `b`?"
         );
     }
 

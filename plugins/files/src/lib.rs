@@ -41,7 +41,7 @@ mod writer;
 
 pub use dataset::{Dataset, layout};
 pub use description::Description;
-pub use error::{FileError, Place};
+pub use error::{FileError, MissingColumn, Place};
 pub use format::Format;
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};

@@ -1,6 +1,8 @@
 //! Decides what can be wrong with a graph that reads well, and how it is said.
 
-use crate::diagnostic::{Problem, Severity, nearest};
+use std::sync::Arc;
+
+use crate::diagnostic::{Names, Problem, Severity, nearest};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -20,7 +22,7 @@ pub enum CompileProblem {
         packages: Vec<&'static str>,
     },
     /// A reference to a node or signal that is not there.
-    UnknownNode { node: String, known: Vec<String> },
+    UnknownNode { node: String, known: Arc<Names> },
     /// A reference to a port that the node does not have.
     UnknownPort {
         node: String,
@@ -137,14 +139,18 @@ pub enum CompileProblem {
     NoOutputs,
 }
 
-fn names<T: AsRef<str>>(known: &[T]) -> String {
+fn names<I>(known: I) -> String
+where
+    I: IntoIterator<Item: AsRef<str>, IntoIter: ExactSizeIterator>,
+{
     const MOST: usize = 12;
+    let known = known.into_iter();
+    let count = known.len();
     let shown: Vec<_> = known
-        .iter()
         .take(MOST)
         .map(|name| format!("`{}`", name.as_ref()))
         .collect();
-    match known.len() {
+    match count {
         0 => "nothing".to_owned(),
         n if n > MOST => format!("{} and {} more", shown.join(", "), n - MOST),
         _ => shown.join(", "),
@@ -217,13 +223,36 @@ impl Problem for CompileProblem {
     }
 
     fn may_follow_from_a_gap(&self) -> bool {
-        !matches!(
-            self,
+        match self {
+            Self::UnknownNode { .. }
+            | Self::UnknownPort { .. }
+            | Self::UnknownChannel { .. }
+            | Self::MissingInput { .. }
+            | Self::ChannelCount { .. }
+            | Self::Units { .. }
+            | Self::PointOrDifference { .. }
+            | Self::NoRows { .. }
+            | Self::Spans { .. }
+            | Self::Horizons { .. }
+            | Self::Cycle { .. }
+            | Self::Leak { .. }
+            | Self::NoMaxAge { .. }
+            | Self::Doubt { .. }
+            | Self::NeverLearns { .. }
+            | Self::NoHorizon { .. }
+            | Self::PredictedTruth { .. }
+            | Self::EndlessTruth { .. }
+            | Self::LimitUnit { .. }
+            | Self::DuplicateName { .. }
+            | Self::UnusedNode { .. }
+            | Self::UnusedSignal { .. }
+            | Self::Unreachable { .. }
+            | Self::NoOutputs => true,
             Self::UnknownKind { .. }
-                | Self::KindTwice { .. }
-                | Self::UnknownInput { .. }
-                | Self::Parameter { .. }
-        )
+            | Self::KindTwice { .. }
+            | Self::UnknownInput { .. }
+            | Self::Parameter { .. } => false,
+        }
     }
 
     fn message(&self) -> String {
@@ -384,7 +413,10 @@ impl Problem for CompileProblem {
             Self::KindTwice { .. } => {
                 "leave one of the crates out when the program is built".to_owned()
             }
-            Self::UnknownNode { node, known } => or_known(node, known, "the graph has"),
+            Self::UnknownNode { node, known } => match known.nearest(node) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("the graph has {}", names(known.iter())),
+            },
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
             Self::UnknownChannel {
                 node,

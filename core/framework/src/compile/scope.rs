@@ -1,16 +1,21 @@
 //! Decides which slots a reference names.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use indexmap::{IndexMap, IndexSet};
 
 use super::problem::CompileProblem;
 use super::reference::{Reference, is_pattern, matches};
+use crate::diagnostic::Names;
 
 /// What the names of a graph stand for, as far as it is known.
 #[derive(Debug, Default)]
 pub(crate) struct Scopes {
     scopes: IndexMap<String, Scope>,
+    /// What there is to refer to, once somebody refers to what there is not.
+    known: OnceCell<Arc<Names>>,
 }
 
 /// The output ports of a node or signal, as the rest of the graph sees them.
@@ -33,15 +38,22 @@ pub(crate) enum Found {
 }
 
 /// The names that a graph gives itself: an instance of a module stands for the nodes inside of it.
-pub(crate) fn outermost<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let outer = names.map(|name| name.split(['/', '[']).next().unwrap_or_default());
-    let outer: IndexSet<&str> = outer.collect();
-    outer.into_iter().map(str::to_owned).collect()
+pub(crate) fn outermost<'a>(names: impl Iterator<Item = &'a str>) -> Arc<Names> {
+    let outer: IndexSet<&str> = names.map(without_inner).collect();
+    Arc::new(outer.into_iter().map(str::to_owned).collect())
+}
+
+fn without_inner(name: &str) -> &str {
+    name.split(['/', '[']).next().unwrap_or_default()
 }
 
 impl Scopes {
     pub(crate) fn declare(&mut self, name: &str) {
         self.scopes.entry(name.to_owned()).or_default();
+        let known = self.known.get();
+        if known.is_some_and(|known| !known.contains(without_inner(name))) {
+            self.known.take();
+        }
     }
 
     pub(crate) fn get_mut(&mut self, name: &str) -> &mut Scope {
@@ -70,6 +82,11 @@ impl Scopes {
         shown.map(|(name, _)| name.as_str())
     }
 
+    /// What there is to refer to. It is listed once: a graph may refer to thousands of names that it does not have.
+    fn known(&self) -> &Arc<Names> {
+        self.known.get_or_init(|| outermost(self.shown()))
+    }
+
     pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
         let reference = Reference::parse(text);
         if reference.is_member() {
@@ -87,7 +104,7 @@ impl Scopes {
             }
             return Err(Box::new(CompileProblem::UnknownNode {
                 node: reference.node.to_owned(),
-                known: outermost(self.shown()),
+                known: Arc::clone(self.known()),
             }));
         };
         if scope.broken {

@@ -4,8 +4,17 @@ use super::instance::{Declared, ReadParts};
 use super::keys::Learn;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
-use crate::document::{Decoded, InstanceDecl, LeftOut, NodeDecl};
+use crate::document::{InstanceDecl, LeftOut, NodeDecl};
 use crate::node::{InputPort, Kind, Mistake, Read, Role};
+
+/// What is found whichever choice stands where one could not be read.
+fn agreed(mut readings: impl Iterator<Item = Vec<Mistake>>) -> Vec<Mistake> {
+    let mut agreed = readings.next().unwrap_or_default();
+    for found in readings {
+        agreed.retain(|mistake| found.contains(mistake));
+    }
+    agreed
+}
 
 impl Resolver<'_> {
     /// Looks through an instance of which nobody will read anything.
@@ -25,23 +34,27 @@ impl Resolver<'_> {
         let declared = Declared { node, decl, kind };
         self.known_inputs(&declared);
         let ports = self.wired(&declared);
-        if let Some((keys, left_out)) = parts.estimator.as_ref().map(Decoded::rest)
-            && let Some(Learn::Within(limits)) = keys.learn
-        {
-            self.own_mistakes(&declared, limits.mistakes(), left_out);
+        if let Some(keys) = &parts.estimator {
+            let mistakes = agreed(keys.readings().map(|keys| match &keys.learn {
+                Some(Learn::Within(limits)) => limits.mistakes(),
+                _ => Vec::new(),
+            }));
+            self.own_mistakes(&declared, mistakes, keys.left_out());
         }
-        let Some((spec, left_out)) = parts.spec.as_ref().map(Decoded::rest) else {
+        let Some(spec) = &parts.spec else {
             return;
         };
-        let mistakes = match spec.role() {
-            Role::Feature(feature) if !feature.closes_loops() => ports
-                .and_then(|ports| feature.outputs(&self.inputs(&declared, ports)).err())
-                .unwrap_or_default(),
+        let inputs = ports.map(|ports| self.inputs(&declared, ports));
+        let mistakes = agreed(spec.readings().map(|spec| match spec.role() {
+            Role::Feature(feature) if !feature.closes_loops() => {
+                let outputs = inputs.as_ref().map(|inputs| feature.outputs(inputs));
+                outputs.and_then(Result::err).unwrap_or_default()
+            }
             Role::Feature(_) => Vec::new(),
             Role::Estimator(estimator) => estimator.mistakes(),
             Role::Combiner(combiner) => combiner.mistakes(),
-        };
-        self.own_mistakes(&declared, mistakes, left_out);
+        }));
+        self.own_mistakes(&declared, mistakes, spec.left_out());
     }
 
     /// Tells those mistakes that do not follow from what was left out.

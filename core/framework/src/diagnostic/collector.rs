@@ -1,7 +1,9 @@
 //! Collecting diagnostics in any order and telling each mistake once; how they look is decided by the renderer.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
+use super::gaps::Gaps;
 use super::{Place, Sources, render};
 
 /// How bad a problem is.
@@ -52,9 +54,7 @@ pub trait Problem {
     }
 
     /// Whether it may only follow from something else that is missing, so that it is not told where parts of a file could not be read.
-    fn may_follow_from_a_gap(&self) -> bool {
-        false
-    }
+    fn may_follow_from_a_gap(&self) -> bool;
 }
 
 /// A problem at a place.
@@ -107,7 +107,7 @@ pub struct Diagnostics {
     errors: usize,
     reported: usize,
     /// Where something is missing that could not be read.
-    gaps: Vec<Place>,
+    gaps: Arc<Gaps>,
     /// Something may be missing anywhere.
     open: bool,
 }
@@ -192,7 +192,7 @@ impl Diagnostics {
     pub(crate) fn aside(&self) -> Self {
         Self {
             open: self.open,
-            gaps: self.gaps.clone(),
+            gaps: Arc::clone(&self.gaps),
             ..Self::default()
         }
     }
@@ -217,14 +217,15 @@ impl Diagnostics {
     /// Notes where parts of files could not be read: at `places`, or anywhere. What may only follow from that is not told.
     pub(crate) fn leave_open(&mut self, anywhere: bool, places: &[Place]) {
         self.open |= anywhere;
-        self.gaps.extend(places);
+        if !places.is_empty() {
+            let gaps = Arc::make_mut(&mut self.gaps);
+            places.iter().for_each(|gap| gaps.add(*gap));
+        }
     }
 
     /// Whether something that could not be read may be missing at a place.
     pub(crate) fn is_open(&self, place: Place) -> bool {
-        let around =
-            |gap: &Place| gap.source == place.source && (gap.start..gap.end).contains(&place.start);
-        self.open || self.gaps.iter().any(around)
+        self.open || self.gaps.hold(place)
     }
 
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {

@@ -2,12 +2,15 @@
 
 mod codes;
 mod collector;
+mod gaps;
+mod names;
 mod nearest;
 mod place;
 mod render;
 
 pub use codes::{CODES, Code, explain};
 pub use collector::{Diagnostic, Diagnostics, Problem, Severity};
+pub use names::Names;
 pub use nearest::nearest;
 pub use place::{Place, SourceId, Sources};
 

@@ -1,12 +1,21 @@
 //! Which known name an unknown one may have meant; it never decides that a name is wrong.
 
+/// Longest name that is compared, in bytes: a longer text is not a misspelt name, and comparing takes time in the product of the lengths.
+pub(super) const LONGEST: usize = 64;
+
+/// Shortest name that another may continue, in bytes.
+pub(super) const SHORTEST: usize = 3;
+
+/// The largest distance of two names, the longer of so many letters, at which they are near.
+pub(super) fn farthest(longer: usize) -> usize {
+    (longer / 3).max(1)
+}
+
 /// The candidate that is spelt most like `name`, if one is near enough to be meant.
 ///
 /// Near is a Damerau–Levenshtein distance of at most a third of the longer name, at least 1, capital letters aside; the first of equals is taken.
 /// A name that only continues or shortens a candidate of three letters or more counts as near too.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // A long text is not a misspelt name, and the distance takes time in the product of the lengths.
-    const LONGEST: usize = 64;
     if name.is_empty() || name.len() > LONGEST {
         return None;
     }
@@ -19,9 +28,10 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         let known = candidate.to_lowercase();
         let (one, other) = (wanted.chars().count(), known.chars().count());
         let longer = one.max(other);
-        let farthest = (longer / 3).max(1);
+        let farthest = farthest(longer);
         let shorter = wanted.len().min(known.len());
-        let continues = shorter >= 3 && (wanted.starts_with(&known) || known.starts_with(&wanted));
+        let continues =
+            shorter >= SHORTEST && (wanted.starts_with(&known) || known.starts_with(&wanted));
         // Names whose lengths differ by more are farther apart, and a file of many names has many such.
         if !continues && one.abs_diff(other) > farthest {
             continue;

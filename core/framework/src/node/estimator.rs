@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::fmt::Debug;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Coefficients, InputPort, Learner, Learns, Mistake, TrainedRange};
@@ -273,6 +274,7 @@ pub struct TrainingReport {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OrderTable {
     /// The figure that chose.
+    #[serde(with = "figure_name")]
     pub by: OrderFigure,
     /// The rows on which each was fitted.
     pub rows: usize,
@@ -283,21 +285,23 @@ pub struct OrderTable {
 }
 
 /// A figure by which orders are compared; the smallest is the best.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum OrderFigure {
     /// Akaike's information criterion.
-    #[serde(rename = "AIC")]
     Aic,
     /// The same, corrected for few rows.
     #[default]
-    #[serde(rename = "AICc")]
     Aicc,
-    /// The Bayesian information criterion.
-    #[serde(rename = "BIC")]
+    /// The Bayesian information criterion, which takes the fewest coefficients.
     Bic,
     /// The final prediction error.
-    #[serde(rename = "FPE")]
     Fpe,
+}
+
+impl OrderFigure {
+    /// All that there are.
+    pub const ALL: [Self; 4] = [Self::Aic, Self::Aicc, Self::Bic, Self::Fpe];
 }
 
 impl std::fmt::Display for OrderFigure {
@@ -308,6 +312,25 @@ impl std::fmt::Display for OrderFigure {
             Self::Bic => "BIC",
             Self::Fpe => "FPE",
         })
+    }
+}
+
+/// A figure by its usual name, as models and reports have it; a graph has it in small letters.
+mod figure_name {
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::ser::Serializer;
+
+    use super::OrderFigure;
+
+    pub(super) fn serialize<S: Serializer>(by: &OrderFigure, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(by)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<OrderFigure, D::Error> {
+        let name = String::deserialize(from)?;
+        let mut all = OrderFigure::ALL.into_iter();
+        all.find(|figure| figure.to_string() == name)
+            .ok_or_else(|| D::Error::unknown_variant(&name, &["AIC", "AICc", "BIC", "FPE"]))
     }
 }
 

@@ -1,6 +1,9 @@
 //! Decides which channels of a plan a test's reference names.
 
+use std::sync::Arc;
+
 use crate::compile::{CompileProblem, Plan, Reference, is_pattern, matches, outermost};
+use crate::diagnostic::Names;
 
 /// The slots of a reference, in the order of the plan. The names of outputs (`predicted.Z1`) are understood too.
 pub(super) fn look_up(plan: &Plan, text: &str) -> Result<Vec<usize>, CompileProblem> {
@@ -107,7 +110,7 @@ fn ports(plan: &Plan, slot: usize) -> Vec<&'static str> {
 }
 
 /// What a reference may begin with.
-fn names(plan: &Plan) -> Vec<String> {
+fn names(plan: &Plan) -> Arc<Names> {
     let channels = plan.channels.iter().map(|channel| channel.name.as_str());
     let outputs = plan.outputs.iter().map(|output| output.name.as_str());
     outermost(

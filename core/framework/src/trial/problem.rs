@@ -111,17 +111,27 @@ impl Problem for TrialProblem {
     }
 
     fn may_follow_from_a_gap(&self) -> bool {
-        !matches!(
-            self,
+        match self {
+            Self::NoData
+            | Self::NothingExpected { .. }
+            | Self::MachineLacks { .. }
+            | Self::Units { .. }
+            | Self::NotAPrediction { .. }
+            | Self::NoRival { .. }
+            | Self::NoShape
+            | Self::Fault(_)
+            | Self::NotMeasured { .. }
+            | Self::ChannelTwice { .. }
+            | Self::BareSample { .. } => true,
+            Self::Keys { excluded, .. } => !excluded,
             Self::TwoData { .. }
-                | Self::DuplicateName { .. }
-                | Self::UnknownMachine { .. }
-                | Self::MachineTwice { .. }
-                | Self::ScheduleUnreadable { .. }
-                | Self::Schedule(_)
-                | Self::Keys { excluded: true, .. }
-                | Self::Range { .. }
-        )
+            | Self::DuplicateName { .. }
+            | Self::UnknownMachine { .. }
+            | Self::MachineTwice { .. }
+            | Self::ScheduleUnreadable { .. }
+            | Self::Schedule(_)
+            | Self::Range { .. } => false,
+        }
     }
 
     fn message(&self) -> String {

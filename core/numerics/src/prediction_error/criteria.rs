@@ -1,20 +1,5 @@
 //! What a fit is worth beside its number of coefficients. Decides the formulas; not which models are compared.
 
-use serde::{Deserialize, Serialize};
-
-/// By which figure the order of a model is chosen; the smallest is the best.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Criterion {
-    /// Akaike's.
-    Aic,
-    /// The same, corrected for few rows.
-    Aicc,
-    /// The Bayesian one.
-    Bic,
-    /// The final prediction error.
-    Fpe,
-}
-
 /// The four figures of a fit by least squares. They compare fits on the same rows only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InformationCriteria {
@@ -44,17 +29,6 @@ impl InformationCriteria {
             aicc: aic + 2.0 * k * (k + 1.0) / room(n - k - 1.0),
             bic: likelihood + k * n.ln(),
             fpe: variance * (n + p) / room(n - p),
-        }
-    }
-
-    /// One of the figures.
-    #[must_use]
-    pub fn by(&self, criterion: Criterion) -> f64 {
-        match criterion {
-            Criterion::Aic => self.aic,
-            Criterion::Aicc => self.aicc,
-            Criterion::Bic => self.bic,
-            Criterion::Fpe => self.fpe,
         }
     }
 }

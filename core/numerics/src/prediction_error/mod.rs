@@ -14,7 +14,7 @@ mod stepper;
 #[cfg(test)]
 mod tests;
 
-pub use criteria::{Criterion, InformationCriteria};
+pub use criteria::InformationCriteria;
 pub use polynomials::{InputOrders, Orders, Polynomials, Transfer};
 pub use residuals::Samples;
 pub use roots::Fading;

@@ -6,12 +6,18 @@ use super::error::Step;
 #[derive(Debug, Clone)]
 pub struct Decoded<T> {
     value: T,
+    /// What it may be as well, where a choice could not be read.
+    others: Vec<T>,
     left_out: LeftOut,
 }
 
 impl<T> Decoded<T> {
-    pub(super) fn of(value: T, left_out: LeftOut) -> Self {
-        Self { value, left_out }
+    pub(super) fn of(value: T, others: Vec<T>, left_out: LeftOut) -> Self {
+        Self {
+            value,
+            others,
+            left_out,
+        }
     }
 
     /// The value, if nothing was left out.
@@ -25,14 +31,20 @@ impl<T> Decoded<T> {
         self.is_whole().then_some(&self.value)
     }
 
-    /// The value with defaults and stand-ins for what was left out, and what that is.
-    pub(crate) fn rest(&self) -> (&T, &LeftOut) {
-        (&self.value, &self.left_out)
+    /// The value with defaults and stand-ins for what was left out, once for each choice that may stand where one could not be read.
+    pub(crate) fn readings(&self) -> impl Iterator<Item = &T> {
+        std::iter::once(&self.value).chain(&self.others)
     }
 
-    /// The same with another value.
-    pub(crate) fn map<U>(self, of: impl FnOnce(T) -> U) -> Decoded<U> {
-        Decoded::of(of(self.value), self.left_out)
+    /// What was left out.
+    pub(crate) fn left_out(&self) -> &LeftOut {
+        &self.left_out
+    }
+
+    /// The same with other values.
+    pub(crate) fn map<U>(self, of: impl Fn(T) -> U) -> Decoded<U> {
+        let others = self.others.into_iter().map(&of).collect();
+        Decoded::of(of(self.value), others, self.left_out)
     }
 
     fn is_whole(&self) -> bool {

@@ -15,7 +15,7 @@ use serde::de::DeserializeOwned;
 
 use super::tree::Value;
 use crate::diagnostic::Diagnostics;
-use error::{DecodeError, Mistake};
+use error::{DecodeError, Mistake, Step};
 pub use left_out::{Decoded, LeftOut};
 use repair::Repair;
 use tree::{Place, TreeDeserializer};
@@ -56,7 +56,9 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
                 let meant = strange.iter().filter_map(Mistake::meant);
                 let touched = repair.as_ref().map_or(&[][..], Repair::touched);
                 let left_out = LeftOut::of(touched.iter().cloned().chain(meant));
-                return Some(Decoded::of(value, left_out));
+                let others = repair.iter().flat_map(Repair::others);
+                let others = others.filter_map(|tree| attempt::<T>(&tree).0.ok());
+                return Some(Decoded::of(value, others.collect(), left_out));
             }
             Err(error) => error.into_mistake(value.place),
         };
@@ -79,7 +81,13 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
                         !at_key && !still_missing
                     }
                 };
-                repair.put_in(&mistake.path, key, stands_in) || repair.take_out(&mistake.path)
+                let first = |tree: &Value| {
+                    let error = attempt::<T>(tree).0.err()?;
+                    Some(error.into_mistake(value.place))
+                };
+                repair.put_in(&mistake.path, key, stands_in)
+                    || repair.choose(&mistake.path, key, word(value, &mistake.path, key), first)
+                    || repair.take_out(&mistake.path)
             }
             None => repair.take_out(&mistake.path),
         };
@@ -88,6 +96,15 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
         }
     }
     None
+}
+
+/// The text that the user wrote under a key, where the way to it is by keys alone.
+fn word<'a>(value: &'a Value, path: &[Step], key: &str) -> Option<&'a str> {
+    let table = path.iter().try_fold(value, |value, step| match step {
+        Step::Key(key) => value.as_table()?.get(key),
+        Step::Index(_) => None,
+    })?;
+    table.as_table()?.get(key)?.as_text()
 }
 
 /// One reading: the result, and the unknown keys that were passed over.

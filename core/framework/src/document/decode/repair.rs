@@ -1,6 +1,8 @@
 //! Taking what is wrong out of a copy of the tree so that the rest can be read; it reports nothing.
 
 use super::error::{Mistake, Step};
+use crate::diagnostic::nearest;
+use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Value};
 
 /// The index of what was taken out of a list; no list is that long.
@@ -11,6 +13,8 @@ pub(super) struct Repair {
     tree: Value,
     /// Ways to what was taken out or put in; tables and lists above them are no longer as the user wrote them.
     touched: Vec<Vec<Step>>,
+    /// Ways to choices that were put in, and what else would do there.
+    chosen: Vec<(Vec<Step>, Vec<String>)>,
 }
 
 impl Repair {
@@ -18,6 +22,7 @@ impl Repair {
         Repair {
             tree: value.clone(),
             touched: Vec::new(),
+            chosen: Vec::new(),
         }
     }
 
@@ -102,40 +107,127 @@ impl Repair {
             Data::List(Vec::new()),
             Data::Table(crate::document::tree::Table::new()),
         ];
-        let mut way = path.to_vec();
-        way.push(Step::Key(key.to_owned()));
         for data in stand_ins {
-            let Some(holder) = inside(&mut self.tree, path) else {
-                return false;
-            };
-            let place = holder.place;
-            let Data::Table(table) = &mut holder.data else {
-                return false;
-            };
-            if table.contains(key) {
+            if !self.insert(path, key, data) {
                 return false;
             }
-            table.insert(
-                key,
-                Entry {
-                    key: place,
-                    value: Value::new(place, data),
-                },
-            );
             if readable(&self.tree) {
-                self.touched.push(way);
+                self.touched.push(way(path, key));
                 return true;
             }
-            if let Some(Value {
-                data: Data::Table(table),
-                ..
-            }) = inside(&mut self.tree, path)
-            {
-                table.remove(key);
-            }
+            self.remove(path, key);
         }
         false
     }
+
+    /// Puts a choice under a missing key: the one that `word` may be meant for, or the first of those that will do. False if
+    /// none will. `read` gives the first mistake of a tree.
+    pub(super) fn choose(
+        &mut self,
+        path: &[Step],
+        key: &str,
+        word: Option<&str>,
+        read: impl Fn(&Value) -> Option<Mistake>,
+    ) -> bool {
+        // The place of a value in a list is another once one before it is taken out.
+        if path.iter().any(|step| matches!(step, Step::Index(_))) {
+            return false;
+        }
+        let mut will_do = self.choices(path, key, read);
+        let names = || will_do.iter().map(String::as_str);
+        if let Some(near) = word.and_then(|word| nearest(word, names())) {
+            will_do = vec![near.to_owned()];
+        }
+        if will_do.is_empty() {
+            return false;
+        }
+        self.insert(path, key, Data::Text(will_do.remove(0)));
+        self.touched.push(way(path, key));
+        self.chosen.push((way(path, key), will_do));
+        true
+    }
+
+    /// The choices under a missing key with which what stands beside it can be read; all where none makes a difference to that.
+    fn choices(
+        &mut self,
+        path: &[Step],
+        key: &str,
+        read: impl Fn(&Value) -> Option<Mistake>,
+    ) -> Vec<String> {
+        let way = way(path, key);
+        let mut with = |choice: &str| {
+            let put = self.insert(path, key, Data::Text(choice.to_owned()));
+            let first = read(&self.tree);
+            if put {
+                self.remove(path, key);
+            }
+            first
+        };
+        // No choice is without a name.
+        let choices = match with("") {
+            Some(Mistake {
+                path,
+                problem: DocumentProblem::UnknownChoice { choices, .. },
+                ..
+            }) if path == way => choices,
+            _ => return Vec::new(),
+        };
+        let tried: Vec<_> = choices.iter().map(|choice| with(choice)).collect();
+        let is_beside = |first: &Mistake| {
+            let still_missing = first.path == path && first.missing_key() == Some(key);
+            first.path.starts_with(path) && !first.path.starts_with(&way) && !still_missing
+        };
+        let same = tried.windows(2).all(|two| two[0] == two[1]);
+        if same && tried.iter().flatten().all(is_beside) {
+            return choices;
+        }
+        let tried = choices.into_iter().zip(tried);
+        let readable = tried.filter(|(_, first)| {
+            let mut first = first.iter();
+            first.all(|first| !first.path.starts_with(path))
+        });
+        readable.map(|(choice, _)| choice).collect()
+    }
+
+    /// The tree with each of the other choices that would do.
+    pub(super) fn others(&self) -> impl Iterator<Item = Value> {
+        let others = self.chosen.iter();
+        let others = others.flat_map(|(way, others)| others.iter().map(move |other| (way, other)));
+        others.filter_map(|(way, other)| {
+            let mut tree = self.tree.clone();
+            inside(&mut tree, way)?.data = Data::Text(other.clone());
+            Some(tree)
+        })
+    }
+
+    /// Puts a value under a key of the table at `path`; false if there is none or it has the key.
+    fn insert(&mut self, path: &[Step], key: &str, data: Data) -> bool {
+        let Some(holder) = inside(&mut self.tree, path) else {
+            return false;
+        };
+        let place = holder.place;
+        let Data::Table(table) = &mut holder.data else {
+            return false;
+        };
+        if table.contains(key) {
+            return false;
+        }
+        let value = Value::new(place, data);
+        table.insert(key, Entry { key: place, value });
+        true
+    }
+
+    fn remove(&mut self, path: &[Step], key: &str) {
+        if let Some(holder) = inside(&mut self.tree, path)
+            && let Data::Table(table) = &mut holder.data
+        {
+            table.remove(key);
+        }
+    }
+}
+
+fn way(path: &[Step], key: &str) -> Vec<Step> {
+    [path, &[Step::Key(key.to_owned())]].concat()
 }
 
 fn inside<'a>(value: &'a mut Value, path: &[Step]) -> Option<&'a mut Value> {

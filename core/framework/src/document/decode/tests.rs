@@ -2,12 +2,13 @@ use serde::Deserialize;
 
 use super::*;
 use crate::diagnostic::Sources;
+use crate::document::tree::Data;
 use crate::document::{Memory, load_text};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
 
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 struct Parameters {
     ahead: Duration,
     unit: Unit,
@@ -26,28 +27,28 @@ struct Parameters {
     quiet: bool,
 }
 
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Method {
     Forward,
     Backward,
 }
 
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 enum Solver {
     Ridge { alpha: f64 },
     Sgd { rate: f64, every: Option<Duration> },
 }
 
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
 enum Windows {
     List(Vec<Duration>),
     Range { shortest: Duration, steps: u32 },
 }
 
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Shape {
     Flat,
@@ -55,7 +56,7 @@ enum Shape {
     Power(f64),
 }
 
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 struct Selection {
     folds: u32,
     tolerance: f64,
@@ -84,6 +85,53 @@ fn read(text: &str) -> (Option<Parameters>, String) {
         parameters,
         format!("\n{}", diagnostics.render(&sources, false, 120)),
     )
+}
+
+/// All that a table that is complete but for `text` may mean, and what was left out.
+fn readings(text: &str) -> (Vec<Parameters>, LeftOut) {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let complete = "ahead = \"5min\"\nunit = \"nm\"\nlags = []\nalpha = 1\n";
+    let text = format!("schema = 1\n{complete}{text}");
+    let files = Memory::new();
+    let document = load_text("a.toml", text, &files, &mut sources, &mut diagnostics);
+    let mut tree = document.expect("the text is TOML").tree;
+    if let Data::Table(table) = &mut tree.data {
+        table.remove("schema");
+    }
+    let read = decode_rest::<Parameters>(&tree, "node \"n\"", &|_| None, &mut diagnostics);
+    let read = read.expect("something can be read");
+    assert_eq!(diagnostics.error_count(), 1);
+    let left_out = read.left_out().clone();
+    (read.readings().cloned().collect(), left_out)
+}
+
+#[test]
+fn a_misspelt_choice_leaves_what_stands_beside_it_to_be_looked_at() {
+    let (read, left_out) = readings("solver = { type = \"rigde\", alpha = 2 }");
+    assert_eq!(read.len(), 1);
+    assert_eq!(read[0].solver, Some(Solver::Ridge { alpha: 2.0 }));
+    assert!(left_out.explains("solver.type") && left_out.explains("solver"));
+    assert!(!left_out.explains("solver.alpha"));
+}
+
+#[test]
+fn a_choice_that_is_none_may_be_any_with_which_the_rest_can_be_read() {
+    let (read, _) = readings("solver = { type = 5, rate = 2 }");
+    let every = None;
+    assert_eq!(read.len(), 1);
+    assert_eq!(read[0].solver, Some(Solver::Sgd { rate: 2.0, every }));
+
+    let (read, left_out) =
+        readings("selection = { folds = 1, tolerance = 2, method = \"sideways\" }");
+    let methods = read.iter().filter_map(|one| one.selection.as_ref());
+    let methods: Vec<_> = methods.map(|selection| &selection.method).collect();
+    assert_eq!(methods, [&Method::Forward, &Method::Backward]);
+    assert!(!left_out.explains("selection.folds"));
+
+    // No choice has both.
+    let (read, left_out) = readings("solver = { type = 5, alpha = 1, rate = 2 }");
+    assert_eq!(read[0].solver, None);
+    assert!(left_out.explains("solver.alpha"));
 }
 
 /// The mistakes of a table that is complete but for `text`.

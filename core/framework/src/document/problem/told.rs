@@ -335,19 +335,46 @@ impl Problem for DocumentProblem {
     }
 
     fn may_follow_from_a_gap(&self) -> bool {
-        matches!(
-            self,
+        match self {
             Self::MissingKey { .. }
-                | Self::UnknownSet { .. }
-                // In an output none has a meaning.
-                | Self::UnknownPlaceholder { instead: None, .. }
-                | Self::NothingToRemove { .. }
-                | Self::SamplesWithoutClock { .. }
-                | Self::UnknownChannel { .. }
-                | Self::UnknownModule { .. }
-                | Self::OutOfReach { .. }
-                | Self::UnknownOutput { .. }
-        )
+            | Self::UnknownSet { .. }
+            | Self::NothingToRemove { .. }
+            | Self::SamplesWithoutClock { .. }
+            | Self::UnknownChannel { .. }
+            | Self::UnknownModule { .. }
+            | Self::OutOfReach { .. }
+            | Self::UnknownOutput { .. } => true,
+            // In an output none has a meaning.
+            Self::UnknownPlaceholder { instead, .. } => instead.is_none(),
+            Self::Syntax { .. }
+            | Self::Unreadable { .. }
+            | Self::TooLarge { .. }
+            | Self::TooDeep { .. }
+            | Self::LongChain { .. }
+            | Self::ExtendsLoop { .. }
+            | Self::SchemaMissing
+            | Self::SchemaUnknown { .. }
+            | Self::UnknownKey { .. }
+            | Self::WrongType { .. }
+            | Self::UnknownChoice { .. }
+            | Self::Refused { .. }
+            | Self::NumberTooLarge { .. }
+            | Self::BadName { .. }
+            | Self::DuplicateName { .. }
+            | Self::EmptyList { .. }
+            | Self::TooManyInstances { .. }
+            | Self::TooLargeExpanded { .. }
+            | Self::Unit(_)
+            | Self::Duration(_)
+            | Self::Quantity(_)
+            | Self::OneColumn { .. }
+            | Self::RangeUnit { .. }
+            | Self::RangeOrder { .. }
+            | Self::TimeContradiction { .. }
+            | Self::NoLength { .. }
+            | Self::StepNotPositive
+            | Self::ModuleLoop { .. } => false,
+        }
     }
 
     fn related(&self) -> Vec<(Place, String)> {
