@@ -44,6 +44,18 @@ impl Times<LANES> {
     }
 }
 
+impl Times<1> {
+    /// The same sums for several channels.
+    #[inline(always)]
+    pub(super) fn repeated<const L: usize>(&self) -> Times<L> {
+        Times {
+            n: [self.n[0]; L],
+            t: [self.t[0]; L],
+            tt: [self.tt[0]; L],
+        }
+    }
+}
+
 impl<const L: usize> Times<L> {
     pub(super) const NONE: Times<L> = Times {
         n: [0.0; L],
@@ -62,11 +74,27 @@ impl<const L: usize> Times<L> {
 
     /// The same sums about an origin that lies `by` earlier.
     #[inline(always)]
-    pub(super) fn shifted(&self, by: f64) -> Times<L> {
+    pub(super) fn shifted(&self, by: &[f64; L]) -> Times<L> {
         Times {
             n: self.n,
-            t: from_fn(|i| self.t[i] + by * self.n[i]),
-            tt: from_fn(|i| self.tt[i] + by * (2.0 * self.t[i] + by * self.n[i])),
+            t: from_fn(|i| self.t[i] + by[i] * self.n[i]),
+            tt: from_fn(|i| self.tt[i] + by[i] * (2.0 * self.t[i] + by[i] * self.n[i])),
+        }
+    }
+
+    /// Sets those of one channel.
+    #[inline(always)]
+    pub(super) fn set(&mut self, i: usize, one: &Times<1>) {
+        (self.n[i], self.t[i], self.tt[i]) = (one.n[0], one.t[0], one.tt[0]);
+    }
+
+    /// Those of one channel.
+    #[inline(always)]
+    pub(super) fn only(&self, i: usize) -> Times<1> {
+        Times {
+            n: [self.n[i]],
+            t: [self.t[i]],
+            tt: [self.tt[i]],
         }
     }
 }
@@ -285,7 +313,7 @@ impl Table {
         let by = |slot: usize| table.common[slot].origin.wrapping_sub(origin) as f64;
         let mut rows = Times::NONE;
         for (to, slot) in slots.clone().enumerate().rev() {
-            rows = rows.plus(&table.common[slot].rows.shifted(by(slot)));
+            rows = rows.plus(&table.common[slot].rows.shifted(&[by(slot)]));
             self.common[to] = Common { origin, rows };
         }
         for (group, other) in self.groups.iter_mut().zip(&table.groups) {
@@ -304,7 +332,7 @@ impl Table {
             if group.keeps_times {
                 let mut times = Times::NONE;
                 for (to, slot) in slots.clone().enumerate().rev() {
-                    times = times.plus(&other.times[slot].shifted(by(slot)));
+                    times = times.plus(&other.times[slot].shifted(&[by(slot); LANES]));
                     group.times[to] = times;
                 }
             }
