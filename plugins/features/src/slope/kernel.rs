@@ -73,6 +73,8 @@ pub struct RollingSlope {
     longest: usize,
     /// Whether in all windows every channel has a value and is present in every row.
     all_complete: bool,
+    /// Whether all windows have enough rows, but each has gaps.
+    all_gaps: bool,
     longest_needed_open: i64,
     /// By window: the results of the channels of a group.
     results: Vec<Lanes>,
@@ -217,6 +219,7 @@ impl RollingSlope {
             shortest: shortest.unwrap_or(0),
             longest: longest.unwrap_or(0),
             all_complete: false,
+            all_gaps: false,
             weights: vec![Weights::NONE; windows.len().div_ceil(ABREAST)],
             longest_needed_open: windows.iter().map(|w| w.needed_open).max().unwrap_or(0),
             results: vec![[0.0; LANES]; windows.len()],
@@ -310,28 +313,31 @@ impl RollingSlope {
                 if window.head < current {
                     window.parts.places[0] = rows.slot(window.head);
                 }
-                weights.set_head(i, blocks.tail(window.parts.places[0]));
+                weights.set_head(i, window.parts.places[0]);
                 long_enough &= window.span(t_ns) >= window.needed_span;
             }
         }
-        self.weigh();
         let rows = &self.rows;
         let head_of = |index: usize| self.windows.get(index).map_or(0, |window| window.head);
-        let complete = long_enough
-            && rows.next() - head_of(self.shortest) >= self.coverage.min_samples as u64
-            && head_of(self.longest) >= rows.complete_from();
+        let newest = head_of(self.shortest);
+        let enough = long_enough && rows.next() - newest >= self.coverage.min_samples as u64;
+        let complete = enough && head_of(self.longest) >= rows.complete_from();
+        // Where each window has gaps the weights are those of no channel.
+        self.all_gaps = enough && newest < rows.complete_from();
+        if !self.all_gaps {
+            self.weigh();
+        }
         if !complete || !self.all_complete {
             self.judge(t_ns);
         }
         self.all_complete = complete;
     }
 
-    /// Finds the weights of all windows, whose parts are known. Apart from that, as numbers just written one by one are slow to be
-    /// read as vectors.
+    /// Finds the weights of all windows, whose parts are known.
     fn weigh(&mut self) {
         let (windows, blocks) = (&self.windows, &self.blocks);
         for weights in &mut self.weights {
-            weights.weigh(blocks.now(0));
+            weights.weigh(blocks.tails(), blocks.now(0));
         }
         let newest = windows.get(self.shortest);
         if newest.is_some_and(|window| window.head > blocks.current_start()) {
@@ -384,8 +390,10 @@ impl RollingSlope {
     /// Slopes of the channels of a group in each window.
     #[inline]
     fn slopes_of(&self, group: usize, slopes: &mut [Lanes]) {
-        let [head, rest, now] = self.blocks.groups(group).map(|group| &*group.values);
-        slopes_of_complete(&self.windows, &self.weights, head, rest, now, slopes);
+        if !self.all_gaps {
+            let [head, rest, now] = self.blocks.groups(group).map(|group| &*group.values);
+            slopes_of_complete(&self.windows, &self.weights, head, rest, now, slopes);
+        }
         if !self.all_complete {
             self.slopes_of_incomplete(group, slopes);
         }

@@ -281,8 +281,8 @@ impl Blocks {
 
     /// What all channels have in common of the rows of a closed block from the one in a slot on.
     #[inline]
-    pub(super) fn tail(&self, slot: usize) -> &Common {
-        &self.tails.common[slot]
+    pub(super) fn tails(&self) -> &[Common] {
+        &self.tails.common
     }
 
     /// What all channels have in common of the current block, or of a window within it.

@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use super::sums::{Common, Group, LANES, Lanes, Times, Values};
+use super::sums::{Common, Group, LANES, Lanes, Times, TimesOfLanes, Values};
 
 const NS_PER_S: f64 = 1e9;
 
@@ -22,8 +22,9 @@ pub(super) const ABREAST: usize = 4;
 pub(super) struct Weights {
     /// As in [`Parts`].
     by: [f64; ABREAST],
-    /// Sums of the rows' times in the first two parts, and in the window.
-    head: Times<ABREAST>,
+    /// Where the sums of the first parts lie. They are not copied, as numbers just written one by one are slow to be read as vectors.
+    heads: [usize; ABREAST],
+    /// Sums of the rows' times in the second parts, and in the windows.
     rest: Times<ABREAST>,
     times: Times<ABREAST>,
     of_ty: [f64; ABREAST],
@@ -34,7 +35,7 @@ pub(super) struct Weights {
 impl Weights {
     pub(super) const NONE: Weights = Weights {
         by: [0.0; ABREAST],
-        head: Times::NONE,
+        heads: [0; ABREAST],
         rest: Times::NONE,
         times: Times::NONE,
         of_ty: [0.0; ABREAST],
@@ -49,15 +50,21 @@ impl Weights {
     }
 
     #[inline(always)]
-    pub(super) fn set_head(&mut self, i: usize, head: &Common) {
-        self.head.set(i, &head.rows);
+    pub(super) fn set_head(&mut self, i: usize, place: usize) {
+        self.heads[i] = place;
     }
 
     /// Finds the weights of windows that end with the current block. Not inlined, as the compiler would take several of these at once,
     /// which lie too far apart.
     #[inline(never)]
-    pub(super) fn weigh(&mut self, now: &Common) {
-        let head = self.head.shifted(&self.by);
+    pub(super) fn weigh(&mut self, heads: &[Common], now: &Common) {
+        let heads = self.heads.map(|place| &heads[place].rows);
+        let head = Times {
+            n: heads.map(|head| head.n[0]),
+            t: heads.map(|head| head.t[0]),
+            tt: heads.map(|head| head.tt[0]),
+        };
+        let head = head.shifted(&self.by);
         self.times = self.rest.plus(&now.rows.repeated()).plus(&head);
         [self.of_ty, self.of_y, self.of_head_y] = weights(&self.times, &self.by);
     }
@@ -122,16 +129,17 @@ impl Parts {
         least: &mut Least,
     ) {
         let [h, r, w] = self.places;
-        let times = [&head.times[h], &rest.times[r], &now.times[w]];
-        let [head, rest, now] = [&head.values[h], &rest.values[r], &now.values[w]];
-        slopes_with_gaps(self.by, times, head, rest, now, slopes, least);
+        let head = (&head.times[h], &head.values[h]);
+        let rest = (&rest.times[r], &rest.values[r]);
+        let now = (&now.times[w], &now.values[w]);
+        slopes_with_gaps(self.by, head, rest, now, slopes, least);
     }
 
     #[inline(always)]
     fn times_with_gaps(&self, [head, rest, now]: [&Group; 3]) -> Times<LANES> {
-        let head = &head.times[self.places[0]];
-        let rest = &rest.times[self.places[1]];
-        let now = &now.times[self.places[2]];
+        let head = &head.times[self.places[0]].0;
+        let rest = &rest.times[self.places[1]].0;
+        let now = &now.times[self.places[2]].0;
         rest.plus(now).plus(&head.shifted(&[self.by; LANES]))
     }
 
@@ -189,15 +197,14 @@ impl Parts {
 #[inline(never)]
 fn slopes_with_gaps(
     by: f64,
-    [head_times, rest_times, now_times]: [&Times<LANES>; 3],
-    head: &Values,
-    rest: &Values,
-    now: &Values,
+    (head_times, head): (&TimesOfLanes, &Values),
+    (rest_times, rest): (&TimesOfLanes, &Values),
+    (now_times, now): (&TimesOfLanes, &Values),
     slopes: &mut Lanes,
     least: &mut Least,
 ) {
     for i in 0..LANES {
-        let [h, r, w] = [head_times, rest_times, now_times].map(|times| times.only(i));
+        let [h, r, w] = [head_times, rest_times, now_times].map(|times| times.0.only(i));
         let times = r.plus(&w).plus(&h.shifted(&[by]));
         let Times {
             n: [n],
@@ -240,10 +247,11 @@ impl Least {
     }
 
     /// Whether each channel has at least `min_samples`, which span enough, and sums that have kept their digits, in every window.
-    #[inline(always)]
     pub(super) fn suffices(&self, min_samples: f64) -> bool {
-        let least = |of: Lanes| of.into_iter().fold(f64::INFINITY, lesser);
-        least(self.n) >= min_samples && least(self.above_thin) >= 0.0 && least(self.span) >= 0.0
+        (0..LANES).fold(true, |suffices, i| {
+            let enough = (self.n[i] >= min_samples) & (self.span[i] >= 0.0);
+            suffices & enough & (self.above_thin[i] >= 0.0)
+        })
     }
 }
 

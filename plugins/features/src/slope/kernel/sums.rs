@@ -99,6 +99,11 @@ impl<const L: usize> Times<L> {
     }
 }
 
+/// Those of a group. They fill lines of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct TimesOfLanes(pub(super) Times<LANES>);
+
 /// Sums of a group that concern the values of its channels: Σy, Σty. They fill lines of the cache.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -183,7 +188,7 @@ pub(super) struct Group {
     /// Whether the sums of time per channel are kept.
     keeps_times: bool,
     pub(super) values: Vec<Values>,
-    pub(super) times: Vec<Times<LANES>>,
+    pub(super) times: Vec<TimesOfLanes>,
     /// Σy².
     pub(super) squares: Vec<Lanes>,
 }
@@ -221,7 +226,7 @@ impl Table {
         self.common.resize(slots, Common::NONE);
         for group in &mut self.groups {
             group.values.resize(slots, Values::NONE);
-            group.times.resize(slots, Times::NONE);
+            group.times.resize(slots, TimesOfLanes(Times::NONE));
             if group.keeps_squares {
                 group.squares.resize(slots, [0.0; LANES]);
             }
@@ -236,7 +241,7 @@ impl Table {
         };
         for group in &mut self.groups {
             group.values[slot] = Values::NONE;
-            group.times[slot] = Times::NONE;
+            group.times[slot] = TimesOfLanes(Times::NONE);
             if group.keeps_squares {
                 group.squares[slot] = [0.0; LANES];
             }
@@ -257,7 +262,7 @@ impl Table {
                 *run = from_fn(|i| run[i] + squares[i]);
             }
             if group.keeps_times {
-                group.times[slot] = group.times[slot].plus(&Times::of(t, y));
+                group.times[slot].0 = group.times[slot].0.plus(&Times::of(t, y));
             }
         }
     }
@@ -295,7 +300,7 @@ impl Table {
                 let mut times = Times::NONE;
                 for (slot, t, y) in samples {
                     times = times.plus(&Times::of(t, y));
-                    group.times[slot] = times;
+                    group.times[slot].0 = times;
                 }
             }
         }
@@ -332,8 +337,8 @@ impl Table {
             if group.keeps_times {
                 let mut times = Times::NONE;
                 for (to, slot) in slots.clone().enumerate().rev() {
-                    times = times.plus(&other.times[slot].shifted(&[by(slot); LANES]));
-                    group.times[to] = times;
+                    times = times.plus(&other.times[slot].0.shifted(&[by(slot); LANES]));
+                    group.times[to].0 = times;
                 }
             }
         }
