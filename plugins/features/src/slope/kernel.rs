@@ -88,7 +88,7 @@ struct Window {
     needed_span: i64,
     /// How long ago a channel must have begun, in nanoseconds.
     needed_open: i64,
-    /// The oldest row in it, when that was, and the block of that row.
+    /// The oldest row in it, when that was, and the block of that row or one before it.
     head: u64,
     head_ns: i64,
     block: usize,
@@ -150,11 +150,6 @@ impl Window {
         }
     }
 
-    /// Finds the block of the oldest row, which is not before the one that it had.
-    fn find_block(&mut self, blocks: &Blocks) {
-        self.block = blocks.find(self.head, self.block);
-    }
-
     /// Finds the parts of the window with number `index`, and tells its weights what they do not learn with every row.
     /// Not inlined, as this is seldom needed and takes registers.
     #[inline(never)]
@@ -165,7 +160,7 @@ impl Window {
         blocks: &mut Blocks,
         weights: &mut Weights,
     ) {
-        self.find_block(blocks);
+        self.block = blocks.find(self.head, self.block);
         let current = blocks.current_start();
         let (place, rest, by) = blocks.rest_of(rows, self.head, self.block);
         weights.set_rest(index % ABREAST, rest, by);
@@ -288,7 +283,7 @@ impl RollingSlope {
         let mut oldest_block = self.blocks.starts().len() - 1;
         for window in &mut self.windows {
             window.advance(&self.rows, t_ns);
-            window.find_block(&self.blocks);
+            window.block = self.blocks.find(window.head, window.block);
             oldest_block = oldest_block.min(window.block);
         }
         self.blocks.close(&self.rows, t_ns, oldest_block);

@@ -263,8 +263,8 @@ impl Blocks {
         }
     }
 
-    /// Where the rows after block `block` lie, to which a window's first row belongs, and the origin of that block's times less that
-    /// of all later ones.
+    /// Of a window that begins with row `head` of block `block`: where the sums over the closed blocks after that one are, what all
+    /// channels have in common of them, and [`by`](super::parts::Parts::by).
     pub(super) fn rest_of(&self, rows: &Rows, head: u64, block: usize) -> (usize, &Common, f64) {
         let current = self.starts.len() - 1;
         let place = current.min(block + 1);
@@ -279,7 +279,7 @@ impl Blocks {
         (place, rest, by as f64)
     }
 
-    /// What all channels have in common of the rows of a closed block from the one in a slot on.
+    /// By slot of a row, what all channels have in common of it and the later ones of its block, which is closed.
     #[inline]
     pub(super) fn tails(&self) -> &[Common] {
         &self.tails.common

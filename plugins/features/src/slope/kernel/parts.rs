@@ -49,6 +49,7 @@ impl Weights {
         self.rest.set(i, &rest.rows);
     }
 
+    /// Sets where the first part of window `i` lies.
     #[inline(always)]
     pub(super) fn set_head(&mut self, i: usize, place: usize) {
         self.heads[i] = place;
@@ -203,7 +204,7 @@ fn slopes_with_gaps(
     slopes: &mut Lanes,
     least: &mut Least,
 ) {
-    for i in 0..LANES {
+    for (i, slope) in slopes.iter_mut().enumerate() {
         let [h, r, w] = [head_times, rest_times, now_times].map(|times| times.0.only(i));
         let times = r.plus(&w).plus(&h.shifted(&[by]));
         let Times {
@@ -214,7 +215,7 @@ fn slopes_with_gaps(
         least.n[i] = lesser(least.n[i], n);
         least.above_thin[i] = lesser(least.above_thin[i], (n * tt - t * t) - THIN * (n * tt));
         let [[of_ty], [of_y], [of_head_y]] = weights(&times, &[by]);
-        slopes[i] = of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+        *slope = of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
             - of_y * (rest.y[i] + now.y[i])
             - of_head_y * head.y[i];
     }
