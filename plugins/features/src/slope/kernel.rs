@@ -17,13 +17,14 @@ mod sums;
 mod tests;
 
 use std::array::from_fn;
+use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
 use blocks::Blocks;
-use parts::{Least, Line, Parts};
+use parts::{ABREAST, Least, Line, Parts, Weights};
 use rows::Rows;
-use sums::{LANES, Lanes};
+use sums::{LANES, Lanes, Values};
 
 /// Samples of this size or above count as absent, like infinities: their squares would overflow.
 pub(crate) const LIMIT: f64 = 1e100;
@@ -63,12 +64,17 @@ pub struct RollingSlope {
     no_value: NoValue,
     squares: bool,
     windows: Vec<Window>,
+    /// Of the windows, [`ABREAST`] at a time.
+    weights: Vec<Weights>,
     rows: Rows,
     blocks: Blocks,
-    /// Number of the shortest window, if there is one.
+    /// Numbers of the shortest and the longest window, if there is one.
     shortest: usize,
+    longest: usize,
     /// Whether in all windows every channel has a value and is present in every row.
     all_complete: bool,
+    /// Whether all windows have enough rows, but each has gaps.
+    all_gaps: bool,
     longest_needed_open: i64,
     /// By window: the results of the channels of a group.
     results: Vec<Lanes>,
@@ -82,15 +88,13 @@ struct Window {
     needed_span: i64,
     /// How long ago a channel must have begun, in nanoseconds.
     needed_open: i64,
-    /// The oldest row in it, when that was, and the block of that row.
+    /// The oldest row in it, when that was, and the block of that row or one before it.
     head: u64,
     head_ns: i64,
     block: usize,
-    /// The first row of the next block.
-    block_end: u64,
     parts: Parts,
-    /// Nanoseconds from the oldest row to the newest.
-    span: f64,
+    /// From this oldest row on the parts are to be found anew.
+    parts_until: u64,
     kind: Kind,
 }
 
@@ -114,9 +118,8 @@ impl Window {
             head: 0,
             head_ns: 0,
             block: 0,
-            block_end: u64::MAX,
             parts: Parts::NONE,
-            span: 0.0,
+            parts_until: 0,
             kind: Kind::Absent,
         }
     }
@@ -124,7 +127,13 @@ impl Window {
     /// Begins with the first row of all.
     fn begin(&mut self, t_ns: i64) {
         (self.head, self.head_ns) = (0, t_ns);
-        (self.block, self.block_end) = (0, 0);
+        self.block = 0;
+        self.seek();
+    }
+
+    /// Lets the parts be found anew, which may lie elsewhere.
+    fn seek(&mut self) {
+        self.parts_until = 0;
     }
 
     /// Drops the rows that are outside of the window that ends with the row at `t_ns`, the last one or the next.
@@ -132,7 +141,7 @@ impl Window {
     fn advance(&mut self, rows: &Rows, t_ns: i64) {
         // Without a sign no two instants are too far apart.
         let leaves = |t: i64| t_ns.wrapping_sub(t) as u64 >= self.width_ns as u64;
-        while self.head < rows.next() && leaves(self.head_ns) {
+        while leaves(self.head_ns) {
             self.head += 1;
             self.head_ns = match self.head < rows.next() {
                 true => rows.time(self.head),
@@ -141,14 +150,38 @@ impl Window {
         }
     }
 
-    /// Finds the block of the oldest row, which is not before the one that it had.
-    fn find_block(&mut self, blocks: &Blocks) {
+    /// Finds the parts of the window with number `index`, and tells its weights what they do not learn with every row.
+    /// Not inlined, as this is seldom needed and takes registers.
+    #[inline(never)]
+    fn find_parts(
+        &mut self,
+        index: usize,
+        rows: &Rows,
+        blocks: &mut Blocks,
+        weights: &mut Weights,
+    ) {
         self.block = blocks.find(self.head, self.block);
-        self.block_end = blocks
-            .starts()
-            .get(self.block + 1)
-            .copied()
-            .unwrap_or(u64::MAX);
+        let current = blocks.current_start();
+        let (place, rest, by) = blocks.rest_of(rows, self.head, self.block);
+        weights.set_rest(index % ABREAST, rest, by);
+        self.parts = Parts {
+            places: [rows.capacity(), place, 0],
+            by,
+        };
+        self.parts_until = match self.head.cmp(&current) {
+            Ordering::Less => blocks.starts()[self.block + 1],
+            Ordering::Equal => current + 1,
+            Ordering::Greater => {
+                self.parts.places[2] = blocks.sum_short(rows, index, self.head);
+                0
+            }
+        };
+    }
+
+    /// Nanoseconds from its oldest row to the newest, which is at `t_ns`; no more than its width.
+    #[inline(always)]
+    fn span(&self, t_ns: i64) -> i64 {
+        t_ns.wrapping_sub(self.head_ns)
     }
 }
 
@@ -170,6 +203,7 @@ impl RollingSlope {
             .map(|&width_ns| Window::new(width_ns.max(1), &coverage))
             .collect();
         let shortest = (0..windows.len()).min_by_key(|&index| windows[index].width_ns);
+        let longest = (0..windows.len()).max_by_key(|&index| windows[index].width_ns);
         RollingSlope {
             channels,
             coverage,
@@ -178,7 +212,10 @@ impl RollingSlope {
             rows,
             blocks,
             shortest: shortest.unwrap_or(0),
+            longest: longest.unwrap_or(0),
             all_complete: false,
+            all_gaps: false,
+            weights: vec![Weights::NONE; windows.len().div_ceil(ABREAST)],
             longest_needed_open: windows.iter().map(|w| w.needed_open).max().unwrap_or(0),
             results: vec![[0.0; LANES]; windows.len()],
             windows,
@@ -232,6 +269,7 @@ impl RollingSlope {
         let oldest = self.blocks.oldest();
         if self.rows.reserve(oldest) {
             self.blocks.rebuild(&self.rows, t_ns);
+            self.windows.iter_mut().for_each(Window::seek);
         }
         let begun = self.rows.append(t_ns, y, LIMIT, oldest);
         self.blocks.add_newest(&self.rows, begun);
@@ -245,43 +283,79 @@ impl RollingSlope {
         let mut oldest_block = self.blocks.starts().len() - 1;
         for window in &mut self.windows {
             window.advance(&self.rows, t_ns);
-            window.find_block(&self.blocks);
+            window.block = self.blocks.find(window.head, window.block);
             oldest_block = oldest_block.min(window.block);
         }
         self.blocks.close(&self.rows, t_ns, oldest_block);
-        let windows = self.windows.iter_mut();
-        windows.for_each(|window| window.block -= oldest_block);
+        for window in &mut self.windows {
+            window.block -= oldest_block;
+            window.seek();
+        }
     }
 
-    /// Lets the windows end with the last row, which is at `t_ns`, and finds their parts.
+    /// Lets the windows end with the last row, which is at `t_ns`, and finds their parts and weights.
     fn advance(&mut self, t_ns: i64) {
         let (rows, blocks) = (&self.rows, &mut self.blocks);
-        let (current, complete_from) = (blocks.current_start(), rows.complete_from());
-        let mut all_complete = true;
-        for (index, window) in self.windows.iter_mut().enumerate() {
-            window.advance(rows, t_ns);
-            if window.head >= window.block_end {
-                window.find_block(blocks);
+        let current = blocks.current_start();
+        let mut long_enough = true;
+        let abreast = self.windows.chunks_mut(ABREAST).zip(&mut self.weights);
+        for (nth, (windows, weights)) in abreast.enumerate() {
+            for (i, window) in windows.iter_mut().enumerate() {
+                window.advance(rows, t_ns);
+                if window.head >= window.parts_until {
+                    window.find_parts(ABREAST * nth + i, rows, blocks, weights);
+                }
+                if window.head < current {
+                    window.parts.places[0] = rows.slot(window.head);
+                }
+                weights.set_head(i, window.parts.places[0]);
+                long_enough &= window.span(t_ns) >= window.needed_span;
             }
-            let head = window.head;
-            if head > current {
-                blocks.sum_short(rows, index, head);
+        }
+        let rows = &self.rows;
+        let head_of = |index: usize| self.windows.get(index).map_or(0, |window| window.head);
+        let newest = head_of(self.shortest);
+        let enough = long_enough && rows.next() - newest >= self.coverage.min_samples as u64;
+        let complete = enough && head_of(self.longest) >= rows.complete_from();
+        // Where each window has gaps the weights are those of no channel.
+        self.all_gaps = enough && newest < rows.complete_from();
+        if !self.all_gaps {
+            self.weigh();
+        }
+        if !complete || !self.all_complete {
+            self.judge(t_ns);
+        }
+        self.all_complete = complete;
+    }
+
+    /// Finds the weights of all windows, whose parts are known.
+    fn weigh(&mut self) {
+        let (windows, blocks) = (&self.windows, &self.blocks);
+        for weights in &mut self.weights {
+            weights.weigh(blocks.tails(), blocks.now(0));
+        }
+        let newest = windows.get(self.shortest);
+        if newest.is_some_and(|window| window.head > blocks.current_start()) {
+            let places = windows.iter().map(|window| window.parts.places[2]);
+            for (index, place) in places.enumerate().filter(|(_, place)| *place > 0) {
+                self.weights[index / ABREAST].weigh_whole(index % ABREAST, blocks.now(place));
             }
-            window.parts = blocks.parts(rows, index, head, window.block);
-            // No more than the width of the window.
-            let span = t_ns.wrapping_sub(window.head_ns);
-            window.span = span as f64;
-            let few = rows.next() - head < self.coverage.min_samples as u64;
-            window.kind = if few || span < window.needed_span {
+        }
+    }
+
+    /// Says of each window what is known of all channels at once.
+    fn judge(&mut self, t_ns: i64) {
+        let rows = &self.rows;
+        for window in &mut self.windows {
+            let few = rows.next() - window.head < self.coverage.min_samples as u64;
+            window.kind = if few || window.span(t_ns) < window.needed_span {
                 Kind::Absent
-            } else if head < complete_from {
+            } else if window.head < rows.complete_from() {
                 Kind::Gaps
             } else {
                 Kind::Complete
             };
-            all_complete &= window.kind == Kind::Complete;
         }
-        self.all_complete = all_complete;
     }
 
     /// Slopes at the last row, per second: `out[channel * W + window]`, with one of the two NaNs where there is no value.
@@ -311,12 +385,9 @@ impl RollingSlope {
     /// Slopes of the channels of a group in each window.
     #[inline]
     fn slopes_of(&self, group: usize, slopes: &mut [Lanes]) {
-        let groups = self.blocks.groups(group);
-        let values = groups.map(|group| &*group.values);
-        for (window, slopes) in self.windows.iter().zip(&mut *slopes) {
-            if window.kind == Kind::Complete {
-                window.parts.slopes(values, slopes);
-            }
+        if !self.all_gaps {
+            let [head, rest, now] = self.blocks.groups(group).map(|group| &*group.values);
+            slopes_of_complete(&self.windows, &self.weights, head, rest, now, slopes);
         }
         if !self.all_complete {
             self.slopes_of_incomplete(group, slopes);
@@ -327,14 +398,15 @@ impl RollingSlope {
     fn slopes_of_incomplete(&self, group: usize, slopes: &mut [Lanes]) {
         let groups = self.blocks.groups(group);
         let silent = &self.rows.silent()[group];
+        let t_ns = self.last_time().unwrap_or(0);
         let mut least = Least::NONE;
         for (window, slopes) in self.windows.iter().zip(&mut *slopes) {
             match window.kind {
                 Kind::Complete => {}
                 Kind::Gaps => {
                     let wait = self.rows.wait(window.head, group);
-                    let beyond = window.span - window.needed_span as f64;
-                    least.add_span(&from_fn(|i| beyond - silent[i] - wait[i]));
+                    let beyond = window.span(t_ns) as f64 - window.needed_span as f64;
+                    least.add_span(beyond, silent, wait);
                     window.parts.slopes_with_gaps(groups, slopes, &mut least);
                 }
                 Kind::Absent => *slopes = [self.no_value.absent; LANES],
@@ -370,7 +442,8 @@ impl RollingSlope {
             &self.rows.silent()[group],
         );
         let (min_samples, absent) = (self.coverage.min_samples as f64, self.no_value.absent);
-        let span: Lanes = from_fn(|i| window.span - silent[i] - wait[i]);
+        let whole = window.span(self.last_time().unwrap_or(0)) as f64;
+        let span: Lanes = from_fn(|i| whole - silent[i] - wait[i]);
         let far: Lanes = from_fn(|i| {
             if span[i] >= window.needed_span as f64 {
                 values[i]
@@ -443,13 +516,16 @@ impl RollingSlope {
         self.give(out, |kernel, group, values| {
             let (groups, origins) = (kernel.blocks.groups(group), &kernel.blocks.origins()[group]);
             let end_ns = kernel.last_time().unwrap_or(0);
-            for (window, values) in kernel.windows.iter().zip(values) {
+            for (index, (window, values)) in kernel.windows.iter().zip(values).enumerate() {
+                let times = kernel.weights[index / ABREAST].times(index % ABREAST);
                 let moments = match window.kind {
                     Kind::Gaps => window.parts.moments(groups),
-                    _ => window.parts.moments_of_complete(groups),
+                    _ => window.parts.moments_with(groups, &times),
                 };
+                let origin = kernel.blocks.now(window.parts.places[2]).origin;
+                let end = end_ns.wrapping_sub(origin) as f64;
                 *values = from_fn(|i| {
-                    let line = window.parts.line(groups, i, &moments, end_ns);
+                    let line = window.parts.line(groups, i, &moments, end);
                     let line = match moments.thin(i) || line.is_flat() {
                         true => kernel.line(window, LANES * group + i),
                         false => line,
@@ -459,6 +535,28 @@ impl RollingSlope {
                 kernel.mark_absent(window, group, &moments.n, values);
             }
         });
+    }
+}
+
+/// Slopes of the channels of a group in the windows in which each is present in every row. Not inlined, and the tables given one by
+/// one, so that the compiler knows how the sums are aligned.
+#[inline(never)]
+fn slopes_of_complete(
+    windows: &[Window],
+    weights: &[Weights],
+    head: &[Values],
+    rest: &[Values],
+    now: &[Values],
+    slopes: &mut [Lanes],
+) {
+    let abreast = windows.chunks(ABREAST).zip(weights);
+    for ((windows, weights), slopes) in abreast.zip(slopes.chunks_mut(ABREAST)) {
+        for (i, (window, slopes)) in windows.iter().zip(slopes).enumerate() {
+            if window.kind == Kind::Complete {
+                let [h, r, w] = window.parts.places;
+                *slopes = weights.slopes(i, [&head[h], &rest[r], &now[w]]);
+            }
+        }
     }
 }
 
@@ -475,15 +573,24 @@ fn transpose(results: &[Lanes], out: &mut [f64]) {
         }
         return;
     }
-    let mut rest = out;
-    let channels: [&mut [f64]; LANES] = from_fn(|_| {
-        let (channel, others) = std::mem::take(&mut rest).split_at_mut(wide);
-        rest = others;
-        channel
-    });
-    for (index, result) in results.iter().enumerate() {
+    // One comparison for all places of a window, or of several.
+    let (abreast, others) = results.as_chunks::<ABREAST>();
+    let last = (LANES - 1) * wide;
+    let mut first = 0;
+    for results in abreast {
+        let out = &mut out[first..first + last + ABREAST];
         for i in 0..LANES {
-            channels[i][index] = result[i];
+            for window in 0..ABREAST {
+                out[i * wide + window] = results[window][i];
+            }
         }
+        first += ABREAST;
+    }
+    for result in others {
+        let out = &mut out[first..first + last + 1];
+        for i in 0..LANES {
+            out[i * wide] = result[i];
+        }
+        first += 1;
     }
 }

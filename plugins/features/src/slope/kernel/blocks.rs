@@ -3,9 +3,8 @@
 
 use std::array::from_fn;
 
-use super::parts::Parts;
 use super::rows::Rows;
-use super::sums::{Group, LANES, Lanes, Table, group_count};
+use super::sums::{Common, Group, LANES, Lanes, Table, group_count};
 
 /// Blocks that restored ones have room for, beside as many again.
 const SPARE_BLOCKS: usize = 16;
@@ -173,9 +172,10 @@ impl Blocks {
         }
     }
 
-    /// Sums all rows of a window that begins within the current block: at most [`FEWEST_ROWS`].
-    pub(super) fn sum_short(&mut self, rows: &Rows, window: usize, head: u64) {
+    /// Sums all rows of a window that begins within the current block: at most [`FEWEST_ROWS`]. Says where the sums are.
+    pub(super) fn sum_short(&mut self, rows: &Rows, window: usize, head: u64) -> usize {
         self.sum_now(rows, window + 1, head);
+        window + 1
     }
 
     fn sum_now(&mut self, rows: &Rows, slot: usize, first: u64) {
@@ -263,23 +263,32 @@ impl Blocks {
         }
     }
 
-    /// The parts of window number `window`, which begins with row `head` of block `block`.
-    #[inline]
-    pub(super) fn parts(&self, rows: &Rows, window: usize, head: u64, block: usize) -> Parts {
+    /// Of a window that begins with row `head` of block `block`: where the sums over the closed blocks after that one are, what all
+    /// channels have in common of them, and [`by`](super::parts::Parts::by).
+    pub(super) fn rest_of(&self, rows: &Rows, head: u64, block: usize) -> (usize, &Common, f64) {
         let current = self.starts.len() - 1;
-        let places = if block < current {
-            [rows.slot(head), block + 1, 0]
-        } else {
-            let whole = head > self.starts[current];
-            [rows.capacity(), current, if whole { window + 1 } else { 0 }]
+        let place = current.min(block + 1);
+        let rest = &self.rest.common[place];
+        let by = match block < current {
+            true => self.tails.common[rows.slot(head)]
+                .origin
+                .wrapping_sub(rest.origin),
+            false => 0,
         };
-        let [head, rest, now] = places;
-        let common = [
-            &self.tails.common[head],
-            &self.rest.common[rest],
-            &self.now.common[now],
-        ];
-        Parts::new(common, places)
+        // Both lie within a window.
+        (place, rest, by as f64)
+    }
+
+    /// By slot of a row, what all channels have in common of it and the later ones of its block, which is closed.
+    #[inline]
+    pub(super) fn tails(&self) -> &[Common] {
+        &self.tails.common
+    }
+
+    /// What all channels have in common of the current block, or of a window within it.
+    #[inline]
+    pub(super) fn now(&self, slot: usize) -> &Common {
+        &self.now.common[slot]
     }
 
     /// The sums of a group of channels within closed blocks, over them and of the current one.

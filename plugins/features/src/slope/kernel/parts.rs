@@ -2,11 +2,9 @@
 
 use std::array::from_fn;
 
-use super::sums::{Common, Group, LANES, Lanes, Times, Values};
+use super::sums::{Common, Group, LANES, Lanes, Times, TimesOfLanes, Values};
 
 const NS_PER_S: f64 = 1e9;
-
-const HALF: usize = LANES / 2;
 
 /// Where Σ(t − t̄)² is a smaller part of Σt² than this, the samples lie closer together than they lie to the origin of time,
 /// and too many digits are lost. Samples that span half of a window are above it up to thousands of samples.
@@ -15,73 +13,114 @@ const THIN: f64 = 1e-4;
 /// Where Σ(y − ȳ)² is a smaller part of Σy² than this, it is computed from the samples.
 const FLAT: f64 = 1e-6;
 
-/// The end of a closed block, the whole blocks after it and the current block: where their sums lie, and how they are weighed.
+/// Windows whose weights are computed together, so that vector instructions do it.
+pub(super) const ABREAST: usize = 4;
+
+/// What the sums of windows that stand abreast are multiplied by where a channel is present in every row: the weights are
+/// the same for all channels then, and there is but one division.
+#[derive(Clone, Debug)]
+pub(super) struct Weights {
+    /// As in [`Parts`].
+    by: [f64; ABREAST],
+    /// Where the sums of the first parts lie. They are not copied, as numbers just written one by one are slow to be read as vectors.
+    heads: [usize; ABREAST],
+    /// Sums of the rows' times in the second parts, and in the windows.
+    rest: Times<ABREAST>,
+    times: Times<ABREAST>,
+    of_ty: [f64; ABREAST],
+    of_y: [f64; ABREAST],
+    of_head_y: [f64; ABREAST],
+}
+
+impl Weights {
+    pub(super) const NONE: Weights = Weights {
+        by: [0.0; ABREAST],
+        heads: [0; ABREAST],
+        rest: Times::NONE,
+        times: Times::NONE,
+        of_ty: [0.0; ABREAST],
+        of_y: [0.0; ABREAST],
+        of_head_y: [0.0; ABREAST],
+    };
+
+    /// Sets what window `i` keeps as long as neither its block nor the current one changes.
+    pub(super) fn set_rest(&mut self, i: usize, rest: &Common, by: f64) {
+        self.by[i] = by;
+        self.rest.set(i, &rest.rows);
+    }
+
+    /// Sets where the first part of window `i` lies.
+    #[inline(always)]
+    pub(super) fn set_head(&mut self, i: usize, place: usize) {
+        self.heads[i] = place;
+    }
+
+    /// Finds the weights of windows that end with the current block. Not inlined, as the compiler would take several of these at once,
+    /// which lie too far apart.
+    #[inline(never)]
+    pub(super) fn weigh(&mut self, heads: &[Common], now: &Common) {
+        let heads = self.heads.map(|place| &heads[place].rows);
+        let head = Times {
+            n: heads.map(|head| head.n[0]),
+            t: heads.map(|head| head.t[0]),
+            tt: heads.map(|head| head.tt[0]),
+        };
+        let head = head.shifted(&self.by);
+        self.times = self.rest.plus(&now.rows.repeated()).plus(&head);
+        [self.of_ty, self.of_y, self.of_head_y] = weights(&self.times, &self.by);
+    }
+
+    /// Finds the weights of window `i`, which begins within the current block.
+    pub(super) fn weigh_whole(&mut self, i: usize, whole: &Common) {
+        let [[of_ty], [of_y], [of_head_y]] = weights(&whole.rows, &[0.0]);
+        self.times.set(i, &whole.rows);
+        (self.of_ty[i], self.of_y[i], self.of_head_y[i]) = (of_ty, of_y, of_head_y);
+    }
+
+    /// Sums of the times of all rows of window `i`.
+    pub(super) fn times(&self, i: usize) -> Times<LANES> {
+        self.times.only(i).repeated()
+    }
+
+    /// Slopes per second in window `i` of channels that are present in every row of it.
+    #[inline(always)]
+    pub(super) fn slopes(&self, i: usize, [head, rest, now]: [&Values; 3]) -> Lanes {
+        let (of_ty, of_y, of_head_y) = (self.of_ty[i], self.of_y[i], self.of_head_y[i]);
+        from_fn(|i| {
+            of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+                - of_y * (rest.y[i] + now.y[i])
+                - of_head_y * head.y[i]
+        })
+    }
+}
+
+/// `slope = (N·Σty − Σt·Σy) / (N·Σt² − (Σt)²)`
+#[inline(always)]
+fn weights<const L: usize>(Times { n, t, tt }: &Times<L>, by: &[f64; L]) -> [[f64; L]; 3] {
+    let scale: [f64; L] = from_fn(|i| NS_PER_S / (n[i] * tt[i] - t[i] * t[i]));
+    let of_ty: [f64; L] = from_fn(|i| n[i] * scale[i]);
+    let of_y: [f64; L] = from_fn(|i| t[i] * scale[i]);
+    let of_head_y = from_fn(|i| of_y[i] - of_ty[i] * by[i]);
+    [of_ty, of_y, of_head_y]
+}
+
+/// The end of a closed block, the whole blocks after it and the current block: where their sums lie.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
     /// The three runs in their tables.
-    places: [usize; 3],
-    /// What times are measured from.
-    origin: i64,
+    pub(super) places: [usize; 3],
     /// Origin of the first run's time less that of the other two, in nanoseconds.
-    by: f64,
-    /// Sums of the rows' times.
-    times: Times<1>,
-    of_ty: f64,
-    of_y: f64,
-    of_head_y: f64,
+    pub(super) by: f64,
 }
 
 impl Parts {
     pub(super) const NONE: Parts = Parts {
         places: [0; 3],
-        origin: 0,
         by: 0.0,
-        times: Times::NONE,
-        of_ty: 0.0,
-        of_y: 0.0,
-        of_head_y: 0.0,
     };
 
-    /// For a complete window the weights of the sums are the same for all channels, and there is but one division:
-    /// `slope = (N·Σty − Σt·Σy) / (N·Σt² − (Σt)²)`
-    #[inline]
-    pub(super) fn new([head, rest, now]: [&Common; 3], places: [usize; 3]) -> Parts {
-        // Both lie within a window, or the first is empty and its origin is of no meaning.
-        let by = head.origin.wrapping_sub(now.origin) as f64;
-        let times = rest.rows.plus(&now.rows).plus(&head.rows.shifted(by));
-        let [n, t, tt] = [times.n[0], times.t[0], times.tt[0]];
-        let scale = NS_PER_S / (n * tt - t * t);
-        let (of_ty, of_y) = (n * scale, t * scale);
-        Parts {
-            places,
-            origin: now.origin,
-            by,
-            times,
-            of_ty,
-            of_y,
-            of_head_y: of_y - of_ty * by,
-        }
-    }
-
-    /// Slopes per second of channels that are present in every row of the window.
-    #[inline(always)]
-    pub(super) fn slopes(&self, [head, rest, now]: [&[Values]; 3], slopes: &mut Lanes) {
-        let [h, r, w] = self.places;
-        self.slopes_of(&head[h], &rest[r], &now[w], slopes);
-    }
-
-    /// Not inlined, so that the compiler keeps in mind how the sums are aligned.
-    #[inline(never)]
-    fn slopes_of(&self, head: &Values, rest: &Values, now: &Values, slopes: &mut Lanes) {
-        *slopes = from_fn(|i| {
-            self.of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
-                - self.of_y * (rest.y[i] + now.y[i])
-                - self.of_head_y * head.y[i]
-        });
-    }
-
     /// Slopes per second of channels that may be absent from some rows: for each the very operations of
-    /// [`slopes`](Self::slopes), so that a channel keeps its bits while another is absent.
+    /// [`Weights`], so that a channel keeps its bits while another is absent.
     /// What must not be too little is noted in `least`.
     #[inline(always)]
     pub(super) fn slopes_with_gaps(
@@ -91,55 +130,18 @@ impl Parts {
         least: &mut Least,
     ) {
         let [h, r, w] = self.places;
-        let times = [&head.times[h], &rest.times[r], &now.times[w]];
-        let values = [&head.values[h], &rest.values[r], &now.values[w]];
-        // In halves, which fit into the registers.
-        for first in [0, HALF] {
-            self.half_with_gaps(first, values, times, slopes, least);
-        }
-    }
-
-    #[inline(always)]
-    fn half_with_gaps(
-        &self,
-        first: usize,
-        [head, rest, now]: [&Values; 3],
-        times: [&Times<LANES>; 3],
-        slopes: &mut Lanes,
-        least: &mut Least,
-    ) {
-        let half = |of: &Lanes| -> [f64; HALF] { from_fn(|i| of[first + i]) };
-        let [h, r, w] = times.map(|times| Times {
-            n: half(&times.n),
-            t: half(&times.t),
-            tt: half(&times.tt),
-        });
-        let Times { n, t, tt } = r.plus(&w).plus(&h.shifted(self.by));
-        let n_tt: [f64; HALF] = from_fn(|i| n[i] * tt[i]);
-        let n_sxx: [f64; HALF] = from_fn(|i| n_tt[i] - t[i] * t[i]);
-        for (i, lane) in (first..first + HALF).enumerate() {
-            least.n[lane] = lesser(least.n[lane], n[i]);
-        }
-        for (i, lane) in (first..first + HALF).enumerate() {
-            let above_thin = n_sxx[i] - THIN * n_tt[i];
-            least.above_thin[lane] = lesser(least.above_thin[lane], above_thin);
-        }
-        for (i, lane) in (first..first + HALF).enumerate() {
-            let scale = NS_PER_S / n_sxx[i];
-            let (of_ty, of_y) = (n[i] * scale, t[i] * scale);
-            let of_head_y = of_y - of_ty * self.by;
-            slopes[lane] = of_ty * (head.ty[lane] + (rest.ty[lane] + now.ty[lane]))
-                - of_y * (rest.y[lane] + now.y[lane])
-                - of_head_y * head.y[lane];
-        }
+        let head = (&head.times[h], &head.values[h]);
+        let rest = (&rest.times[r], &rest.values[r]);
+        let now = (&now.times[w], &now.values[w]);
+        slopes_with_gaps(self.by, head, rest, now, slopes, least);
     }
 
     #[inline(always)]
     fn times_with_gaps(&self, [head, rest, now]: [&Group; 3]) -> Times<LANES> {
-        let head = &head.times[self.places[0]];
-        let rest = &rest.times[self.places[1]];
-        let now = &now.times[self.places[2]];
-        rest.plus(now).plus(&head.shifted(self.by))
+        let head = &head.times[self.places[0]].0;
+        let rest = &rest.times[self.places[1]].0;
+        let now = &now.times[self.places[2]].0;
+        rest.plus(now).plus(&head.shifted(&[self.by; LANES]))
     }
 
     /// How many samples there are of channels that may be absent from some rows, and whether so many digits were lost that the sums
@@ -156,19 +158,9 @@ impl Parts {
         self.moments_with(groups, &self.times_with_gaps(groups))
     }
 
-    /// The same of channels that are present in every row.
-    pub(super) fn moments_of_complete(&self, groups: [&Group; 3]) -> Moments {
-        let Times { n, t, tt } = self.times;
-        let times = Times {
-            n: [n[0]; LANES],
-            t: [t[0]; LANES],
-            tt: [tt[0]; LANES],
-        };
-        self.moments_with(groups, &times)
-    }
-
+    /// The same where the sums of times are known.
     #[inline(always)]
-    fn moments_with(
+    pub(super) fn moments_with(
         &self,
         [head, rest, now]: [&Group; 3],
         &Times { n, t, tt }: &Times<LANES>,
@@ -187,24 +179,45 @@ impl Parts {
         }
     }
 
-    /// Centred sums of one channel of a group, from runs that keep squares; the window ends at `end_ns`.
-    pub(super) fn line(
-        &self,
-        groups: [&Group; 3],
-        i: usize,
-        moments: &Moments,
-        end_ns: i64,
-    ) -> Line {
+    /// Centred sums of one channel of a group, from runs that keep squares; the window ends `end` after the origin of its times.
+    pub(super) fn line(&self, groups: [&Group; 3], i: usize, moments: &Moments, end: f64) -> Line {
         let place = |part: usize| groups[part].squares[self.places[part]][i];
         let (n, t, y) = (moments.n[i], moments.t[i], moments.y[i]);
         Line {
             n,
             mean: y / n,
-            since_mean: end_ns.wrapping_sub(self.origin) as f64 - t / n,
+            since_mean: end - t / n,
             sxx: moments.n_sxx[i] / n,
             sxy: moments.n_sxy[i] / n,
             syy: place(0) + (place(1) + place(2)) - y * y / n,
         }
+    }
+}
+
+/// Not inlined, so that the compiler knows that nothing overlaps and takes several channels at once.
+#[inline(never)]
+fn slopes_with_gaps(
+    by: f64,
+    (head_times, head): (&TimesOfLanes, &Values),
+    (rest_times, rest): (&TimesOfLanes, &Values),
+    (now_times, now): (&TimesOfLanes, &Values),
+    slopes: &mut Lanes,
+    least: &mut Least,
+) {
+    for (i, slope) in slopes.iter_mut().enumerate() {
+        let [h, r, w] = [head_times, rest_times, now_times].map(|times| times.0.only(i));
+        let times = r.plus(&w).plus(&h.shifted(&[by]));
+        let Times {
+            n: [n],
+            t: [t],
+            tt: [tt],
+        } = times;
+        least.n[i] = lesser(least.n[i], n);
+        least.above_thin[i] = lesser(least.above_thin[i], (n * tt - t * t) - THIN * (n * tt));
+        let [[of_ty], [of_y], [of_head_y]] = weights(&times, &[by]);
+        *slope = of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+            - of_y * (rest.y[i] + now.y[i])
+            - of_head_y * head.y[i];
     }
 }
 
@@ -225,16 +238,21 @@ impl Least {
         span: [f64::INFINITY; LANES],
     };
 
-    #[inline(always)]
-    pub(super) fn add_span(&mut self, beyond: &Lanes) {
-        self.span = from_fn(|i| lesser(self.span[i], beyond[i]));
+    /// Notes what the samples span where the window spans `beyond` what it must, its last samples have been silent for so long and its
+    /// first ones awaited. Not inlined, so that the compiler knows that nothing overlaps.
+    #[inline(never)]
+    pub(super) fn add_span(&mut self, beyond: f64, silent: &Lanes, wait: &Lanes) {
+        for i in 0..LANES {
+            self.span[i] = lesser(self.span[i], beyond - silent[i] - wait[i]);
+        }
     }
 
     /// Whether each channel has at least `min_samples`, which span enough, and sums that have kept their digits, in every window.
-    #[inline(always)]
     pub(super) fn suffices(&self, min_samples: f64) -> bool {
-        let least = |of: Lanes| of.into_iter().fold(f64::INFINITY, lesser);
-        least(self.n) >= min_samples && least(self.above_thin) >= 0.0 && least(self.span) >= 0.0
+        (0..LANES).fold(true, |suffices, i| {
+            let enough = (self.n[i] >= min_samples) & (self.span[i] >= 0.0);
+            suffices & enough & (self.above_thin[i] >= 0.0)
+        })
     }
 }
 

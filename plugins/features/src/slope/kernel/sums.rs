@@ -44,6 +44,18 @@ impl Times<LANES> {
     }
 }
 
+impl Times<1> {
+    /// The same sums for several channels.
+    #[inline(always)]
+    pub(super) fn repeated<const L: usize>(&self) -> Times<L> {
+        Times {
+            n: [self.n[0]; L],
+            t: [self.t[0]; L],
+            tt: [self.tt[0]; L],
+        }
+    }
+}
+
 impl<const L: usize> Times<L> {
     pub(super) const NONE: Times<L> = Times {
         n: [0.0; L],
@@ -62,14 +74,35 @@ impl<const L: usize> Times<L> {
 
     /// The same sums about an origin that lies `by` earlier.
     #[inline(always)]
-    pub(super) fn shifted(&self, by: f64) -> Times<L> {
+    pub(super) fn shifted(&self, by: &[f64; L]) -> Times<L> {
         Times {
             n: self.n,
-            t: from_fn(|i| self.t[i] + by * self.n[i]),
-            tt: from_fn(|i| self.tt[i] + by * (2.0 * self.t[i] + by * self.n[i])),
+            t: from_fn(|i| self.t[i] + by[i] * self.n[i]),
+            tt: from_fn(|i| self.tt[i] + by[i] * (2.0 * self.t[i] + by[i] * self.n[i])),
+        }
+    }
+
+    /// Sets those of one channel.
+    #[inline(always)]
+    pub(super) fn set(&mut self, i: usize, one: &Times<1>) {
+        (self.n[i], self.t[i], self.tt[i]) = (one.n[0], one.t[0], one.tt[0]);
+    }
+
+    /// Those of one channel.
+    #[inline(always)]
+    pub(super) fn only(&self, i: usize) -> Times<1> {
+        Times {
+            n: [self.n[i]],
+            t: [self.t[i]],
+            tt: [self.tt[i]],
         }
     }
 }
+
+/// Those of a group. They fill lines of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct TimesOfLanes(pub(super) Times<LANES>);
 
 /// Sums of a group that concern the values of its channels: Σy, Σty. They fill lines of the cache.
 #[derive(Clone, Copy, Debug)]
@@ -155,7 +188,7 @@ pub(super) struct Group {
     /// Whether the sums of time per channel are kept.
     keeps_times: bool,
     pub(super) values: Vec<Values>,
-    pub(super) times: Vec<Times<LANES>>,
+    pub(super) times: Vec<TimesOfLanes>,
     /// Σy².
     pub(super) squares: Vec<Lanes>,
 }
@@ -193,7 +226,7 @@ impl Table {
         self.common.resize(slots, Common::NONE);
         for group in &mut self.groups {
             group.values.resize(slots, Values::NONE);
-            group.times.resize(slots, Times::NONE);
+            group.times.resize(slots, TimesOfLanes(Times::NONE));
             if group.keeps_squares {
                 group.squares.resize(slots, [0.0; LANES]);
             }
@@ -208,7 +241,7 @@ impl Table {
         };
         for group in &mut self.groups {
             group.values[slot] = Values::NONE;
-            group.times[slot] = Times::NONE;
+            group.times[slot] = TimesOfLanes(Times::NONE);
             if group.keeps_squares {
                 group.squares[slot] = [0.0; LANES];
             }
@@ -229,7 +262,7 @@ impl Table {
                 *run = from_fn(|i| run[i] + squares[i]);
             }
             if group.keeps_times {
-                group.times[slot] = group.times[slot].plus(&Times::of(t, y));
+                group.times[slot].0 = group.times[slot].0.plus(&Times::of(t, y));
             }
         }
     }
@@ -267,7 +300,7 @@ impl Table {
                 let mut times = Times::NONE;
                 for (slot, t, y) in samples {
                     times = times.plus(&Times::of(t, y));
-                    group.times[slot] = times;
+                    group.times[slot].0 = times;
                 }
             }
         }
@@ -285,7 +318,7 @@ impl Table {
         let by = |slot: usize| table.common[slot].origin.wrapping_sub(origin) as f64;
         let mut rows = Times::NONE;
         for (to, slot) in slots.clone().enumerate().rev() {
-            rows = rows.plus(&table.common[slot].rows.shifted(by(slot)));
+            rows = rows.plus(&table.common[slot].rows.shifted(&[by(slot)]));
             self.common[to] = Common { origin, rows };
         }
         for (group, other) in self.groups.iter_mut().zip(&table.groups) {
@@ -304,8 +337,8 @@ impl Table {
             if group.keeps_times {
                 let mut times = Times::NONE;
                 for (to, slot) in slots.clone().enumerate().rev() {
-                    times = times.plus(&other.times[slot].shifted(by(slot)));
-                    group.times[to] = times;
+                    times = times.plus(&other.times[slot].0.shifted(&[by(slot); LANES]));
+                    group.times[to].0 = times;
                 }
             }
         }
