@@ -234,6 +234,7 @@ impl Problem for CompileProblem {
             | Self::NoRows { .. }
             | Self::Spans { .. }
             | Self::Horizons { .. }
+            | Self::Truths { .. }
             | Self::Cycle { .. }
             | Self::Leak { .. }
             | Self::NoMaxAge { .. }
