@@ -2,14 +2,17 @@
 
 use std::fmt;
 
-use athermal_core::node::{Mistake, OrderFigure, OrderTable, TriedOrder};
-use athermal_numerics::InformationCriteria;
+use athermal_core::node::{Mistake, OrderFigure, OrderTable, TrainingReport, TriedOrder};
+use athermal_numerics::{InformationCriteria, NumericsError};
 use schemars::JsonSchema;
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The most orders that are compared.
 const MOST: usize = 500;
+/// By how many the rows must outnumber the coefficients for all figures of an order to be finite: AICc divides by
+/// `N − k − 1`, and `k` is one more than the coefficients.
+const LEFT_OVER: usize = 3;
 /// The largest order.
 pub(crate) const LARGEST: usize = 100;
 
@@ -175,9 +178,26 @@ impl Order {
         open.map(|((letter, order), _)| format!("{letter} {order}"))
     }
 
-    /// The best of what was tried, and the table of all.
-    pub(crate) fn best(&self, rows: usize, tried: Vec<Tried>) -> Option<(usize, OrderTable)> {
-        let told = tried.into_iter().map(|tried| TriedOrder {
+    /// The best of what was tried; the table goes into the report. Orders with nearly as many coefficients as there are rows fit
+    /// them without any error whatever they are worth, so they are not ranked.
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFewRows`] when no order is left.
+    pub(crate) fn best(
+        &self,
+        rows: usize,
+        tried: Vec<Tried>,
+        report: &mut TrainingReport,
+    ) -> Result<usize, NumericsError> {
+        let count = tried.len();
+        let least = tried.iter().map(|tried| tried.coefficients).min();
+        let ranked: Vec<(usize, Tried)> = tried
+            .into_iter()
+            .enumerate()
+            .filter(|(_, tried)| tried.coefficients + LEFT_OVER <= rows)
+            .collect();
+        let places: Vec<usize> = ranked.iter().map(|(place, _)| *place).collect();
+        let told = ranked.into_iter().map(|(_, tried)| TriedOrder {
             order: tried.name,
             coefficients: tried.coefficients,
             aic: tried.figures.aic,
@@ -187,15 +207,27 @@ impl Order {
         });
         let tried: Vec<_> = told.collect();
         let worth = tried.iter().map(|tried| tried.figure(self.by)).enumerate();
-        let (best, _) = worth
+        let best = worth
             .filter(|(_, worth)| worth.is_finite())
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let table = OrderTable {
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((chosen, _)) = best else {
+            return Err(NumericsError::TooFewRows {
+                needed: (least.unwrap_or(1) + LEFT_OVER) as u64,
+                found: rows as u64,
+            });
+        };
+        let left_out = count - tried.len();
+        if left_out > 0 {
+            report.notes.push(format!(
+                "{left_out} of {count} orders have too many coefficients to be ranked on {rows} rows"
+            ));
+        }
+        report.orders = Some(Box::new(OrderTable {
             by: self.by,
             rows,
-            chosen: best,
+            chosen,
             tried,
-        };
-        Some((best, table))
+        }));
+        Ok(places[chosen])
     }
 }

@@ -64,24 +64,32 @@ impl LinearTrainer {
         &self,
         scales: &[f64],
         report: &mut TrainingReport,
-    ) -> Result<(Vec<usize>, f64), NumericsError> {
+    ) -> Result<(Vec<usize>, f64), TrainingError> {
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let penalty = self.solver.penalty();
-        let mut settled = penalty.settle(&self.blocks, &all, scales)?;
-        let mut columns = all;
-        let alpha = settled.alpha;
-        let chosen = match (&self.selection, &self.order) {
-            (Some(by), _) => Some(by.run(&self.regressors, &self.blocks, scales, alpha, report)?),
-            (None, Some(by)) => {
-                Some(by.run(&self.regressors, &self.blocks, scales, alpha, report)?)
+        let columns = match (&self.selection, &self.order) {
+            (Some(by), _) => {
+                let settled = penalty.settle(&self.blocks, &all, scales).map_err(told)?;
+                by.run(
+                    &self.regressors,
+                    &self.blocks,
+                    scales,
+                    settled.alpha,
+                    report,
+                )
+                .map_err(told)?
             }
-            (None, None) => None,
+            (None, Some(by)) => {
+                let columns = by.run(&self.regressors, &self.blocks, scales, report)?;
+                report.notes.extend(self.solver.beside_least_squares());
+                columns
+            }
+            (None, None) => all,
         };
-        if let Some(chosen) = chosen {
-            columns = chosen;
-            // What was best for all candidates need not be so for those chosen.
-            settled = penalty.settle(&self.blocks, &columns, scales)?;
-        }
+        // What was best for all candidates need not be so for those chosen.
+        let settled = penalty
+            .settle(&self.blocks, &columns, scales)
+            .map_err(told)?;
         report.notes.extend(settled.note);
         Ok((columns, settled.alpha))
     }
@@ -90,7 +98,7 @@ impl LinearTrainer {
     pub(crate) fn find(&self, report: &mut TrainingReport) -> Result<Found, TrainingError> {
         let gram = self.blocks.total();
         let standard = Standardization::of(&gram);
-        let (columns, alpha) = self.chosen(&standard.scales, report).map_err(told)?;
+        let (columns, alpha) = self.chosen(&standard.scales, report)?;
         let squares = LeastSquares::ridge(alpha);
         let solved = squares.solve(&gram, &columns, &standard.scales, self.blocks.rows());
         let fit = solved.map_err(told)?;
@@ -208,7 +216,11 @@ impl LinearTrainer {
             let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
             (model.predict(&row) - y).powi(2)
         });
-        report.in_sample_rmse = Some((squared.sum::<f64>() / rows.count() as f64).sqrt());
+        let rmse = (squared.sum::<f64>() / rows.count() as f64).sqrt();
+        if !rmse.is_finite() {
+            return Err(diverged(&model, options.rate));
+        }
+        report.in_sample_rmse = Some(rmse);
         let online = self.range_of(&columns).map(|range| {
             let frame = Frame::new(names, &columns, &standard, mean);
             OnlinePredictor::new(frame, Recursion::Sgd(sgd), range)
@@ -220,6 +232,8 @@ impl LinearTrainer {
         name_columns(fit, |column| &self.regressors[column].name, report);
         match fit.method {
             Method::Cholesky => {}
+            // The least squares only looked at the regressors; the coefficients are found in another way.
+            _ if matches!(self.solver, Solver::Sgd { .. }) => {}
             // Every coefficient is determined, so there is nothing to worry about.
             Method::Svd { rank } if rank + fit.constant.len() == fit.columns.len() => {}
             Method::Svd { rank } => report.notes.push(format!(
@@ -258,9 +272,32 @@ pub(crate) fn told(error: NumericsError) -> TrainingError {
             rows: usize::try_from(found).unwrap_or(usize::MAX),
             needed: usize::try_from(needed).unwrap_or(usize::MAX),
         },
+        error @ NumericsError::FoldsOfBlocks { .. } => TrainingError::Unsolvable {
+            reason: format!("{error}; a larger `--memory` keeps the rows, or take fewer folds"),
+        },
         error => TrainingError::Unsolvable {
             reason: error.to_string(),
         },
+    }
+}
+
+/// Why stochastic gradients gave no model: their steps grew without bound.
+fn diverged(model: &LinearPredictor, rate: LearningRate) -> TrainingError {
+    let (LearningRate::Constant { eta0 } | LearningRate::InvScaling { eta0, .. }) = rate;
+    let names = model.regressors.iter().map(String::as_str);
+    let named = names.zip(&model.coefficients);
+    let mut all = named.chain([("the intercept", &model.intercept)]);
+    let what = all.find(|(_, value)| !value.is_finite()).map_or_else(
+        || "the error on the rows of the fit".to_owned(),
+        |(name, _)| match name {
+            "the intercept" => name.to_owned(),
+            name => format!("the coefficient of {name}"),
+        },
+    );
+    TrainingError::Unsolvable {
+        reason: format!(
+            "the stochastic gradients diverged: {what} is not finite with `eta0` = {eta0}; a smaller `eta0` takes smaller steps"
+        ),
     }
 }
 
