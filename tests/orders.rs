@@ -94,6 +94,33 @@ fn criteria_of_an_autoregression_equal_the_oracle_of_statsmodels() {
 }
 
 #[test]
+fn orders_are_compared_by_least_squares_whatever_the_solver() {
+    let expected = expected();
+    let least_squares = "solver = { type = \"ols\" }";
+    for (solver, name) in [
+        ("", "ridge"),
+        ("solver = { type = \"ridge\", alpha = 100 }", "ridge"),
+        ("solver = { type = \"sgd\" }", "sgd"),
+    ] {
+        let node = AR.replace(least_squares, solver);
+        let (orders, told) = fitted("solvers", &graph("bic", &node));
+        let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        for (tried, expected) in orders["tried"].as_array().unwrap().iter().zip(&expected) {
+            let of = |value: &Value| value["aic"].as_f64().unwrap();
+            let off = of(tried) / of(expected) - 1.0;
+            assert!(off.abs() < 1e-6, "{solver}: {tried}, not {expected}");
+        }
+        assert!(
+            told.contains("compared by ordinary least squares"),
+            "{told}"
+        );
+        assert!(told.contains(&format!("fitted by `{name}`")), "{told}");
+    }
+    let (_, told) = fitted("solvers", &graph("bic", AR));
+    assert!(!told.contains("compared by"), "{told}");
+}
+
+#[test]
 fn the_search_for_a_model_without_a_moving_average_compares_as_least_squares_do() {
     let (orders, _) = fitted("search", &graph("bic", ARMA));
     let (tried, expected) = (orders["tried"].as_array().unwrap(), expected());

@@ -28,7 +28,8 @@ pub struct Ar {
     /// How coefficients are found.
     #[serde(default)]
     pub solver: Solver,
-    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6" }`; without it all are.
+    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6" }`; without it
+    /// all are. Orders are compared by ordinary least squares, whatever the solver; it fits the chosen one.
     #[serde(default)]
     pub order: Option<Order>,
 }

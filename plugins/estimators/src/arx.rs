@@ -34,7 +34,8 @@ pub struct Arx {
     /// How features and lags are chosen; without it, all are used.
     #[serde(default)]
     pub selection: Option<Selection>,
-    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6", nb = "1..3" }`; without it all are.
+    /// How many of the first lags are used, where that is left open, such as `{ by = "aicc", na = "1..6", nb = "1..3" }`; without it
+    /// all are. Orders are compared by ordinary least squares, whatever the solver; it fits the chosen one.
     #[serde(default)]
     pub order: Option<Order>,
 }

@@ -1,4 +1,4 @@
-//! Decides how many of the lags of a linear model are used, where their number is left open.
+//! Decides how many of the lags of a linear model are used, where their number is left open; not how the chosen ones are fitted.
 
 use athermal_core::node::{Mistake, Regressor, TrainingReport};
 use athermal_core::time::Duration;
@@ -40,13 +40,13 @@ impl LagOrder {
         mistakes
     }
 
-    /// The columns of the best order with this penalty; all that were compared go into the report.
+    /// The columns of the best order by least squares, whatever the solver: the criteria are made for them, and with a penalty
+    /// another coefficient may enlarge the residuals. All that were compared go into the report.
     pub(crate) fn run(
         &self,
         regressors: &[Regressor],
         blocks: &GramBlocks,
         scales: &[f64],
-        alpha: f64,
         report: &mut TrainingReport,
     ) -> Result<Vec<usize>, NumericsError> {
         let gram = blocks.total();
@@ -59,7 +59,7 @@ impl LagOrder {
             if columns.is_empty() {
                 continue;
             }
-            let fit = LeastSquares::ridge(alpha).solve(&gram, &columns, scales, blocks.rows())?;
+            let fit = LeastSquares::ordinary().solve(&gram, &columns, scales, blocks.rows())?;
             let coefficients = columns.len() - fit.constant.len() + 1;
             let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
             tried.push(Tried {

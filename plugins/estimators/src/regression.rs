@@ -67,21 +67,20 @@ impl LinearTrainer {
     ) -> Result<(Vec<usize>, f64), NumericsError> {
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let penalty = self.solver.penalty();
-        let mut settled = penalty.settle(&self.blocks, &all, scales)?;
-        let mut columns = all;
-        let alpha = settled.alpha;
-        let chosen = match (&self.selection, &self.order) {
-            (Some(by), _) => Some(by.run(&self.regressors, &self.blocks, scales, alpha, report)?),
-            (None, Some(by)) => {
-                Some(by.run(&self.regressors, &self.blocks, scales, alpha, report)?)
+        let columns = match (&self.selection, &self.order) {
+            (Some(by), _) => {
+                let alpha = penalty.settle(&self.blocks, &all, scales)?.alpha;
+                by.run(&self.regressors, &self.blocks, scales, alpha, report)?
             }
-            (None, None) => None,
+            (None, Some(by)) => {
+                let columns = by.run(&self.regressors, &self.blocks, scales, report)?;
+                report.notes.extend(self.solver.beside_least_squares());
+                columns
+            }
+            (None, None) => all,
         };
-        if let Some(chosen) = chosen {
-            columns = chosen;
-            // What was best for all candidates need not be so for those chosen.
-            settled = penalty.settle(&self.blocks, &columns, scales)?;
-        }
+        // What was best for all candidates need not be so for those chosen.
+        let settled = penalty.settle(&self.blocks, &columns, scales)?;
         report.notes.extend(settled.note);
         Ok((columns, settled.alpha))
     }

@@ -120,6 +120,18 @@ impl Solver {
         }
     }
 
+    /// What to tell of a comparison by least squares, where the fit is another.
+    pub(crate) fn beside_least_squares(&self) -> Option<String> {
+        let name = match self {
+            Self::Ols {} => return None,
+            Self::Ridge { .. } => "ridge",
+            Self::Sgd { .. } => "sgd",
+        };
+        Some(format!(
+            "orders are compared by ordinary least squares; the chosen one is fitted by `{name}`"
+        ))
+    }
+
     /// The penalty of the least squares that this stands for.
     pub(crate) fn penalty(&self) -> Penalty {
         match *self {
