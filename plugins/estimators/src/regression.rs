@@ -207,7 +207,11 @@ impl LinearTrainer {
             let row: Vec<f64> = columns.iter().map(|&column| x[column]).collect();
             (model.predict(&row) - y).powi(2)
         });
-        report.in_sample_rmse = Some((squared.sum::<f64>() / rows.count() as f64).sqrt());
+        let rmse = (squared.sum::<f64>() / rows.count() as f64).sqrt();
+        if !rmse.is_finite() {
+            return Err(diverged(&model, options.rate));
+        }
+        report.in_sample_rmse = Some(rmse);
         let online = self.range_of(&columns).map(|range| {
             let frame = Frame::new(names, &columns, &standard, mean);
             OnlinePredictor::new(frame, Recursion::Sgd(sgd), range)
@@ -260,6 +264,26 @@ pub(crate) fn told(error: NumericsError) -> TrainingError {
         error => TrainingError::Unsolvable {
             reason: error.to_string(),
         },
+    }
+}
+
+/// Why stochastic gradients gave no model: their steps grew without bound.
+fn diverged(model: &LinearPredictor, rate: LearningRate) -> TrainingError {
+    let (LearningRate::Constant { eta0 } | LearningRate::InvScaling { eta0, .. }) = rate;
+    let names = model.regressors.iter().map(String::as_str);
+    let named = names.zip(&model.coefficients);
+    let mut all = named.chain([("the intercept", &model.intercept)]);
+    let what = all.find(|(_, value)| !value.is_finite()).map_or_else(
+        || "the error on the rows of the fit".to_owned(),
+        |(name, _)| match name {
+            "the intercept" => name.to_owned(),
+            name => format!("the coefficient of {name}"),
+        },
+    );
+    TrainingError::Unsolvable {
+        reason: format!(
+            "the stochastic gradients diverged: {what} is not finite with `eta0` = {eta0}; a smaller `eta0` takes smaller steps"
+        ),
     }
 }
 

@@ -6,7 +6,9 @@ use super::FitOptions;
 use super::collect::{Collector, Sink, Trainee};
 use super::report::{EstimatorFit, Outcome};
 use crate::compile::{Plan, PlannedRole};
-use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
+use crate::node::{
+    Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+};
 use crate::time::Instant;
 
 /// A fit in the making: the complete rows of the candidates that were kept go to the trainer.
@@ -15,7 +17,7 @@ pub(super) struct Making {
     kept: Vec<usize>,
     row: Vec<f64>,
     all: Vec<f64>,
-    rows: u64,
+    truths: Truths,
     incomplete: u64,
 }
 
@@ -31,7 +33,7 @@ impl Sink for Making {
         if self.row.iter().any(|value| value.is_nan()) {
             self.incomplete += 1;
         } else {
-            self.rows += 1;
+            self.truths.count(truth);
             self.trainer.row_at(at, &self.row, truth);
         }
     }
@@ -83,8 +85,50 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
         row: Vec::with_capacity(kept.len()),
         all: Vec::new(),
         kept,
-        rows: 0,
+        truths: Truths::default(),
         incomplete: 0,
+    }
+}
+
+/// Fewer complete rows say nothing about how a truth hangs together with anything.
+const LEAST_ROWS: u64 = 2;
+/// A fit whose error is larger than that of the mean by this factor is no better than none.
+const WORSE_THAN_MEAN: f64 = 1.1;
+/// The share of a mean that rounding may make up.
+const ROUNDING: f64 = 1e-9;
+
+/// The truths of the complete rows.
+#[derive(Debug, Clone, Copy, Default)]
+struct Truths {
+    rows: u64,
+    mean: f64,
+    /// The sum of the squares about the mean.
+    squares: f64,
+}
+
+impl Truths {
+    /// One more (Welford 1962).
+    fn count(&mut self, truth: f64) {
+        self.rows += 1;
+        let off = truth - self.mean;
+        self.mean += off / self.rows as f64;
+        self.squares += off * (truth - self.mean);
+    }
+
+    /// What to tell of a fit that is clearly worse on its rows than their mean.
+    fn doubt(self, report: &TrainingReport) -> Option<String> {
+        let rmse = report.in_sample_rmse?;
+        let of_mean = (self.squares / self.rows as f64).sqrt();
+        let clearly = rmse > WORSE_THAN_MEAN * of_mean + ROUNDING * self.mean.abs();
+        clearly.then(|| {
+            let times = match rmse / of_mean {
+                few if few < 1e4 => format!("{few:.1}"),
+                many => format!("{many:.0e}"),
+            };
+            format!(
+                "the error on the rows of the fit is {times} times that of predicting their mean, so this fit is of no use"
+            )
+        })
     }
 }
 
@@ -104,13 +148,23 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
             )
         })
         .collect();
-    let trained = if making.rows == 0 {
-        Err(TrainingError::TooFewRows { rows: 0, needed: 2 })
+    let truths = making.truths;
+    let trained = if truths.rows < LEAST_ROWS {
+        Err(TrainingError::TooFewRows {
+            rows: truths.rows as usize,
+            needed: LEAST_ROWS as usize,
+        })
     } else {
         making.trainer.finish()
     };
     let (outcome, predictor) = match trained {
-        Ok(Trained { predictor, report }) => (Outcome::Fitted(report), Some(predictor)),
+        Ok(Trained {
+            predictor,
+            mut report,
+        }) => {
+            report.notes.extend(truths.doubt(&report));
+            (Outcome::Fitted(report), Some(predictor))
+        }
         Err(error) => (Outcome::Failed(error), None),
     };
     let fit = EstimatorFit {
@@ -118,7 +172,7 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
         kind: node.kind.name,
         truth: truth.name.clone(),
         unit: truth.channel.unit.difference().to_string(),
-        rows: making.rows,
+        rows: truths.rows,
         dropped,
         dropped_candidates,
         streamed,
