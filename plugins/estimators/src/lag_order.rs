@@ -1,10 +1,11 @@
 //! Decides how many of the lags of a linear model are used, where their number is left open; not how the chosen ones are fitted.
 
-use athermal_core::node::{Mistake, Regressor, TrainingReport};
+use athermal_core::node::{Mistake, Regressor, TrainingError, TrainingReport};
 use athermal_core::time::Duration;
-use athermal_numerics::{GramBlocks, InformationCriteria, LeastSquares, NumericsError};
+use athermal_numerics::{GramBlocks, InformationCriteria, LeastSquares};
 
 use crate::order::{Order, Tried};
+use crate::regression::told;
 
 /// How many of the first lags are compared.
 #[derive(Debug, Clone)]
@@ -48,7 +49,7 @@ impl LagOrder {
         blocks: &GramBlocks,
         scales: &[f64],
         report: &mut TrainingReport,
-    ) -> Result<Vec<usize>, NumericsError> {
+    ) -> Result<Vec<usize>, TrainingError> {
         let gram = blocks.total();
         let rows = usize::try_from(gram.count()).unwrap_or(usize::MAX);
         let given = [self.lags.len(), self.feature_lags.len(), 0, 0, 0, 0];
@@ -59,7 +60,9 @@ impl LagOrder {
             if columns.is_empty() {
                 continue;
             }
-            let fit = LeastSquares::ordinary().solve(&gram, &columns, scales, blocks.rows())?;
+            let fit = LeastSquares::ordinary()
+                .solve(&gram, &columns, scales, blocks.rows())
+                .map_err(told)?;
             let coefficients = columns.len() - fit.constant.len() + 1;
             let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
             tried.push(Tried {
@@ -69,14 +72,14 @@ impl LagOrder {
             });
             all.push(columns);
         }
-        let (best, table) = self
-            .order
-            .best(rows, tried)
-            .ok_or(NumericsError::TooFewRows {
-                needed: 4,
-                found: gram.count(),
-            })?;
-        report.orders = Some(Box::new(table));
+        if tried.is_empty() {
+            return Err(TrainingError::Unsolvable {
+                reason: format!(
+                    "none of the lags to compare has a value in enough of the {rows} rows"
+                ),
+            });
+        }
+        let best = self.order.best(rows, tried, report).map_err(told)?;
         Ok(all.swap_remove(best))
     }
 

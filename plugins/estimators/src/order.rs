@@ -2,14 +2,17 @@
 
 use std::fmt;
 
-use athermal_core::node::{Mistake, OrderFigure, OrderTable, TriedOrder};
-use athermal_numerics::{Criterion, InformationCriteria};
+use athermal_core::node::{Mistake, OrderFigure, OrderTable, TrainingReport, TriedOrder};
+use athermal_numerics::{Criterion, InformationCriteria, NumericsError};
 use schemars::JsonSchema;
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The most orders that are compared.
 const MOST: usize = 500;
+/// By how many the rows must outnumber the coefficients for all figures of an order to be finite: AICc divides by
+/// `N − k − 1`, and `k` is one more than the coefficients.
+const LEFT_OVER: usize = 3;
 /// The largest order.
 pub(crate) const LARGEST: usize = 100;
 
@@ -210,14 +213,43 @@ impl Order {
         open.map(|((letter, order), _)| format!("{letter} {order}"))
     }
 
-    /// The best of what was tried, and the table of all.
-    pub(crate) fn best(&self, rows: usize, tried: Vec<Tried>) -> Option<(usize, OrderTable)> {
+    /// The best of what was tried; the table goes into the report. Orders with nearly as many coefficients as there are rows fit
+    /// them without any error whatever they are worth, so they are not ranked.
+    ///
+    /// # Errors
+    /// [`NumericsError::TooFewRows`] when no order is left.
+    pub(crate) fn best(
+        &self,
+        rows: usize,
+        tried: Vec<Tried>,
+        report: &mut TrainingReport,
+    ) -> Result<usize, NumericsError> {
+        let count = tried.len();
+        let least = tried.iter().map(|tried| tried.coefficients).min();
+        let ranked: Vec<(usize, Tried)> = tried
+            .into_iter()
+            .enumerate()
+            .filter(|(_, tried)| tried.coefficients + LEFT_OVER <= rows)
+            .collect();
         let by = |tried: &Tried| tried.figures.by(self.by.criterion());
-        let worth = tried.iter().map(by).enumerate();
-        let (best, _) = worth
+        let worth = ranked.iter().map(|(_, tried)| by(tried)).enumerate();
+        let best = worth
             .filter(|(_, worth)| worth.is_finite())
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let told = tried.into_iter().map(|tried| TriedOrder {
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((chosen, _)) = best else {
+            return Err(NumericsError::TooFewRows {
+                needed: (least.unwrap_or(1) + LEFT_OVER) as u64,
+                found: rows as u64,
+            });
+        };
+        let left_out = count - ranked.len();
+        if left_out > 0 {
+            report.notes.push(format!(
+                "{left_out} of {count} orders have too many coefficients to be ranked on {rows} rows"
+            ));
+        }
+        let at = ranked[chosen].0;
+        let told = ranked.into_iter().map(|(_, tried)| TriedOrder {
             order: tried.name,
             coefficients: tried.coefficients,
             aic: tried.figures.aic,
@@ -225,12 +257,12 @@ impl Order {
             bic: tried.figures.bic,
             fpe: tried.figures.fpe,
         });
-        let table = OrderTable {
+        report.orders = Some(Box::new(OrderTable {
             by: self.by.told(),
             rows,
-            chosen: best,
+            chosen,
             tried: told.collect(),
-        };
-        Some((best, table))
+        }));
+        Ok(at)
     }
 }

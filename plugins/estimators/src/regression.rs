@@ -64,13 +64,20 @@ impl LinearTrainer {
         &self,
         scales: &[f64],
         report: &mut TrainingReport,
-    ) -> Result<(Vec<usize>, f64), NumericsError> {
+    ) -> Result<(Vec<usize>, f64), TrainingError> {
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let penalty = self.solver.penalty();
         let columns = match (&self.selection, &self.order) {
             (Some(by), _) => {
-                let alpha = penalty.settle(&self.blocks, &all, scales)?.alpha;
-                by.run(&self.regressors, &self.blocks, scales, alpha, report)?
+                let settled = penalty.settle(&self.blocks, &all, scales).map_err(told)?;
+                by.run(
+                    &self.regressors,
+                    &self.blocks,
+                    scales,
+                    settled.alpha,
+                    report,
+                )
+                .map_err(told)?
             }
             (None, Some(by)) => {
                 let columns = by.run(&self.regressors, &self.blocks, scales, report)?;
@@ -80,7 +87,9 @@ impl LinearTrainer {
             (None, None) => all,
         };
         // What was best for all candidates need not be so for those chosen.
-        let settled = penalty.settle(&self.blocks, &columns, scales)?;
+        let settled = penalty
+            .settle(&self.blocks, &columns, scales)
+            .map_err(told)?;
         report.notes.extend(settled.note);
         Ok((columns, settled.alpha))
     }
@@ -89,7 +98,7 @@ impl LinearTrainer {
     pub(crate) fn find(&self, report: &mut TrainingReport) -> Result<Found, TrainingError> {
         let gram = self.blocks.total();
         let standard = Standardization::of(&gram);
-        let (columns, alpha) = self.chosen(&standard.scales, report).map_err(told)?;
+        let (columns, alpha) = self.chosen(&standard.scales, report)?;
         let squares = LeastSquares::ridge(alpha);
         let solved = squares.solve(&gram, &columns, &standard.scales, self.blocks.rows());
         let fit = solved.map_err(told)?;

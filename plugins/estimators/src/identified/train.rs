@@ -3,7 +3,7 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    InformationCriteria, Polynomials, PredictionError, PredictionErrorFit, Samples,
+    InformationCriteria, NumericsError, Polynomials, PredictionError, PredictionErrorFit, Samples,
     Standardization, Standardizer,
 };
 
@@ -158,15 +158,14 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         if let Some(misfit) = self.asked.misfit(self.names.len()) {
             return Err(unsolvable(misfit));
         }
-        let too_few = TrainingError::TooFewRows {
-            rows: self.rows.len(),
-            needed: 3,
+        let apart = || match self.rows.len() {
+            rows @ ..3 => TrainingError::TooFewRows { rows, needed: 3 },
+            rows => unsolvable(format!(
+                "there is a gap before each of the {rows} rows, and the model needs rows that follow each other"
+            )),
         };
-        let pace = Pace::of(
-            self.asked.every(),
-            self.span,
-            self.between().ok_or(too_few)?,
-        );
+        let between = self.between().ok_or_else(apart)?;
+        let pace = Pace::of(self.asked.every(), self.span, between);
         let mut standard = Standardizer::new(self.names.len());
         if !self.names.is_empty() {
             self.regressors
@@ -266,7 +265,7 @@ impl Asked {
             return self
                 .search(orders.coefficients())
                 .fit(orders, samples, 0)
-                .map_err(told);
+                .map_err(|error| unfit(error, samples));
         }
         let firsts = candidates.iter().map(|(_, orders)| orders.first());
         let first = firsts.max().unwrap_or(0);
@@ -288,11 +287,11 @@ impl Asked {
                 Err(error) => failed = Some(error),
             }
         }
-        let Some((best, table)) = order.best(samples.counted(first), tried) else {
-            let reason = "no order could be fitted".to_owned();
-            return Err(failed.map_or(unsolved(reason), told));
-        };
-        report.orders = Some(Box::new(table));
+        let rows = samples.counted(first);
+        let best = order.best(rows, tried, report).map_err(|too_few| {
+            let error = failed.unwrap_or(too_few);
+            unfit(error, samples)
+        })?;
         Ok(fits.swap_remove(best))
     }
 
@@ -313,8 +312,18 @@ impl Asked {
     }
 }
 
-fn unsolved(reason: String) -> TrainingError {
-    TrainingError::Unsolvable { reason }
+/// Why samples allow no fit: those that count are fewer than all, since others are the past that they are predicted from.
+fn unfit(error: NumericsError, samples: &Samples) -> TrainingError {
+    match error {
+        NumericsError::TooFewRows { needed, found } => TrainingError::Unsolvable {
+            reason: format!(
+                "{found} of {} rows have all the past that these orders look back on, and at least {needed} are needed: \
+                 smaller orders, or more rows without gaps, would help",
+                samples.counted(0)
+            ),
+        },
+        error => told(error),
+    }
 }
 
 /// How samples follow each other.
