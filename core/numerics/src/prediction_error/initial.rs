@@ -132,6 +132,9 @@ fn level(intercept: f64, a: &[f64]) -> f64 {
     }
 }
 
+/// The longest first regression, but for models that look back further themselves.
+const LONGEST: usize = 40;
+
 /// The residuals of a long regression stand in for the innovations, on which the short one is then done too (Hannan and
 /// Rissanen 1982).
 fn hannan_rissanen(
@@ -140,7 +143,9 @@ fn hannan_rissanen(
     penalty: f64,
 ) -> Result<Polynomials, NumericsError> {
     let count = samples.count() as f64;
-    let longer = (count.ln().powf(1.5).ceil() as usize).clamp(orders.nc + 1, 40);
+    let longer = (count.ln().powf(1.5).ceil() as usize)
+        .min(LONGEST)
+        .max(orders.nc + 1);
     let most = samples.count() / (8 * (1 + samples.width()));
     let longer = longer.min(most).min(samples.longest() / 2).max(1);
     let long = regression(orders, samples, penalty, longer)?;

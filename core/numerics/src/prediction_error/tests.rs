@@ -442,6 +442,22 @@ fn coefficients_are_near_the_oracle_of_the_exact_likelihood() {
 }
 
 #[test]
+fn a_moving_average_that_is_longer_than_the_first_regression_is_searched() {
+    let (_, model) = models().swap_remove(0);
+    let samples = simulated(&model, 600, 1.0, 3);
+    let orders = Orders {
+        nc: 45,
+        ..orders(&model)
+    };
+    let search = PredictionError {
+        most_steps: 1,
+        ..PredictionError::default()
+    };
+    let fit = search.fit(&orders, &samples, 0).unwrap();
+    assert!(fit.residual_sum_of_squares.is_finite());
+}
+
+#[test]
 fn transfer_functions_are_near_the_oracle_of_another_search() {
     let oracle = Oracle::read();
     for (name, orders) in &of_oracle()[1..4] {
