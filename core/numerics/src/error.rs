@@ -1,6 +1,7 @@
 //! What can be wrong with a request to this library. Does not decide how a caller words it for its own users.
 
 use std::fmt;
+use std::ops::Range;
 
 /// Why statistics could not be combined or solved.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +78,26 @@ pub enum NumericsError {
         /// How many rows there are.
         rows: u64,
     },
+    /// Enough rows for the folds, but they come in blocks that cannot be cut.
+    FoldsOfBlocks {
+        /// How many folds were asked for.
+        folds: usize,
+        /// How many rows there are.
+        rows: u64,
+        /// How many rows a block has.
+        block: u64,
+    },
+    /// What is left out beside a test leaves nothing to train on.
+    FoldsApart {
+        /// The rows that would be tested.
+        test: Range<u64>,
+        /// How many rows there are.
+        rows: u64,
+        /// The rows left out on either side.
+        gap: u64,
+        /// The rows left out after the test and its gap.
+        embargo: u64,
+    },
     /// A factorisation did not converge.
     NoConvergence,
 }
@@ -128,6 +149,26 @@ impl fmt::Display for NumericsError {
                 f,
                 "{rows} rows cannot be cut into {folds} folds; at least two folds and one row in each are needed"
             ),
+            Self::FoldsOfBlocks { folds, rows, block } => write!(
+                f,
+                "{rows} rows cannot be cut into {folds} folds, since they did not fit in memory and are summed in blocks of {block} rows"
+            ),
+            Self::FoldsApart {
+                test,
+                rows,
+                gap,
+                embargo,
+            } => {
+                let (first, last) = (test.start + 1, test.end);
+                write!(
+                    f,
+                    "of {rows} rows none is left to train on where rows {first} to {last} are tested, with a gap of {gap} rows"
+                )?;
+                if *embargo > 0 {
+                    write!(f, " and an embargo of {embargo}")?;
+                }
+                Ok(())
+            }
             Self::NoConvergence => write!(f, "the factorisation did not converge"),
         }
     }

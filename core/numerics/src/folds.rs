@@ -76,13 +76,13 @@ impl Folds {
     /// block, and gaps become no smaller than stated.
     ///
     /// # Errors
-    /// [`NumericsError::Folds`] for fewer than two folds or a fold without a row to test or to train on.
+    /// [`NumericsError::Folds`] for fewer than two folds or fewer rows than folds; [`NumericsError::FoldsOfBlocks`] where rows
+    /// one by one would do; [`NumericsError::FoldsApart`] for a fold without a row to train on.
     pub fn of_blocks(&self, rows: u64, size: u64) -> Result<Vec<FoldRows>, NumericsError> {
         let folds = self.count();
-        let refused = NumericsError::Folds { folds, rows };
         let parts = folds as u64 + u64::from(matches!(self, Self::Expanding { .. }));
         if folds < 2 || rows < parts {
-            return Err(refused);
+            return Err(NumericsError::Folds { folds, rows });
         }
         let snap = |row: u64| match (row + size / 2) / size * size {
             nearest if nearest <= rows / size * size && row < rows => nearest,
@@ -97,13 +97,26 @@ impl Folds {
                 test,
             })
             .collect();
-        if cut
-            .iter()
-            .any(|fold| fold.test.is_empty() || fold.train.is_empty())
-        {
-            return Err(refused);
+        let lacks = |fold: &&FoldRows| fold.test.is_empty() || fold.train.is_empty();
+        let Some(lacking) = cut.iter().find(lacks) else {
+            return Ok(cut);
+        };
+        if size > 1 {
+            // What fails one by one too is not the fault of the blocks.
+            self.of(rows)?;
+            let block = size;
+            return Err(NumericsError::FoldsOfBlocks { folds, rows, block });
         }
-        Ok(cut)
+        let (gap, embargo) = match *self {
+            Self::Blocked { gap, embargo, .. } => (gap, embargo),
+            Self::Expanding { gap, .. } => (gap, 0),
+        };
+        Err(NumericsError::FoldsApart {
+            test: lacking.test.clone(),
+            rows,
+            gap,
+            embargo,
+        })
     }
 
     fn tests(&self, rows: u64) -> Vec<Range<u64>> {
@@ -197,6 +210,29 @@ mod tests {
         assert_eq!(folds[0].test, 0..500);
         assert_eq!(folds[0].train, [600..1000]);
         assert_eq!(folds[1].train, [0..400]);
+    }
+
+    #[test]
+    fn a_refusal_tells_whether_rows_or_blocks_or_what_is_left_out_are_the_cause() {
+        let three = Folds::contiguous(3);
+        let told = |refused: Result<Vec<FoldRows>, NumericsError>| refused.unwrap_err().to_string();
+        assert!(
+            told(three.of(2)).contains("2 rows cannot be cut into 3 folds; at least two folds")
+        );
+        let blocks = told(three.of_blocks(12, 256));
+        assert!(blocks.contains("12 rows") && blocks.contains("in blocks of 256 rows"));
+        let wide = Folds::Blocked {
+            folds: 3,
+            gap: 2,
+            embargo: 7,
+        };
+        for size in [1, 4] {
+            let apart = told(wide.of_blocks(12, size));
+            assert_eq!(
+                apart,
+                "of 12 rows none is left to train on where rows 1 to 4 are tested, with a gap of 2 rows and an embargo of 7"
+            );
+        }
     }
 
     #[test]

@@ -270,6 +270,9 @@ pub(crate) fn told(error: NumericsError) -> TrainingError {
             rows: usize::try_from(found).unwrap_or(usize::MAX),
             needed: usize::try_from(needed).unwrap_or(usize::MAX),
         },
+        error @ NumericsError::FoldsOfBlocks { .. } => TrainingError::Unsolvable {
+            reason: format!("{error}; a larger `--memory` keeps the rows, or take fewer folds"),
+        },
         error => TrainingError::Unsolvable {
             reason: error.to_string(),
         },
