@@ -232,6 +232,8 @@ impl LinearTrainer {
         name_columns(fit, |column| &self.regressors[column].name, report);
         match fit.method {
             Method::Cholesky => {}
+            // The least squares only looked at the regressors; the coefficients are found in another way.
+            _ if matches!(self.solver, Solver::Sgd { .. }) => {}
             // Every coefficient is determined, so there is nothing to worry about.
             Method::Svd { rank } if rank + fit.constant.len() == fit.columns.len() => {}
             Method::Svd { rank } => report.notes.push(format!(
