@@ -60,6 +60,7 @@ pub struct CrossValidated {
     #[serde(default)]
     pub by: By,
     /// Go back to the smallest set on the way whose score is within one standard error of the best (Breiman et al. 1984).
+    /// Backwards the way then goes on to the last one, whatever the tolerance, since smaller sets come later.
     #[serde(default)]
     pub one_standard_error: bool,
 }
@@ -169,10 +170,11 @@ impl Selection {
                 return stepwise(how, regressors, blocks, scales, report);
             }
         };
+        let to_the_end = direction == Direction::Backward && how.one_standard_error;
         let search = Search {
             direction,
             alpha,
-            tolerance: Some(how.tolerance),
+            tolerance: (!to_the_end).then_some(how.tolerance),
             most: how.most,
             score: SelectionScore::R2,
         };

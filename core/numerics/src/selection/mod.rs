@@ -71,6 +71,8 @@ pub struct Selection {
     pub columns: Vec<usize>,
     /// The columns chosen after each step, the start counted where there is one.
     path: Vec<Vec<usize>>,
+    /// How many sets at the beginning of the path have more units than were asked for.
+    too_large: usize,
 }
 
 /// The score from which a search backwards starts.
@@ -100,11 +102,16 @@ pub struct Smallest {
 impl Selection {
     /// The smallest set on the way whose mean score is within one standard error of the best (Breiman et al. 1984, section
     /// 3.4.3); of several as small the best. Nothing without a step.
+    ///
+    /// A search backwards comes to the smaller sets last, so it must have gone on to its end, without a tolerance.
     pub fn within_one_standard_error(&self) -> Option<Smallest> {
         let start = self.start.iter().map(|start| (start.mean, &start.folds));
         let steps = self.steps.iter().map(|step| (step.mean, &step.folds));
         let scores: Vec<(f64, &Vec<f64>)> = start.chain(steps).collect();
-        let &(best, folds) = scores.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let &(best, folds) = scores
+            .get(self.too_large..)?
+            .iter()
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
         let n = folds.len() as f64;
         let spread: f64 = folds.iter().map(|score| (score - best).powi(2)).sum();
         let standard_error = if folds.len() > 1 {
@@ -112,7 +119,8 @@ impl Selection {
         } else {
             0.0
         };
-        let near = (0..scores.len()).filter(|&at| scores[at].0 >= best - standard_error);
+        let near =
+            (self.too_large..scores.len()).filter(|&at| scores[at].0 >= best - standard_error);
         let smallest = near.min_by(|&a, &b| {
             let size = self.path[a].len().cmp(&self.path[b].len());
             size.then(scores[b].0.total_cmp(&scores[a].0))

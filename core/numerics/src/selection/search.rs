@@ -102,6 +102,7 @@ impl Search {
                 refused: None,
                 columns: Vec::new(),
                 path: Vec::new(),
+                too_large: 0,
             },
         };
         if self.direction != Direction::Backward {
@@ -176,8 +177,11 @@ impl State<'_> {
         let Some(step) = self.best(&there, Change::Removed) else {
             return false;
         };
-        let loses_little = |tolerance: f64| self.reached - step.mean <= tolerance;
         let too_many = self.how.most.is_some_and(|most| size > most);
+        if too_many {
+            self.selection.too_large = self.selection.path.len();
+        }
+        let loses_little = |tolerance: f64| self.reached - step.mean <= tolerance;
         if !(too_many || self.how.tolerance.is_none_or(loses_little)) {
             self.selection.refused = Some(step);
             return false;

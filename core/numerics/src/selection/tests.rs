@@ -257,6 +257,33 @@ fn the_smallest_set_within_one_standard_error_is_that_of_the_own_oracle() {
 }
 
 #[test]
+fn the_smallest_set_on_the_way_back_has_no_smaller_one_as_good_and_is_not_too_large() {
+    let (blocks, _) = own();
+    let scales = Standardization::of(&blocks.total()).scales;
+    let search = |most| {
+        let how = Search {
+            direction: Direction::Backward,
+            most,
+            ..Search::forward()
+        };
+        how.run(&blocks, &thirds(), &scales).unwrap()
+    };
+    let found = search(None);
+    let smallest = found.within_one_standard_error().unwrap();
+    assert!(found.steps.len() > smallest.steps, "the way ends there");
+    let least = smallest.best - smallest.standard_error;
+    assert!(found.steps[smallest.steps - 1].mean >= least);
+    assert!(
+        found.steps[smallest.steps..]
+            .iter()
+            .all(|step| step.mean < least)
+    );
+    let most = smallest.columns.len() - 1;
+    let fewer = search(Some(most)).within_one_standard_error().unwrap();
+    assert!(fewer.columns.len() <= most, "{fewer:?}");
+}
+
+#[test]
 fn stepwise_regression_takes_the_steps_of_the_own_oracle() {
     let (blocks, expected) = own();
     let how = Stepwise {
