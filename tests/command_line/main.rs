@@ -526,7 +526,7 @@ fn data_without_rows_are_told_and_never_a_panic() {
         &scratch.path("new.json"),
     ])
     .ended(1);
-    fit.tells(&["thermal could not be fitted", "0 complete rows"]);
+    fit.tells(&["thermal could not be fitted", "has no value in the data"]);
 }
 
 #[test]

@@ -31,6 +31,11 @@ impl Validity {
         }
     }
 
+    /// Whether there was no row to tell candidates by.
+    pub(super) fn knows_nothing(&self) -> bool {
+        self.rows == 0
+    }
+
     /// The share of rows in which a candidate had a value, those with a cold window not counted.
     pub(super) fn share(&self, candidate: usize) -> f64 {
         let warm = self.rows - self.cold[candidate];
@@ -41,10 +46,10 @@ impl Validity {
         }
     }
 
-    /// The candidates that are kept.
+    /// The candidates that are kept: all of them where no row speaks against any.
     pub(super) fn kept(&self) -> Vec<usize> {
         (0..self.present.len())
-            .filter(|&candidate| self.share(candidate) >= NEEDED)
+            .filter(|&candidate| self.knows_nothing() || self.share(candidate) >= NEEDED)
             .collect()
     }
 }
@@ -63,6 +68,11 @@ mod tests {
         }
         assert_eq!(validity.kept(), [0, 1]);
         assert!((validity.share(2) - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn without_a_row_no_candidate_is_dropped() {
+        assert_eq!(Validity::new(2).kept(), [0, 1]);
     }
 
     #[test]

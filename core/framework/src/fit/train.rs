@@ -149,7 +149,13 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
         })
         .collect();
     let truths = making.truths;
-    let trained = if truths.rows < LEAST_ROWS {
+    let trained = if trainee.validity.knows_nothing() {
+        Err(TrainingError::NoTruth {
+            truth: truth.name.clone(),
+            outside_limits: dropped.outside_limits,
+            too_early: dropped.without_run,
+        })
+    } else if truths.rows < LEAST_ROWS {
         Err(TrainingError::TooFewRows {
             rows: truths.rows as usize,
             needed: LEAST_ROWS as usize,

@@ -212,6 +212,15 @@ pub enum TrainingError {
         /// Rows that are needed.
         needed: usize,
     },
+    /// There is no truth to learn from.
+    NoTruth {
+        /// What is to be predicted.
+        truth: String,
+        /// How many values of it are outside the limits of `train.abs_truth`.
+        outside_limits: u64,
+        /// How many came before the estimator had run at the right time.
+        too_early: u64,
+    },
     /// The numbers allow no solution.
     Unsolvable {
         /// What is wrong with them, in words.
@@ -225,6 +234,26 @@ impl std::fmt::Display for TrainingError {
             Self::TooFewRows { rows, needed } => {
                 write!(f, "{rows} complete rows, and at least {needed} are needed")
             }
+            Self::NoTruth {
+                truth,
+                outside_limits,
+                too_early,
+            } => match (outside_limits, too_early) {
+                (0, 0) => write!(f, "`{truth}` has no value in the data"),
+                (outside, 0) => write!(
+                    f,
+                    "`{truth}` has no value within the limits of `train.abs_truth`, and {outside} outside"
+                ),
+                (0, early) => write!(
+                    f,
+                    "`{truth}` has no value after it could first be predicted, and {early} before"
+                ),
+                (outside, early) => write!(
+                    f,
+                    "`{truth}` has {outside} values outside the limits of `train.abs_truth`, {early} before it could \
+                     first be predicted, and no other"
+                ),
+            },
             Self::Unsolvable { reason } => write!(f, "{reason}"),
         }
     }
