@@ -250,8 +250,8 @@ impl std::fmt::Display for TrainingError {
                 ),
                 (outside, early) => write!(
                     f,
-                    "`{truth}` has {outside} values outside the limits of `train.abs_truth`, {early} before it could \
-                     first be predicted, and no other"
+                    "of `{truth}` {outside} values are outside the limits of `train.abs_truth`, and {early} came \
+                     before it could first be predicted; there is no other"
                 ),
             },
             Self::Unsolvable { reason } => write!(f, "{reason}"),

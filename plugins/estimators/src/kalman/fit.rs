@@ -159,6 +159,11 @@ impl KalmanTrainer {
 
     fn tell(&self, followed: &Followed, report: &mut TrainingReport) {
         report.in_sample_rmse = Some(followed.innovation_rms);
+        report.notes.push(
+            "the in-sample RMSE is of each row predicted from those before it, while the model was still being \
+             learned; `evaluate` starts with what was learned, so its figure on the same rows is another"
+                .to_owned(),
+        );
         if self.parameters.noises.is_none() {
             let unit = self.unit.parse::<Unit>().map(|unit| unit.difference());
             let unit = unit.map_or_else(|_| self.unit.clone(), |unit| unit.to_string());
