@@ -244,8 +244,13 @@ impl NarxTrainer {
             format!("{name} {:.3e}", term.ratio)
         });
         let ratios: Vec<String> = ratios.collect();
+        let told = if ratios.is_empty() {
+            "no term explains as much as `tolerance` asks for, so the prediction is the mean of the rows".to_owned()
+        } else {
+            format!("error-reduction ratios: {}", ratios.join(", "))
+        };
         TrainingReport {
-            notes: vec![format!("error-reduction ratios: {}", ratios.join(", "))],
+            notes: vec![told],
             selection: found
                 .terms
                 .iter()
