@@ -292,6 +292,7 @@ fn stepwise(
         candidates: tried(&step.candidates, &name),
     };
     report.selection = selected.steps.iter().map(of_step).collect();
+    report.refused = selected.refused.as_ref().map(of_step);
     report.notes.push(
         "chosen by F-tests: the R² are of the rows of the fit, the candidates' figures are their F"
             .to_owned(),

@@ -41,6 +41,8 @@ pub struct StepwiseStep {
 pub struct StepwiseSelection {
     /// The steps, in order.
     pub steps: Vec<StepwiseStep>,
+    /// The step that was not taken since its F was too small.
+    pub refused: Option<StepwiseStep>,
     /// The columns chosen by all steps, in the order in which they came.
     pub columns: Vec<usize>,
 }
@@ -110,12 +112,18 @@ impl Swept {
 
     fn run(mut self, how: &Stepwise) -> StepwiseSelection {
         let most = how.most.unwrap_or(usize::MAX);
+        let mut refused = None;
         while self.columns.len() < most {
             let candidates = self.entering();
-            let best = candidates.iter().copied().filter(|c| c.mean >= how.enter);
+            let best = candidates.iter().copied().filter(|c| !c.mean.is_nan());
             let Some(best) = best.reduce(|a, b| if b.mean > a.mean { b } else { a }) else {
                 break;
             };
+            if best.mean < how.enter {
+                let left = self.unexplained() - self.explained(best.candidate);
+                refused = Some(self.step(best, Change::Added, left, candidates));
+                break;
+            }
             self.sweep(best.candidate);
             self.columns.push(best.candidate);
             self.note(best, Change::Added, candidates);
@@ -132,6 +140,7 @@ impl Swept {
         }
         StepwiseSelection {
             steps: self.steps,
+            refused,
             columns: self.columns,
         }
     }
@@ -144,6 +153,11 @@ impl Swept {
         self.moments[(self.target(), self.target())]
     }
 
+    /// What a column that is not chosen would explain.
+    fn explained(&self, column: usize) -> f64 {
+        self.moments[(column, self.target())].powi(2) / self.moments[(column, column)]
+    }
+
     fn entering(&self) -> Vec<CandidateScore> {
         let target = self.target();
         let degrees = self.rows - self.columns.len() as f64 - 2.0;
@@ -152,7 +166,7 @@ impl Swept {
             if degrees < 1.0 || pivot <= COLLINEAR_SHARE * self.own[column] {
                 return f64::NAN;
             }
-            let explained = self.moments[(column, target)].powi(2) / pivot;
+            let explained = self.explained(column);
             explained / ((self.unexplained() - explained).max(0.0) / degrees)
         };
         (0..target)
@@ -181,13 +195,25 @@ impl Swept {
     }
 
     fn note(&mut self, tried: CandidateScore, change: Change, candidates: Vec<CandidateScore>) {
-        self.steps.push(StepwiseStep {
+        let step = self.step(tried, change, self.unexplained(), candidates);
+        self.steps.push(step);
+    }
+
+    /// A step that leaves so much unexplained.
+    fn step(
+        &self,
+        tried: CandidateScore,
+        change: Change,
+        left: f64,
+        candidates: Vec<CandidateScore>,
+    ) -> StepwiseStep {
+        StepwiseStep {
             column: tried.candidate,
             change,
             f: tried.mean,
-            r2: 1.0 - self.unexplained().max(0.0) / self.spread,
+            r2: 1.0 - left.max(0.0) / self.spread,
             candidates,
-        });
+        }
     }
 
     fn sweep(&mut self, column: usize) {
