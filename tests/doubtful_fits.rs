@@ -1,0 +1,282 @@
+//! Fits that fail, or that are worth little: the program says so, and names the true cause.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::fmt::Write as _;
+
+use workbench::{Finished, Scratch, athermal};
+
+const FEATURES: &str = "inputs.features = \"in\"";
+
+/// A graph in which one node predicts `out.y`, maybe from `in.u` and `in.v`; a row each second.
+fn graph(node: &str) -> String {
+    format!(
+        r#"
+schema = 1
+[time]
+column = "s"
+step = "1s"
+[signals.in]
+unit = "V"
+channels = ["u", "v"]
+column = "{{channel}}"
+max_age = "1s"
+[signals.out]
+unit = "nm"
+channels = ["y"]
+column = "{{channel}}"
+max_age = "1s"
+[nodes.m]
+inputs.truth = "out.y"
+ahead = "0 samples"
+{node}
+[outputs]
+p = "m"
+"#
+    )
+}
+
+/// Numbers about zero that hang together in no way.
+fn noise(row: usize, of: usize) -> f64 {
+    let x = (row as f64 * 12.9898 + of as f64 * 78.233).sin() * 43_758.545_3;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+/// So many rows of `u`, `v` and a truth made from them.
+fn data(rows: usize, truth: impl Fn(usize, f64, f64) -> f64) -> String {
+    let mut text = String::from("s,u,v,y\n");
+    for row in 0..rows {
+        let (u, v) = (noise(row, 1), noise(row, 2));
+        let _ = writeln!(text, "{row},{u},{v},{}", truth(row, u, v));
+    }
+    text
+}
+
+/// Two features that explain the truth but for a little noise.
+fn explained(rows: usize) -> String {
+    data(rows, |row, u, v| 3.0 * u - 2.0 * v + 0.1 * noise(row, 3))
+}
+
+fn fit(name: &str, node: &str, data: &str, more: &[&str]) -> Finished {
+    fit_graph(name, &graph(node), data, more)
+}
+
+/// A fit of the graph on the rows, with more arguments; messages and report in one line each.
+fn fit_graph(name: &str, graph: &str, data: &str, more: &[&str]) -> Finished {
+    let scratch = Scratch::new(&format!("doubtful-{name}"));
+    let (graph, data) = (
+        scratch.file("graph.toml", graph),
+        scratch.file("data.csv", data),
+    );
+    let model = scratch.path("model.json");
+    let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+        vec![&"fit", &graph, &"--data", &data, &"-o", &model];
+    arguments.extend(more.iter().map(|more| more as &dyn AsRef<std::ffi::OsStr>));
+    let mut finished = athermal(&arguments);
+    let unwrapped = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    finished.told = unwrapped(&finished.told);
+    finished.out = unwrapped(&finished.out);
+    finished
+}
+
+#[test]
+fn gradients_that_diverge_are_an_error_that_names_the_step_size() {
+    let node = |eta0: &str| {
+        format!(
+            "type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"sgd\", eta0 = {eta0}, epochs = 100 }}"
+        )
+    };
+    let far = fit("diverged", &node("100.0"), &explained(200), &[]).ended(1);
+    far.tells(&[
+        "m could not be fitted",
+        "diverged",
+        "`eta0` = 100",
+        "a smaller `eta0`",
+    ]);
+    let near = fit("diverged", &node("0.01"), &explained(200), &[]).ended(0);
+    assert!(!near.out.contains("of no use"), "{}", near.out);
+}
+
+#[test]
+fn a_fit_that_is_worse_than_the_mean_of_its_rows_is_doubted() {
+    let node = format!(
+        "type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"sgd\", eta0 = 1.2, power = 0.0, epochs = 1 }}"
+    );
+    let told = fit("worse", &node, &explained(60), &[]).ended(0);
+    assert!(
+        told.out
+            .contains("times that of predicting their mean, so this fit is of no use"),
+        "{}",
+        told.out
+    );
+}
+
+#[test]
+fn a_single_row_is_not_fitted_by_any_kind() {
+    let lags = "lags = [\"1 sample\"]";
+    for node in [
+        format!("type = \"linear\"\n{FEATURES}"),
+        format!("type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"sgd\" }}"),
+        format!("type = \"lasso\"\n{FEATURES}\nalpha = 0.1"),
+        format!("type = \"huber\"\n{FEATURES}"),
+        format!("type = \"rls\"\n{FEATURES}"),
+        format!("type = \"polynomial\"\n{FEATURES}"),
+        format!("type = \"arx\"\n{FEATURES}\n{lags}"),
+        format!("type = \"narx\"\n{FEATURES}\n{lags}"),
+        "type = \"arma\"".to_owned(),
+        "type = \"kalman\"".to_owned(),
+    ] {
+        let fit = fit("single", &node, &explained(1), &[]).ended(1);
+        fit.tells(&["1 complete rows, and at least 2 are needed"]);
+    }
+}
+
+#[test]
+fn orders_that_fit_few_rows_without_error_are_not_ranked() {
+    let lags = "lags = [\"1 sample\"]\nfeature_lags = [\"0s\", \"1 sample\"]";
+    let node = |orders: &str| format!("type = \"arx\"\n{FEATURES}\n{lags}\norder = {orders}");
+    let both = node("{ by = \"aic\", nb = \"1..2\" }");
+    let some = fit("ranked", &both, &explained(60), &[]).ended(0).out;
+    assert!(
+        !some.contains("to be ranked") && some.contains("nb 2"),
+        "{some}"
+    );
+    // Nine rows have a row before them, and the larger order has seven coefficients with a third feature.
+    let three = graph(&both).replace("[\"u\", \"v\"]", "[\"u\", \"v\", \"w\"]");
+    let mut rows = String::from("s,u,v,y,w\n");
+    for (row, line) in explained(10).lines().skip(1).enumerate() {
+        let _ = writeln!(rows, "{line},{}", noise(row, 4));
+    }
+    let few = fit_graph("ranked", &three, &rows, &[]).ended(0).out;
+    assert!(
+        few.contains("1 of 2 orders have too many coefficients to be ranked on 9 rows"),
+        "{few}"
+    );
+    assert!(
+        few.contains("nb 1") && !few.contains("nb 2") && !few.contains("inf"),
+        "{few}"
+    );
+    let none = fit("ranked", &both, &explained(5), &[]).ended(1);
+    none.tells(&["5 complete rows, and at least 6 are needed"]);
+    let without = node("{ by = \"aic\", na = \"1..1\", nb = \"0..0\" }");
+    let without = fit("ranked", &without, &explained(4), &[]).ended(1);
+    without.tells(&["none of the lags to compare has a value in enough of the 4 rows"]);
+}
+
+#[test]
+fn a_model_whose_past_takes_all_rows_says_so() {
+    let node = "type = \"arma\"\nna = 50\nnc = 2";
+    let fit = fit("past", node, &explained(30), &[]).ended(1);
+    fit.tells(&[
+        "0 of 30 rows have all the past",
+        "at least",
+        "smaller orders",
+    ]);
+}
+
+#[test]
+fn a_truth_without_a_value_is_not_blamed_on_the_features() {
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let none = data(50, |_, _, _| f64::NAN).replace("NaN", "");
+    let fit_none = fit("truth", &node, &none, &[]).ended(1);
+    fit_none.tells(&["`out.y` has no value in the data"]);
+    assert!(!fit_none.out.contains("left out in."), "{}", fit_none.out);
+    let limited = format!("{node}\ntrain.abs_truth = {{ above = \"100 nm\" }}");
+    let outside = fit("truth", &limited, &explained(50), &[]).ended(1);
+    outside.tells(&["no value within the limits of `train.abs_truth`, and 50 outside"]);
+}
+
+#[test]
+fn gradients_on_collinear_features_are_not_said_to_be_solved_by_singular_values() {
+    let mut text = String::from("s,u,v,y\n");
+    for row in 0..100 {
+        let u = noise(row, 1);
+        let _ = writeln!(text, "{row},{u},{},{}", 2.0 * u, 3.0 * u + noise(row, 3));
+    }
+    let node =
+        |solver: &str| format!("type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"{solver}\" }}");
+    let gradients = fit("collinear", &node("sgd"), &text, &[]).ended(0).out;
+    assert!(
+        gradients.contains("nearly a combination of the others: in.v"),
+        "{gradients}"
+    );
+    assert!(!gradients.contains("singular values"), "{gradients}");
+    let squares = fit("collinear", &node("ols"), &text, &[]).ended(0).out;
+    assert!(squares.contains("singular values"), "{squares}");
+}
+
+#[test]
+fn folds_that_cannot_be_cut_name_their_cause() {
+    let node = |folds: &str| {
+        format!(
+            "type = \"linear\"\n{FEATURES}\nselection = {{ method = \"forward\", folds = {folds} }}"
+        )
+    };
+    let streamed = fit("folds", &node("3"), &explained(120), &["--memory", "0"]).ended(1);
+    streamed.tells(&[
+        "120 rows cannot be cut into 3 folds",
+        "blocks of 256 rows",
+        "`--memory`",
+    ]);
+    let apart = node("{ type = \"blocked\", count = 5, gap_rows = 200, embargo_rows = 300 }");
+    let apart = fit("folds", &apart, &explained(300), &[]).ended(1);
+    apart.tells(&[
+        "of 300 rows none is left to train on",
+        "a gap of 200 rows and an embargo of 300",
+    ]);
+    let few = fit("folds", &node("3"), &explained(2), &[]).ended(1);
+    few.tells(&["2 rows cannot be cut into 3 folds; at least two folds and one row in each"]);
+}
+
+#[test]
+fn backwards_the_smallest_set_within_one_standard_error_is_looked_for_beyond_the_tolerance() {
+    // Of the two features the second explains so little that folds differ by more, but more than the tolerance.
+    let rows = data(60, |row, u, v| {
+        3.0 * u + 0.6 * v + (0.2 + 2.0 * row as f64 / 60.0) * noise(row, 3)
+    });
+    let node = |rule: bool| {
+        format!(
+            "type = \"linear\"\n{FEATURES}\nselection = {{ method = \"backward\", one_standard_error = {rule} }}"
+        )
+    };
+    let plain = fit("backward", &node(false), &rows, &[]).ended(0).out;
+    assert!(plain.contains("no more: − in.v would make it"), "{plain}");
+    let ruled = fit("backward", &node(true), &rows, &[]).ended(0).out;
+    let told = "the set after the first step is the smallest within one standard error";
+    assert!(ruled.contains(told), "{ruled}");
+}
+
+#[test]
+fn f_tests_that_take_nothing_tell_what_they_left() {
+    let rows = data(100, |row, _, _| noise(row, 3));
+    let node = format!(
+        "type = \"linear\"\n{FEATURES}\nselection = {{ method = \"stepwise\", f_enter = 50.0 }}"
+    );
+    let told = fit("stepwise", &node, &rows, &[]).ended(0).out;
+    assert!(told.contains("no more: in."), "{told}");
+}
+
+#[test]
+fn a_narx_without_a_term_says_that_it_predicts_the_mean() {
+    let rows = data(100, |row, _, _| 7.0 + noise(row, 3));
+    let node = format!("type = \"narx\"\n{FEATURES}\nlags = [\"1 sample\"]\ntolerance = 0.9");
+    let told = fit("narx", &node, &rows, &[]).ended(0).out;
+    assert!(
+        told.contains("the prediction is the mean of the rows"),
+        "{told}"
+    );
+    assert!(!told.contains("error-reduction"), "{told}");
+}
+
+#[test]
+fn kalman_says_of_which_predictions_its_error_is() {
+    let told = fit("kalman", "type = \"kalman\"", &explained(60), &[])
+        .ended(0)
+        .out;
+    assert!(
+        told.contains("while the model was still being learned"),
+        "{told}"
+    );
+}
