@@ -259,6 +259,41 @@ fn white_residuals_are_told_from_others() {
 }
 
 #[test]
+fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
+    let model = model("paused", NOISE, &[]);
+    let found = |pause: f64, missing: bool| {
+        let mut random = Prng::stream(1, "noise");
+        let (mut table, mut smooth) = (Table::default(), 0.0);
+        for row in 0..1500 {
+            smooth = 0.5 * smooth + random.normal();
+            let later = if row < 800 { 0.0 } else { pause };
+            let is_missing = random.uniform() < 0.75 && missing;
+            let smooth = if is_missing { f64::NAN } else { smooth };
+            table.push(secs(f64::from(row) + later), &[random.normal(), smooth]);
+        }
+        let observation = observe(&model, &table).unwrap();
+        let days = day::count(&observation, "750s".parse().unwrap());
+        let mut found = residual::residuals(&model.plan, &observation);
+        (found.remove(1), days)
+    };
+    let (whole, two) = found(0.0, false);
+    let (paused, three) = found(36_000.0, false);
+    assert_eq!((two, three), (2, 3));
+    assert_eq!((paused.spaced, paused.spacing_s), (1500, 1.0));
+    // Of 1499 pairs of neighbours one is missing.
+    assert!((paused.autocorrelation[0] - whole.autocorrelation[0]).abs() < 0.002);
+    assert_eq!(paused.white(), Some(false));
+    let (few, _) = found(0.0, true);
+    assert!(few.spaced < 500 && few.spacing_s == 1.0, "{}", few.spaced);
+    assert!(
+        (few.autocorrelation[0] - 0.5).abs() < 0.2,
+        "{:?}",
+        few.autocorrelation
+    );
+    assert_eq!(few.white(), Some(false));
+}
+
+#[test]
 fn a_single_truth_long_after_the_first_row_is_one_residual() {
     let model = model("single", NOISE, &[]);
     let mut table = Table::default();

@@ -5,6 +5,7 @@
 
 pub mod comparison;
 pub mod day;
+mod gap;
 pub mod lag;
 mod observation;
 mod plot;

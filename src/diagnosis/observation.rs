@@ -8,6 +8,8 @@ use athermal_core::recording::{Event, Recording};
 use athermal_core::score::{Trace, TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
 
+use super::gap::Gaps;
+
 /// A model's pass over a recording.
 #[derive(Debug, Clone)]
 pub struct Observation {
@@ -17,18 +19,19 @@ pub struct Observation {
     pub sources: Vec<SourceStatistics>,
     /// First and last instant of each segment that has a row.
     pub segments: Vec<Option<(Instant, Instant)>>,
+    /// The times between rows, breaks left out.
+    pub(super) rows: Gaps,
 }
 
 /// What can be said of a measured channel without its course.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SourceStatistics {
     /// Valid samples.
     pub samples: u64,
     /// Their mean.
     pub mean: f64,
     squares: f64,
-    /// The sum and the number of the times between samples.
-    gaps: (Duration, i64),
+    gaps: Gaps,
     last: Option<Instant>,
 }
 
@@ -39,7 +42,7 @@ impl SourceStatistics {
         self.mean += before / self.samples as f64;
         self.squares += before * (value - self.mean);
         if let Some(last) = self.last.replace(now) {
-            self.gaps = (self.gaps.0 + (now - last), self.gaps.1 + 1);
+            self.gaps.push(now - last);
         }
     }
 
@@ -49,11 +52,10 @@ impl SourceStatistics {
         (self.squares / self.samples.max(1) as f64).sqrt()
     }
 
-    /// The mean time between samples; none for less than two.
+    /// The median time between samples; none for less than two.
     #[must_use]
     pub fn interval(&self) -> Option<Duration> {
-        let (sum, count) = self.gaps;
-        (count > 0).then(|| Duration::from_ns(sum.as_ns() / count))
+        self.gaps.median()
     }
 }
 
@@ -65,6 +67,7 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
     let count = model.plan.sources.len();
     let mut sources = vec![SourceStatistics::default(); count];
     let mut segments = vec![None];
+    let mut rows = Gaps::default();
     let mut look = |engine: &Engine, event: Event| match event {
         Event::Segment => {
             segments.push(None);
@@ -72,7 +75,10 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
         }
         Event::Row(now) => {
             if let Some(period) = segments.last_mut() {
-                let (from, _) = period.unwrap_or((now, now));
+                let (from, last) = period.unwrap_or((now, now));
+                if period.is_some() {
+                    rows.push(now - last);
+                }
                 *period = Some((from, now));
             }
             for (slot, source) in sources.iter_mut().enumerate() {
@@ -88,24 +94,18 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
         trace,
         sources,
         segments,
+        rows,
     })
 }
 
 impl Observation {
-    /// The mean time between two values of a truth, breaks and gaps of the recording included; none for less than two.
-    pub(super) fn interval(truth: &TruthTrace) -> Option<Duration> {
-        let pairs = truth.times.windows(2);
-        let gaps = pairs.filter(|pair| pair[0].0 == pair[1].0);
-        let (sum, count) = gaps.fold((0, 0), |(sum, count), pair| {
-            (sum + (pair[1].1 - pair[0].1).as_ns(), count + 1)
-        });
-        (count > 0).then(|| Duration::from_ns(sum / count))
-    }
-
-    /// How long the recording is, breaks left out.
-    pub(super) fn length(&self) -> Duration {
-        let each = self.segments.iter().flatten();
-        each.fold(Duration::ZERO, |sum, &(from, to)| sum + (to - from))
+    /// The times between the values of a truth, breaks of the recording left out.
+    pub(super) fn gaps(truth: &TruthTrace) -> Gaps {
+        let mut gaps = Gaps::default();
+        for pair in truth.times.windows(2).filter(|of| of[0].0 == of[1].0) {
+            gaps.push(pair[1].1 - pair[0].1);
+        }
+        gaps
     }
 }
 
