@@ -252,8 +252,8 @@ fn white_residuals_are_told_from_others() {
     }
     let observation = observe(&model, &table).unwrap();
     let found = residual::residuals(&model.plan, &observation);
-    assert_eq!(found[0].white(), Some(true), "{:?}", found[0].p_value);
-    assert_eq!(found[1].white(), Some(false));
+    assert_eq!(found[0].white, Some(true), "{:?}", found[0].p_value);
+    assert_eq!(found[1].white, Some(false));
     assert_eq!((found[1].spaced, found[1].spacing_s), (2000, 1.0));
     assert!((found[1].autocorrelation[0] - 0.6).abs() < 0.05);
 }
@@ -282,7 +282,7 @@ fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
     assert_eq!((paused.spaced, paused.spacing_s), (1500, 1.0));
     // Of 1499 pairs of neighbours one is missing.
     assert!((paused.autocorrelation[0] - whole.autocorrelation[0]).abs() < 0.002);
-    assert_eq!(paused.white(), Some(false));
+    assert_eq!(paused.white, Some(false));
     let (few, _) = found(0.0, true);
     assert!(few.spaced < 500 && few.spacing_s == 1.0, "{}", few.spaced);
     assert!(
@@ -290,7 +290,7 @@ fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
         "{:?}",
         few.autocorrelation
     );
-    assert_eq!(few.white(), Some(false));
+    assert_eq!(few.white, Some(false));
 }
 
 #[test]
@@ -302,7 +302,7 @@ fn a_single_truth_long_after_the_first_row_is_one_residual() {
     let observation = observe(&model, &table).unwrap();
     let found = residual::residuals(&model.plan, &observation);
     assert_eq!((found[0].count, found[0].spaced), (1, 1));
-    assert_eq!(found[0].white(), None);
+    assert_eq!(found[0].white, None);
 }
 
 #[test]

@@ -77,6 +77,27 @@ pub struct Options {
     pub windows: bool,
 }
 
+impl Diagnosis {
+    /// Leaves out what is said of other predictions than those asked for by name, and of truths none of them predicts.
+    pub fn keep_only(&mut self, of: &[String]) {
+        self.residuals.retain(|it| is_asked(&it.prediction, of));
+        let kept = |truth: &str| self.residuals.iter().any(|it| it.truth == truth);
+        self.main.retain(|it| kept(&it.truth));
+        self.lags.retain(|it| kept(&it.truth));
+        self.windows.retain(|it| kept(&it.truth));
+        self.responses.retain(|it| is_asked(&it.node, of));
+        self.designs.retain(|it| is_asked(&it.node, of));
+        self.contributions.retain(|it| is_asked(&it.prediction, of));
+        if let Some(days) = &mut self.days {
+            let left_out = days.left_out.iter_mut().map(|it| &mut it.scores);
+            let curve = days.curve.iter_mut().map(|it| &mut it.scores);
+            left_out
+                .chain(curve)
+                .for_each(|scores| scores.retain(|it| is_asked(&it.prediction, of)));
+        }
+    }
+}
+
 /// Diagnoses a model on a recording. `progress` is told how many fits of how many are done.
 ///
 /// # Errors

@@ -18,7 +18,7 @@ use super::observation::Observation;
 const MOST_LAGS: usize = 20;
 const SHARE: usize = 5;
 /// A series is called white unless it would be as unlikely as this.
-const UNLIKELY: f64 = 0.01;
+pub const UNLIKELY: f64 = 0.01;
 
 /// The residuals of a prediction: measured less predicted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -39,22 +39,19 @@ pub struct Residuals {
     pub spacing_s: f64,
     /// How many these are.
     pub spaced: usize,
-    /// Their autocorrelation from lag 1 on; empty where there are too few.
+    /// Their autocorrelation from lag 1 on; empty where there are too few, and NaN (null in JSON) at a lag with too few pairs.
     pub autocorrelation: Vec<f64>,
-    /// Half the width of the band about zero that holds 95 % of the autocorrelations of a white series, for each lag.
+    /// Half the width of the band about zero that holds 95 % of the autocorrelations at each lag of a series that has none from
+    /// that lag on (Bartlett 1946): of a white one at lag 1, and wider beyond where there is some before.
     pub bound: Vec<f64>,
     /// The statistic of Ljung and Box over all these lags, and how likely a white series has one as large.
     pub ljung_box: Option<f64>,
     /// See `ljung_box`.
     pub p_value: Option<f64>,
-}
-
-impl Residuals {
-    /// Whether they may be white; none where there are too few to say.
-    #[must_use]
-    pub fn white(&self) -> Option<bool> {
-        self.p_value.map(|p| p >= UNLIKELY)
-    }
+    /// Whether they may be white, `p_value` not being below `level`; none where there are too few to say.
+    pub white: Option<bool>,
+    /// The p-value below which they are called not white.
+    pub level: f64,
 }
 
 /// The residuals of every prediction of a model.
@@ -106,6 +103,8 @@ fn of_prediction(
         bound: errors.iter().map(|error| NORMAL_95 * error).collect(),
         ljung_box: last.map(|of| of.statistic),
         p_value: last.map(|of| of.p_value),
+        white: last.map(|of| of.p_value >= UNLIKELY),
+        level: UNLIKELY,
     }
 }
 
