@@ -340,7 +340,8 @@ fn a_sensor_at_rest_takes_away_what_it_contributes() {
         2000.0 * course[row][0] + 500.0 * course[row][1]
     });
     let observation = observe(&model, &table).unwrap();
-    let found = sensor::contributions(&model, &table, &observation).unwrap();
+    let (found, untold) = sensor::contributions(&model, &table, &observation).unwrap();
+    assert!(untold.is_empty());
     let names: Vec<&str> = found.iter().map(|of| of.sensor.as_str()).collect();
     // Positions are what is predicted, not what it is predicted from.
     assert_eq!(names, ["temperature.a", "temperature.b"]);
@@ -359,6 +360,57 @@ fn a_sensor_at_rest_takes_away_what_it_contributes() {
         assert!((1.0..1.5).contains(&regressor.inflation), "{regressor:?}");
     }
     assert!(designs[0].condition >= 1.0 && designs[0].condition < 2.0);
+}
+
+#[test]
+fn a_sensor_that_is_watched_is_tried_like_any_other() {
+    let terms = [("gradients.a@150s", 2.0), ("gradients.b@150s", 0.5)];
+    let facts = |watch: &str| {
+        let text = TWO_SENSORS.replace(
+            "[nodes.gradients]\ntype = \"slope\"\ninputs.signal = \"temperature\"",
+            &format!(
+                "[nodes.sound]\ntype = \"health\"\ninputs.signal = \"temperature\"\n{watch}\n\
+                 [nodes.gradients]\ntype = \"slope\"\ninputs.signal = \"sound\""
+            ),
+        );
+        let model = model("watched", &text, &[("thermal", linear(&terms, 0.0))]);
+        let table = wandering(3000, |course, row| 2000.0 * course[row][0]);
+        diagnose(&model, &table, &Options::default(), &mut |_, _| {})
+            .unwrap()
+            .0
+    };
+    let free = facts("range = [\"-1e4 Cel\", \"1e4 Cel\"]");
+    let watches = [
+        "stuck_after = \"1min\"\nmax_rate = \"0.01 K/s\"\nrecover = \"5min\"",
+        "stuck_after = \"1min\"\nnoise_above = \"0.1 mK\"\nnoise_samples = 100",
+    ];
+    for watch in watches {
+        let watched = facts(watch);
+        assert!(watched.untold.is_empty(), "{watch}: {:?}", watched.untold);
+        for (of, as_free) in watched.contributions.iter().zip(&free.contributions) {
+            assert_eq!(of.sensor, as_free.sensor);
+            assert!(
+                (of.moves / as_free.moves - 1.0).abs() < 0.02,
+                "{of:?} {as_free:?}"
+            );
+        }
+        let [of, as_free] = [&watched, &free].map(|it| &it.responses[0].sensors);
+        assert_eq!(of.len(), 2, "{watch}");
+        for (of, as_free) in of.iter().zip(as_free) {
+            let [total, expected] = [of, as_free].map(|it| it.total.unwrap());
+            assert!(
+                (total / expected - 1.0).abs() < 0.01,
+                "{watch}: {total} {expected}"
+            );
+        }
+    }
+    let blind = facts("range = [\"-1 Cel\", \"1 Cel\"]");
+    assert!(blind.contributions.is_empty() && blind.responses.is_empty());
+    let [untold] = &blind.untold[..] else {
+        panic!("{:?}", blind.untold)
+    };
+    assert_eq!(untold.estimator.as_deref(), Some("thermal"));
+    assert_eq!(untold.silent, "sound");
 }
 
 #[test]
@@ -549,6 +601,47 @@ fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
     countless.ended(0).tells(&["a longer --day"]);
     let unfitted = of(&graph("die-tester"), &[]);
     unfitted.ended(2).tells(&["fit"]);
+}
+
+#[test]
+fn why_there_is_nothing_is_said_and_nothing_is_told_as_no_number() {
+    let scratch = Scratch::new("nothing");
+    let log = |name: &str, white: fn(usize) -> String| {
+        let rows = (0..200).map(|row| format!("{row},{},\n", white(row)));
+        let rows: String = rows.collect();
+        scratch.file(name, format!("time_s,white,smooth\n{rows}"))
+    };
+    let graph = scratch.file("noise.toml", NOISE);
+    let empty = log("empty.csv", |_| String::new());
+    let told = athermal_on("diagnose", &graph, &empty, &[&"--no-fit", &"--window"]);
+    let told = told.ended(0);
+    told.tells(&["no value of the truth y.white", "no truth is a slope"]);
+    assert!(!told.out.contains("NaN"), "{}", told.out);
+    // A multiplicative hash stands in for noise.
+    let noise = log("noise.csv", |row| {
+        let bits = (row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+        (bits % 1009).to_string()
+    });
+    let told = athermal_on(
+        "diagnose",
+        &graph,
+        &noise,
+        &[&"--no-fit", &"--of", &"white"],
+    );
+    let told = told.ended(0);
+    assert!(
+        told.out.contains("where p is not below 0.01"),
+        "{}",
+        told.out
+    );
+    assert!(!told.told.contains("--window"), "{}", told.told);
+    let of_one: [&dyn AsRef<OsStr>; 5] = [&"--no-fit", &"--of", &"white", &"--format", &"json"];
+    let facts = athermal_on("diagnose", &graph, &noise, &of_one);
+    let facts = facts.ended(0).json();
+    let residuals = facts["diagnosis"]["residuals"].as_array().unwrap();
+    assert_eq!(residuals.len(), 1);
+    assert_eq!(residuals[0]["level"], 0.01);
+    assert!(residuals[0]["white"].is_boolean());
 }
 
 #[test]

@@ -381,6 +381,7 @@ mod tests {
             sources: Vec::new(),
             segments,
             rows: Gaps::default(),
+            valid: Vec::new(),
         };
         Calendar::new(&observation, at(24) - at(0))
     }

@@ -26,6 +26,11 @@ impl Gaps {
         self.count += 1;
     }
 
+    /// How many there are.
+    pub(super) fn count(&self) -> i64 {
+        self.count
+    }
+
     /// The median; none without a gap.
     pub(super) fn median(&self) -> Option<Duration> {
         self.quantile(1, 2)

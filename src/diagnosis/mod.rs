@@ -12,12 +12,14 @@ mod plot;
 pub mod regressor;
 pub mod residual;
 pub mod response;
+mod rest;
 pub mod sensor;
 pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
 pub use plot::plots;
 pub(crate) use plot::{Picture, response as response_picture, with_truth as truth_picture};
+pub use rest::Untold;
 
 use athermal_core::compile::Plan;
 use athermal_core::fit::FitError;
@@ -45,6 +47,8 @@ pub struct Diagnosis {
     pub designs: Vec<regressor::Design>,
     /// What each sensor contributes.
     pub contributions: Vec<sensor::Contribution>,
+    /// What could not be told of sensors, and which node gave nothing.
+    pub untold: Vec<Untold>,
     /// What fits on some days are worth on others; none where it was not asked for, or there are too few days or too many.
     pub days: Option<day::Days>,
     /// How many days the recording has.
@@ -88,6 +92,8 @@ impl Diagnosis {
         self.responses.retain(|it| is_asked(&it.node, of));
         self.designs.retain(|it| is_asked(&it.node, of));
         self.contributions.retain(|it| is_asked(&it.prediction, of));
+        self.untold
+            .retain(|it| it.estimator.as_ref().is_none_or(|node| is_asked(node, of)));
         if let Some(days) = &mut self.days {
             let left_out = days.left_out.iter_mut().map(|it| &mut it.scores);
             let curve = days.curve.iter_mut().map(|it| &mut it.scores);
@@ -120,14 +126,18 @@ pub fn diagnose(
             prediction: plan.channels[of.slot].name.clone(),
         })
     });
+    let (responses, mut untold) = response::answers(model, &observation)?;
+    let (contributions, more) = sensor::contributions(model, recording, &observation)?;
+    untold.extend(more);
     let diagnosis = Diagnosis {
         graph: plan.name.clone().unwrap_or_default(),
         main: main.collect(),
         residuals: residual::residuals(plan, &observation),
         lags: lag::lags(model, recording, &observation, &options.of)?,
-        responses: response::responses(model, &observation)?,
+        responses,
         designs: regressor::designs(model, recording)?,
-        contributions: sensor::contributions(model, recording, &observation)?,
+        contributions,
+        untold,
         days: match options.day {
             Some(day) => day::days(model, recording, &observation, day, progress)?,
             None => None,

@@ -21,6 +21,8 @@ pub struct Observation {
     pub segments: Vec<Option<(Instant, Instant)>>,
     /// The times between rows, breaks left out.
     pub(super) rows: Gaps,
+    /// Of each slot, at how many rows it had a value.
+    pub(super) valid: Vec<u64>,
 }
 
 /// What can be said of a measured channel without its course.
@@ -31,6 +33,9 @@ pub struct SourceStatistics {
     /// Their mean.
     pub mean: f64,
     squares: f64,
+    /// The sum of squared differences from one sample to the next.
+    steps: f64,
+    newest: f64,
     gaps: Gaps,
     last: Option<Instant>,
 }
@@ -41,9 +46,18 @@ impl SourceStatistics {
         let before = value - self.mean;
         self.mean += before / self.samples as f64;
         self.squares += before * (value - self.mean);
-        if let Some(last) = self.last.replace(now) {
+        let last = self.last.replace(now);
+        if let Some(last) = last {
             self.gaps.push(now - last);
+            self.steps += (value - self.newest).powi(2);
         }
+        self.newest = value;
+    }
+
+    /// The noise of single samples: √(mean of squared successive differences / 2) (von Neumann 1941); 0 of less than two.
+    #[must_use]
+    pub fn noise(&self) -> f64 {
+        (self.steps / 2.0 / self.gaps.count().max(1) as f64).sqrt()
     }
 
     /// The standard deviation of the samples; 0 of none.
@@ -68,12 +82,14 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
     let mut sources = vec![SourceStatistics::default(); count];
     let mut segments = vec![None];
     let mut rows = Gaps::default();
+    let mut valid = vec![0; model.plan.channels.len()];
     let mut look = |engine: &Engine, event: Event| match event {
         Event::Segment => {
             segments.push(None);
             sources.iter_mut().for_each(|source| source.last = None);
         }
         Event::Row(now) => {
+            count_valid(engine, &mut valid);
             if let Some(period) = segments.last_mut() {
                 let (from, last) = period.unwrap_or((now, now));
                 if period.is_some() {
@@ -95,7 +111,15 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
         sources,
         segments,
         rows,
+        valid,
     })
+}
+
+/// Counts each slot that has a value.
+pub(super) fn count_valid(engine: &Engine, valid: &mut [u64]) {
+    for (slot, count) in valid.iter_mut().enumerate() {
+        *count += u64::from(!engine.value(slot).is_nan());
+    }
 }
 
 impl Observation {

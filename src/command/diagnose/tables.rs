@@ -35,6 +35,7 @@ impl<'a> Tables<'a> {
             self.responses(),
             self.designs(),
             self.contributions(),
+            self.untold(),
             self.days(),
             self.windows(),
         ];
@@ -191,7 +192,7 @@ impl<'a> Tables<'a> {
                     format!("  {}", of.node),
                     count(of.rows),
                     of.regressors.len().to_string(),
-                    or_dash(known(of.condition)),
+                    or_dash(defined(of.condition)),
                     worst.map_or("-".to_owned(), |of| number(of.inflation)),
                     worst.map_or_else(String::new, |of| {
                         let much = of.inflation > INFLATED;
@@ -249,7 +250,7 @@ impl<'a> Tables<'a> {
         let as_it_is = shown.iter().map(|name| {
             let mut residuals = self.diagnosis.residuals.iter();
             let residuals = residuals.find(|of| of.prediction == *name);
-            or_dash(residuals.and_then(|of| known(of.rms)))
+            or_dash(residuals.and_then(|of| defined(of.rms)))
         });
         errors.insert(0, ("as it is".to_owned(), as_it_is.collect()));
         format!(
@@ -258,6 +259,31 @@ impl<'a> Tables<'a> {
             matrix("sensor", &columns, &moves),
             matrix("at rest", &columns, &errors)
         )
+    }
+
+    /// Which sensors could not be tried.
+    fn untold(&self) -> String {
+        let all = self.diagnosis.untold.iter();
+        let shown = all.filter(|of| {
+            let node = of.estimator.as_ref();
+            node.is_none_or(|node| self.shows_estimator(node))
+        });
+        let told = shown.map(|of| {
+            let silent = &of.silent;
+            match (&of.estimator, &of.sensor) {
+                (Some(node), Some(sensor)) => {
+                    format!("{node}: no answer to {sensor}, since {silent} gives nothing when that steps\n")
+                }
+                (Some(node), None) => {
+                    format!("{node}: no answers, since {silent} gives nothing while all sensors rest\n")
+                }
+                (None, sensor) => {
+                    let sensor = sensor.as_deref().unwrap_or("a sensor");
+                    format!("{sensor}: no contribution, since {silent} gives nothing when it rests\n")
+                }
+            }
+        });
+        told.collect()
     }
 
     fn days(&self) -> String {
@@ -327,8 +353,8 @@ fn residuals(shown: &[&Residuals]) -> String {
             };
             vec![
                 format!("  {}", of.prediction),
-                or_dash(known(of.rms)),
-                or_dash(known(of.mean)),
+                or_dash(defined(of.rms)),
+                or_dash(defined(of.mean)),
                 count(of.spaced as u64),
                 largest,
                 bound,
@@ -447,8 +473,8 @@ fn regressors(of: &Design) -> String {
         .map(|of| {
             vec![
                 format!("    {}", of.name),
-                or_dash(known(of.effect)),
-                or_dash(known(of.inflation)),
+                or_dash(defined(of.effect)),
+                or_dash(defined(of.inflation)),
             ]
         })
         .collect();
@@ -468,7 +494,7 @@ pub(super) fn axis_of(channel: &str) -> String {
 }
 
 /// None where there is no number.
-fn known(value: f64) -> Option<f64> {
+fn defined(value: f64) -> Option<f64> {
     Some(value).filter(|value| !value.is_nan())
 }
 
