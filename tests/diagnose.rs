@@ -294,6 +294,28 @@ fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
 }
 
 #[test]
+fn missing_truths_leave_the_lag_of_a_feature_where_it_is() {
+    let terms = [("temperature.a", 1000.0)];
+    let text = TWO_SENSORS
+        .replace("\"gradients\"", "\"temperature\"")
+        .replace("\"drift.z\"", "\"position.z\"")
+        .replace("\"1min\"", "\"10s\"");
+    let model = model("sparse", &text, &[("thermal", linear(&terms, 0.0))]);
+    let (mut random, mut table) = (Prng::stream(4, "sparse"), Table::default());
+    for row in 0..2000 {
+        let [a, b, missing] = [random.normal(), random.normal(), random.uniform()];
+        let z = if missing < 0.75 { f64::NAN } else { 1000.0 * a };
+        let later = if row < 1000 { 0.0 } else { 36_000.0 };
+        table.push(secs(10.0 * f64::from(row) + later), &[a, b, z]);
+    }
+    let observation = observe(&model, &table).unwrap();
+    let found = lag::lags(&model, &table, &observation, &[]).unwrap();
+    let of_a = &found[0].features[0].truth;
+    assert_eq!(of_a.best_lag_s, 0.0);
+    assert!(of_a.best > 0.99, "{}", of_a.best);
+}
+
+#[test]
 fn a_single_truth_long_after_the_first_row_is_one_residual() {
     let model = model("single", NOISE, &[]);
     let mut table = Table::default();

@@ -1,4 +1,4 @@
-//! Decides what time usually lies between two samples: the median of the gaps, which neither a pause nor a few missing samples move.
+//! Decides what time usually lies between two samples: a quantile of the gaps, which neither a pause nor a few missing samples move.
 //! Not what counts as a sample.
 
 use std::collections::BTreeMap;

@@ -96,9 +96,7 @@ pub fn lags(
     slots.sort_unstable();
     slots.dedup();
     let truths = &observation.trace.truths;
-    let intervals = truths
-        .iter()
-        .filter_map(|of| Observation::gaps(of).median());
+    let intervals = truths.iter().filter_map(Observation::interval);
     let Some(interval) = intervals.min().filter(|_| !slots.is_empty()) else {
         return Ok(Vec::new());
     };

@@ -123,13 +123,14 @@ pub(super) fn count_valid(engine: &Engine, valid: &mut [u64]) {
 }
 
 impl Observation {
-    /// The times between the values of a truth, breaks of the recording left out.
-    pub(super) fn gaps(truth: &TruthTrace) -> Gaps {
+    /// A time between two values of a truth so short that nine gaps of ten reach as far, breaks left out; none for less than two.
+    /// Where gaps vary, or many values are missing at random, few fall together within it, and many places are empty instead.
+    pub(super) fn interval(truth: &TruthTrace) -> Option<Duration> {
         let mut gaps = Gaps::default();
         for pair in truth.times.windows(2).filter(|of| of[0].0 == of[1].0) {
             gaps.push(pair[1].1 - pair[0].1);
         }
-        gaps
+        gaps.quantile(1, 10)
     }
 }
 

@@ -80,7 +80,7 @@ fn of_prediction(
     let count = present.len();
     let span = plan.channels[truth.slot].channel.span;
     let apart = span.max(of.ahead);
-    let spacing = apart.max(place_of_one(truth));
+    let spacing = apart.max(Observation::interval(truth).unwrap_or(Duration::ZERO));
     let spaced = spaced(observation, truth, &left, (spacing, apart));
     let number = spaced.iter().filter(|e| !e.is_nan()).count();
     let lags = MOST_LAGS.min(number / SHARE);
@@ -106,13 +106,6 @@ fn of_prediction(
         white: last.map(|of| of.p_value >= UNLIKELY),
         level: UNLIKELY,
     }
-}
-
-/// How long a place of the series is that holds one residual: so short that nine gaps of ten reach into the next place. Where the
-/// interval of a truth varies, or many are missing at random, few fall together, and most places are empty instead.
-fn place_of_one(truth: &TruthTrace) -> Duration {
-    let gaps = Observation::gaps(truth);
-    gaps.quantile(1, 10).unwrap_or(Duration::ZERO)
 }
 
 /// The first value of every stretch of `spacing`, none nearer than `apart` to the one before; NaN where there is none. Segments

@@ -182,6 +182,9 @@ pub(super) fn answers(
     Ok((facts.collect(), untold))
 }
 
+/// Which of the slots that are followed fell silent, each with the first node that gave nothing.
+type Lost = Vec<(usize, String)>;
+
 /// A graph at rest that is about to be disturbed.
 struct Probe<'a> {
     model: &'a Model,
@@ -261,13 +264,12 @@ impl<'a> Probe<'a> {
 
     /// The answers to a step of `size`, or of a smaller one where that is let through; with its size, and of each slot that fell
     /// silent the first node that gave nothing.
-    #[allow(clippy::type_complexity)]
     fn run_somehow(
         &mut self,
         source: usize,
         size: f64,
-    ) -> Result<(Vec<[Course; 2]>, f64, Vec<(usize, String)>), EngineError> {
-        let mut best: Option<(Vec<[Course; 2]>, f64, Vec<(usize, String)>)> = None;
+    ) -> Result<(Vec<[Course; 2]>, f64, Lost), EngineError> {
+        let mut best: Option<(Vec<[Course; 2]>, f64, Lost)> = None;
         for share in SMALLER {
             let (found, lost) = self.run(source, share * size)?;
             let fewer = best
@@ -286,13 +288,8 @@ impl<'a> Probe<'a> {
 
     /// How the slots change from the instant on at which a source steps up and down by `size`, tick by tick, against a run in which
     /// it rests; NaN where there is no value. And of each slot that thereby lost its value the first node that gave nothing.
-    #[allow(clippy::type_complexity)]
-    fn run(
-        &mut self,
-        source: usize,
-        size: f64,
-    ) -> Result<(Vec<[Course; 2]>, Vec<(usize, String)>), EngineError> {
-        let mut lost: Vec<(usize, String)> = Vec::new();
+    fn run(&mut self, source: usize, size: f64) -> Result<(Vec<[Course; 2]>, Lost), EngineError> {
+        let mut lost: Lost = Lost::new();
         let mut runs = Vec::new();
         for change in [size, -size] {
             let mut samples = self.rest.clone();
