@@ -116,7 +116,7 @@ pub fn stated(seconds: f64) -> String {
 pub fn length(duration: Duration) -> String {
     const MILLISECOND_NS: i64 = 1_000_000;
     let ns = duration.as_ns();
-    if ns < MILLISECOND_NS {
+    if ns.unsigned_abs() < MILLISECOND_NS as u64 {
         return duration.to_string();
     }
     let rounded = (ns as f64 / MILLISECOND_NS as f64).round() as i64;

@@ -252,10 +252,67 @@ fn white_residuals_are_told_from_others() {
     }
     let observation = observe(&model, &table).unwrap();
     let found = residual::residuals(&model.plan, &observation);
-    assert_eq!(found[0].white(), Some(true), "{:?}", found[0].p_value);
-    assert_eq!(found[1].white(), Some(false));
+    assert_eq!(found[0].white, Some(true), "{:?}", found[0].p_value);
+    assert_eq!(found[1].white, Some(false));
     assert_eq!((found[1].spaced, found[1].spacing_s), (2000, 1.0));
     assert!((found[1].autocorrelation[0] - 0.6).abs() < 0.05);
+}
+
+#[test]
+fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
+    let model = model("paused", NOISE, &[]);
+    let found = |pause: f64, missing: bool| {
+        let mut random = Prng::stream(1, "noise");
+        let (mut table, mut smooth) = (Table::default(), 0.0);
+        for row in 0..1500 {
+            smooth = 0.5 * smooth + random.normal();
+            let later = if row < 800 { 0.0 } else { pause };
+            let is_missing = random.uniform() < 0.75 && missing;
+            let smooth = if is_missing { f64::NAN } else { smooth };
+            table.push(secs(f64::from(row) + later), &[random.normal(), smooth]);
+        }
+        let observation = observe(&model, &table).unwrap();
+        let days = day::count(&observation, "750s".parse().unwrap());
+        let mut found = residual::residuals(&model.plan, &observation);
+        (found.remove(1), days)
+    };
+    let (whole, two) = found(0.0, false);
+    let (paused, three) = found(36_000.0, false);
+    assert_eq!((two, three), (2, 3));
+    assert_eq!((paused.spaced, paused.spacing_s), (1500, 1.0));
+    // Of 1499 pairs of neighbours one is missing.
+    assert!((paused.autocorrelation[0] - whole.autocorrelation[0]).abs() < 0.002);
+    assert_eq!(paused.white, Some(false));
+    let (few, _) = found(0.0, true);
+    assert!(few.spaced < 500 && few.spacing_s == 1.0, "{}", few.spaced);
+    assert!(
+        (few.autocorrelation[0] - 0.5).abs() < 0.2,
+        "{:?}",
+        few.autocorrelation
+    );
+    assert_eq!(few.white, Some(false));
+}
+
+#[test]
+fn missing_truths_leave_the_lag_of_a_feature_where_it_is() {
+    let terms = [("temperature.a", 1000.0)];
+    let text = TWO_SENSORS
+        .replace("\"gradients\"", "\"temperature\"")
+        .replace("\"drift.z\"", "\"position.z\"")
+        .replace("\"1min\"", "\"10s\"");
+    let model = model("sparse", &text, &[("thermal", linear(&terms, 0.0))]);
+    let (mut random, mut table) = (Prng::stream(4, "sparse"), Table::default());
+    for row in 0..2000 {
+        let [a, b, missing] = [random.normal(), random.normal(), random.uniform()];
+        let z = if missing < 0.75 { f64::NAN } else { 1000.0 * a };
+        let later = if row < 1000 { 0.0 } else { 36_000.0 };
+        table.push(secs(10.0 * f64::from(row) + later), &[a, b, z]);
+    }
+    let observation = observe(&model, &table).unwrap();
+    let found = lag::lags(&model, &table, &observation, &[]).unwrap();
+    let of_a = &found[0].features[0].truth;
+    assert_eq!(of_a.best_lag_s, 0.0);
+    assert!(of_a.best > 0.99, "{}", of_a.best);
 }
 
 #[test]
@@ -267,7 +324,7 @@ fn a_single_truth_long_after_the_first_row_is_one_residual() {
     let observation = observe(&model, &table).unwrap();
     let found = residual::residuals(&model.plan, &observation);
     assert_eq!((found[0].count, found[0].spaced), (1, 1));
-    assert_eq!(found[0].white(), None);
+    assert_eq!(found[0].white, None);
 }
 
 #[test]
@@ -305,7 +362,8 @@ fn a_sensor_at_rest_takes_away_what_it_contributes() {
         2000.0 * course[row][0] + 500.0 * course[row][1]
     });
     let observation = observe(&model, &table).unwrap();
-    let found = sensor::contributions(&model, &table, &observation).unwrap();
+    let (found, untold) = sensor::contributions(&model, &table, &observation).unwrap();
+    assert!(untold.is_empty());
     let names: Vec<&str> = found.iter().map(|of| of.sensor.as_str()).collect();
     // Positions are what is predicted, not what it is predicted from.
     assert_eq!(names, ["temperature.a", "temperature.b"]);
@@ -324,6 +382,57 @@ fn a_sensor_at_rest_takes_away_what_it_contributes() {
         assert!((1.0..1.5).contains(&regressor.inflation), "{regressor:?}");
     }
     assert!(designs[0].condition >= 1.0 && designs[0].condition < 2.0);
+}
+
+#[test]
+fn a_sensor_that_is_watched_is_tried_like_any_other() {
+    let terms = [("gradients.a@150s", 2.0), ("gradients.b@150s", 0.5)];
+    let facts = |watch: &str| {
+        let text = TWO_SENSORS.replace(
+            "[nodes.gradients]\ntype = \"slope\"\ninputs.signal = \"temperature\"",
+            &format!(
+                "[nodes.sound]\ntype = \"health\"\ninputs.signal = \"temperature\"\n{watch}\n\
+                 [nodes.gradients]\ntype = \"slope\"\ninputs.signal = \"sound\""
+            ),
+        );
+        let model = model("watched", &text, &[("thermal", linear(&terms, 0.0))]);
+        let table = wandering(3000, |course, row| 2000.0 * course[row][0]);
+        diagnose(&model, &table, &Options::default(), &mut |_, _| {})
+            .unwrap()
+            .0
+    };
+    let free = facts("range = [\"-1e4 Cel\", \"1e4 Cel\"]");
+    let watches = [
+        "stuck_after = \"1min\"\nmax_rate = \"0.01 K/s\"\nrecover = \"5min\"",
+        "stuck_after = \"1min\"\nnoise_above = \"0.1 mK\"\nnoise_samples = 100",
+    ];
+    for watch in watches {
+        let watched = facts(watch);
+        assert!(watched.untold.is_empty(), "{watch}: {:?}", watched.untold);
+        for (of, as_free) in watched.contributions.iter().zip(&free.contributions) {
+            assert_eq!(of.sensor, as_free.sensor);
+            assert!(
+                (of.moves / as_free.moves - 1.0).abs() < 0.02,
+                "{of:?} {as_free:?}"
+            );
+        }
+        let [of, as_free] = [&watched, &free].map(|it| &it.responses[0].sensors);
+        assert_eq!(of.len(), 2, "{watch}");
+        for (of, as_free) in of.iter().zip(as_free) {
+            let [total, expected] = [of, as_free].map(|it| it.total.unwrap());
+            assert!(
+                (total / expected - 1.0).abs() < 0.01,
+                "{watch}: {total} {expected}"
+            );
+        }
+    }
+    let blind = facts("range = [\"-1 Cel\", \"1 Cel\"]");
+    assert!(blind.contributions.is_empty() && blind.responses.is_empty());
+    let [untold] = &blind.untold[..] else {
+        panic!("{:?}", blind.untold)
+    };
+    assert_eq!(untold.estimator.as_deref(), Some("thermal"));
+    assert_eq!(untold.silent, "sound");
 }
 
 #[test]
@@ -514,6 +623,47 @@ fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
     countless.ended(0).tells(&["a longer --day"]);
     let unfitted = of(&graph("die-tester"), &[]);
     unfitted.ended(2).tells(&["fit"]);
+}
+
+#[test]
+fn why_there_is_nothing_is_said_and_nothing_is_told_as_no_number() {
+    let scratch = Scratch::new("nothing");
+    let log = |name: &str, white: fn(usize) -> String| {
+        let rows = (0..200).map(|row| format!("{row},{},\n", white(row)));
+        let rows: String = rows.collect();
+        scratch.file(name, format!("time_s,white,smooth\n{rows}"))
+    };
+    let graph = scratch.file("noise.toml", NOISE);
+    let empty = log("empty.csv", |_| String::new());
+    let told = athermal_on("diagnose", &graph, &empty, &[&"--no-fit", &"--window"]);
+    let told = told.ended(0);
+    told.tells(&["no value of the truth y.white", "no truth is a slope"]);
+    assert!(!told.out.contains("NaN"), "{}", told.out);
+    // A multiplicative hash stands in for noise.
+    let noise = log("noise.csv", |row| {
+        let bits = (row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+        (bits % 1009).to_string()
+    });
+    let told = athermal_on(
+        "diagnose",
+        &graph,
+        &noise,
+        &[&"--no-fit", &"--of", &"white"],
+    );
+    let told = told.ended(0);
+    assert!(
+        told.out.contains("where p is not below 0.01"),
+        "{}",
+        told.out
+    );
+    assert!(!told.told.contains("--window"), "{}", told.told);
+    let of_one: [&dyn AsRef<OsStr>; 5] = [&"--no-fit", &"--of", &"white", &"--format", &"json"];
+    let facts = athermal_on("diagnose", &graph, &noise, &of_one);
+    let facts = facts.ended(0).json();
+    let residuals = facts["diagnosis"]["residuals"].as_array().unwrap();
+    assert_eq!(residuals.len(), 1);
+    assert_eq!(residuals[0]["level"], 0.01);
+    assert!(residuals[0]["white"].is_boolean());
 }
 
 #[test]

@@ -7,7 +7,7 @@ use athermal::Model;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
 use athermal::core::score::trace;
-use athermal::diagnosis::comparison::{Column, Comparison, Contender, compare};
+use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, compare};
 use clap::Args;
 use serde_json::json;
 
@@ -22,8 +22,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Every prediction of every graph is a row, every axis a column. All that predict the same truth over the same horizon are scored
 /// on the instants at which all of them are valid, beside no model and persistence.
 ///
-/// Beside each score stands the standard error of its difference to the best of the column: the instants are cut into ten blocks of
-/// time, whose differences tell how much that of all of them would vary (batch means; Law and Kelton). A difference of less than
+/// Beside each score stands the standard error of its difference to the best of the column: the instants are cut, in order of
+/// time, into ten blocks of as many each, whose differences tell how much that of all of them would vary (batch means; Law and Kelton). A difference of less than
 /// two standard errors, marked ~, may be chance: of two such graphs choose the simpler one, or score them on more days.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -193,9 +193,16 @@ fn heading(comparison: &Comparison) -> String {
         }
         (_, most) => count(most.unwrap_or(0)),
     };
+    let few = 2 * BLOCKS;
+    let few = match fewest {
+        Some(fewest) if fewest < few as u64 => {
+            format!("fewer than {few} instants tell nothing of ±: which is best may be chance\n")
+        }
+        _ => String::new(),
+    };
     format!(
         "RMSE in {}, {} ahead, {instants} instants; * best, ! worse than no model\n\
-         ± standard error of the difference to the best; ~ that may be chance\n",
+         ± standard error of the difference to the best; ~ that may be chance\n{few}",
         comparison.unit,
         stated(comparison.ahead_s)
     )
@@ -210,7 +217,7 @@ fn cell(comparison: &Comparison, row: usize, column: usize, truth: &Column) -> S
     let worse = truth.no_model.is_some_and(|zero| rmse > zero);
     let worse = if worse { "!" } else { "" };
     if truth.best == Some(row) {
-        return format!("*{}", number(rmse));
+        return format!("*{worse}{}", number(rmse));
     }
     let best = truth.best.and_then(of).unwrap_or(rmse);
     match comparison.rows[row].difference_error[column] {
@@ -225,6 +232,42 @@ fn cell(comparison: &Comparison, row: usize, column: usize, truth: &Column) -> S
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn one_row(count: usize, rmse: f64) -> Comparison {
+        Comparison {
+            ahead_s: 0.0,
+            span_s: 0.0,
+            unit: "nm".to_owned(),
+            truths: vec![Column {
+                truth: "drift.Z".to_owned(),
+                name: "Z".to_owned(),
+                count,
+                no_model: Some(2.39),
+                persistence: None,
+                best: Some(0),
+            }],
+            rows: vec![athermal::diagnosis::comparison::Row {
+                graph: "a".to_owned(),
+                node: "vote".to_owned(),
+                kind: "mean",
+                rmse: vec![Some(rmse)],
+                difference_error: vec![None],
+                valid: vec![Some(1.0)],
+            }],
+        }
+    }
+
+    #[test]
+    fn the_best_row_may_be_worse_than_no_model() {
+        assert!(describe(&one_row(100, 8.49)).contains(" *!8.49"));
+        assert!(describe(&one_row(100, 2.0)).contains(" *2.00"));
+    }
+
+    #[test]
+    fn with_few_instants_it_is_said_that_the_best_may_be_chance() {
+        assert!(describe(&one_row(19, 2.0)).contains("best may be chance"));
+        assert!(!describe(&one_row(20, 2.0)).contains("best may be chance"));
+    }
 
     #[test]
     fn a_graph_that_comes_again_has_rows_of_its_own() {

@@ -30,7 +30,7 @@ const NUMBERS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 11, 15, 21, 30, 42];
 pub struct Days {
     /// The length of a day in s, as stated.
     pub day_s: f64,
-    /// How many there are.
+    /// How many have a truth.
     pub count: usize,
     /// Each day, predicted by a fit on all others.
     pub left_out: Vec<LeftOut>,
@@ -41,7 +41,7 @@ pub struct Days {
 /// A day that was left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOut {
-    /// Its number, from 1.
+    /// Its number, from 1, among those that have a truth.
     pub day: usize,
     /// How well it was predicted.
     pub scores: Vec<DayScore>,
@@ -88,17 +88,28 @@ impl DayScore {
 }
 
 impl Calendar {
-    /// The last day of a segment takes a rest of less than half a day.
+    /// Days without a truth are none: a pause has no day that could be predicted. The last day of a segment takes a rest of less
+    /// than half a day.
     fn new(observation: &Observation, day: Duration) -> Self {
-        let mut begins = Vec::new();
-        for (segment, period) in observation.segments.iter().enumerate() {
-            let Some((from, to)) = *period else {
-                continue;
-            };
-            let segment = u32::try_from(segment).unwrap_or(u32::MAX);
-            let begin = |nth: i64| (segment, from + Duration::from_ns(nth * day.as_ns()));
-            begins.extend((0..days_in(from, to, day)).map(begin));
+        let begin = |segment: u32, at: Instant| {
+            let (from, to) = observation.segments.get(segment as usize).copied()??;
+            let nth = (at - from).as_ns() / day.as_ns();
+            let nth = nth.min(days_in(from, to, day) - 1);
+            Some((segment, from + Duration::from_ns(nth * day.as_ns())))
+        };
+        let truths = observation.trace.truths.iter();
+        let mut begins: Vec<(u32, Instant)> = Vec::new();
+        for truth in truths {
+            let mut of_truth: Vec<_> = truth
+                .times
+                .iter()
+                .filter_map(|of| begin(of.0, of.1))
+                .collect();
+            of_truth.dedup();
+            begins.extend(of_truth);
         }
+        begins.sort_unstable();
+        begins.dedup();
         Self { begins }
     }
 
@@ -117,12 +128,10 @@ fn days_in(from: Instant, to: Instant, day: Duration) -> i64 {
     ((to - from).secs() / day.secs()).round().max(1.0) as i64
 }
 
-/// Into how many days a recording falls. They are not laid out: a week has 6 × 10¹⁴ of a nanosecond.
+/// How many days of a recording have a truth.
 #[must_use]
 pub fn count(observation: &Observation, day: Duration) -> usize {
-    let each = observation.segments.iter().flatten();
-    let days = each.map(|&(from, to)| days_in(from, to, day));
-    days.fold(0_i64, i64::saturating_add) as usize
+    Calendar::new(observation, day).count()
 }
 
 /// Fits a model's graph anew on some days and scores it on the others. `progress` is told how many fits of how many are done.
@@ -137,11 +146,11 @@ pub fn days(
     day: Duration,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Option<Days>, FitError> {
-    let count = count(observation, day);
+    let calendar = Calendar::new(observation, day);
+    let count = calendar.count();
     if !(2..=MOST_DAYS).contains(&count) {
         return Ok(None);
     }
-    let calendar = Calendar::new(observation, day);
     let numbers: Vec<usize> = NUMBERS.into_iter().filter(|&n| n + 1 < count).collect();
     let fits: usize = numbers.iter().map(|&n| placings(n, count).len()).sum();
     let (total, mut done) = ((fits + count) as u64, 0);
@@ -338,7 +347,11 @@ impl Rows for SomeRows<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use super::super::gap::Gaps;
     use super::*;
+    use athermal_core::score::TruthTrace;
 
     #[test]
     fn fits_on_a_few_days_come_from_the_whole_recording() {
@@ -348,19 +361,47 @@ mod tests {
         assert_eq!(placings(2, 3), [0, 1]);
     }
 
+    fn at(hours: i64) -> Instant {
+        Instant::from_ns(hours * 3_600_000_000_000)
+    }
+
+    /// With truths at such hours of segments.
+    fn calendar(segments: Vec<Option<(Instant, Instant)>>, truths: &[(u32, i64)]) -> Calendar {
+        let mut trace = Trace::default();
+        trace.truths.push(TruthTrace {
+            slot: 0,
+            times: truths.iter().map(|&(of, hour)| (of, at(hour))).collect(),
+            values: vec![0.0; truths.len()],
+            errors: vec![f64::NAN; truths.len()],
+            persistence: BTreeMap::new(),
+            predictions: Vec::new(),
+        });
+        let observation = Observation {
+            trace,
+            sources: Vec::new(),
+            segments,
+            rows: Gaps::default(),
+            valid: Vec::new(),
+        };
+        Calendar::new(&observation, at(24) - at(0))
+    }
+
     #[test]
     fn a_short_rest_belongs_to_the_day_before_and_a_segment_begins_a_day() {
-        let at = |hours: i64| Instant::from_ns(hours * 3_600_000_000_000);
-        let calendar = Calendar::new(
-            &Observation {
-                trace: Trace::default(),
-                sources: Vec::new(),
-                segments: vec![Some((at(0), at(58))), None, Some((at(0), at(5)))],
-            },
-            at(24) - at(0),
-        );
+        let segments = vec![Some((at(0), at(58))), None, Some((at(0), at(5)))];
+        let calendar = calendar(segments, &[(0, 1), (0, 30), (0, 57), (2, 0)]);
         assert_eq!(calendar.count(), 3);
         assert_eq!(calendar.day_of(0, at(57)), 1);
         assert_eq!(calendar.day_of(2, at(1)), 2);
+    }
+
+    #[test]
+    fn a_day_without_a_truth_is_no_day() {
+        let segments = vec![Some((at(0), at(240)))];
+        let calendar = calendar(segments, &[(0, 1), (0, 25), (0, 239)]);
+        assert_eq!(calendar.count(), 3);
+        assert_eq!(calendar.day_of(0, at(20)), 0);
+        assert_eq!(calendar.day_of(0, at(26)), 1);
+        assert_eq!(calendar.day_of(0, at(230)), 2);
     }
 }

@@ -20,6 +20,8 @@ const MOST_LAGS: i64 = 60;
 const FEWEST_LAGS: i64 = 20;
 /// Instants of the grid, at most.
 const MOST_INSTANTS: i64 = 20_000;
+/// A lag at which fewer than this share of the pairs of others are left is not set against them.
+const SHARE_OF_PAIRS: usize = 4;
 /// Autocorrelations reach so many times further than the lags, since bounds are sums over all of them.
 const REACH: usize = 4;
 
@@ -98,7 +100,9 @@ pub fn lags(
     let Some(interval) = intervals.min().filter(|_| !slots.is_empty()) else {
         return Ok(Vec::new());
     };
-    let longest = Duration::from_ns(observation.length().as_ns() / MOST_INSTANTS);
+    let pause = Duration::from_ns(interval.as_ns().saturating_mul(FEWEST_LAGS));
+    let length = observation.rows.length(pause);
+    let longest = Duration::from_ns(length.as_ns() / MOST_INSTANTS);
     let reach = Duration::from_ns(plan.warm_up.as_ns() / MOST_LAGS);
     let step = interval.max(longest).max(reach).max(Duration::from_ns(1));
     let count = (plan.warm_up.as_ns() / step.as_ns()).clamp(FEWEST_LAGS, MOST_LAGS) as usize;
@@ -166,7 +170,10 @@ fn correlogram(
     let r = cross_correlation(x, y, lag_s.len() / 2);
     let pairs = x.iter().zip(y).filter(|(x, y)| !(*x + *y).is_nan());
     let error = cross_correlation_error(x_smooth, y_smooth, pairs.count());
-    let present = (0..r.len()).filter(|&lag| !r[lag].is_nan() && lag_s[lag] >= from_s);
+    let there = pairs_at(x, y, lag_s.len() / 2);
+    let most = there.iter().copied().max().unwrap_or(0);
+    let counts = |&lag: &usize| SHARE_OF_PAIRS * there[lag] >= most && !r[lag].is_nan();
+    let present = (0..r.len()).filter(|lag| counts(lag) && lag_s[*lag] >= from_s);
     let best = present.max_by(|&a, &b| r[a].abs().total_cmp(&r[b].abs()));
     Correlogram {
         best_lag_s: best.map_or(f64::NAN, |best| lag_s[best]),
@@ -174,6 +181,18 @@ fn correlogram(
         r,
         error,
     }
+}
+
+/// How many pairs of values there are at each lag from `-lags` to `lags`.
+fn pairs_at(x: &[f64], y: &[f64], lags: usize) -> Vec<usize> {
+    let pairs = |x: &[f64], y: &[f64]| {
+        let there = x.iter().zip(y).filter(|(x, y)| !(**x + **y).is_nan());
+        there.count()
+    };
+    let after = |of: &'_ [f64], lag: usize| of.len().min(lag);
+    let lead = (1..=lags).rev().map(|lag| pairs(&x[after(x, lag)..], y));
+    let follow = (0..=lags).map(|lag| pairs(x, &y[after(y, lag)..]));
+    lead.chain(follow).collect()
 }
 
 /// The channels that estimators of a truth are offered, the truth itself left out.
@@ -201,16 +220,16 @@ fn features(plan: &Plan, truth: usize) -> Vec<usize> {
 /// Slots sampled at regular instants.
 struct Grid {
     step: Duration,
-    /// Instants without values between segments, so that no pair reaches across.
+    /// Instants without values between segments, and for longer pauses, so that no pair reaches across.
     apart: usize,
     slots: Vec<usize>,
     max_age: Vec<Duration>,
     held: Vec<(f64, Instant)>,
     next: Option<Instant>,
-    /// For each segment its first instant and where it stands on the grid.
-    begins: Vec<(Instant, usize)>,
+    /// Where each segment, and each part of it after a pause, begins: its segment, its first instant and its place on the grid.
+    begins: Vec<(u32, Instant, usize)>,
     series: Vec<Vec<f64>>,
-    segment: usize,
+    segment: u32,
 }
 
 impl Grid {
@@ -243,20 +262,18 @@ impl Grid {
     fn look(&mut self, engine: &Engine, event: Event) {
         let Event::Row(now) = event else {
             self.held.fill((f64::NAN, Instant::MIN));
-            let empty = self.len() + self.apart;
-            self.series
-                .iter_mut()
-                .for_each(|series| series.resize(empty, f64::NAN));
-            self.next = None;
+            self.stand_apart();
             self.segment += 1;
             return;
         };
+        let longest = Duration::from_ns(self.step.as_ns().saturating_mul(self.apart as i64));
+        if let Some(next) = self.next.filter(|&next| now - next > longest) {
+            self.sample(next + longest);
+            self.stand_apart();
+        }
         if self.next.is_none() {
             self.next = Some(now);
-            // A segment may have no row, and then has no place.
-            let place = (now, self.len());
-            self.begins.resize(self.segment + 1, place);
-            self.begins[self.segment] = place;
+            self.begins.push((self.segment, now, self.len()));
         }
         self.sample(now - Duration::from_ns(1));
         for (held, &slot) in self.held.iter_mut().zip(&self.slots) {
@@ -265,6 +282,15 @@ impl Grid {
             }
         }
         self.sample(now);
+    }
+
+    /// Leaves room before what comes next.
+    fn stand_apart(&mut self) {
+        let empty = self.len() + self.apart;
+        self.series
+            .iter_mut()
+            .for_each(|series| series.resize(empty, f64::NAN));
+        self.next = None;
     }
 
     /// Writes down what is held at every instant of the grid up to one.
@@ -286,7 +312,10 @@ impl Grid {
         let held = own.unwrap_or(self.step).max(self.step);
         let step = self.step.as_ns();
         for (nth, (&(segment, at), &value)) in truth.times.iter().zip(values).enumerate() {
-            let Some(&(begin, place)) = self.begins.get(segment as usize) else {
+            let after = self
+                .begins
+                .partition_point(|of| (of.0, of.1) <= (segment, at));
+            let Some(&(_, begin, place)) = self.begins.get(after.wrapping_sub(1)) else {
                 continue;
             };
             let next = truth.times.get(nth + 1);
@@ -298,7 +327,7 @@ impl Grid {
                 + i64::from((at - begin).as_ns().rem_euclid(step) > 0);
             let end = (until - begin).as_ns().div_euclid(step)
                 + i64::from((until - begin).as_ns().rem_euclid(step) > 0);
-            let room = self.segment_end(segment as usize).min(placed.len());
+            let room = self.end_before(after).min(placed.len());
             let from = (place + first.max(0) as usize).min(room);
             let to = (place + end.max(0) as usize).min(room);
             if from < to {
@@ -308,9 +337,12 @@ impl Grid {
         placed
     }
 
-    fn segment_end(&self, segment: usize) -> usize {
-        let next = self.begins.get(segment + 1);
-        next.map_or(self.len(), |&(_, place)| place.saturating_sub(self.apart))
+    /// Where what begins before another ends.
+    fn end_before(&self, next: usize) -> usize {
+        let next = self.begins.get(next);
+        next.map_or(self.len(), |&(_, _, place)| {
+            place.saturating_sub(self.apart)
+        })
     }
 }
 

@@ -5,18 +5,21 @@
 
 pub mod comparison;
 pub mod day;
+mod gap;
 pub mod lag;
 mod observation;
 mod plot;
 pub mod regressor;
 pub mod residual;
 pub mod response;
+mod rest;
 pub mod sensor;
 pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
 pub use plot::plots;
 pub(crate) use plot::{Picture, response as response_picture, with_truth as truth_picture};
+pub use rest::Untold;
 
 use athermal_core::compile::Plan;
 use athermal_core::fit::FitError;
@@ -44,6 +47,8 @@ pub struct Diagnosis {
     pub designs: Vec<regressor::Design>,
     /// What each sensor contributes.
     pub contributions: Vec<sensor::Contribution>,
+    /// What could not be told of sensors, and which node gave nothing.
+    pub untold: Vec<Untold>,
     /// What fits on some days are worth on others; none where it was not asked for, or there are too few days or too many.
     pub days: Option<day::Days>,
     /// How many days the recording has.
@@ -76,6 +81,29 @@ pub struct Options {
     pub windows: bool,
 }
 
+impl Diagnosis {
+    /// Leaves out what is said of other predictions than those asked for by name, and of truths none of them predicts.
+    pub fn keep_only(&mut self, of: &[String]) {
+        self.residuals.retain(|it| is_asked(&it.prediction, of));
+        let kept = |truth: &str| self.residuals.iter().any(|it| it.truth == truth);
+        self.main.retain(|it| kept(&it.truth));
+        self.lags.retain(|it| kept(&it.truth));
+        self.windows.retain(|it| kept(&it.truth));
+        self.responses.retain(|it| is_asked(&it.node, of));
+        self.designs.retain(|it| is_asked(&it.node, of));
+        self.contributions.retain(|it| is_asked(&it.prediction, of));
+        self.untold
+            .retain(|it| it.estimator.as_ref().is_none_or(|node| is_asked(node, of)));
+        if let Some(days) = &mut self.days {
+            let left_out = days.left_out.iter_mut().map(|it| &mut it.scores);
+            let curve = days.curve.iter_mut().map(|it| &mut it.scores);
+            left_out
+                .chain(curve)
+                .for_each(|scores| scores.retain(|it| is_asked(&it.prediction, of)));
+        }
+    }
+}
+
 /// Diagnoses a model on a recording. `progress` is told how many fits of how many are done.
 ///
 /// # Errors
@@ -98,14 +126,18 @@ pub fn diagnose(
             prediction: plan.channels[of.slot].name.clone(),
         })
     });
+    let (responses, mut untold) = response::answers(model, &observation)?;
+    let (contributions, more) = sensor::contributions(model, recording, &observation)?;
+    untold.extend(more);
     let diagnosis = Diagnosis {
         graph: plan.name.clone().unwrap_or_default(),
         main: main.collect(),
         residuals: residual::residuals(plan, &observation),
         lags: lag::lags(model, recording, &observation, &options.of)?,
-        responses: response::responses(model, &observation)?,
+        responses,
         designs: regressor::designs(model, recording)?,
-        contributions: sensor::contributions(model, recording, &observation)?,
+        contributions,
+        untold,
         days: match options.day {
             Some(day) => day::days(model, recording, &observation, day, progress)?,
             None => None,

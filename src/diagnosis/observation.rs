@@ -8,6 +8,8 @@ use athermal_core::recording::{Event, Recording};
 use athermal_core::score::{Trace, TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
 
+use super::gap::Gaps;
+
 /// A model's pass over a recording.
 #[derive(Debug, Clone)]
 pub struct Observation {
@@ -17,18 +19,24 @@ pub struct Observation {
     pub sources: Vec<SourceStatistics>,
     /// First and last instant of each segment that has a row.
     pub segments: Vec<Option<(Instant, Instant)>>,
+    /// The times between rows, breaks left out.
+    pub(super) rows: Gaps,
+    /// Of each slot, at how many rows it had a value.
+    pub(super) valid: Vec<u64>,
 }
 
 /// What can be said of a measured channel without its course.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SourceStatistics {
     /// Valid samples.
     pub samples: u64,
     /// Their mean.
     pub mean: f64,
     squares: f64,
-    /// The sum and the number of the times between samples.
-    gaps: (Duration, i64),
+    /// The sum of squared differences from one sample to the next.
+    steps: f64,
+    newest: f64,
+    gaps: Gaps,
     last: Option<Instant>,
 }
 
@@ -38,9 +46,18 @@ impl SourceStatistics {
         let before = value - self.mean;
         self.mean += before / self.samples as f64;
         self.squares += before * (value - self.mean);
-        if let Some(last) = self.last.replace(now) {
-            self.gaps = (self.gaps.0 + (now - last), self.gaps.1 + 1);
+        let last = self.last.replace(now);
+        if let Some(last) = last {
+            self.gaps.push(now - last);
+            self.steps += (value - self.newest).powi(2);
         }
+        self.newest = value;
+    }
+
+    /// The noise of single samples: √(mean of squared successive differences / 2) (von Neumann 1941); 0 of less than two.
+    #[must_use]
+    pub fn noise(&self) -> f64 {
+        (self.steps / 2.0 / self.gaps.count().max(1) as f64).sqrt()
     }
 
     /// The standard deviation of the samples; 0 of none.
@@ -49,11 +66,10 @@ impl SourceStatistics {
         (self.squares / self.samples.max(1) as f64).sqrt()
     }
 
-    /// The mean time between samples; none for less than two.
+    /// The median time between samples; none for less than two.
     #[must_use]
     pub fn interval(&self) -> Option<Duration> {
-        let (sum, count) = self.gaps;
-        (count > 0).then(|| Duration::from_ns(sum.as_ns() / count))
+        self.gaps.median()
     }
 }
 
@@ -65,14 +81,20 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
     let count = model.plan.sources.len();
     let mut sources = vec![SourceStatistics::default(); count];
     let mut segments = vec![None];
+    let mut rows = Gaps::default();
+    let mut valid = vec![0; model.plan.channels.len()];
     let mut look = |engine: &Engine, event: Event| match event {
         Event::Segment => {
             segments.push(None);
             sources.iter_mut().for_each(|source| source.last = None);
         }
         Event::Row(now) => {
+            count_valid(engine, &mut valid);
             if let Some(period) = segments.last_mut() {
-                let (from, _) = period.unwrap_or((now, now));
+                let (from, last) = period.unwrap_or((now, now));
+                if period.is_some() {
+                    rows.push(now - last);
+                }
                 *period = Some((from, now));
             }
             for (slot, source) in sources.iter_mut().enumerate() {
@@ -88,24 +110,27 @@ pub fn observe(model: &Model, recording: &dyn Recording) -> Result<Observation, 
         trace,
         sources,
         segments,
+        rows,
+        valid,
     })
 }
 
-impl Observation {
-    /// The mean time between two values of a truth, breaks and gaps of the recording included; none for less than two.
-    pub(super) fn interval(truth: &TruthTrace) -> Option<Duration> {
-        let pairs = truth.times.windows(2);
-        let gaps = pairs.filter(|pair| pair[0].0 == pair[1].0);
-        let (sum, count) = gaps.fold((0, 0), |(sum, count), pair| {
-            (sum + (pair[1].1 - pair[0].1).as_ns(), count + 1)
-        });
-        (count > 0).then(|| Duration::from_ns(sum / count))
+/// Counts each slot that has a value.
+pub(super) fn count_valid(engine: &Engine, valid: &mut [u64]) {
+    for (slot, count) in valid.iter_mut().enumerate() {
+        *count += u64::from(!engine.value(slot).is_nan());
     }
+}
 
-    /// How long the recording is, breaks left out.
-    pub(super) fn length(&self) -> Duration {
-        let each = self.segments.iter().flatten();
-        each.fold(Duration::ZERO, |sum, &(from, to)| sum + (to - from))
+impl Observation {
+    /// A time between two values of a truth so short that nine gaps of ten reach as far, breaks left out; none for less than two.
+    /// Where gaps vary, or many values are missing at random, few fall together within it, and many places are empty instead.
+    pub(super) fn interval(truth: &TruthTrace) -> Option<Duration> {
+        let mut gaps = Gaps::default();
+        for pair in truth.times.windows(2).filter(|of| of[0].0 == of[1].0) {
+            gaps.push(pair[1].1 - pair[0].1);
+        }
+        gaps.quantile(1, 10)
     }
 }
 

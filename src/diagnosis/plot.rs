@@ -225,14 +225,20 @@ fn autocorrelation(of: &Residuals) -> Picture {
         label: label.to_owned(),
         mark: Mark::Line,
     };
+    let known = x.iter().zip(&of.autocorrelation);
+    let known = known.filter(|(_, r)| !r.is_nan());
+    let (at, r) = known.unzip();
     let bars = Points {
-        x: x.clone(),
-        y: of.autocorrelation.clone(),
+        x: at,
+        y: r,
         class: "c2",
         label: String::new(),
         mark: Mark::Bars,
     };
-    let (above, below) = (bound(1.0, "95 % of a white series"), bound(-1.0, ""));
+    let (above, below) = (
+        bound(1.0, "95 %, if there is none from that lag on"),
+        bound(-1.0, ""),
+    );
     Picture {
         title: format!("Autocorrelation of the residuals of {}", of.prediction),
         x_label: format!("lag in {}", unit.name),

@@ -1,12 +1,15 @@
 //! Decides whether what predictions leave of a truth is white, so that nothing in its own past could still improve them.
 //!
 //! Truths over windows that overlap share noise, and forecasts made before the last error was known repeat it. So residuals are
-//! taken one per window or horizon, whichever is longer: those of a perfect model are white, and others are not.
+//! taken one per window or horizon, whichever is longer: those of a perfect model are white, and others are not. Where truths are
+//! missing, their places stay empty, and only pairs that are there tell of a lag.
 
 use athermal_core::compile::Plan;
 use athermal_core::score::{PredictionTrace, TruthTrace};
-use athermal_core::time::Duration;
-use athermal_numerics::{NORMAL_95, autocorrelation, autocorrelation_errors, ljung_box};
+use athermal_core::time::{Duration, Instant};
+use athermal_numerics::{
+    NORMAL_95, autocorrelation, autocorrelation_errors, autocorrelation_pairs, ljung_box,
+};
 use serde::Serialize;
 
 use super::observation::Observation;
@@ -15,7 +18,7 @@ use super::observation::Observation;
 const MOST_LAGS: usize = 20;
 const SHARE: usize = 5;
 /// A series is called white unless it would be as unlikely as this.
-const UNLIKELY: f64 = 0.01;
+pub const UNLIKELY: f64 = 0.01;
 
 /// The residuals of a prediction: measured less predicted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -36,22 +39,19 @@ pub struct Residuals {
     pub spacing_s: f64,
     /// How many these are.
     pub spaced: usize,
-    /// Their autocorrelation from lag 1 on; empty where there are too few.
+    /// Their autocorrelation from lag 1 on; empty where there are too few, and NaN (null in JSON) at a lag with too few pairs.
     pub autocorrelation: Vec<f64>,
-    /// Half the width of the band about zero that holds 95 % of the autocorrelations of a white series, for each lag.
+    /// Half the width of the band about zero that holds 95 % of the autocorrelations at each lag of a series that has none from
+    /// that lag on (Bartlett 1946): of a white one at lag 1, and wider beyond where there is some before.
     pub bound: Vec<f64>,
     /// The statistic of Ljung and Box over all these lags, and how likely a white series has one as large.
     pub ljung_box: Option<f64>,
     /// See `ljung_box`.
     pub p_value: Option<f64>,
-}
-
-impl Residuals {
-    /// Whether they may be white; none where there are too few to say.
-    #[must_use]
-    pub fn white(&self) -> Option<bool> {
-        self.p_value.map(|p| p >= UNLIKELY)
-    }
+    /// Whether they may be white, `p_value` not being below `level`; none where there are too few to say.
+    pub white: Option<bool>,
+    /// The p-value below which they are called not white.
+    pub level: f64,
 }
 
 /// The residuals of every prediction of a model.
@@ -79,16 +79,16 @@ fn of_prediction(
     let present: Vec<f64> = left.iter().copied().filter(|e| !e.is_nan()).collect();
     let count = present.len();
     let span = plan.channels[truth.slot].channel.span;
-    let interval = Observation::interval(truth).unwrap_or(Duration::ZERO);
-    // Intervals of a truth vary about their mean, and a place without one would be a gap.
-    let spacing = span.max(of.ahead).max(interval);
-    let spaced = spaced(observation, truth, &left, spacing);
+    let apart = span.max(of.ahead);
+    let spacing = apart.max(Observation::interval(truth).unwrap_or(Duration::ZERO));
+    let spaced = spaced(observation, truth, &left, (spacing, apart));
     let number = spaced.iter().filter(|e| !e.is_nan()).count();
     let lags = MOST_LAGS.min(number / SHARE);
     let correlation = autocorrelation(&spaced, lags);
-    let errors = autocorrelation_errors(&correlation, number);
-    let whiteness = ljung_box(&correlation, number);
-    let last = whiteness.last().filter(|of| of.statistic.is_finite());
+    let pairs = autocorrelation_pairs(&spaced, lags);
+    let errors = autocorrelation_errors(&correlation, &pairs);
+    let whiteness = ljung_box(&correlation, &pairs);
+    let last = whiteness.last().filter(|of| !of.p_value.is_nan());
     let truth = &plan.channels[truth.slot];
     Residuals {
         prediction: plan.channels[of.slot].name.clone(),
@@ -103,36 +103,43 @@ fn of_prediction(
         bound: errors.iter().map(|error| NORMAL_95 * error).collect(),
         ljung_box: last.map(|of| of.statistic),
         p_value: last.map(|of| of.p_value),
+        white: last.map(|of| of.p_value >= UNLIKELY),
+        level: UNLIKELY,
     }
 }
 
-/// The first value of every stretch of `spacing`; NaN where there is none. Segments stand far apart.
+/// The first value of every stretch of `spacing`, none nearer than `apart` to the one before; NaN where there is none. Segments
+/// stand far apart, and no pause is longer than the longest lag.
 fn spaced(
     observation: &Observation,
     truth: &TruthTrace,
     values: &[f64],
-    spacing: Duration,
+    (spacing, apart): (Duration, Duration),
 ) -> Vec<f64> {
     let mut spaced: Vec<f64> = Vec::new();
-    let (mut begin, mut segment, mut last) = (0, None, None);
+    // Of the last value that was taken: its segment, instant and place since the segment began.
+    let mut last: Option<(u32, Instant, i64)> = None;
     for (&(of, at), &value) in truth.times.iter().zip(values) {
-        let Some((first, _)) = observation.segments.get(of as usize).copied().flatten() else {
+        let first = observation.segments.get(of as usize).copied().flatten();
+        let Some((first, _)) = first.filter(|_| !value.is_nan()) else {
             continue;
         };
-        if segment != Some(of) {
-            begin = spaced.len() + usize::from(segment.is_some()) * MOST_LAGS;
-            (segment, last) = (Some(of), None);
-        }
-        // Two neighbours must not be nearer than the spacing, so a place is taken by its first value only if the one
-        // before is far enough away.
-        if value.is_nan() || last.is_some_and(|last| at - last < spacing) {
-            continue;
-        }
-        // Nothing is spaced where each segment has one truth at most, at an instant and of no horizon.
-        let place = (at - first).as_ns().checked_div(spacing.as_ns());
-        let place = place.unwrap_or(0) as usize;
-        last = Some(at);
-        spaced.resize((begin + place).max(spaced.len()), f64::NAN);
+        // Instants lie in the middle of places, so that small shifts of a regular one change nothing. Nothing is spaced where
+        // each segment has one truth at most, at an instant and of no horizon.
+        let since = (at - first).as_ns() + spacing.as_ns() / 2;
+        let place = since.checked_div(spacing.as_ns()).unwrap_or(0);
+        let empty = match last {
+            Some((before, then, taken)) if before == of => {
+                if place <= taken || at - then < apart {
+                    continue;
+                }
+                (place - taken - 1).min(MOST_LAGS as i64)
+            }
+            Some(_) => MOST_LAGS as i64,
+            None => 0,
+        };
+        last = Some((of, at, place));
+        spaced.resize(spaced.len() + empty as usize, f64::NAN);
         spaced.push(value);
     }
     spaced

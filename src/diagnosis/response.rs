@@ -3,9 +3,12 @@
 //! The impulse response of a linear estimator is `Γ = Σ c_k e_k`, its coefficients times what each feature makes of an impulse
 //! (Mandelli, Dankwart and Napoli, section 3.2). It is found by asking the graph itself: all sensors rest at their means, one of
 //! them steps, and the engine runs. So it holds for whatever features a graph has, lags and other frames included, and for an
-//! estimator that is not linear it is the answer to a change of one standard deviation. Estimators that read or follow past
-//! truths run freely, on their own predictions: truths that rest while a sensor steps would tell them that nothing has happened,
-//! and what is asked for is the transfer function of the model, not of a predictor that is contradicted.
+//! estimator that is not linear it is the answer to a change of one standard deviation. Where a node that watches sensors lets
+//! that not through, the change is a hundredth of it, or less, and sensors rest as the module `rest` says.
+//!
+//! Estimators that read or follow past truths run freely, on their own predictions: truths that rest while a sensor steps would tell
+//! them that nothing has happened, and what is asked for is the transfer function of the model, not of a predictor that is
+//! contradicted.
 
 use std::sync::Arc;
 
@@ -18,9 +21,12 @@ use serde::Serialize;
 
 use super::observation::Observation;
 use super::of_truths;
+use super::rest::{Rest, Untold, silent};
 
 /// Instants of a response, at most.
 const MOST_INSTANTS: i64 = 2_000;
+/// A step that a watch does not let through is tried again at these shares of its size.
+const SMALLER: [f64; 3] = [1.0, 1e-2, 1e-4];
 /// A step response below this share of the largest of its estimator is none.
 const NOTHING: f64 = 1e-9;
 /// A step response that ends above this share of its largest value has not come back to nothing.
@@ -90,6 +96,14 @@ impl Response {
 /// # Errors
 /// When the fit does not belong to the graph.
 pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Responses>, FitError> {
+    Ok(answers(model, observation)?.0)
+}
+
+/// The responses, and those that are not known although the estimator uses something.
+pub(super) fn answers(
+    model: &Model,
+    observation: &Observation,
+) -> Result<(Vec<Responses>, Vec<Untold>), FitError> {
     let plan = &*model.plan;
     let estimators: Vec<usize> = (0..plan.nodes.len())
         .filter(|&node| matches!(plan.nodes[node].role, PlannedRole::Estimator { .. }))
@@ -100,15 +114,38 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
         .collect();
     let of_truth = of_truths(plan);
     let Some(mut probe) = Probe::new(model, observation, &slots)? else {
-        return Ok(Vec::new());
+        return Ok(Default::default());
     };
+    let uses = |node: usize| {
+        let fitted = model.fitted.get(&plan.nodes[node].instance());
+        fitted.is_some_and(|of| !of.uses().is_empty())
+    };
+    let mut untold = Vec::new();
+    for (&node, &slot) in estimators.iter().zip(&slots) {
+        if uses(node) && probe.resting.value(slot).is_nan() {
+            untold.push(Untold {
+                sensor: None,
+                estimator: Some(plan.nodes[node].instance()),
+                silent: silent(plan, &probe.resting, slot),
+            });
+        }
+    }
     let mut sensors: Vec<Vec<Response>> = vec![Vec::new(); slots.len()];
     for source in (0..plan.sources.len()).filter(|&source| !of_truth[source]) {
         let size = match observation.sources[source].deviation() {
             spread if spread > 0.0 => spread,
             _ => continue,
         };
-        let answers = probe.run(source, size)?;
+        let (answers, size, lost) = probe.run_somehow(source, size)?;
+        for (nth, silent) in lost {
+            if uses(estimators[nth]) {
+                untold.push(Untold {
+                    sensor: Some(plan.sources[source].name.clone()),
+                    estimator: Some(plan.nodes[estimators[nth]].instance()),
+                    silent,
+                });
+            }
+        }
         for (nth, [up, down]) in answers.iter().enumerate() {
             let ahead = plan.channels[slots[nth]].channel.ahead;
             let answer = Answer {
@@ -141,8 +178,12 @@ pub fn responses(model: &Model, observation: &Observation) -> Result<Vec<Respons
             sensors,
         }
     });
-    Ok(facts.filter(|of| !of.sensors.is_empty()).collect())
+    let facts = facts.filter(|of| !of.sensors.is_empty());
+    Ok((facts.collect(), untold))
 }
+
+/// Which of the slots that are followed fell silent, each with the first node that gave nothing.
+type Lost = Vec<(usize, String)>;
 
 /// A graph at rest that is about to be disturbed.
 struct Probe<'a> {
@@ -178,9 +219,30 @@ impl<'a> Probe<'a> {
             .iter()
             .map(|of| if of.samples > 0 { of.mean } else { f64::NAN });
         let rest: Vec<f64> = rest.collect();
-        let clock = Clock { step, ticks };
+        // The stillest rest at which as many have a value as at any.
+        let mut best: Option<(usize, Clock, Engine)> = None;
+        for kind in Rest::ALL {
+            let aside = sources.iter().map(|of| kind.to_either_side(of)).collect();
+            let clock = Clock {
+                step,
+                ticks,
+                aside: Arc::new(aside),
+            };
+            let resting = clock.engine_at_rest(model, &rest)?;
+            let valid = slots.iter().filter(|&&slot| !resting.value(slot).is_nan());
+            let valid = valid.count();
+            if best.as_ref().is_none_or(|(most, ..)| valid > *most) {
+                best = Some((valid, clock, resting));
+            }
+            if valid == slots.len() {
+                break;
+            }
+        }
+        let Some((_, clock, resting)) = best else {
+            return Ok(None);
+        };
         Ok(Some(Self {
-            resting: clock.engine_at_rest(model, &rest)?,
+            resting,
             undisturbed: Vec::new(),
             model,
             slots,
@@ -200,9 +262,34 @@ impl<'a> Probe<'a> {
         Ok(&self.undisturbed[tick])
     }
 
+    /// The answers to a step of `size`, or of a smaller one where that is let through; with its size, and of each slot that fell
+    /// silent the first node that gave nothing.
+    fn run_somehow(
+        &mut self,
+        source: usize,
+        size: f64,
+    ) -> Result<(Vec<[Course; 2]>, f64, Lost), EngineError> {
+        let mut best: Option<(Vec<[Course; 2]>, f64, Lost)> = None;
+        for share in SMALLER {
+            let (found, lost) = self.run(source, share * size)?;
+            let fewer = best
+                .as_ref()
+                .is_none_or(|(.., fewest)| lost.len() < fewest.len());
+            let none = lost.is_empty();
+            if fewer {
+                best = Some((found, share * size, lost));
+            }
+            if none {
+                break;
+            }
+        }
+        Ok(best.unwrap_or_default())
+    }
+
     /// How the slots change from the instant on at which a source steps up and down by `size`, tick by tick, against a run in which
-    /// it rests; NaN where there is no value.
-    fn run(&mut self, source: usize, size: f64) -> Result<Vec<[Course; 2]>, EngineError> {
+    /// it rests; NaN where there is no value. And of each slot that thereby lost its value the first node that gave nothing.
+    fn run(&mut self, source: usize, size: f64) -> Result<(Vec<[Course; 2]>, Lost), EngineError> {
+        let mut lost: Lost = Lost::new();
         let mut runs = Vec::new();
         for change in [size, -size] {
             let mut samples = self.rest.clone();
@@ -210,35 +297,41 @@ impl<'a> Probe<'a> {
             runs.push((self.clock.engine_at_rest(self.model, &self.rest)?, samples));
         }
         let mut found = vec![<[Course; 2]>::default(); self.slots.len()];
-        let (clock, slots) = (self.clock, self.slots);
+        let (clock, slots, model) = (self.clock.clone(), self.slots, self.model);
         for tick in 0..MOST_INSTANTS {
             let undisturbed = self.undisturbed(tick as usize)?;
             for (side, (engine, samples)) in runs.iter_mut().enumerate() {
                 clock.advance(engine, tick, samples)?;
                 let slots = slots.iter().zip(undisturbed);
-                for ((&slot, rest), courses) in slots.zip(&mut found) {
+                for (nth, ((&slot, rest), courses)) in slots.zip(&mut found).enumerate() {
                     courses[side].push(engine.value(slot) - rest);
+                    let is_lost = engine.value(slot).is_nan() && !rest.is_nan();
+                    if is_lost && lost.iter().all(|of| of.0 != nth) {
+                        lost.push((nth, silent(&model.plan, engine, slot)));
+                    }
                 }
             }
             if tick >= clock.ticks && found.iter().flatten().all(Course::is_at_rest) {
                 break;
             }
         }
-        Ok(found)
+        Ok((found, lost))
     }
 }
 
 /// When the ticks are; that of the step is 0.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Clock {
     step: Duration,
     /// So many at rest, and at least as many after the step.
     ticks: i64,
+    /// By how much each channel goes to either side of what it is, tick by tick.
+    aside: Arc<Vec<f64>>,
 }
 
 impl Clock {
     /// An engine that has seen all sensors at rest until the tick before the step.
-    fn engine_at_rest(self, model: &Model, rest: &[f64]) -> Result<Engine, EngineError> {
+    fn engine_at_rest(&self, model: &Model, rest: &[f64]) -> Result<Engine, EngineError> {
         let mut engine = Engine::new(Arc::clone(&model.plan), &model.fitted)?;
         // Nothing has been measured that could be learned from.
         engine.freeze(true);
@@ -249,9 +342,12 @@ impl Clock {
         Ok(engine)
     }
 
-    fn advance(self, engine: &mut Engine, tick: i64, samples: &[f64]) -> Result<(), EngineError> {
+    fn advance(&self, engine: &mut Engine, tick: i64, samples: &[f64]) -> Result<(), EngineError> {
         let at = Instant::from_ns((self.ticks + tick) * self.step.as_ns());
-        engine.step(at, samples).map(|_| ())
+        let side = if tick.rem_euclid(2) == 0 { 1.0 } else { -1.0 };
+        let samples = samples.iter().zip(&*self.aside);
+        let samples: Vec<f64> = samples.map(|(value, aside)| value + side * aside).collect();
+        engine.step(at, &samples).map(|_| ())
     }
 }
 

@@ -4,14 +4,19 @@
 //! voters is seen to do so. Nothing is fitted anew: a sensor that others could replace after a fit still contributes.
 
 use athermal_core::compile::Plan;
+use athermal_core::engine::Engine;
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
 use athermal_core::recording::{Event, Recording, RecordingError, Rows};
-use athermal_core::score::{PredictionTrace, trace};
+use athermal_core::score::{PredictionTrace, Trace, trace};
 use serde::Serialize;
 
-use super::observation::Observation;
+use super::observation::{Observation, count_valid};
 use super::of_truths;
+use super::rest::{Rest, Untold, name};
+
+/// A node that has a value at less than this share of its rows when a sensor rests has fallen silent.
+const STILL_THERE: f64 = 0.9;
 
 /// What a sensor contributes to a prediction.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,7 +35,7 @@ pub struct Contribution {
     pub rmse_at_rest: f64,
 }
 
-/// What every sensor contributes to every prediction; measured channels of which truths are made are not taken for sensors.
+/// What every sensor contributes to every prediction, and of which it cannot be told; measured channels of which truths are made are not taken for sensors.
 ///
 /// # Errors
 /// When the recording cannot be read, or the fit does not belong to the graph.
@@ -38,20 +43,23 @@ pub fn contributions(
     model: &Model,
     recording: &dyn Recording,
     observation: &Observation,
-) -> Result<Vec<Contribution>, FitError> {
+) -> Result<(Vec<Contribution>, Vec<Untold>), FitError> {
     let plan = &*model.plan;
     let of_truth = of_truths(plan);
-    let mut contributions = Vec::new();
+    let (mut contributions, mut untold) = (Vec::new(), Vec::new());
     for source in (0..plan.sources.len()).filter(|&source| !of_truth[source]) {
         if observation.sources[source].samples == 0 {
             continue;
         }
-        let resting = AtRest {
-            recording,
-            source,
-            mean: observation.sources[source].mean,
-        };
-        let rested = trace(&model.plan, &model.fitted, &resting, &mut |_, _| {})?;
+        let (rested, silent) = rested(model, recording, observation, source)?;
+        if let Some(slot) = silent {
+            untold.push(Untold {
+                sensor: Some(plan.sources[source].name.clone()),
+                estimator: None,
+                silent: name(plan, slot),
+            });
+            continue;
+        }
         let truths = observation.trace.truths.iter().zip(&rested.truths);
         for (truth, rested) in truths {
             let predictions = truth.predictions.iter().zip(&rested.predictions);
@@ -60,7 +68,41 @@ pub fn contributions(
             }));
         }
     }
-    Ok(contributions)
+    Ok((contributions, untold))
+}
+
+/// A pass with a sensor at rest, as still as no node falls silent by it; or else the first slot that does.
+fn rested(
+    model: &Model,
+    recording: &dyn Recording,
+    observation: &Observation,
+    source: usize,
+) -> Result<(Trace, Option<usize>), FitError> {
+    let statistics = &observation.sources[source];
+    let mut first = None;
+    for rest in Rest::ALL {
+        let resting = AtRest {
+            recording,
+            source,
+            mean: statistics.mean,
+            to_either_side: rest.to_either_side(statistics),
+        };
+        let mut valid = vec![0; observation.valid.len()];
+        let mut look = |engine: &Engine, event: Event| {
+            if let Event::Row(_) = event {
+                count_valid(engine, &mut valid);
+            }
+        };
+        let trace = trace(&model.plan, &model.fitted, &resting, &mut look)?;
+        let pairs = valid.iter().zip(&observation.valid);
+        let mut fewer = pairs.map(|(&now, &then)| (now as f64) < STILL_THERE * then as f64);
+        let silent = fewer.position(|fewer| fewer);
+        if silent.is_none() {
+            return Ok((trace, None));
+        }
+        first.get_or_insert((trace, silent));
+    }
+    Ok(first.unwrap_or_default())
 }
 
 /// None where the two have no instant in common, or the sensor changes nothing.
@@ -92,17 +134,20 @@ fn contribution(
     })
 }
 
-/// A recording in which a channel stays at one value, at the instants at which it was measured.
+/// A recording in which a channel stays at its mean, or alternates about it, at the instants at which it was measured.
 struct AtRest<'a> {
     recording: &'a dyn Recording,
     source: usize,
     mean: f64,
+    to_either_side: f64,
 }
 
 struct RowsAtRest<'a> {
     rows: Box<dyn Rows + 'a>,
     source: usize,
     mean: f64,
+    /// By how much the next value lies from the mean.
+    next: f64,
 }
 
 impl Recording for AtRest<'_> {
@@ -111,6 +156,7 @@ impl Recording for AtRest<'_> {
             rows: self.recording.open(plan)?,
             source: self.source,
             mean: self.mean,
+            next: self.to_either_side,
         }))
     }
 }
@@ -119,7 +165,8 @@ impl Rows for RowsAtRest<'_> {
     fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
         let event = self.rows.next(values)?;
         if matches!(event, Some(Event::Row(_))) && !values[self.source].is_nan() {
-            values[self.source] = self.mean;
+            values[self.source] = self.mean + self.next;
+            self.next = -self.next;
         }
         Ok(event)
     }

@@ -99,6 +99,13 @@ pub fn windows(model: &Model, recording: &dyn Recording) -> Result<Vec<Windows>,
     Ok(facts.collect())
 }
 
+/// Whether any truth that is predicted is a slope, and so has a window.
+#[must_use]
+pub fn any(plan: &Plan) -> bool {
+    let mut truths = plan.channels.iter().filter_map(|of| of.predicts);
+    truths.any(|truth| measured_by(plan, truth).is_some())
+}
+
 fn widths(segments: &[Measured], own_s: f64, factor: f64) -> Vec<Width> {
     let long = segments.iter().filter(|of| of.time_s.len() > 1);
     let (mut length, mut count) = (0.0, 0.0);

@@ -4,56 +4,86 @@
 /// The factor of a standard error that covers 95 % of a normal distribution.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// The autocorrelation at lags 0 to `lags`: `Σ (x_i − x̄)(x_{i+k} − x̄) / Σ (x_i − x̄)²` (Box and Jenkins 1976, section 2.1.5). A
-/// constant series has none: NaN throughout.
+/// A lag of a series with gaps tells something from so many pairs on, or from all that a series without gaps would have.
+const FEWEST_PAIRS: usize = 10;
+
+/// The autocorrelation at lags 0 to `lags`: `Σ (x_i − x̄)(x_{i+k} − x̄) / Σ (x_i − x̄)²` (Box and Jenkins 1976, section 2.1.5), the
+/// sum of `m_k` pairs times `(n − k) / m_k` where values are missing, since a pair that is not there tells nothing of its product
+/// (Parzen 1963). NaN at lags of fewer than ten pairs, and throughout for a constant series.
 #[must_use]
 pub fn autocorrelation(x: &[f64], lags: usize) -> Vec<f64> {
     let about = about_mean(x);
     let spread: f64 = about.iter().map(|d| d * d).sum();
+    let pairs = autocorrelation_pairs(x, lags);
     (0..=lags)
         .map(|lag| {
+            let all = pairs[0].saturating_sub(lag);
+            if pairs[lag] < FEWEST_PAIRS.min(all) {
+                return f64::NAN;
+            }
             let products = about.iter().zip(after(&about, lag)).map(|(a, b)| a * b);
-            products.sum::<f64>() / spread
+            let missing = if all == pairs[lag] {
+                1.0
+            } else {
+                all as f64 / pairs[lag] as f64
+            };
+            products.sum::<f64>() / spread * missing
         })
         .collect()
 }
 
-/// The standard error of the autocorrelation at each lag from 1 on, were it zero from that lag on, of `count` values
-/// (Bartlett 1946): `√((1 + 2 Σ_{j<k} r_j²) / n)`. `correlation` begins with lag 0.
+/// How many pairs of values each lag from 0 to `lags` has; of lag 0, how many values there are.
 #[must_use]
-pub fn autocorrelation_errors(correlation: &[f64], count: usize) -> Vec<f64> {
+pub fn autocorrelation_pairs(x: &[f64], lags: usize) -> Vec<usize> {
+    let pairs = |lag: usize| x.iter().zip(after(x, lag));
+    let there = |lag: usize| pairs(lag).filter(|(a, b)| !a.is_nan() && !b.is_nan());
+    (0..=lags).map(|lag| there(lag).count()).collect()
+}
+
+/// The standard error of the autocorrelation at each lag from 1 on, were it zero from that lag on (Bartlett 1946):
+/// `√((1 + 2 Σ_{j<k} r_j²) / n)`, times `√((n − k) / m_k)` where only `m_k` pairs are there. Both begin with lag 0.
+#[must_use]
+pub fn autocorrelation_errors(correlation: &[f64], pairs: &[usize]) -> Vec<f64> {
+    let count = pairs.first().copied().unwrap_or(0);
     let mut inflation = 1.0;
-    let tail = correlation.get(1..).unwrap_or_default();
-    tail.iter()
-        .map(|r| {
-            let error = (inflation / count as f64).sqrt();
-            inflation += 2.0 * r * r;
-            error
-        })
-        .collect()
+    let lags = correlation.iter().zip(pairs).enumerate().skip(1);
+    lags.map(|(lag, (r, &there))| {
+        let missing = (count as f64 - lag as f64) / there as f64;
+        let missing = if missing.is_finite() { missing } else { 1.0 };
+        let error = (inflation / count as f64 * missing).sqrt();
+        inflation += if r.is_nan() { 0.0 } else { 2.0 * r * r };
+        error
+    })
+    .collect()
 }
 
 /// The statistic of Ljung and Box (1978) over the lags up to one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LjungBox {
-    /// `Q = n (n + 2) Σ_{k ≤ lag} r_k² / (n − k)`.
+    /// `Q = n (n + 2) Σ_{k ≤ lag} r_k² / (n − k)`, each summand times `m_k / (n − k)` where only `m_k` pairs are there: so each has
+    /// a mean of about one, as in a series without gaps (after Stoffer and Toloi 1992).
     pub statistic: f64,
-    /// How likely a white series has a `Q` as large: the upper tail of `χ²` with as many degrees of freedom as lags.
+    /// How likely a white series has a `Q` as large: the upper tail of `χ²` with as many degrees of freedom as lags that have a
+    /// correlation.
     pub p_value: f64,
 }
 
-/// The statistic of Ljung and Box for each lag from 1 on, of `count` values. `correlation` begins with lag 0.
+/// The statistic of Ljung and Box for each lag from 1 on. Both begin with lag 0; a lag without a correlation adds nothing.
 #[must_use]
-pub fn ljung_box(correlation: &[f64], count: usize) -> Vec<LjungBox> {
-    let n = count as f64;
-    let mut sum = 0.0;
-    let lags = correlation.iter().enumerate().skip(1);
-    lags.map(|(lag, r)| {
-        sum += r * r / (n - lag as f64);
+pub fn ljung_box(correlation: &[f64], pairs: &[usize]) -> Vec<LjungBox> {
+    let n = pairs.first().copied().unwrap_or(0) as f64;
+    let (mut sum, mut degrees) = (0.0, 0);
+    let lags = correlation.iter().zip(pairs).enumerate().skip(1);
+    lags.map(|(lag, (r, &there))| {
+        if !r.is_nan() {
+            let all = n - lag as f64;
+            sum += r * r / all * (there as f64 / all);
+            degrees += 1;
+        }
         let statistic = n * (n + 2.0) * sum;
         LjungBox {
             statistic,
-            p_value: chi_squared_tail(statistic, lag),
+            p_value: chi_squared_tail(statistic, degrees),
         }
     })
     .collect()
@@ -122,6 +152,7 @@ fn pearson(x: &[f64], y: &[f64]) -> f64 {
 #[must_use]
 pub fn cross_correlation_error(x: &[f64], y: &[f64], pairs: usize) -> f64 {
     let products = x.iter().zip(y).skip(1).map(|(a, b)| a * b);
+    let products = products.filter(|product| !product.is_nan());
     let inflation = 1.0 + 2.0 * products.sum::<f64>();
     (inflation.max(1.0) / pairs as f64).sqrt()
 }
@@ -175,8 +206,9 @@ mod tests {
         for series in ["ar2", "white"] {
             let x = column("acf_ljungbox/input.csv", series).unwrap();
             let found = autocorrelation(&x, 30);
-            let errors = autocorrelation_errors(&found, x.len());
-            let whiteness = ljung_box(&found, x.len());
+            let pairs = autocorrelation_pairs(&x, 30);
+            let errors = autocorrelation_errors(&found, &pairs);
+            let whiteness = ljung_box(&found, &pairs);
             let rows = expected.records.iter().zip(&numbers);
             let mut compared = 0;
             for (_, row) in rows.filter(|(record, _)| record[0] == series) {
@@ -220,12 +252,66 @@ mod tests {
     }
 
     #[test]
-    fn autocorrelation_is_that_of_the_definition_and_gaps_do_not_count() {
+    fn autocorrelation_is_that_of_the_definition() {
         // Mean 0: squares add up to 10, neighbours to 1·2 + 2·(−2) + (−2)·(−1) = 0, next but one to −2 − 2 = −4.
         let found = autocorrelation(&[1.0, 2.0, -2.0, -1.0], 3);
         assert_eq!(found, [1.0, 0.0, -0.4, -0.1]);
-        let with_gap = autocorrelation(&[1.0, 2.0, f64::NAN, -2.0, -1.0], 2);
-        assert_eq!(with_gap, [1.0, 0.4, -0.4]);
+        assert_eq!(
+            autocorrelation_pairs(&[1.0, 2.0, f64::NAN, 3.0], 3),
+            [3, 1, 1, 1]
+        );
+    }
+
+    #[test]
+    fn a_series_with_gaps_has_the_correlation_of_the_pairs_that_are_there() {
+        // 1, 1, −1, −1 again and again, of which every third value is missing: neighbours are as often alike as not, and
+        // next but one are opposite.
+        let wave: Vec<f64> = (0..1200)
+            .map(|i| match i % 3 {
+                0 => f64::NAN,
+                _ if i % 4 < 2 => 1.0,
+                _ => -1.0,
+            })
+            .collect();
+        let (found, pairs) = (autocorrelation(&wave, 4), autocorrelation_pairs(&wave, 4));
+        assert_eq!(pairs[0], 800);
+        close(found[2], -(800.0 - 2.0) / 800.0, 1e-12);
+        close(found[4], (800.0 - 4.0) / 800.0, 1e-12);
+        // Nine pairs tell nothing where there could be more.
+        let lonely: Vec<f64> = (0..40)
+            .map(|i| {
+                if i < 10 || i % 2 == 0 {
+                    f64::from(i % 7)
+                } else {
+                    f64::NAN
+                }
+            })
+            .collect();
+        assert_eq!(autocorrelation_pairs(&lonely, 1)[1], 10);
+        assert!(!autocorrelation(&lonely, 1)[1].is_nan());
+        assert!(autocorrelation(&lonely[1..], 1)[1].is_nan());
+    }
+
+    #[test]
+    fn white_noise_with_gaps_has_a_statistic_near_its_degrees_of_freedom() {
+        // The bits of a multiplicative hash stand in for noise.
+        let hash = |i: u64| {
+            (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (i << 7)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
+                >> 11
+        };
+        let noise = |i: u64| hash(i) as f64 / 2.0_f64.powi(53) - 0.5;
+        let mut sum = 0.0;
+        for seed in 0..50 {
+            let value = |i: u64| noise(1_000_000 * seed + i);
+            let there = |i: u64| hash(7_000_000 + 31 * seed + 100 * i).is_multiple_of(4);
+            let x: Vec<f64> = (0..1500)
+                .map(|i| if there(i) { value(i) } else { f64::NAN })
+                .collect();
+            let (r, pairs) = (autocorrelation(&x, 20), autocorrelation_pairs(&x, 20));
+            sum += ljung_box(&r, &pairs).last().unwrap().statistic;
+        }
+        // χ² of 20 degrees of freedom has a standard deviation of √40, and the mean of 50 one of 0.9.
+        close(sum / 50.0, 20.0, 2.7);
     }
 
     #[test]

@@ -56,8 +56,8 @@ pub use blocks::{BLOCK_ROWS, DEFAULT_ROW_MEMORY, GramBlocks, Rows};
 pub use change::{Adwin, AdwinOptions, MeanChange, PageHinkley, PageHinkleyOptions};
 pub use collinearity::Collinearity;
 pub use correlation::{
-    LjungBox, NORMAL_95, autocorrelation, autocorrelation_errors, cross_correlation,
-    cross_correlation_error, ljung_box,
+    LjungBox, NORMAL_95, autocorrelation, autocorrelation_errors, autocorrelation_pairs,
+    cross_correlation, cross_correlation_error, ljung_box,
 };
 pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;

@@ -8,7 +8,9 @@ use std::path::PathBuf;
 
 use athermal::Duration;
 use athermal::core::compile::{Plan, Wanted};
-use athermal::diagnosis::{Diagnosis, Options, day, diagnose, is_called, plots};
+use athermal::diagnosis::{
+    Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
+};
 use clap::Args;
 use serde_json::json;
 
@@ -20,7 +22,7 @@ use tables::Tables;
 
 /// Show why a model predicts as well as it does, and what would make it better
 ///
-/// Tells whether what predictions leave is white; which features say something of the truth, at which lag, and of what
+/// Tells whether what predictions leave is white (p of Ljung and Box not below 0.01); which features say something of the truth, at which lag, and of what
 /// predictions leave; how each estimator answers a change of each sensor; how well the data determine it; what each sensor
 /// contributes; and, by fits of its own on the data, how well each day is predicted from the others and how many days are
 /// needed.
@@ -89,18 +91,25 @@ impl Diagnose {
         if terminal.format == Format::Json {
             let files = dataset.paths().iter();
             let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
-            println!("{:#}", json!({ "data": files, "diagnosis": diagnosis }));
+            let mut asked = diagnosis.clone();
+            asked.keep_only(&self.of);
+            println!("{:#}", json!({ "data": files, "diagnosis": asked }));
         } else {
             print!("{}", tables.text());
         }
         let trace = &observation.trace;
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
         self.tell(terminal, &diagnosis);
+        tell_empty(terminal, &model.plan, &diagnosis, &observation);
+        let drifts = window::any(&model.plan);
+        if self.window && !drifts {
+            terminal.note("--window shows nothing, since no truth is a slope");
+        }
         if let Some(folder) = &self.plots {
             write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
         }
         if terminal.format == Format::Table
-            && let Some(next) = self.next(&tables)
+            && let Some(next) = self.next(&tables, drifts)
         {
             terminal.note(format_args!("\n{next}"));
         }
@@ -142,5 +151,29 @@ impl Diagnose {
             "{graph} predicts nothing called `{unknown}`; there are {}",
             known.join(", ")
         )))
+    }
+}
+
+/// Why there is nothing to say of predictions without a residual.
+fn tell_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observation: &Observation) {
+    for main in &diagnosis.main {
+        let residuals = diagnosis.residuals.iter();
+        let mut of_main = residuals.filter(|of| of.prediction == main.prediction);
+        if of_main.all(|of| of.count > 0) {
+            continue;
+        }
+        let mut truths = observation.trace.truths.iter();
+        let truth = truths.find(|of| plan.channels[of.slot].name == main.truth);
+        let there = truth.map_or(0, |of| of.values.iter().filter(|y| !y.is_nan()).count());
+        if there == 0 {
+            let truth = &main.truth;
+            terminal.warning(format_args!("the data have no value of the truth {truth}"));
+        } else {
+            let plural = if there == 1 { "" } else { "s" };
+            terminal.warning(format_args!(
+                "{} is at none of the {there} instant{plural} at which {} was measured, so nothing can be told of it",
+                main.prediction, main.truth
+            ));
+        }
     }
 }

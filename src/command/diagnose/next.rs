@@ -9,10 +9,10 @@ use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 
 impl Diagnose {
-    /// What to try next, each with its reason; nothing where nothing follows.
-    pub(super) fn next(&self, tables: &Tables) -> Option<String> {
+    /// What to try next, each with its reason; nothing where nothing follows. `drifts` says whether any truth is a slope.
+    pub(super) fn next(&self, tables: &Tables, drifts: bool) -> Option<String> {
         let left = self.what_is_left(tables);
-        let left = left.or_else(|| self.wider_windows(tables));
+        let left = left.or_else(|| self.wider_windows(tables).filter(|_| drifts));
         let found: Vec<String> = left.into_iter().chain(self.more_days(tables)).collect();
         (!found.is_empty()).then(|| found.join("\n"))
     }

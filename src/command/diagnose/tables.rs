@@ -3,7 +3,7 @@
 use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 use athermal::diagnosis::lag::{Correlogram, FeatureLags, Lags};
 use athermal::diagnosis::regressor::Design;
-use athermal::diagnosis::residual::Residuals;
+use athermal::diagnosis::residual::{Residuals, UNLIKELY};
 use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
 use super::responses;
@@ -35,6 +35,7 @@ impl<'a> Tables<'a> {
             self.responses(),
             self.designs(),
             self.contributions(),
+            self.untold(),
             self.days(),
             self.windows(),
         ];
@@ -109,7 +110,7 @@ impl<'a> Tables<'a> {
     pub(super) fn all_white(&self) -> bool {
         let all = self.diagnosis.residuals.iter();
         let mut shown = all.filter(|of| self.shows(&of.prediction)).peekable();
-        shown.peek().is_some() && shown.all(|of| of.white() == Some(true))
+        shown.peek().is_some() && shown.all(|of| of.white == Some(true))
     }
 
     /// Whether fits on fewer days than there are were too far from those on all others.
@@ -191,7 +192,7 @@ impl<'a> Tables<'a> {
                     format!("  {}", of.node),
                     count(of.rows),
                     of.regressors.len().to_string(),
-                    number(of.condition),
+                    or_dash(defined(of.condition)),
                     worst.map_or("-".to_owned(), |of| number(of.inflation)),
                     worst.map_or_else(String::new, |of| {
                         let much = of.inflation > INFLATED;
@@ -249,7 +250,7 @@ impl<'a> Tables<'a> {
         let as_it_is = shown.iter().map(|name| {
             let mut residuals = self.diagnosis.residuals.iter();
             let residuals = residuals.find(|of| of.prediction == *name);
-            residuals.map_or("-".to_owned(), |of| number(of.rms))
+            or_dash(residuals.and_then(|of| defined(of.rms)))
         });
         errors.insert(0, ("as it is".to_owned(), as_it_is.collect()));
         format!(
@@ -258,6 +259,31 @@ impl<'a> Tables<'a> {
             matrix("sensor", &columns, &moves),
             matrix("at rest", &columns, &errors)
         )
+    }
+
+    /// Which sensors could not be tried.
+    fn untold(&self) -> String {
+        let all = self.diagnosis.untold.iter();
+        let shown = all.filter(|of| {
+            let node = of.estimator.as_ref();
+            node.is_none_or(|node| self.shows_estimator(node))
+        });
+        let told = shown.map(|of| {
+            let silent = &of.silent;
+            match (&of.estimator, &of.sensor) {
+                (Some(node), Some(sensor)) => {
+                    format!("{node}: no answer to {sensor}, since {silent} gives nothing when that steps\n")
+                }
+                (Some(node), None) => {
+                    format!("{node}: no answers, since {silent} gives nothing while all sensors rest\n")
+                }
+                (None, sensor) => {
+                    let sensor = sensor.as_deref().unwrap_or("a sensor");
+                    format!("{sensor}: no contribution, since {silent} gives nothing when it rests\n")
+                }
+            }
+        });
+        told.collect()
     }
 
     fn days(&self) -> String {
@@ -310,26 +336,28 @@ fn residuals(shown: &[&Residuals]) -> String {
         .iter()
         .map(|of| {
             let lags = of.autocorrelation.len();
-            let largest = (0..lags).max_by(|&a, &b| {
+            let known = (0..lags).filter(|&lag| !of.autocorrelation[lag].is_nan());
+            let largest = known.max_by(|&a, &b| {
                 let size = |lag: usize| of.autocorrelation[lag].abs();
                 size(a).total_cmp(&size(b))
             });
+            let bound = largest.map_or("-".to_owned(), |lag| format!("±{:.2}", of.bound[lag]));
             let largest = largest.map_or("-".to_owned(), |lag| {
                 let after = seconds((lag + 1) as f64 * of.spacing_s);
                 format!("{:.2} at {after}", of.autocorrelation[lag])
             });
-            let verdict = match of.white() {
+            let verdict = match of.white {
                 Some(true) => "white",
                 Some(false) => "not white",
                 None => "too few",
             };
             vec![
                 format!("  {}", of.prediction),
-                number(of.rms),
-                number(of.mean),
+                or_dash(defined(of.rms)),
+                or_dash(defined(of.mean)),
                 count(of.spaced as u64),
                 largest,
-                of.bound.first().map_or("-".into(), |b| format!("±{b:.2}")),
+                bound,
                 or_dash(of.ljung_box),
                 of.p_value.map_or("-".to_owned(), |p| match p {
                     p if p < 0.0005 => "<0.001".to_owned(),
@@ -352,8 +380,9 @@ fn residuals(shown: &[&Residuals]) -> String {
     ];
     format!(
         "residuals: measured less predicted in {}, of which n are {} apart, so that\n\
-         neither windows nor horizons overlap; their largest autocorrelation beside the\n\
-         95 % of white ones; Q of Ljung and Box over {} lags\n{}",
+         neither windows nor horizons overlap; their largest autocorrelation, and within\n\
+         what 95 % lie at its lag where there is none from that lag on (Bartlett);\n\
+         Q of Ljung and Box over {} lags: white where p is not below {UNLIKELY}\n{}",
         first.unit,
         seconds(first.spacing_s),
         first.autocorrelation.len(),
@@ -444,8 +473,8 @@ fn regressors(of: &Design) -> String {
         .map(|of| {
             vec![
                 format!("    {}", of.name),
-                number(of.effect),
-                number(of.inflation),
+                or_dash(defined(of.effect)),
+                or_dash(defined(of.inflation)),
             ]
         })
         .collect();
@@ -464,10 +493,19 @@ pub(super) fn axis_of(channel: &str) -> String {
     axis.to_owned()
 }
 
-/// A length of time, to the second where it is longer than a minute.
+/// None where there is no number.
+fn defined(value: f64) -> Option<f64> {
+    Some(value).filter(|value| !value.is_nan())
+}
+
+/// A length of time, to the second where it is longer than a minute, and to the minute where it is longer than an hour.
 fn seconds(seconds: f64) -> String {
-    let is_long = seconds.abs() > 60.0;
-    stated(if is_long { seconds.round() } else { seconds })
+    let to = match seconds.abs() {
+        size if size > 3600.0 => 60.0,
+        size if size > 60.0 => 1.0,
+        _ => return stated(seconds),
+    };
+    stated((seconds / to).round() * to)
 }
 
 #[cfg(test)]
@@ -475,8 +513,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lags_are_told_to_the_second_where_they_are_longer_than_a_minute() {
+    fn lags_are_told_to_the_second_from_a_minute_on_and_to_the_minute_from_an_hour_on() {
         assert_eq!(seconds(-150.05), "-150s");
         assert_eq!(seconds(0.08), "80ms");
+        assert_eq!(seconds(-26.666_666_666), "-26.667s");
+        assert_eq!(
+            (seconds(11_160.0), seconds(15_810.0)),
+            ("3h6min".into(), "4h24min".into())
+        );
     }
 }
