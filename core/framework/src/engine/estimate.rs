@@ -83,7 +83,7 @@ pub(crate) struct Estimate {
     row: Vec<f64>,
     takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
-    pub(super) learning: Option<Learning>,
+    pub(super) learning: Option<Box<Learning>>,
     /// What is read in place of measured past truths, in an evaluation that says so.
     feedback: Option<Box<Feedback>>,
 }
@@ -131,9 +131,13 @@ impl Estimate {
             None => None,
             Some(planned) => {
                 let learning = Learning::new(&predictor, *planned, *truth, *training);
-                Some(learning.ok_or_else(|| EngineError::DoesNotLearn {
-                    node: node.instance(),
-                })?)
+                Some(
+                    learning
+                        .map(Box::new)
+                        .ok_or_else(|| EngineError::DoesNotLearn {
+                            node: node.instance(),
+                        })?,
+                )
             }
         };
         Ok(Self {
@@ -282,13 +286,13 @@ impl Estimate {
 
     /// What goes on learning.
     pub(crate) fn learning(&mut self) -> Option<&mut Learning> {
-        self.learning.as_mut()
+        self.learning.as_deref_mut()
     }
 
     /// What was learned since the fit.
     pub(crate) fn snapshot(&self) -> NodeState {
         self.learning
-            .as_ref()
+            .as_deref()
             .map(Learning::snapshot)
             .unwrap_or_default()
     }

@@ -1,0 +1,143 @@
+//! What `athermal diagnose` prints, draws and warns of.
+
+use std::ffi::OsStr;
+use std::path::Path;
+
+use super::NOISE;
+use super::workbench::{Scratch, athermal_on, graph, simulated};
+
+#[test]
+fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
+    let scratch = Scratch::new("diagnose");
+    let week = simulated(&scratch, "log.csv", "die-tester", 3.0, 1);
+    let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
+    athermal_on("fit", &graph("die-tester"), &week, &[&"-o", &model]).ended(0);
+    let diagnosed =
+        |more: &[&dyn AsRef<OsStr>]| athermal_on("diagnose", &model, &week, more).ended(0);
+    let told = diagnosed(&[&"--window", &"--plots", &plots]);
+    for line in told.out.lines() {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    for section in [
+        "residuals: ",
+        "correlation of features",
+        "thermal: how far a step of 1 K",
+        "how well the data determine",
+        "what each sensor moves",
+        "RMSE in nm/min of each day",
+        "how many days are needed",
+        "signal to noise",
+    ] {
+        assert!(
+            told.out.contains(section),
+            "no `{section}` in:\n{}",
+            told.out
+        );
+    }
+    // The simulated room tells something of what the vote leaves.
+    assert!(
+        told.told.contains("diagnose") && told.told.contains("--of "),
+        "{}",
+        told.told
+    );
+    for line in told.told.lines() {
+        assert!(line.chars().count() <= 80 || line.contains('/'), "{line}");
+    }
+    let pictures = [
+        "autocorrelation-vote.Z1",
+        "lags-drift.Z1",
+        "impulse-thermal.Z1",
+        "days",
+        "windows",
+    ];
+    for name in pictures {
+        let name = format!("{}.svg", name.replace('.', "_"));
+        let svg = std::fs::read_to_string(plots.join(&name)).unwrap();
+        assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{name}");
+    }
+    let facts = diagnosed(&[&"--no-fit", &"--format", &"json"]).json();
+    assert_eq!(facts["diagnosis"]["main"].as_array().unwrap().len(), 6);
+    assert!(facts["diagnosis"]["days"].is_null());
+    let few = scratch.path("few");
+    let of_one = diagnosed(&[&"--no-fit", &"--of", &"thermal.Z1", &"--plots", &few]);
+    assert!(
+        of_one.out.contains("per σ") && !of_one.out.contains("vote."),
+        "{}",
+        of_one.out
+    );
+    assert!(of_one.out.contains("left of it by thermal.Z1"));
+    let drawn = std::fs::read_dir(few).unwrap();
+    let mut drawn: Vec<_> = drawn
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".svg"))
+        .collect();
+    drawn.sort();
+    let expected = [
+        "autocorrelation-thermal_Z1.svg",
+        "impulse-thermal_Z1.svg",
+        "lags-drift_Z1.svg",
+        "lags-residual-drift_Z1.svg",
+        "step-thermal_Z1.svg",
+    ];
+    assert_eq!(drawn, expected);
+}
+
+#[test]
+fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
+    let scratch = Scratch::new("undiagnosed");
+    let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph("die-tester"), &log, &[&"-o", &model]).ended(0);
+    let of = |graph: &Path, more: &[&dyn AsRef<OsStr>]| athermal_on("diagnose", graph, &log, more);
+    let unknown = of(&model, &[&"--no-fit", &"--of", &"Z9"]);
+    unknown.ended(2).tells(&["nothing called `Z9`", "vote.Z1"]);
+    let never = of(&model, &[&"--day", &"0s"]);
+    never.ended(2).tells(&["--day is 0s"]);
+    let short = of(&model, &[]);
+    short.ended(0).tells(&["a shorter --day"]);
+    let countless = of(&model, &[&"--day", &"1ns"]);
+    countless.ended(0).tells(&["a longer --day"]);
+    let unfitted = of(&graph("die-tester"), &[]);
+    unfitted.ended(2).tells(&["fit"]);
+}
+
+#[test]
+fn why_there_is_nothing_is_said_and_nothing_is_told_as_no_number() {
+    let scratch = Scratch::new("nothing");
+    let log = |name: &str, white: fn(usize) -> String| {
+        let rows = (0..200).map(|row| format!("{row},{},\n", white(row)));
+        let rows: String = rows.collect();
+        scratch.file(name, format!("time_s,white,smooth\n{rows}"))
+    };
+    let graph = scratch.file("noise.toml", NOISE);
+    let empty = log("empty.csv", |_| String::new());
+    let told = athermal_on("diagnose", &graph, &empty, &[&"--no-fit", &"--window"]);
+    let told = told.ended(0);
+    told.tells(&["no value of the truth y.white", "no truth is a slope"]);
+    assert!(!told.out.contains("NaN"), "{}", told.out);
+    // A multiplicative hash stands in for noise.
+    let noise = log("noise.csv", |row| {
+        let bits = (row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+        (bits % 1009).to_string()
+    });
+    let told = athermal_on(
+        "diagnose",
+        &graph,
+        &noise,
+        &[&"--no-fit", &"--of", &"white"],
+    );
+    let told = told.ended(0);
+    assert!(
+        told.out.contains("where p is not below 0.01"),
+        "{}",
+        told.out
+    );
+    assert!(!told.told.contains("--window"), "{}", told.told);
+    let of_one: [&dyn AsRef<OsStr>; 5] = [&"--no-fit", &"--of", &"white", &"--format", &"json"];
+    let facts = athermal_on("diagnose", &graph, &noise, &of_one);
+    let facts = facts.ended(0).json();
+    let residuals = facts["diagnosis"]["residuals"].as_array().unwrap();
+    assert_eq!(residuals.len(), 1);
+    assert_eq!(residuals[0]["level"], 0.01);
+    assert!(residuals[0]["white"].is_boolean());
+}
