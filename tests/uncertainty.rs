@@ -407,8 +407,9 @@ fn the_most_likely_noises_are_told_as_a_graph_takes_them() {
     let athermal::core::fit::Outcome::Fitted(told) = &report.estimators[0].outcome else {
         panic!("{:?}", report.estimators[0].outcome)
     };
-    let note = &told.notes[0];
-    let noises = note.strip_prefix("most likely are noises = ").unwrap();
+    let mut notes = told.notes.iter();
+    let noises = notes.find_map(|note| note.strip_prefix("most likely are noises = "));
+    let noises = noises.unwrap();
     // A uniform number of width 10 has a variance of 100/12; the level gains 120 times 1/12 in an hour.
     let observation: f64 = noises
         .split('"')
@@ -419,7 +420,7 @@ fn the_most_likely_noises_are_told_as_a_graph_takes_them() {
         .unwrap();
     assert!(
         (observation / (100.0_f64 / 12.0).sqrt() - 1.0).abs() < 0.1,
-        "{note}"
+        "{noises}"
     );
     let again = text.replace("trend = true", &format!("trend = true\nnoises = {noises}"));
     assert_eq!(workbench::plan(&again).nodes.len(), 1);

@@ -1,6 +1,6 @@
 //! Combiners that go by a state or give reasons, in a running graph.
 
-use super::workbench::Bench;
+use super::workbench::{Bench, plan, problems};
 use super::{SAMPLES, SLOPES};
 
 fn bench() -> Bench {
@@ -92,4 +92,39 @@ fn a_guard_says_why_it_holds_a_prediction_back() {
         }
     }
     assert_eq!(values(&bench, told), [0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn predictions_of_one_axis_are_not_put_together_with_those_of_another() {
+    let text = |still: &str, judge: &str| {
+        let samples = SAMPLES.replace("[\"Z\"]", "[\"X\", \"Z\"]");
+        format!(
+            "{samples}{SLOPES}
+[nodes.still]
+type = \"zero\"
+inputs.truth = \"drift.{still}\"
+ahead = \"5min\"
+[nodes.same]
+type = \"persistence\"
+inputs.truth = \"drift.Z\"
+ahead = \"5min\"
+[nodes.vote]
+type = \"auto_weighted\"
+inputs.voters = [\"same\", \"still\"]
+inputs.truth = \"drift.{judge}\"
+memory = \"15min\"
+[outputs]
+out = \"vote\"
+also = \"drift\"
+"
+        )
+    };
+    let told = problems(&text("X", "Z"));
+    assert!(told.contains("A066"), "{told}");
+    let both = "`same.Z` predicts `drift.Z` and `still.X` `drift.X`";
+    assert!(told.contains(both), "{told}");
+    let told = problems(&text("Z", "X"));
+    let judged = "`same.Z` predicts `drift.Z` and is to be judged by `drift.X`";
+    assert!(told.contains(judged), "{told}");
+    plan(&text("Z", "Z"));
 }

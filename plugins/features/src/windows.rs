@@ -109,10 +109,10 @@ pub struct DynamicRange {
     pub dynamic_range: Duration,
     /// The shortest window.
     pub shortest: Duration,
-    /// How many windows run from the shortest to the first harmonic, both counted; 2 or more.
+    /// How many windows run from the shortest to the first harmonic, both counted; 2 to 100.
     #[schemars(range(min = 2, max = 100))]
     pub steps: u32,
-    /// How many harmonics there are; 1 or more.
+    /// How many harmonics there are; 1 to 100.
     #[schemars(range(min = 1, max = 100))]
     pub harmonics: u32,
 }

@@ -205,6 +205,13 @@ impl Resolver<'_> {
         agree
     }
 
+    /// Whether two channels are different members of the same port or signal, as `drift.X` and `drift.Y` are. Of other channels,
+    /// such as two slopes of the same position, it is not known whether they are the same quantity.
+    fn are_members(&self, one: usize, other: usize) -> bool {
+        let of = |slot: usize| self.channels[slot].name.rsplit_once('.').map(|(of, _)| of);
+        one != other && of(one).is_some() && of(one) == of(other)
+    }
+
     /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant. The second is another
     /// vote, or the truth.
     pub(super) fn agree(
@@ -234,7 +241,7 @@ impl Resolver<'_> {
             }
         } else if let Some(of_first) = a.predicts
             && let Some(of_second) = if votes { b.predicts } else { Some(second) }
-            && of_first != of_second
+            && self.are_members(of_first, of_second)
         {
             let name = |slot: usize| self.channels[slot].name.clone();
             CompileProblem::Truths {

@@ -442,7 +442,7 @@ impl Problem for CompileProblem {
             Self::Spans { .. } => "compute both over windows of the same length".to_owned(),
             Self::Horizons { .. } => "give both the same `ahead`".to_owned(),
             Self::Truths { .. } => {
-                "combine predictions of one channel; where there is one for each axis, `each` makes a node for each".to_owned()
+                "combine predictions of one axis; `each` makes a node for each of several".to_owned()
             }
             Self::Cycle { .. } => "let the feedback go through a `delay` node".to_owned(),
             Self::Leak {

@@ -305,7 +305,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A066",
         "predictions of different truths",
-        "All voters of a combiner predict the same channel, and that is the one they are judged by. A prediction of X is none of Y, however alike the two are."
+        "All voters of a combiner predict the same thing, and are judged by it. A prediction of one axis is none of another, however alike the two are."
     ),
     code!(
         "A070",
