@@ -105,6 +105,12 @@ pub fn lags(
     let longest = Duration::from_ns(length.as_ns() / MOST_INSTANTS);
     let reach = Duration::from_ns(plan.warm_up.as_ns() / MOST_LAGS);
     let step = interval.max(longest).max(reach).max(Duration::from_ns(1));
+    let main =
+        |truth: &TruthTrace| Some(truth.predictions[main_prediction(plan, truth, of)?].ahead);
+    let horizons = truths.iter().filter_map(main);
+    let step = horizons
+        .min()
+        .map_or(step, |horizon| fitted_into(horizon, step));
     let count = (plan.warm_up.as_ns() / step.as_ns()).clamp(FEWEST_LAGS, MOST_LAGS) as usize;
     let mut grid = Grid::new(plan, slots, step, count);
     trace(
@@ -158,6 +164,17 @@ pub fn lags(
             })
         });
     Ok(facts.collect())
+}
+
+/// The step next to one given of which a horizon is a multiple, so that what was known just when a prediction was made is looked at.
+fn fitted_into(horizon: Duration, step: Duration) -> Duration {
+    let (horizon, nearly) = (horizon.as_ns(), step.as_ns());
+    let steps = (horizon + nearly / 2) / nearly;
+    if steps > 0 {
+        Duration::from_ns(horizon.div_euclid(steps) + i64::from(horizon % steps > 0))
+    } else {
+        step
+    }
 }
 
 /// Of two series, each with its autocorrelation; the largest is looked for at lags from `from_s` on.
@@ -349,6 +366,15 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_horizon_lies_on_the_grid_of_lags() {
+        let ns = Duration::from_ns;
+        assert_eq!(fitted_into(ns(300_000), ns(74_800)), ns(75_000));
+        assert_eq!(fitted_into(ns(100), ns(30)), ns(34));
+        assert_eq!(fitted_into(ns(20), ns(75)), ns(75), "shorter than a step");
+        assert_eq!(fitted_into(Duration::ZERO, ns(75)), ns(75));
+    }
 
     #[test]
     fn the_largest_correlation_is_told_with_its_lag_and_its_bound() {
