@@ -284,15 +284,13 @@ pub(crate) fn told(error: NumericsError) -> TrainingError {
 /// Why stochastic gradients gave no model: their steps grew without bound.
 fn diverged(model: &LinearPredictor, rate: LearningRate) -> TrainingError {
     let (LearningRate::Constant { eta0 } | LearningRate::InvScaling { eta0, .. }) = rate;
-    let names = model.regressors.iter().map(String::as_str);
-    let named = names.zip(&model.coefficients);
-    let mut all = named.chain([("the intercept", &model.intercept)]);
-    let what = all.find(|(_, value)| !value.is_finite()).map_or_else(
-        || "the error on the rows of the fit".to_owned(),
-        |(name, _)| match name {
-            "the intercept" => name.to_owned(),
-            name => format!("the coefficient of {name}"),
-        },
+    let named = model.regressors.iter().zip(&model.coefficients);
+    let named = named.map(|(name, value)| (format!("the coefficient of {name}"), *value));
+    let mut all = named.chain([("the intercept".to_owned(), model.intercept)]);
+    let what = all.find(|(_, value)| !value.is_finite());
+    let what = what.map_or(
+        "the error on the rows of the fit".to_owned(),
+        |(what, _)| what,
     );
     TrainingError::Unsolvable {
         reason: format!(

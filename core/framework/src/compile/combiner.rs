@@ -208,7 +208,7 @@ impl Resolver<'_> {
     /// Whether two channels are different members of the same port or signal, as `drift.X` and `drift.Y` are. Of other channels,
     /// such as two slopes of the same position, it is not known whether they are the same quantity.
     fn are_members(&self, one: usize, other: usize) -> bool {
-        let of = |slot: usize| self.channels[slot].name.rsplit_once('.').map(|(of, _)| of);
+        let of = |slot: usize| self.channels[slot].name.split_once('.').map(|(of, _)| of);
         one != other && of(one).is_some() && of(one) == of(other)
     }
 

@@ -58,13 +58,7 @@ impl Share {
             }
             within.end
         };
-        let edge = |nth: u64| {
-            if nth == 0 {
-                within.start
-            } else {
-                after(count * nth / parts)
-            }
-        };
+        let edge = |nth: u64| after(count * nth / parts);
         (0..parts).map(|nth| edge(nth)..edge(nth + 1)).collect()
     }
 }
