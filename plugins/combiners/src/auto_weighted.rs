@@ -232,17 +232,18 @@ impl Weigher {
 
 impl Rule for Weigher {
     fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
-        if votes.present().next().is_none() {
-            return f64::NAN;
-        }
         let last = self.weighed(errors, votes);
-        let terms = votes
-            .present()
-            .map(|(voter, vote)| last.weights[voter] * vote);
-        if last.total == 0.0 {
-            f64::NAN
+        let (mut sum, mut any) = (0.0, false);
+        for (weight, vote) in last.weights.iter().zip(votes.0) {
+            if !vote.is_nan() {
+                sum += weight * vote;
+                any = true;
+            }
+        }
+        if any && last.total != 0.0 {
+            sum / last.total
         } else {
-            terms.fold(0.0, |sum, term| sum + term) / last.total
+            f64::NAN
         }
     }
 

@@ -88,9 +88,9 @@ pub(crate) struct Errors {
     /// How often the means have changed, so that what follows from them is worked out only then.
     #[serde(skip)]
     changes: u64,
-    /// An instant before which nothing in memory arrived.
+    /// Up to when nothing in memory is to be forgotten.
     #[serde(skip, default = "long_ago")]
-    oldest: Instant,
+    kept_until: Instant,
 }
 
 fn long_ago() -> Instant {
@@ -106,7 +106,7 @@ impl Errors {
             means: vec![None; voters],
             counts: vec![0.0; voters],
             changes: 0,
-            oldest: long_ago(),
+            kept_until: long_ago(),
         }
     }
 
@@ -142,7 +142,7 @@ impl Errors {
 
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
         self.changes += 1;
-        self.oldest = self.oldest.min(arrived);
+        self.kept_until = self.kept_until.min(arrived + self.memory.longest());
         let squares = &mut self.squares[voter];
         match self.memory {
             Memory::Truths(last) if squares.len() >= last.truths => {
@@ -169,13 +169,10 @@ impl Errors {
 
     /// Forgets what arrived longer than the memory before `newest`.
     pub(crate) fn advance(&mut self, newest: Instant) {
-        if matches!(self.memory, Memory::Truths(_)) {
+        if newest < self.kept_until || matches!(self.memory, Memory::Truths(_)) {
             return;
         }
         let forgotten = newest - self.memory.longest();
-        if forgotten < self.oldest {
-            return;
-        }
         for voter in 0..self.squares.len() {
             let squares = &mut self.squares[voter];
             let before = squares.len();
@@ -191,7 +188,7 @@ impl Errors {
         }
         let fronts = self.squares.iter().filter_map(VecDeque::front);
         let oldest = fronts.map(|&(arrived, _)| arrived).min();
-        self.oldest = oldest.unwrap_or(Instant::MAX);
+        self.kept_until = oldest.map_or(Instant::MAX, |oldest| oldest + self.memory.longest());
     }
 
     /// Moves what is remembered to the clock of another segment.
@@ -199,7 +196,7 @@ impl Errors {
         for (arrived, _) in self.squares.iter_mut().flatten() {
             *arrived = *arrived + shift;
         }
-        self.oldest = Instant::MIN;
+        self.kept_until = long_ago();
     }
 
     /// Goes on from what was remembered of the same voters, maybe for another time.
@@ -210,7 +207,7 @@ impl Errors {
         };
         let voters = self.squares.len();
         self.changes += 1;
-        self.oldest = Instant::MIN;
+        self.kept_until = long_ago();
         if known.squares.len() != voters || known.means.len() != voters {
             return Restored::cold("the number of voters differs");
         }

@@ -247,18 +247,20 @@ impl Estimate {
             let (values, rest) = row.split_at_mut(part.places.len());
             row = rest;
             let there = &from.values[..];
-            for (value, &place) in values.iter_mut().zip(&part.places) {
-                *value = there[place];
-            }
             if let Some(stamp) = from.together {
+                for (value, &place) in values.iter_mut().zip(&part.places) {
+                    *value = there[place];
+                }
                 oldest = oldest.min(stamp);
                 continue;
             }
-            for (value, &place) in values.iter().zip(&part.places) {
+            let stamps = &from.stamps[..];
+            for (value, &place) in values.iter_mut().zip(&part.places) {
+                *value = there[place];
                 if value.is_nan() {
                     whole = false;
                 } else {
-                    oldest = oldest.min(from.stamps[place]);
+                    oldest = oldest.min(stamps[place]);
                 }
             }
         }

@@ -53,11 +53,7 @@ impl Pairing {
     /// # Panics
     /// When `parts` do not add up to the width.
     pub fn run<'a>(&mut self, now: Instant, parts: impl IntoIterator<Item = &'a [f64]>) {
-        while self.len >= 2 && self.times[self.index(1)] <= now - self.ahead {
-            self.first = self.index(1);
-            self.len -= 1;
-            self.number += 1;
-        }
+        self.forget_before(now - self.ahead);
         if self.len == self.times.len() {
             self.grow();
         }
@@ -76,11 +72,7 @@ impl Pairing {
     /// The run that a truth at `tau` belongs to. Instants asked for never go back.
     pub fn truth(&mut self, tau: Instant) -> Option<Paired<'_>> {
         let due = tau - self.ahead;
-        while self.len >= 2 && self.times[self.index(1)] <= due {
-            self.first = self.index(1);
-            self.len -= 1;
-            self.number += 1;
-        }
+        self.forget_before(due);
         let at = self.times[self.first];
         if self.len == 0 || at > due || due - at > self.limit {
             return None;
@@ -112,6 +104,20 @@ impl Pairing {
     pub fn clear(&mut self) {
         self.number += self.len as u64;
         self.len = 0;
+    }
+
+    /// Forgets the runs before the last one at or before `due`.
+    #[inline]
+    fn forget_before(&mut self, due: Instant) {
+        while self.len >= 2 {
+            let second = self.index(1);
+            if self.times[second] > due {
+                break;
+            }
+            self.first = second;
+            self.len -= 1;
+            self.number += 1;
+        }
     }
 
     fn index(&self, nth: usize) -> usize {
