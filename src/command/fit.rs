@@ -24,6 +24,9 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Prints for each node that is fitted (estimators, and features that learn) the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
 /// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells.
+///
+/// With `--format json` all of that, and what sentences say of weights, penalties, noises and the like, is data: `estimators` has
+/// an object for each node, and its `figures` are by name, unrounded.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \

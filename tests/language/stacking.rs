@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::node::Figure;
 use athermal::core::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
@@ -75,16 +76,17 @@ fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight_as_in_the_or
         rmse("rich"),
         rmse("plain")
     );
-    let weights = &report("stack").notes[0];
-    let weight = |name: &str| -> f64 {
-        let after = weights.split(&format!("{name} ")).nth(1).unwrap();
-        after.split(',').next().unwrap().parse().unwrap()
+    let stacked = report("stack");
+    let Figure::Named(weights) = &stacked.figures["weights"] else {
+        panic!("{stacked:?}");
     };
+    let weight = |name: &str| weights[name].0;
     let expected = &numbers(include_str!("../oracles/stacking/expected.csv"))[0];
-    assert!(weight("rich.Z") < 0.25 * weight("plain.Z"), "{weights}");
+    assert!(weight("rich.Z") < 0.25 * weight("plain.Z"), "{weights:?}");
     for (name, expected) in ["plain.Z", "rich.Z"].into_iter().zip(expected) {
-        // They are told to three decimals.
-        assert!((weight(name) - expected).abs() < 0.0005 + 1e-9, "{weights}");
+        assert!((weight(name) - expected).abs() < 1e-9, "{weights:?}");
+        let told = format!("{name} {expected:.3}");
+        assert!(stacked.notes[0].contains(&told), "{:?}", stacked.notes);
     }
 
     // While the lags are cold the rich one is absent, and the plain one goes on alone.

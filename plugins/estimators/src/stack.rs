@@ -2,8 +2,8 @@
 
 use athermal_core::model::numbers;
 use athermal_core::node::{
-    Coefficients, Estimator, Factor, InputPort, Of, Predictor, Regressors, Term, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup,
+    Coefficients, Estimator, Factor, Figure, InputPort, Of, Predictor, Regressors, Term, Trained,
+    Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{GramBlocks, NumericsError, non_negative_least_squares};
@@ -90,15 +90,17 @@ impl Trainer for Stacking {
             })
             .sum();
         let squares = (moments[(voters, voters)] - explained).max(0.0);
-        let named = stacked.saved.regressors.iter().zip(weights);
-        let named: Vec<String> = named
+        let named = stacked.saved.regressors.iter().zip(weights.iter().copied());
+        let told: Vec<String> = named
+            .clone()
             .map(|(name, weight)| format!("{name} {weight:.3}"))
             .collect();
-        let report = TrainingReport {
+        let mut report = TrainingReport {
             in_sample_rmse: Some((squares / total.count() as f64).sqrt()),
-            notes: vec![format!("weights: {}", named.join(", "))],
+            notes: vec![format!("weights: {}", told.join(", "))],
             ..TrainingReport::default()
         };
+        report.figure("weights", Figure::named(named));
         Ok(Trained {
             predictor: Box::new(stacked),
             report,

@@ -177,7 +177,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let found = self.asked.identify(&samples, pace.series, report)?;
         let truths = self.rows.iter().map(|row| row.truth);
         tell_rows(&self.names, &self.regressors, truths, report);
-        report.notes.push(pace.told());
+        pace.tell(report);
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
@@ -229,6 +229,8 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
+        report.figure("converged", fit.converged);
+        report.figure("steps_of_search", fit.steps);
         if !fit.converged {
             report.notes.push(format!(
                 "the search had not ended after {} steps",
@@ -345,6 +347,13 @@ impl Pace {
             truths,
             series: truths.min(MOST_SERIES),
         }
+    }
+
+    fn tell(self, report: &mut TrainingReport) {
+        report.figure("step_s", self.step.secs());
+        report.figure("series", self.series);
+        report.figure("truths_within_a_step", self.truths);
+        report.notes.push(self.told());
     }
 
     fn told(self) -> String {

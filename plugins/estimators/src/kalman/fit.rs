@@ -9,6 +9,7 @@ use athermal_numerics::{
     most_likely,
 };
 
+use super::told::Hourly;
 use super::{Kalman, KalmanPredictor, Noises};
 use crate::conditioning::tell_rows;
 use crate::scaling::Scaling;
@@ -167,10 +168,16 @@ impl KalmanTrainer {
         if self.parameters.noises.is_none() {
             let unit = self.unit.parse::<Unit>().map(|unit| unit.difference());
             let unit = unit.map_or_else(|_| self.unit.clone(), |unit| unit.to_string());
-            let told = Told(followed.model, &unit);
-            report.notes.push(format!("most likely are {told}"));
+            let told = Hourly::of(&followed.model);
+            report.figure("noises", told.figure());
+            let noises = told.as_given(&unit);
+            report
+                .notes
+                .push(format!("most likely are noises = {noises}"));
         }
         if self.stride > 1 {
+            report.figure("rows_apart", self.stride);
+            report.figure("rows_followed", self.kept.len());
             report.notes.push(format!(
                 "one row in {} was followed, {} in all",
                 self.stride,
@@ -247,34 +254,4 @@ impl Noises {
             passage: Passage::Continuous,
         })
     }
-}
-
-/// Noises as a graph file would give them, over an hour.
-struct Told<'a>(Structural, &'a str);
-
-impl std::fmt::Display for Told<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self(model, unit) = self;
-        let per: f64 = 3600.0;
-        let observation = significant(model.observation.sqrt());
-        let level = significant((model.level * per).sqrt());
-        write!(f, "noises = {{ observation = \"{observation} {unit}\", ")?;
-        write!(f, "level = \"{level} {unit}\", ")?;
-        if let Some(trend) = model.trend {
-            let trend = significant((trend * per).sqrt() * per);
-            write!(f, "trend = \"{trend} {unit}\", ")?;
-        }
-        write!(f, "per = \"1h\"")?;
-        if model.returning > 0.0
-            && let Some(returns) = Duration::from_secs_f64(significant(1.0 / model.returning))
-        {
-            write!(f, ", returns = \"{returns}\"")?;
-        }
-        write!(f, " }}")
-    }
-}
-
-/// A number to four significant digits.
-fn significant(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }
