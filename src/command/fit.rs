@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
+use super::threads::Threads;
 use crate::figures::{count, number, paragraph, table};
 use crate::invocation::{next, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -40,9 +41,8 @@ pub struct Fit {
     /// Where the model goes; `-` is standard output
     #[arg(long, short, value_name = "MODEL")]
     output: PathBuf,
-    /// Threads that train; the result does not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: Threads,
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
     #[arg(long, value_name = "MB", default_value_t = 64)]
     memory: usize,
@@ -60,11 +60,10 @@ impl Fit {
         let mut sources = Sources::new();
         let mut model = Model::load_from(&self.graph, Wanted::default(), &mut sources)?;
         self.doubt_tests(&model, sources, terminal);
-        let defaults = FitOptions::default();
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
-            threads: self.threads.unwrap_or(defaults.threads),
-            ..defaults
+            threads: self.threads.count(),
+            ..FitOptions::default()
         };
         let report = fit_on(&mut model, &self.data, &options, terminal)?;
         let text = model.to_text().map_err(|error| {
