@@ -129,7 +129,7 @@ fn a_single_row_is_not_fitted_by_any_kind() {
         "type = \"kalman\"".to_owned(),
     ] {
         let fit = fit("single", &node, &explained(1), &[]).ended(1);
-        fit.tells(&["1 complete rows, and at least 2 are needed"]);
+        fit.tells(&["1 complete row, and at least 2 are needed"]);
     }
 }
 

@@ -16,7 +16,7 @@ use serde_json::json;
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use super::threads::Threads;
-use crate::figures::{count, number, paragraph, table};
+use crate::figures::{count, counted, number, paragraph, table};
 use crate::invocation::{next, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -252,9 +252,9 @@ fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
         ];
         if chosen {
             cells.push(format!(
-                "smallest {}, on {} rows",
+                "smallest {}, on {}",
                 orders.by,
-                count(orders.rows as u64)
+                counted(orders.rows as u64, "row")
             ));
         }
         cells
@@ -281,11 +281,11 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let mut text = String::new();
     let _ = write!(
         text,
-        "{} ({} of {}): {} rows",
+        "{} ({} of {}): {}",
         fit.node,
         fit.kind,
         fit.truth,
-        count(fit.rows)
+        counted(fit.rows, "row")
     );
     let dropped = [
         (fit.dropped.outside_limits, "outside the limits"),

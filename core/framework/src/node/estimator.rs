@@ -233,7 +233,11 @@ impl std::fmt::Display for TrainingError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::TooFewRows { rows, needed } => {
-                write!(f, "{rows} complete rows, and at least {needed} are needed")
+                let plural = if *rows == 1 { "" } else { "s" };
+                write!(
+                    f,
+                    "{rows} complete row{plural}, and at least {needed} are needed"
+                )
             }
             Self::NoTruth {
                 truth,
