@@ -19,7 +19,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Score a model's predictions on recorded data
 ///
 /// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
-/// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
+/// truth that shares nothing with the predicted one; K steps ahead that of K steps before, in a free run none), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
 ///
 /// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
