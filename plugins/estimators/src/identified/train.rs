@@ -3,8 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    InformationCriteria, NumericsError, Polynomials, PredictionError, PredictionErrorFit, Samples,
-    Standardization, Standardizer,
+    InformationCriteria, NumericsError, Orders, Polynomials, PredictionError, PredictionErrorFit,
+    Samples, Standardization, Standardizer,
 };
 
 use super::follow::{Identified, MOST_SERIES};
@@ -265,7 +265,7 @@ impl Asked {
             && self.order.is_none()
         {
             return self
-                .search(orders.coefficients())
+                .search(orders, self.penalty)
                 .fit(orders, samples, 0)
                 .map_err(|error| unfit(error, samples));
         }
@@ -274,9 +274,10 @@ impl Asked {
         let mut tried = Vec::new();
         let mut fits = Vec::new();
         let mut failed = None;
+        // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
         for (candidate, orders) in candidates {
             let coefficients = orders.coefficients();
-            match self.search(coefficients).fit(&orders, samples, first) {
+            match self.search(&orders, 0.0).fit(&orders, samples, first) {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     tried.push(Tried {
@@ -284,7 +285,7 @@ impl Asked {
                         coefficients,
                         figures: InformationCriteria::of(fit.rows, coefficients, squares),
                     });
-                    fits.push(fit);
+                    fits.push((fit, orders));
                 }
                 Err(error) => failed = Some(error),
             }
@@ -294,13 +295,23 @@ impl Asked {
             let error = failed.unwrap_or(too_few);
             unfit(error, samples)
         })?;
-        Ok(fits.swap_remove(best))
+        let (fit, orders) = fits.swap_remove(best);
+        if self.penalty == 0.0 || orders.inputs.is_empty() {
+            return Ok(fit);
+        }
+        report.notes.push(
+            "orders are compared without the penalty, with which the chosen one is fitted"
+                .to_owned(),
+        );
+        let search = self.search(&orders, self.penalty);
+        let fit = search.fit(&orders, samples, first);
+        fit.map_err(|error| unfit(error, samples))
     }
 
-    fn search(&self, coefficients: usize) -> PredictionError {
-        let most = MOST_WORK / coefficients.max(1);
+    fn search(&self, orders: &Orders, penalty: f64) -> PredictionError {
+        let most = MOST_WORK / orders.coefficients().max(1);
         PredictionError {
-            penalty: self.penalty,
+            penalty,
             most_steps: most.clamp(20, 100),
         }
     }
