@@ -26,6 +26,9 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells.
 ///
+/// What is fed by estimators, such as a `stack`, learns from predictions of rows that those were not fitted on: all below it is
+/// fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with three.
+///
 /// With `--format json` all of that, and what sentences say of weights, penalties, noises and the like, is data: `estimators` has
 /// an object for each node, and its `figures` are by name, unrounded.
 #[derive(Debug, Args)]

@@ -54,6 +54,49 @@ fn few() -> Table {
 }
 
 #[test]
+fn what_two_levels_learn_from_is_fitted_once() {
+    let above = |name: &str, below: &str| {
+        format!(
+            "[nodes.{name}]\ntype = \"stack\"\ninputs.voters = [\"{below}\", \"plain\"]\n\
+             inputs.truth = \"position.Z\"\nahead = \"0s\"\n"
+        )
+    };
+    let graph = nodes("ahead = \"0s\"").replace(
+        "[outputs]",
+        &format!(
+            "{}{}[outputs]\nhigher = \"higher\"\nhighest = \"highest\"",
+            above("higher", "stack"),
+            above("highest", "higher")
+        ),
+    );
+    let mut table = Table::default();
+    let rows = 4096;
+    for second in 0..rows {
+        let t = f64::from(second);
+        let warm = (0.013 * t).sin();
+        let values = [
+            warm,
+            (0.031 * t).cos(),
+            3.0 * warm + 0.1 * (1.7 * t * t).sin(),
+        ];
+        table.push(
+            Instant::from_ns(i64::from(second) * 10_000_000_000),
+            &values,
+        );
+    }
+    let mut stepped = 0;
+    let plan = plan(&graph);
+    let (_, report) = fit(&plan, &table, &FitOptions::default(), &mut |ticks| {
+        stepped = ticks
+    })
+    .unwrap();
+    assert_eq!(report.estimators.len(), 5);
+    // A level takes a pass, and one above others a pass for each of three folds. What lies below the third level is fitted
+    // once on all ticks and once without each fold, and so on: 1, 1 + 3 + 3 · 1, 1 + 3 + 3 + 3 · 7 and 1 + 3 + 3 + 3 + 3 · 28.
+    assert_eq!(stepped, 94 * u64::try_from(rows).unwrap());
+}
+
+#[test]
 fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight_as_in_the_oracle() {
     let plan = plan(&nodes("ahead = \"0s\""));
     let table = few();
