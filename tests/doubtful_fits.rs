@@ -269,14 +269,3 @@ fn a_narx_without_a_term_says_that_it_predicts_the_mean() {
     );
     assert!(!told.contains("error-reduction"), "{told}");
 }
-
-#[test]
-fn kalman_says_of_which_predictions_its_error_is() {
-    let told = fit("kalman", "type = \"kalman\"", &explained(60), &[])
-        .ended(0)
-        .out;
-    assert!(
-        told.contains("while the model was still being learned"),
-        "{told}"
-    );
-}

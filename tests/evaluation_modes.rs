@@ -208,6 +208,50 @@ fn persistence_of_some_steps_repeats_the_last_truth_so_far_back_also_where_rows_
 }
 
 #[test]
+fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
+    let scratch = Scratch::new("modes-in-sample");
+    let rows = series(400);
+    let first = scratch.file("first.csv", csv(&rows[..250]));
+    let second = scratch.file("second.csv", csv(&rows[250..]));
+    let node = "[nodes.level]\ntype = \"kalman\"\n";
+    let features = "inputs.features = \"input.a\"";
+    for (ahead, more) in [
+        ("0s", ""),
+        ("10s", features),
+        ("30s", features),
+        ("30s", "inputs.features = \"input.a\"\nlearn = false"),
+    ] {
+        let text = GRAPH.replace("LEARN", "");
+        let text = text.replace(node, &format!("{node}{more}\n"));
+        let text = text.replace("ahead = \"10s\"", &format!("ahead = \"{ahead}\""));
+        let graph = scratch.file("graph.toml", text);
+        let model = scratch.path("model.json");
+        athermal(&[&"fit", &graph, &"--data", &first, &second, &"-o", &model]).ended(0);
+        let text = std::fs::read_to_string(&model).unwrap();
+        let kept: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let of = |all: &serde_json::Value| {
+            let mut all = all.as_array().unwrap().iter();
+            all.find(|of| of["node"] == "level").unwrap().clone()
+        };
+        let card = of(&kept["card"]["estimators"]);
+        let score = athermal(&[
+            &"evaluate",
+            &model,
+            &"--data",
+            &first,
+            &second,
+            &"--each-on-its-own",
+            &"--format",
+            &"json",
+        ]);
+        let score = of(&score.ended(0).json()["scores"]);
+        assert_eq!(card["rows"], score["n"], "{ahead} {more}");
+        let of_fit = card["in_sample_rmse"].as_f64().unwrap();
+        near(of_fit, score["rmse"].as_f64().unwrap());
+    }
+}
+
+#[test]
 fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
     let scratch = Scratch::new("modes-learning");
     let data = scratch.file("data.csv", csv(&series(200)));
