@@ -46,6 +46,13 @@ pub fn count(value: u64) -> String {
     text
 }
 
+/// How many there are of something, which is named as one of them: `1 row`, `8,028 rows`.
+#[must_use]
+pub fn counted(value: u64, what: &str) -> String {
+    let plural = if value == 1 { "" } else { "s" };
+    format!("{} {what}{plural}", count(value))
+}
+
 /// A number to so many significant digits.
 #[must_use]
 pub fn digits(value: f64, count: usize) -> String {
@@ -348,5 +355,11 @@ mod tests {
         assert_eq!(count(1), "1");
         assert_eq!(count(1234), "1,234");
         assert_eq!(count(1_234_567), "1,234,567");
+    }
+
+    #[test]
+    fn of_one_there_is_no_plural() {
+        let told = [0, 1, 2, 1234].map(|value| counted(value, "row"));
+        assert_eq!(told, ["0 rows", "1 row", "2 rows", "1,234 rows"]);
     }
 }

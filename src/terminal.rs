@@ -13,7 +13,7 @@ use athermal::files::FileError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use crate::figures::count;
+use crate::figures::{count, counted};
 
 /// Options that every command takes.
 #[derive(Debug, Args)]
@@ -106,12 +106,10 @@ impl Terminal {
         } else {
             self.say(diagnostics.render(sources, self.colour, 100).trim_end());
             let (errors, warnings) = (diagnostics.error_count(), diagnostics.warning_count());
-            let counted = [(errors, "error"), (warnings, "warning")];
-            let counted = counted.iter().filter(|(count, _)| *count > 0);
-            let words: Vec<_> = counted
-                .map(|(count, what)| {
-                    format!("{count} {what}{}", if *count == 1 { "" } else { "s" })
-                })
+            let kinds = [(errors, "error"), (warnings, "warning")];
+            let kinds = kinds.iter().filter(|(count, _)| *count > 0);
+            let words: Vec<_> = kinds
+                .map(|(count, what)| counted(*count as u64, what))
                 .collect();
             self.note(words.join(", "));
         }

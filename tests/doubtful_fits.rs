@@ -129,7 +129,7 @@ fn a_single_row_is_not_fitted_by_any_kind() {
         "type = \"kalman\"".to_owned(),
     ] {
         let fit = fit("single", &node, &explained(1), &[]).ended(1);
-        fit.tells(&["1 complete rows, and at least 2 are needed"]);
+        fit.tells(&["1 complete row, and at least 2 are needed"]);
     }
 }
 
@@ -268,15 +268,4 @@ fn a_narx_without_a_term_says_that_it_predicts_the_mean() {
         "{told}"
     );
     assert!(!told.contains("error-reduction"), "{told}");
-}
-
-#[test]
-fn kalman_says_of_which_predictions_its_error_is() {
-    let told = fit("kalman", "type = \"kalman\"", &explained(60), &[])
-        .ended(0)
-        .out;
-    assert!(
-        told.contains("while the model was still being learned"),
-        "{told}"
-    );
 }

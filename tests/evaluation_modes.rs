@@ -128,7 +128,13 @@ fn the_last_truth_is_repeated_from_as_far_back_as_the_mode_says() {
         figure(&three, "lasting", "rmse"),
         root_mean_square((3..200).map(|t| y[t - 3] - y[t])),
     );
+    let repeats = root_mean_square((3..200).map(|t| y[t - 3] - y[t]));
+    for of in &three {
+        // Features have a prediction of the first three, and nothing to repeat.
+        near(of["baseline_persistence"].as_f64().unwrap(), repeats);
+    }
     let free = scores(&model, &data, &["--mode", "free-run", "--each-on-its-own"]);
+    assert!(free.iter().all(|of| of["baseline_persistence"].is_null()));
     near(
         figure(&free, "lasting", "rmse"),
         root_mean_square((1..200).map(|t| y[0] - y[t])),
@@ -152,6 +158,100 @@ fn the_last_truth_is_repeated_from_as_far_back_as_the_mode_says() {
 }
 
 #[test]
+fn persistence_of_some_steps_repeats_the_last_truth_so_far_back_also_where_rows_are_not_as_far_apart()
+ {
+    let scratch = Scratch::new("modes-persistence");
+    // Between 7 and 13 s apart, so that a step without a horizon is not always as long.
+    let rows = series(200);
+    let times: Vec<f64> = (0..200)
+        .map(|nth| f64::from(10 * nth + [0, 3, 0, 2][nth as usize % 4]))
+        .collect();
+    let lines = rows.iter().zip(&times);
+    let lines = lines.map(|([a, y], time)| format!("{time},{a},{y}\n"));
+    let text = format!("time_s,a,y\n{}", lines.collect::<String>());
+    let data = scratch.file("data.csv", text);
+    let last = |limit: f64| times.iter().rposition(|&time| time <= limit);
+    for ahead in [10.0, 0.0] {
+        let text = GRAPH
+            .replace("LEARN", "")
+            .replace("max_age = \"10s\"", "max_age = \"20s\"");
+        let text = text.replace("ahead = \"10s\"", &format!("ahead = \"{ahead}s\""));
+        let graph = scratch.file("graph.toml", text);
+        let model = fitted(&scratch, "model.json", &graph, &data);
+        for steps in [1, 2, 5] {
+            let mode = [
+                "--mode",
+                "k-step",
+                "--steps",
+                &steps.to_string(),
+                "--each-on-its-own",
+            ];
+            let scores = scores(&model, &data, &mode);
+            let errors = (0..200).filter_map(|nth| {
+                let run = last(times[nth] - ahead)?;
+                let before = run
+                    .checked_sub(1)
+                    .map_or(0.0, |before| times[run] - times[before]);
+                let step = if ahead > 0.0 { ahead } else { before };
+                let mut origin = times[run] + ahead - f64::from(steps) * step;
+                if ahead == 0.0 {
+                    origin = origin.min(times[run] - 1e-9);
+                }
+                Some(rows[last(origin.min(times[run]))?][1] - rows[nth][1])
+            });
+            near(
+                figure(&scores, "features", "baseline_persistence"),
+                root_mean_square(errors),
+            );
+        }
+    }
+}
+
+#[test]
+fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
+    let scratch = Scratch::new("modes-in-sample");
+    let rows = series(400);
+    let first = scratch.file("first.csv", csv(&rows[..250]));
+    let second = scratch.file("second.csv", csv(&rows[250..]));
+    let node = "[nodes.level]\ntype = \"kalman\"\n";
+    let features = "inputs.features = \"input.a\"";
+    for (ahead, more) in [
+        ("0s", ""),
+        ("10s", features),
+        ("30s", features),
+        ("30s", "inputs.features = \"input.a\"\nlearn = false"),
+    ] {
+        let text = GRAPH.replace("LEARN", "");
+        let text = text.replace(node, &format!("{node}{more}\n"));
+        let text = text.replace("ahead = \"10s\"", &format!("ahead = \"{ahead}\""));
+        let graph = scratch.file("graph.toml", text);
+        let model = scratch.path("model.json");
+        athermal(&[&"fit", &graph, &"--data", &first, &second, &"-o", &model]).ended(0);
+        let text = std::fs::read_to_string(&model).unwrap();
+        let kept: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let of = |all: &serde_json::Value| {
+            let mut all = all.as_array().unwrap().iter();
+            all.find(|of| of["node"] == "level").unwrap().clone()
+        };
+        let card = of(&kept["card"]["estimators"]);
+        let score = athermal(&[
+            &"evaluate",
+            &model,
+            &"--data",
+            &first,
+            &second,
+            &"--each-on-its-own",
+            &"--format",
+            &"json",
+        ]);
+        let score = of(&score.ended(0).json()["scores"]);
+        assert_eq!(card["rows"], score["n"], "{ahead} {more}");
+        let of_fit = card["in_sample_rmse"].as_f64().unwrap();
+        near(of_fit, score["rmse"].as_f64().unwrap());
+    }
+}
+
+#[test]
 fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
     let scratch = Scratch::new("modes-learning");
     let data = scratch.file("data.csv", csv(&series(200)));
@@ -165,6 +265,18 @@ fn in_a_free_run_nothing_is_learned_and_one_step_is_the_first_of_several() {
         figure(&scores(&still, &data, &[]), "level", "rmse")
     );
     let first = scores(&model, &data, &["--mode", "k-step", "--steps", "1"]);
+    let told = athermal(&[
+        &"evaluate",
+        &model,
+        &"--data",
+        &data,
+        &"--mode",
+        &"k-step",
+        &"--steps",
+        &"1",
+    ]);
+    let told = told.ended(0).out;
+    assert!(told.starts_with("1 step ahead: "), "{told}");
     let one = scores(&model, &data, &[]);
     for node in ["lasting", "features", "level"] {
         assert_eq!(

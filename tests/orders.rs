@@ -50,14 +50,19 @@ fn expected() -> Vec<Value> {
 
 /// The table of orders that a fit told, and the text for people.
 fn fitted(name: &str, graph: &str) -> (Value, String) {
+    let (card, told) = fitted_card(name, graph);
+    (card["orders"].clone(), told)
+}
+
+/// All that the model keeps of a fit, and the text for people.
+fn fitted_card(name: &str, graph: &str) -> (Value, String) {
     let scratch = Scratch::new(&format!("orders-{name}"));
     let graph = scratch.file("graph.toml", graph);
     let (data, model) = (own_oracle("orders/series.csv"), scratch.path("model.json"));
     let told = athermal(&[&"fit", &graph, &"--data", &data, &"--output", &model]).ended(0);
     let text = std::fs::read_to_string(&model).unwrap();
     let model: Value = serde_json::from_str(&text).unwrap();
-    let orders = &model["card"]["estimators"][0]["orders"];
-    (orders.clone(), told.out)
+    (model["card"]["estimators"][0].clone(), told.out)
 }
 
 #[test]
@@ -118,6 +123,44 @@ fn orders_are_compared_by_least_squares_whatever_the_solver() {
     }
     let (_, told) = fitted("solvers", &graph("bic", AR));
     assert!(!told.contains("compared by"), "{told}");
+}
+
+/// A model that is searched, of two features, with a penalty.
+fn searched(penalty: &str) -> (Value, String) {
+    let features = r#"
+[nodes.before]
+type = "lag"
+inputs.signal = "output"
+lags = ["100s"]
+[nodes.model]
+inputs.features = "before"
+type = "armax"
+nb = 1
+nc = 0
+"#;
+    let graph = graph("bic", &format!("penalty = {penalty}")).replace("[nodes.model]", features);
+    fitted_card(&format!("penalty-{penalty}"), &graph)
+}
+
+#[test]
+fn orders_of_models_that_are_searched_are_compared_without_the_penalty() {
+    let told = "orders are compared without the penalty, with which the chosen one is fitted";
+    let line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let (free, text) = searched("0.0");
+    assert!(!line(&text).contains(told), "{text}");
+    for penalty in ["1.0", "1000.0"] {
+        let (found, text) = searched(penalty);
+        assert_eq!(
+            found["orders"], free["orders"],
+            "with the penalty {penalty}"
+        );
+        assert!(line(&text).contains(told), "{text}");
+        let error = |of: &Value| of["in_sample_rmse"].as_f64().unwrap();
+        assert!(
+            error(&found) > error(&free),
+            "the chosen one is fitted with it"
+        );
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use athermal::core::document::{self, Disk};
 use athermal::core::trial::{self, Trial};
 use clap::Args;
 
-use crate::figures::count;
+use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Look for mistakes in a graph file
@@ -76,12 +76,12 @@ impl Check {
                 let nodes: std::collections::BTreeSet<_> =
                     plan.nodes.iter().map(|node| &node.name).collect();
                 terminal.note(format_args!(
-                    "{}: {} measured channels, {} nodes ({} instances), {} outputs",
+                    "{}: {}, {} ({}), {}",
                     path.display(),
-                    count(plan.sources.len() as u64),
-                    count(nodes.len() as u64),
-                    count(plan.nodes.len() as u64),
-                    count(plan.outputs.len() as u64),
+                    counted(plan.sources.len() as u64, "measured channel"),
+                    counted(nodes.len() as u64, "node"),
+                    counted(plan.nodes.len() as u64, "instance"),
+                    counted(plan.outputs.len() as u64, "output"),
                 ));
             }
         }

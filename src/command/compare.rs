@@ -14,7 +14,7 @@ use serde_json::json;
 use super::data::{self, Data};
 use super::evaluate::check_limit;
 use super::fit::fit_without_card;
-use crate::figures::{count, digits, matrix, number, or_dash, stated};
+use crate::figures::{count, counted, digits, matrix, number, or_dash, stated};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit several graphs on the same data and score them on others, in one table
@@ -189,9 +189,9 @@ fn heading(comparison: &Comparison) -> String {
     let (fewest, most) = (counts.clone().min(), counts.max());
     let instants = match (fewest, most) {
         (Some(fewest), Some(most)) if fewest != most => {
-            format!("{} to {}", count(fewest), count(most))
+            format!("{} to {}", count(fewest), counted(most, "instant"))
         }
-        (_, most) => count(most.unwrap_or(0)),
+        (_, most) => counted(most.unwrap_or(0), "instant"),
     };
     let few = 2 * BLOCKS;
     let few = match fewest {
@@ -201,7 +201,7 @@ fn heading(comparison: &Comparison) -> String {
         _ => String::new(),
     };
     format!(
-        "RMSE in {}, {} ahead, {instants} instants; * best, ! worse than no model\n\
+        "RMSE in {}, {} ahead, {instants}; * best, ! worse than no model\n\
          ± standard error of the difference to the best; ~ that may be chance\n{few}",
         comparison.unit,
         stated(comparison.ahead_s)
@@ -267,6 +267,12 @@ mod tests {
     fn with_few_instants_it_is_said_that_the_best_may_be_chance() {
         assert!(describe(&one_row(19, 2.0)).contains("best may be chance"));
         assert!(!describe(&one_row(20, 2.0)).contains("best may be chance"));
+    }
+
+    #[test]
+    fn a_single_instant_is_no_plural() {
+        assert!(describe(&one_row(1, 2.0)).contains("ahead, 1 instant; *"));
+        assert!(describe(&one_row(2, 2.0)).contains("ahead, 2 instants; *"));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Options, Report};
 use clap::Args;
 
-use crate::figures::count;
+use crate::figures::{count, counted};
 use crate::invocation::{program, quoted};
 use crate::terminal::{Failure, Terminal};
 
@@ -138,15 +138,17 @@ pub fn tell(
         }
     }
     if refused > 0 {
+        let were = if refused == 1 { "was" } else { "were" };
         terminal.warning(format_args!(
-            "{} rows were refused because their time is not after the one before",
-            count(refused)
+            "{} {were} refused for a time that is not after the one before",
+            counted(refused, "row")
         ));
     }
     for (channel, n) in rejected {
+        let are = if *n == 1 { "is" } else { "are" };
         terminal.warning(format_args!(
-            "{channel}: {} samples are infinite or out of range, taken as missing",
-            count(*n)
+            "{channel}: {} {are} infinite or out of range, taken as missing",
+            counted(*n, "sample")
         ));
     }
 }

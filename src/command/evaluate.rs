@@ -12,14 +12,14 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::data::{self, Data};
-use crate::figures::{count, number, or_dash, table};
+use crate::figures::{counted, number, or_dash, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Score a model's predictions on recorded data
 ///
 /// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
-/// truth that shares nothing with the predicted one), and the noise of the truth itself. All predictions of a truth are
+/// truth that shares nothing with the predicted one; K steps ahead that of K steps before, in a free run none), and the noise of the truth itself. All predictions of a truth are
 /// scored on the instants at which all of them are valid.
 ///
 /// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
@@ -218,7 +218,8 @@ fn describe(scores: &Scores, mode: Mode) -> String {
     let mut text = match mode {
         Mode::OneStep => String::new(),
         Mode::Steps(steps) => format!(
-            "{steps} steps ahead: no truth newer than that is read, but what was predicted of it\n\n"
+            "{} ahead: no truth newer than that is read, but what was predicted of it\n\n",
+            counted(steps.get().into(), "step")
         ),
         Mode::FreeRun => {
             "free run: no measured truth is read where there is a prediction of it\n\n".to_owned()
@@ -241,9 +242,9 @@ fn describe(scores: &Scores, mode: Mode) -> String {
         };
         let _ = writeln!(
             text,
-            "{truth} in {}, {} instants",
+            "{truth} in {}, {}",
             first.unit,
-            count(first.n as u64)
+            counted(first.n as u64, "instant")
         );
         let _ = writeln!(
             text,
@@ -331,8 +332,8 @@ fn line(score: &Score) -> Vec<String> {
         remarks.push("no prediction of any truth".to_owned());
     } else if score.own_instants {
         remarks.push(format!(
-            "on its own {} instants (no model {})",
-            score.n,
+            "on its own {} (no model {})",
+            counted(score.n as u64, "instant"),
             score.baseline_zero.map_or("-".into(), number)
         ));
     }

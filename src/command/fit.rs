@@ -15,7 +15,8 @@ use serde_json::json;
 
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
-use crate::figures::{count, number, paragraph, table};
+use super::threads::Threads;
+use crate::figures::{count, counted, number, paragraph, table};
 use crate::invocation::{next, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -24,6 +25,12 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Prints for each node that is fitted (estimators, and features that learn) the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
 /// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells.
+///
+/// What is fed by estimators, such as a `stack`, learns from predictions of rows that those were not fitted on: all below it is
+/// fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with three.
+///
+/// With `--format json` all of that, and what sentences say of weights, penalties, noises and the like, is data: `estimators` has
+/// an object for each node, and its `figures` are by name, unrounded.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal fit graphs/die-tester.toml --data train.csv -o model.json\n  \
@@ -37,9 +44,8 @@ pub struct Fit {
     /// Where the model goes; `-` is standard output
     #[arg(long, short, value_name = "MODEL")]
     output: PathBuf,
-    /// Threads that train; the result does not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: Threads,
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
     #[arg(long, value_name = "MB", default_value_t = 64)]
     memory: usize,
@@ -57,11 +63,10 @@ impl Fit {
         let mut sources = Sources::new();
         let mut model = Model::load_from(&self.graph, Wanted::default(), &mut sources)?;
         self.doubt_tests(&model, sources, terminal);
-        let defaults = FitOptions::default();
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
-            threads: self.threads.unwrap_or(defaults.threads),
-            ..defaults
+            threads: self.threads.count(),
+            ..FitOptions::default()
         };
         let report = fit_on(&mut model, &self.data, &options, terminal)?;
         let text = model.to_text().map_err(|error| {
@@ -250,9 +255,9 @@ fn tell_orders(text: &mut String, orders: &OrderTable, all: bool) {
         ];
         if chosen {
             cells.push(format!(
-                "smallest {}, on {} rows",
+                "smallest {}, on {}",
                 orders.by,
-                count(orders.rows as u64)
+                counted(orders.rows as u64, "row")
             ));
         }
         cells
@@ -279,11 +284,11 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
     let mut text = String::new();
     let _ = write!(
         text,
-        "{} ({} of {}): {} rows",
+        "{} ({} of {}): {}",
         fit.node,
         fit.kind,
         fit.truth,
-        count(fit.rows)
+        counted(fit.rows, "row")
     );
     let dropped = [
         (fit.dropped.outside_limits, "outside the limits"),

@@ -22,6 +22,7 @@ mod show;
 mod simulate;
 mod swap;
 mod test;
+mod threads;
 mod watched;
 
 use clap::Subcommand;

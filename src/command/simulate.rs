@@ -16,7 +16,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::evaluate::load_fitted;
-use crate::figures::count;
+use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
 
 /// Write the recording of a simulated machine, or list the machines
@@ -82,10 +82,11 @@ impl Simulate {
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() != "-" && terminal.format == Format::Table {
+            let plural = if self.days == 1.0 { "" } else { "s" };
             terminal.note(format_args!(
-                "wrote {}: {} rows, {} days of `{name}`, seed {}",
+                "wrote {}: {}, {} day{plural} of `{name}`, seed {}",
                 output.display(),
-                count(rows),
+                counted(rows, "row"),
                 self.days,
                 self.seed
             ));

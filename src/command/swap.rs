@@ -10,7 +10,7 @@ use athermal::{Duration, Instant, Model};
 use clap::Args;
 
 use super::watched::Watched;
-use crate::figures::{count, number};
+use crate::figures::{count, counted, number};
 use crate::terminal::{Failure, Terminal};
 
 /// When and how the graph is replaced.
@@ -341,8 +341,9 @@ impl<'a> Course<'a> {
                     .terminal
                     .warning("the new graph came too late and was sent back"),
                 Notice::Missed { ticks } => {
-                    self.terminal
-                        .warning(format_args!("{} ticks were missed", count(ticks)));
+                    let were = if ticks == 1 { "was" } else { "were" };
+                    let ticks = counted(ticks, "tick");
+                    self.terminal.warning(format_args!("{ticks} {were} missed"));
                 }
             }
         }
@@ -420,11 +421,11 @@ fn figures(verdict: &Verdict) -> String {
     for output in &verdict.outputs {
         let _ = write!(
             text,
-            "\n  {}: RMSE {} running, {} new, over {} instants",
+            "\n  {}: RMSE {} running, {} new, over {}",
             output.output,
             number(output.running_rmse),
             number(output.candidate_rmse),
-            count(output.n as u64)
+            counted(output.n as u64, "instant")
         );
     }
     if let Some(ratio) = verdict.ratio {

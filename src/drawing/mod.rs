@@ -12,7 +12,7 @@ use athermal::core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal::core::node::RoleName;
 use athermal::core::time::Duration;
 
-use crate::figures::length;
+use crate::figures::{counted, length};
 
 /// A graph as boxes and arrows, from what is measured to what comes out.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -121,7 +121,10 @@ impl Drawn<'_> {
         }
         for (signal, slots) in signals {
             let unit = &self.plan.channels[slots[0]].channel.unit;
-            let lines = vec![format!("{} in {unit}", counted(slots.len(), "channel"))];
+            let lines = vec![format!(
+                "{} in {unit}",
+                counted(slots.len() as u64, "channel")
+            )];
             let number = self.add(signal, Class::Signal, lines);
             for slot in slots {
                 self.of_slot[slot] = Some(number);
@@ -192,7 +195,7 @@ impl Drawn<'_> {
         let unit = channels().next().map(|channel| channel.unit.to_string());
         match &node.role {
             PlannedRole::Feature { .. } => {
-                let count = counted(slots.len(), "channel");
+                let count = counted(slots.len() as u64, "channel");
                 lines.push(unit.map_or(count.clone(), |unit| format!("{count} in {unit}")));
                 let spans: BTreeSet<Duration> = channels().map(|channel| channel.span).collect();
                 match (spans.first(), spans.last()) {
@@ -208,12 +211,15 @@ impl Drawn<'_> {
             PlannedRole::Estimator {
                 regressors, truth, ..
             } => {
-                lines.push(format!("from {}", counted(regressors.len(), "regressor")));
+                lines.push(format!(
+                    "from {}",
+                    counted(regressors.len() as u64, "regressor")
+                ));
                 lines.push(format!("{} ahead", length(truth.ahead)));
             }
             PlannedRole::Combiner { voters, .. } => {
                 let voters = self.plan.gathers[*voters].entries.len();
-                lines.push(format!("of {}", counted(voters, "voter")));
+                lines.push(format!("of {}", counted(voters as u64, "voter")));
                 lines.extend(unit.map(|unit| format!("in {unit}")));
             }
         }
@@ -254,17 +260,16 @@ impl Drawn<'_> {
         }
         for (name, slots) in groups {
             let unit = &self.plan.channels[slots[0]].channel.unit;
-            let lines = vec![format!("{} in {unit}", counted(slots.len(), "column"))];
+            let lines = vec![format!(
+                "{} in {unit}",
+                counted(slots.len() as u64, "column")
+            )];
             let number = self.add(name, Class::Output, lines);
             for slot in slots {
                 self.arrow(slot, number, Flow::Data);
             }
         }
     }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

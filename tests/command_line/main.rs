@@ -470,7 +470,7 @@ fn standard_input_is_read_and_empty_cells_stand_for_nothing() {
         run.out,
         "time_s,predicted.Z,now.Z,room.room\n0,,,21.0\n10,,,\n20,,,\n"
     );
-    run.tells(&["position.Z: 1 samples are infinite or out of range"]);
+    run.tells(&["position.Z: 1 sample is infinite or out of range"]);
 }
 
 #[test]

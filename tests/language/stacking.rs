@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::node::Figure;
 use athermal::core::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
@@ -53,6 +54,49 @@ fn few() -> Table {
 }
 
 #[test]
+fn what_two_levels_learn_from_is_fitted_once() {
+    let above = |name: &str, below: &str| {
+        format!(
+            "[nodes.{name}]\ntype = \"stack\"\ninputs.voters = [\"{below}\", \"plain\"]\n\
+             inputs.truth = \"position.Z\"\nahead = \"0s\"\n"
+        )
+    };
+    let graph = nodes("ahead = \"0s\"").replace(
+        "[outputs]",
+        &format!(
+            "{}{}[outputs]\nhigher = \"higher\"\nhighest = \"highest\"",
+            above("higher", "stack"),
+            above("highest", "higher")
+        ),
+    );
+    let mut table = Table::default();
+    let rows = 4096;
+    for second in 0..rows {
+        let t = f64::from(second);
+        let warm = (0.013 * t).sin();
+        let values = [
+            warm,
+            (0.031 * t).cos(),
+            3.0 * warm + 0.1 * (1.7 * t * t).sin(),
+        ];
+        table.push(
+            Instant::from_ns(i64::from(second) * 10_000_000_000),
+            &values,
+        );
+    }
+    let mut stepped = 0;
+    let plan = plan(&graph);
+    let (_, report) = fit(&plan, &table, &FitOptions::default(), &mut |ticks| {
+        stepped = ticks
+    })
+    .unwrap();
+    assert_eq!(report.estimators.len(), 5);
+    // A level takes a pass, and one above others a pass for each of three folds. What lies below the third level is fitted
+    // once on all ticks and once without each fold, and so on: 1, 1 + 3 + 3 · 1, 1 + 3 + 3 + 3 · 7 and 1 + 3 + 3 + 3 + 3 · 28.
+    assert_eq!(stepped, 94 * u64::try_from(rows).unwrap());
+}
+
+#[test]
 fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight_as_in_the_oracle() {
     let plan = plan(&nodes("ahead = \"0s\""));
     let table = few();
@@ -75,16 +119,17 @@ fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight_as_in_the_or
         rmse("rich"),
         rmse("plain")
     );
-    let weights = &report("stack").notes[0];
-    let weight = |name: &str| -> f64 {
-        let after = weights.split(&format!("{name} ")).nth(1).unwrap();
-        after.split(',').next().unwrap().parse().unwrap()
+    let stacked = report("stack");
+    let Figure::Named(weights) = &stacked.figures["weights"] else {
+        panic!("{stacked:?}");
     };
+    let weight = |name: &str| weights[name].0;
     let expected = &numbers(include_str!("../oracles/stacking/expected.csv"))[0];
-    assert!(weight("rich.Z") < 0.25 * weight("plain.Z"), "{weights}");
+    assert!(weight("rich.Z") < 0.25 * weight("plain.Z"), "{weights:?}");
     for (name, expected) in ["plain.Z", "rich.Z"].into_iter().zip(expected) {
-        // They are told to three decimals.
-        assert!((weight(name) - expected).abs() < 0.0005 + 1e-9, "{weights}");
+        assert!((weight(name) - expected).abs() < 1e-9, "{weights:?}");
+        let told = format!("{name} {expected:.3}");
+        assert!(stacked.notes[0].contains(&told), "{:?}", stacked.notes);
     }
 
     // While the lags are cold the rich one is absent, and the plain one goes on alone.

@@ -1,7 +1,7 @@
 //! Decides what a network is trained on, when training stops and which weights are kept; not what is made of the network.
 
 use athermal_core::node::{
-    Predictor, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Figure, Predictor, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::prng::Prng;
 use athermal_core::time::{Duration, Instant};
@@ -197,22 +197,33 @@ impl Learning {
             });
         }
         let rmse = |mean_square: f64| truth.deviation * mean_square.sqrt();
-        let mut notes = vec![format!(
+        let mut report = TrainingReport {
+            in_sample_rmse: Some(rmse(all)),
+            ..TrainingReport::default()
+        };
+        report.figure("rows_trained_on", until);
+        report.figure("rows_judged_by", truths.len() - from);
+        report.figure("rmse_on_those", rmse(error));
+        report.figure("epochs", gone);
+        report.figure("epoch_kept", kept);
+        report.notes.push(format!(
             "trained on {until} rows for {gone} of {epochs} epochs; kept are the weights after {kept}, which predict the {} \
              rows after them within {:.3} {}",
             truths.len() - from,
             rmse(error),
             self.unit
-        )];
+        ));
         if self.thinned > 1 {
-            notes.push(format!(
+            report.figure("rows_apart", self.thinned);
+            report.notes.push(format!(
                 "of {} rows one was kept, for want of memory",
                 self.thinned
             ));
         }
         if !self.layout.incomplete.is_empty() {
             let missing = self.layout.incomplete.join(", ");
-            notes.push(format!(
+            report.figure("left_out", Figure::names(self.layout.incomplete.clone()));
+            report.notes.push(format!(
                 "left out, since steps of it are too often absent: {missing}"
             ));
         }
@@ -224,11 +235,7 @@ impl Learning {
         };
         Ok(Trained {
             predictor: (self.finish)(fit),
-            report: TrainingReport {
-                in_sample_rmse: Some(rmse(all)),
-                notes,
-                ..TrainingReport::default()
-            },
+            report,
         })
     }
 }

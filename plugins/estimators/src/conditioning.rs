@@ -1,6 +1,6 @@
 //! Decides how columns that say nothing, or nothing new, are told; what is made of them is each estimator's.
 
-use athermal_core::node::TrainingReport;
+use athermal_core::node::{Figure, TrainingReport};
 use athermal_numerics::{Gram, LeastSquares, LinearFit, Standardization};
 
 /// Names the constant columns of a fit and those that are nearly a combination of others.
@@ -10,13 +10,18 @@ pub(crate) fn name_columns<'a>(
     report: &mut TrainingReport,
 ) {
     let told = [
-        ("constant, so without effect", &fit.constant),
-        ("nearly a combination of the others", &fit.collinear),
+        ("constant", "constant, so without effect", &fit.constant),
+        (
+            "collinear",
+            "nearly a combination of the others",
+            &fit.collinear,
+        ),
     ];
-    for (what, columns) in told {
+    for (figure, what, columns) in told {
         let names: Vec<&str> = columns.iter().map(|&column| name(column)).collect();
         if !names.is_empty() {
             report.notes.push(format!("{what}: {}", names.join(", ")));
+            report.figure(figure, Figure::names(names));
         }
     }
 }

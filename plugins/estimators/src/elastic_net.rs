@@ -224,6 +224,11 @@ impl SparseTrainer {
         } else {
             ""
         };
+        report.figure("penalty", alphas[best]);
+        report.figure("penalties_tried", alphas.len());
+        report.figure("smallest_penalty", alphas[0]);
+        report.figure("largest_penalty", largest);
+        report.figure("penalty_r2", means[best]);
         report.notes.push(format!(
             "penalty {:.3e} chosen by cross-validation from {} up to {largest:.3e}, R² {:.4}{edge}",
             alphas[best],
@@ -241,6 +246,7 @@ impl SparseTrainer {
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let fit = how.solve(&gram, &all, &scales)?;
         tell_columns(&gram, |column| &self.regressors[column].name, report);
+        report.figure("converged", fit.converged);
         if !fit.converged {
             report.notes.push(
                 "the descent did not come to its end: a larger penalty or fewer features would help"
@@ -251,6 +257,8 @@ impl SparseTrainer {
             .into_iter()
             .filter(|&j| fit.coefficients[j] != 0.0)
             .collect();
+        report.figure("features_kept", kept.len());
+        report.figure("features", self.regressors.len());
         report.notes.push(format!(
             "{} of {} features have a coefficient",
             kept.len(),

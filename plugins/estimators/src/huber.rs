@@ -111,6 +111,9 @@ impl Trainer for RobustTrainer {
             ..TrainingReport::default()
         };
         tell_columns(&gram, |column| &self.regressors[column].name, &mut report);
+        report.figure("outliers", fit.outliers);
+        report.figure("scale", fit.scale);
+        report.figure("converged", fit.converged);
         report.notes.push(format!(
             "{} of {count} rows count as outliers; the scale of the others is {:.4} {}",
             fit.outliers, fit.scale, self.unit

@@ -2,8 +2,9 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Coefficients, Estimator, Factor, InputPort, Mistake, Of, Predictor, Regressor, Regressors,
-    SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TruthLags,
+    Coefficients, Estimator, Factor, Figure, Figures, InputPort, Mistake, Of, Predictor, Regressor,
+    Regressors, SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    TruthLags,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{ErrorReduction, ForwardRegression, Gram, Standardizer};
@@ -241,9 +242,12 @@ impl NarxTrainer {
         let mut explained = 0.0;
         let ratios = found.terms.iter().map(|term| {
             let name = self.terms[term.column].name(&self.regressors);
-            format!("{name} {:.3e}", term.ratio)
+            (name, term.ratio)
         });
-        let ratios: Vec<String> = ratios.collect();
+        let by_name = Figure::named(ratios.clone());
+        let ratios: Vec<String> = ratios
+            .map(|(name, ratio)| format!("{name} {ratio:.3e}"))
+            .collect();
         let told = if ratios.is_empty() {
             "no term explains as much as `tolerance` asks for, so the prediction is the mean of the rows".to_owned()
         } else {
@@ -251,6 +255,7 @@ impl NarxTrainer {
         };
         TrainingReport {
             notes: vec![told],
+            figures: Figures::from([("error_reduction_ratios".to_owned(), by_name)]),
             selection: found
                 .terms
                 .iter()

@@ -45,7 +45,8 @@ pub struct Oe {
     /// How long a step is; without it the span of the truth, or where that is nothing the typical time between truths.
     #[serde(default)]
     pub every: Option<Duration>,
-    /// Which orders are compared, such as `{ by = "aicc", nb = "1..4", nf = "1..4" }`; without it they are as given.
+    /// Which orders are compared, such as `{ by = "aicc", nb = "1..4", nf = "1..4" }`; without it they are as given. They are compared
+    /// without the penalty, with which the chosen one is fitted.
     #[serde(default)]
     pub order: Option<Order>,
 }

@@ -218,6 +218,7 @@ impl Order {
         };
         let left_out = count - tried.len();
         if left_out > 0 {
+            report.figure("orders_not_ranked", left_out);
             report.notes.push(format!(
                 "{left_out} of {count} orders have too many coefficients to be ranked on {rows} rows"
             ));

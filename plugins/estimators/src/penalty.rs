@@ -1,6 +1,6 @@
 //! Decides how a user states the penalty of ridge, and how the best of several is found.
 
-use athermal_core::node::{Forms, Mistake};
+use athermal_core::node::{Forms, Mistake, TrainingReport};
 use athermal_numerics::{
     GramBlocks, NumericsError, cross_validated_penalties, generalised_cross_validation,
     logarithmic_grid,
@@ -81,10 +81,57 @@ impl<'de> Deserialize<'de> for Penalty {
     }
 }
 
-/// A penalty, and what there is to tell about it.
+/// A penalty, and where it was chosen what there is to tell about it.
 pub(crate) struct Settled {
     pub(crate) alpha: f64,
-    pub(crate) note: Option<String>,
+    chosen: Option<Chosen>,
+}
+
+/// How a penalty came out as the best.
+struct Chosen {
+    by: Choice,
+    tried: usize,
+    /// Its place among those that were tried.
+    place: usize,
+    /// The mean R² over the folds, where there are any.
+    r2: Option<f64>,
+}
+
+impl Settled {
+    /// What there is to tell goes into the report.
+    pub(crate) fn tell(&self, report: &mut TrainingReport) {
+        let Some(Chosen {
+            by,
+            tried,
+            place,
+            r2,
+        }) = self.chosen
+        else {
+            return;
+        };
+        let (smallest, largest, _) = by.range();
+        report.figure("penalty", self.alpha);
+        report.figure("penalties_tried", tried);
+        report.figure("smallest_penalty", smallest);
+        report.figure("largest_penalty", largest);
+        let how = match by {
+            Choice::CrossValidation { .. } => "cross-validation",
+            Choice::GeneralisedCrossValidation { .. } => "generalised cross-validation",
+        };
+        let told = r2.map_or_else(String::new, |r2| {
+            report.figure("penalty_r2", r2);
+            format!(", R² {r2:.4}")
+        });
+        let edge = match place {
+            0 => "; it is the smallest tried, a smaller one may be better",
+            _ if place == tried - 1 => "; it is the largest tried, a larger one may be better",
+            _ => "",
+        };
+        report.notes.push(format!(
+            "penalty {:.3e} chosen by {how} from {tried} between {smallest:e} and {largest:e}{told}{edge}",
+            self.alpha
+        ));
+    }
 }
 
 impl Penalty {
@@ -129,52 +176,44 @@ impl Penalty {
         scales: &[f64],
     ) -> Result<Settled, NumericsError> {
         let choice = match *self {
-            Self::Fixed(alpha) => return Ok(Settled { alpha, note: None }),
+            Self::Fixed(alpha) => {
+                return Ok(Settled {
+                    alpha,
+                    chosen: None,
+                });
+            }
             Self::Chosen(choice) => choice,
         };
         let (smallest, largest, per_decade) = choice.range();
         let alphas = logarithmic_grid(smallest, largest, per_decade);
-        let (scores, how) = match choice {
+        let scores: Vec<f64> = match choice {
             Choice::CrossValidation { folds, .. } => {
                 let splits = blocks.splits(&folds.cut())?;
                 let folds = cross_validated_penalties(&splits, columns, scales, &alphas)?;
                 let mean = |scores: &Vec<f64>| scores.iter().sum::<f64>() / scores.len() as f64;
-                (
-                    folds.iter().map(mean).collect::<Vec<_>>(),
-                    "cross-validation",
-                )
+                folds.iter().map(mean).collect()
             }
             Choice::GeneralisedCrossValidation { .. } => {
                 let scores =
                     generalised_cross_validation(&blocks.total(), columns, scales, &alphas)?;
-                (
-                    scores.iter().map(|score| -score).collect(),
-                    "generalised cross-validation",
-                )
+                scores.iter().map(|score| -score).collect()
             }
         };
         // Of several as good the largest.
         let best = (0..alphas.len()).reduce(|a, b| if scores[b] >= scores[a] { b } else { a });
         let best = best.unwrap_or(0);
-        let alpha = alphas[best];
-        let told = match choice {
-            Choice::CrossValidation { .. } => format!(", R² {:.4}", scores[best]),
-            Choice::GeneralisedCrossValidation { .. } => String::new(),
+        let r2 = match choice {
+            Choice::CrossValidation { .. } => Some(scores[best]),
+            Choice::GeneralisedCrossValidation { .. } => None,
         };
-        let edge = match best {
-            0 => "; it is the smallest tried, a smaller one may be better",
-            _ if best == alphas.len() - 1 => {
-                "; it is the largest tried, a larger one may be better"
-            }
-            _ => "",
-        };
-        let note = format!(
-            "penalty {alpha:.3e} chosen by {how} from {} between {smallest:e} and {largest:e}{told}{edge}",
-            alphas.len()
-        );
         Ok(Settled {
-            alpha,
-            note: Some(note),
+            alpha: alphas[best],
+            chosen: Some(Chosen {
+                by: choice,
+                tried: alphas.len(),
+                place: best,
+                r2,
+            }),
         })
     }
 }

@@ -90,7 +90,7 @@ impl LinearTrainer {
         let settled = penalty
             .settle(&self.blocks, &columns, scales)
             .map_err(told)?;
-        report.notes.extend(settled.note);
+        settled.tell(report);
         Ok((columns, settled.alpha))
     }
 
@@ -236,13 +236,20 @@ impl LinearTrainer {
             _ if matches!(self.solver, Solver::Sgd { .. }) => {}
             // Every coefficient is determined, so there is nothing to worry about.
             Method::Svd { rank } if rank + fit.constant.len() == fit.columns.len() => {}
-            Method::Svd { rank } => report.notes.push(format!(
-                "ill-conditioned, so solved by singular values: the rows determine {rank} of {} coefficients",
-                fit.columns.len()
-            )),
-            Method::TinyRidge { alpha } => report.notes.push(format!(
-                "ill-conditioned, and the rows did not fit in memory, so solved with a ridge of {alpha:e}"
-            )),
+            Method::Svd { rank } => {
+                report.figure("rank", rank);
+                report.figure("coefficients", fit.columns.len());
+                report.notes.push(format!(
+                    "ill-conditioned, so solved by singular values: the rows determine {rank} of {} coefficients",
+                    fit.columns.len()
+                ));
+            }
+            Method::TinyRidge { alpha } => {
+                report.figure("tiny_ridge", alpha);
+                report.notes.push(format!(
+                    "ill-conditioned, and the rows did not fit in memory, so solved with a ridge of {alpha:e}"
+                ));
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Decides how a user asks for a selection of regressors, and how it is run and told.
 
-use athermal_core::node::{CandidateScore, Mistake, Regressor, SelectionStep, TrainingReport};
+use athermal_core::node::{
+    CandidateScore, Figure, Mistake, Regressor, SelectionStep, TrainingReport,
+};
 use athermal_numerics::{
     Candidates, Change, Direction, GramBlocks, NumericsError, Search, SelectionScore, Stepwise,
 };
@@ -183,6 +185,7 @@ impl Selection {
         let selected = search.over(&splits, scales, &candidates)?;
         if !blocks.exact_folds() {
             let rows = blocks.block_rows();
+            report.figure("folds_end_at_multiples_of", rows);
             report.notes.push(format!(
                 "the rows did not fit in memory, so folds end at multiples of {rows} rows"
             ));
@@ -202,6 +205,7 @@ impl Selection {
         report.selection = selected.steps.iter().map(of_step).collect();
         report.refused = selected.refused.as_ref().map(of_step);
         if let Some(start) = &selected.start {
+            report.figure("r2_of_all_regressors", start.mean);
             report
                 .notes
                 .push(format!("all regressors together have R² {:.4}", start.mean));
@@ -215,6 +219,7 @@ impl Selection {
                     "combinations of the regressors before them, so left out from the start: {}",
                     names.join(", ")
                 ));
+                report.figure("left_out_from_start", Figure::names(names));
             }
         }
         if how.one_standard_error
@@ -225,6 +230,9 @@ impl Selection {
                 1 => "after the first step".to_owned(),
                 steps => format!("after {steps} of {} steps", selected.steps.len()),
             };
+            report.figure("steps_taken", smallest.steps);
+            report.figure("standard_error_of_best", smallest.standard_error);
+            report.figure("best_r2", smallest.best);
             report.notes.push(format!(
                 "the set {after} is the smallest within one standard error ({:.4}) of the best R² {:.4}",
                 smallest.standard_error, smallest.best

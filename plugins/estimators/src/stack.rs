@@ -2,8 +2,8 @@
 
 use athermal_core::model::numbers;
 use athermal_core::node::{
-    Coefficients, Estimator, Factor, InputPort, Of, Predictor, Regressors, Term, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup,
+    Coefficients, Estimator, Factor, Figure, InputPort, Of, Predictor, Regressors, Term, Trained,
+    Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
 use athermal_numerics::{GramBlocks, NumericsError, non_negative_least_squares};
@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 /// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson 1974), without an
 /// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Predictions of the rows that
 /// an estimator was itself fitted on would flatter the one that fits them closest, so that weights are found on out-of-fold
-/// predictions: each part of the data is predicted by voters fitted on the rest.
+/// predictions: each third of the data is predicted by voters fitted on the rest. So voters are fitted four times, and those of
+/// a voter that is a stack itself 13 times.
 ///
 /// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the others go by the
 /// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over. Only rows with
@@ -90,15 +91,17 @@ impl Trainer for Stacking {
             })
             .sum();
         let squares = (moments[(voters, voters)] - explained).max(0.0);
-        let named = stacked.saved.regressors.iter().zip(weights);
-        let named: Vec<String> = named
+        let named = stacked.saved.regressors.iter().zip(weights.iter().copied());
+        let told: Vec<String> = named
+            .clone()
             .map(|(name, weight)| format!("{name} {weight:.3}"))
             .collect();
-        let report = TrainingReport {
+        let mut report = TrainingReport {
             in_sample_rmse: Some((squares / total.count() as f64).sqrt()),
-            notes: vec![format!("weights: {}", named.join(", "))],
+            notes: vec![format!("weights: {}", told.join(", "))],
             ..TrainingReport::default()
         };
+        report.figure("weights", Figure::named(named));
         Ok(Trained {
             predictor: Box::new(stacked),
             report,

@@ -284,6 +284,10 @@ impl Identify for StateSpace {
             },
             error => told(error),
         })?;
+        report.figure("states", found.model.order());
+        report.figure("singular_values", &found.singular_values[..]);
+        report.figure("stabilised", found.stabilised);
+        report.figure("horizon", horizon);
         report.notes.push(note(&found));
         if horizon < USUAL && self.horizon.is_none() {
             let reason = if horizon < longest {

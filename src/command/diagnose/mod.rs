@@ -17,6 +17,7 @@ use serde_json::json;
 use super::data::{self, Data};
 use super::evaluate::load_fitted;
 use super::report::write_plots;
+use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use tables::Tables;
 
@@ -169,10 +170,11 @@ fn tell_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observati
             let truth = &main.truth;
             terminal.warning(format_args!("the data have no value of the truth {truth}"));
         } else {
-            let plural = if there == 1 { "" } else { "s" };
             terminal.warning(format_args!(
-                "{} is at none of the {there} instant{plural} at which {} was measured, so nothing can be told of it",
-                main.prediction, main.truth
+                "{} is at none of the {} at which {} was measured, so nothing can be told of it",
+                main.prediction,
+                counted(there as u64, "instant"),
+                main.truth
             ));
         }
     }

@@ -7,7 +7,7 @@ use athermal::diagnosis::residual::{Residuals, UNLIKELY};
 use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
 use super::responses;
-use crate::figures::{count, matrix, number, or_dash, stated, table};
+use crate::figures::{count, counted, matrix, number, or_dash, stated, table};
 
 /// Features that are named of each truth.
 const FEATURES: usize = 3;
@@ -382,10 +382,10 @@ fn residuals(shown: &[&Residuals]) -> String {
         "residuals: measured less predicted in {}, of which n are {} apart, so that\n\
          neither windows nor horizons overlap; their largest autocorrelation, and within\n\
          what 95 % lie at its lag where there is none from that lag on (Bartlett);\n\
-         Q of Ljung and Box over {} lags: white where p is not below {UNLIKELY}\n{}",
+         Q of Ljung and Box over {}: white where p is not below {UNLIKELY}\n{}",
         first.unit,
         seconds(first.spacing_s),
-        first.autocorrelation.len(),
+        counted(first.autocorrelation.len() as u64, "lag"),
         table(&header, &rows)
     )
 }
@@ -416,8 +416,8 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
         (label, cells(&of.scores, |score| score.rmse))
     });
     let curve = days.curve.iter().map(|point| {
-        let plural = if point.days == 1 { "" } else { "s" };
-        let label = format!("{} day{plural} ({} fits)", point.days, point.fits);
+        let (days, fits) = (point.days as u64, point.fits as u64);
+        let label = format!("{} ({})", counted(days, "day"), counted(fits, "fit"));
         (label, cells(&point.scores, DayScore::ratio))
     });
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
@@ -425,8 +425,9 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
     let verdict = match enough {
         _ if most == 1 => "two are too few to tell",
         Some(enough) => {
-            let plural = if enough == 1 { " is" } else { "s are" };
-            &format!("{enough} day{plural} enough to come within 5 % of {most}")
+            let days = counted(enough as u64, "day");
+            let verb = if enough == 1 { "is" } else { "are" };
+            &format!("{days} {verb} enough to come within 5 % of {most}")
         }
         None => "more days may still make it better",
     };

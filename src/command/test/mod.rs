@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::threads::Threads;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use report::Summary;
 use work::Status;
@@ -32,9 +33,8 @@ pub struct Test {
     /// Also write the results as JUnit XML
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Threads that fit graphs and run tests; the results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 impl Test {
@@ -60,11 +60,9 @@ impl Test {
                 terminal.warning(format_args!("{} has no tests", suite.path));
             }
         }
-        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let threads = self.threads.unwrap_or(cores).max(1);
         let people = terminal.format != Format::Json;
         let mut told = None;
-        let results = work::run(&suites, threads, &mut |result| {
+        let results = work::run(&suites, self.threads.count(), &mut |result| {
             if people {
                 let suite = &suites[result.suite];
                 if told != Some(result.suite) && !terminal.quiet {

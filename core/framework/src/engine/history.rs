@@ -67,6 +67,15 @@ impl History {
         }
     }
 
+    /// Lets a cursor go back, so that an instant before the one asked last may be asked for.
+    pub fn go_back(&self, at: Instant, cursor: &mut Cursor) {
+        while let Some(last) = cursor.checked_sub(1)
+            && self.entry(last).is_some_and(|past| past.at > at)
+        {
+            *cursor = last;
+        }
+    }
+
     /// From which instant on the answer that a cursor has just been given for `at` may be another, when nothing more is written
     /// down for instants before `unwritten`.
     pub(super) fn stays(
@@ -188,6 +197,20 @@ mod tests {
             asked < 2 * pushed + lag.as_ns() / 1_000_000_000 + 2,
             "{asked}"
         );
+    }
+
+    #[test]
+    fn a_cursor_that_went_back_gives_earlier_values_again() {
+        let mut past = History::new(d(100));
+        let mut cursor = 0;
+        for t in 0..10 {
+            past.push(s(10 * t), t as f64, s(10 * t));
+        }
+        assert_eq!(past.at(s(75), d(60), &mut cursor).0, 7.0);
+        for (t, expected) in [(34, 3.0), (30, 3.0), (80, 8.0), (0, 0.0)] {
+            past.go_back(s(t), &mut cursor);
+            assert_eq!(past.at(s(t), d(60), &mut cursor).0, expected, "at {t} s");
+        }
     }
 
     #[test]

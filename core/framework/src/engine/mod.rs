@@ -12,7 +12,7 @@ mod history;
 mod idle;
 mod keep;
 mod learning;
-mod mode;
+pub(crate) mod mode;
 mod pairing;
 mod recent_error;
 mod revision;

@@ -30,20 +30,20 @@ impl Mode {
 }
 
 /// So many steps, as long as that can be told.
-pub(super) fn times(step: Duration, count: i64) -> Duration {
+pub(crate) fn times(step: Duration, count: i64) -> Duration {
     Duration::from_ns(step.as_ns().saturating_mul(count))
 }
 
 /// The length of a step: as it was planned, or where that is nothing the time between the last two truths.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
+pub(crate) struct Step {
     planned: Duration,
     last: Option<crate::time::Instant>,
     between: Duration,
 }
 
 impl Step {
-    pub(super) fn new(planned: Duration) -> Self {
+    pub(crate) fn new(planned: Duration) -> Self {
         Self {
             planned,
             last: None,
@@ -52,7 +52,7 @@ impl Step {
     }
 
     /// Takes the instant of a truth.
-    pub(super) fn truth(&mut self, at: crate::time::Instant) {
+    pub(crate) fn truth(&mut self, at: crate::time::Instant) {
         if let Some(last) = self.last
             && at > last
         {
@@ -61,16 +61,17 @@ impl Step {
         self.last = Some(at);
     }
 
-    pub(super) fn length(&self) -> Duration {
-        // A lag of one sample is written as the shortest there is.
-        if self.planned > Duration::from_ns(1) {
-            self.planned
-        } else {
-            self.between
-        }
+    pub(crate) fn length(&self) -> Duration {
+        self.planned().unwrap_or(self.between)
     }
 
-    pub(super) fn segment(&mut self) {
+    /// As it was planned, where that is anything.
+    pub(crate) fn planned(&self) -> Option<Duration> {
+        // A lag of one sample is written as the shortest there is.
+        Some(self.planned).filter(|&planned| planned > Duration::from_ns(1))
+    }
+
+    pub(crate) fn segment(&mut self) {
         self.last = None;
     }
 }

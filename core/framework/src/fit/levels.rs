@@ -1,6 +1,7 @@
 //! Decides the passes of a fit: what is fed by estimators and encoders comes after them. From estimators it learns out-of-fold
 //! predictions; encoders are fitted once, since the outputs of two fits mean different things.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::collect::{Collector, Share};
@@ -29,6 +30,40 @@ struct Level {
     nodes: Vec<usize>,
     /// Whether an estimator feeds one of them.
     of_predictions: bool,
+}
+
+/// The fits of a share of the ticks, level by level, and of the same without each of its folds, as far as levels above have
+/// asked for them: what two levels learn from is fitted once.
+struct Course {
+    share: Share,
+    fitted: Fitted,
+    /// How many levels have been fitted.
+    levels: usize,
+    /// Each fold with the course of all ticks but those.
+    folds: Vec<(Range<u64>, Course)>,
+}
+
+impl Course {
+    fn of(share: Share) -> Self {
+        Self {
+            share,
+            fitted: Fitted::new(),
+            levels: 0,
+            folds: Vec::new(),
+        }
+    }
+
+    /// The same ticks without each of so many folds, of which there are `ticks` in all.
+    fn without_folds(&self, ticks: u64, folds: u64) -> Vec<(Range<u64>, Course)> {
+        let folds = self.share.cut(ticks, folds).into_iter();
+        folds
+            .map(|fold| {
+                let mut share = self.share.clone();
+                share.without.push(fold.clone());
+                (fold, Course::of(share))
+            })
+            .collect()
+    }
 }
 
 /// What one part of the rows of a level is made with: the fits below, and the ticks whose truths count.
@@ -64,25 +99,24 @@ impl<'a> Fitting<'a> {
             return Ok((Fitted::new(), self.report));
         }
         let top = self.levels.len() - 1;
-        let (fitted, made) = self.fit_up_to(top, &Share::all(), &Fitted::new())?;
-        let mut made: Vec<_> = made;
+        let mut course = Course::of(Share::all());
+        let mut made = self.fit_up_to(top, &mut course)?;
         made.sort_by_key(|(node, _)| *node);
         self.report.estimators = made.into_iter().map(|(_, fit)| fit).collect();
-        Ok((fitted, self.report))
+        Ok((course.fitted, self.report))
     }
 
-    /// Fits all levels up to one on a share of the ticks, but for what is given.
+    /// Fits the levels up to one that have not been fitted yet, but for what is given.
     fn fit_up_to(
         &mut self,
         top: usize,
-        share: &Share,
-        given: &Fitted,
-    ) -> Result<(Fitted, Vec<(usize, super::EstimatorFit)>), FitError> {
-        let mut fitted = given.clone();
+        course: &mut Course,
+    ) -> Result<Vec<(usize, super::EstimatorFit)>, FitError> {
         let mut reports = Vec::new();
-        for level in 0..=top {
+        for level in course.levels..=top {
+            course.levels = level + 1;
             let plan = self.plan;
-            let open = |node: &&usize| !given.contains_key(&plan.nodes[**node].instance());
+            let open = |node: &&usize| !course.fitted.contains_key(&plan.nodes[**node].instance());
             let nodes: Vec<_> = self.levels[level]
                 .nodes
                 .iter()
@@ -92,50 +126,46 @@ impl<'a> Fitting<'a> {
             if nodes.is_empty() {
                 continue;
             }
-            let parts = self.parts(level, share, &fitted)?;
+            let parts = self.parts(level, course)?;
             let made = self.fit_level(&nodes, &parts)?;
             for (&node, (fit, predictor)) in nodes.iter().zip(made) {
                 if let Some(predictor) = predictor {
-                    fitted.insert(fit.node.clone(), Arc::from(predictor));
+                    course.fitted.insert(fit.node.clone(), Arc::from(predictor));
                 }
                 reports.push((node, fit));
             }
         }
-        Ok((fitted, reports))
+        Ok(reports)
     }
 
     /// Estimators below are fitted without the part of the ticks that they predict for those of this level.
-    fn parts(
-        &mut self,
-        level: usize,
-        share: &Share,
-        below: &Fitted,
-    ) -> Result<Vec<Part>, FitError> {
+    fn parts(&mut self, level: usize, course: &mut Course) -> Result<Vec<Part>, FitError> {
         if !self.levels[level].of_predictions {
             return Ok(vec![Part {
-                fitted: below.clone(),
-                share: share.clone(),
+                fitted: course.fitted.clone(),
+                share: course.share.clone(),
             }]);
         }
-        let mut encoders = Fitted::new();
-        for node in &self.plan.nodes {
-            if let (PlannedRole::Feature { .. }, Some(fit)) =
-                (&node.role, below.get(&node.instance()))
-            {
-                encoders.insert(node.instance(), Arc::clone(fit));
-            }
+        if course.folds.is_empty() {
+            let folds = self.options.folds.max(2) as u64;
+            course.folds = course.without_folds(self.report.ticks, folds);
         }
-        let folds = self.options.folds.max(2) as u64;
         let mut parts = Vec::new();
-        for fold in share.cut(self.report.ticks, folds) {
-            let mut without = share.clone();
-            without.without.push(fold.clone());
-            let (fitted, _) = self.fit_up_to(level - 1, &without, &encoders)?;
+        for (fold, without) in &mut course.folds {
+            // Encoders are given: see above.
+            for node in &self.plan.nodes {
+                if let (PlannedRole::Feature { .. }, Some(fit)) =
+                    (&node.role, course.fitted.get(&node.instance()))
+                {
+                    without.fitted.insert(node.instance(), Arc::clone(fit));
+                }
+            }
+            self.fit_up_to(level - 1, without)?;
             parts.push(Part {
-                fitted,
+                fitted: without.fitted.clone(),
                 share: Share {
-                    within: fold,
-                    without: share.without.clone(),
+                    within: fold.clone(),
+                    without: course.share.without.clone(),
                 },
             });
         }

@@ -115,20 +115,24 @@ impl Truths {
         self.squares += off * (truth - self.mean);
     }
 
-    /// What to tell of a fit that is clearly worse on its rows than their mean.
-    fn doubt(self, report: &TrainingReport) -> Option<String> {
-        let rmse = report.in_sample_rmse?;
+    /// Tells of a fit that is clearly worse on its rows than their mean.
+    fn doubt(self, report: &mut TrainingReport) {
+        let Some(rmse) = report.in_sample_rmse else {
+            return;
+        };
         let of_mean = (self.squares / self.rows as f64).sqrt();
         let clearly = rmse > WORSE_THAN_MEAN * of_mean + ROUNDING * self.mean.abs();
-        clearly.then(|| {
-            let times = match rmse / of_mean {
+        if clearly {
+            let times = rmse / of_mean;
+            report.figure("rmse_over_that_of_mean", times);
+            let times = match times {
                 few if few < 1e4 => format!("{few:.1}"),
                 many => format!("{many:.0e}"),
             };
-            format!(
+            report.notes.push(format!(
                 "the error on the rows of the fit is {times} times that of predicting their mean, so this fit is of no use"
-            )
-        })
+            ));
+        }
     }
 }
 
@@ -168,7 +172,7 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
             predictor,
             mut report,
         }) => {
-            report.notes.extend(truths.doubt(&report));
+            truths.doubt(&mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
         Err(error) => (Outcome::Failed(error), None),

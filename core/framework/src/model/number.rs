@@ -61,4 +61,4 @@ pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D:
 /// A number that serde reads and writes in this form.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(transparent)]
-pub(super) struct Exact(#[serde(with = "self")] pub(super) f64);
+pub struct Exact(#[serde(with = "self")] pub f64);

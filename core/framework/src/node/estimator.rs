@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Coefficients, InputPort, Learner, Learns, Mistake, TrainedRange};
+use super::{Coefficients, Figure, Figures, InputPort, Learner, Learns, Mistake, TrainedRange};
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -233,7 +233,11 @@ impl std::fmt::Display for TrainingError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::TooFewRows { rows, needed } => {
-                write!(f, "{rows} complete rows, and at least {needed} are needed")
+                let plural = if *rows == 1 { "" } else { "s" };
+                write!(
+                    f,
+                    "{rows} complete row{plural}, and at least {needed} are needed"
+                )
             }
             Self::NoTruth {
                 truth,
@@ -297,6 +301,16 @@ pub struct TrainingReport {
     /// What the user should know, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+    /// What else was found, for programs: every figure of a sentence stands here by its name, unrounded.
+    #[serde(default, skip_serializing_if = "Figures::is_empty")]
+    pub figures: Figures,
+}
+
+impl TrainingReport {
+    /// Tells programs a figure by its name, which has the unit at its end where that is not the truth's: `step_s`.
+    pub fn figure(&mut self, name: &str, value: impl Into<Figure>) {
+        self.figures.insert(name.to_owned(), value.into());
+    }
 }
 
 /// Orders of a model, compared on the same rows.

@@ -14,6 +14,7 @@ mod combiner;
 mod encoder;
 mod estimator;
 mod feature;
+mod figure;
 mod forms;
 mod learner;
 mod port;
@@ -31,6 +32,7 @@ pub use estimator::{
     TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
+pub use figure::{Figure, Figures};
 pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};

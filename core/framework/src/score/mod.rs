@@ -50,7 +50,7 @@ pub fn score(
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
     engine.freeze(options.frozen);
     engine.predict_in(options.mode);
-    let mut watch = Watch::new(plan);
+    let mut watch = Watch::new(plan, options.mode);
     let mut stepped = 0;
     let passed = drive(&mut engine, recording, |engine, event| {
         watch.look(engine, event);

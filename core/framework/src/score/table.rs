@@ -62,8 +62,8 @@ pub struct Score {
     pub valid: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of predicting zero.
     pub baseline_zero: Option<f64>,
-    /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, on the same instants; none
-    /// where predictions may not read as new a truth.
+    /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so
+    /// many steps back, on the same instants; none in a free run, which would repeat the first truth of each segment.
     pub baseline_persistence: Option<f64>,
     /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines.
     pub truth_noise: Option<f64>,
@@ -185,7 +185,7 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                         .map(|&i| persistence[i] - truth.values[i])
                         .filter(|e| !e.is_nan()),
                 )
-                .filter(|_| options.mode == Mode::OneStep),
+                .filter(|_| options.mode != Mode::FreeRun),
                 truth_noise: root_mean_square(
                     instants
                         .iter()

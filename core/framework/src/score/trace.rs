@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::Watch;
+use super::{Mode, Watch};
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};
 use crate::fit::{FitError, drive};
@@ -65,7 +65,7 @@ pub fn trace(
     look: &mut dyn FnMut(&Engine, Event),
 ) -> Result<Trace, FitError> {
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
-    let mut watch = Watch::new(plan);
+    let mut watch = Watch::new(plan, Mode::OneStep);
     let mut times = vec![Vec::new(); watch.truths.len()];
     let mut segment = 0;
     let passed = drive(&mut engine, recording, |engine, event| {

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::interval::Intervals;
 use crate::compile::{Plan, TruthLink, persistence_lag};
-use crate::engine::{Cursor, Engine, History, Pairing};
+use crate::engine::mode::{Step, times};
+use crate::engine::{Cursor, Engine, History, Mode, Pairing};
 use crate::recording::Event;
 use crate::time::{Duration, Instant};
 
@@ -40,10 +41,14 @@ pub(crate) struct Prediction {
     pub(crate) ends: Vec<[f64; 2]>,
 }
 
-/// The truth at the smallest lag that sees nothing of the answer, for one horizon.
+/// The newest truth that a prediction of one horizon may read in a mode: in one step that at the smallest lag that sees
+/// nothing of the answer.
 #[derive(Debug)]
 pub(crate) struct Persistence {
     lag: Duration,
+    ahead: Duration,
+    mode: Mode,
+    step: Step,
     max_age: Duration,
     history: History,
     cursor: Cursor,
@@ -52,7 +57,7 @@ pub(crate) struct Persistence {
 }
 
 impl Watch {
-    pub(crate) fn new(plan: &Plan) -> Self {
+    pub(crate) fn new(plan: &Plan, mode: Mode) -> Self {
         let mut truths: BTreeMap<usize, Truth> = BTreeMap::new();
         for (slot, channel) in plan.channels.iter().enumerate() {
             let (Some(of), Some(node)) = (channel.predicts, channel.node) else {
@@ -83,7 +88,7 @@ impl Watch {
             truth
                 .persistences
                 .entry(ahead)
-                .or_insert_with(|| Persistence::new(&link));
+                .or_insert_with(|| Persistence::new(&link, mode));
         }
         Self {
             truths: truths.into_values().collect(),
@@ -132,11 +137,13 @@ impl Truth {
         let measured = engine.ran(self.slot);
         for persistence in self.persistences.values_mut() {
             if measured {
+                persistence.step.truth(now);
                 persistence
                     .history
                     .push(now, engine.value(self.slot), engine.stamp(self.slot));
             }
-            let asked = now - persistence.lag;
+            let asked = persistence.asked(now);
+            persistence.history.go_back(asked, &mut persistence.cursor);
             let (value, _) =
                 persistence
                     .history
@@ -176,21 +183,44 @@ impl Truth {
         for persistence in self.persistences.values_mut() {
             persistence.pairing.clear();
             persistence.history.clear();
+            persistence.step.segment();
             persistence.cursor = 0;
         }
     }
 }
 
 impl Persistence {
-    fn new(link: &TruthLink) -> Self {
+    fn new(link: &TruthLink, mode: Mode) -> Self {
         let lag = persistence_lag(link.span, link.ahead);
+        let step = Step::new(lag + link.ahead);
+        let depth = match (mode, step.planned()) {
+            (Mode::Steps(steps), Some(step)) => times(step, steps.get().into()) - link.ahead,
+            // How far apart truths will lie is not known. Scoring keeps them all anyway.
+            (Mode::Steps(steps), None) if steps.get() > 1 => Duration::MAX,
+            _ => lag,
+        };
         Self {
             lag,
+            ahead: link.ahead,
+            mode,
+            step,
             max_age: link.limit,
-            history: History::new(lag),
+            history: History::new(depth),
             cursor: 0,
             pairing: Pairing::new(link, 1),
             values: Vec::new(),
+        }
+    }
+
+    /// The instant whose truth a run at `now` repeats.
+    fn asked(&self, now: Instant) -> Instant {
+        let newest = now - self.lag;
+        match self.mode {
+            Mode::Steps(steps) => {
+                let back = times(self.step.length(), steps.get().into());
+                newest.min(now + self.ahead - back)
+            }
+            Mode::OneStep | Mode::FreeRun => newest,
         }
     }
 }

@@ -424,15 +424,20 @@ impl fmt::Display for Finding {
             Some(found) => write!(f, "found {}{unit}", figure(found, beside))?,
             None => f.write_str("found no value")?,
         }
+        let instants = if self.instants == 1 {
+            "instant"
+        } else {
+            "instants"
+        };
         match self.first {
             Some((time, value)) if Some(value) == self.found => write!(f, " at {time}")?,
             Some((time, value)) => write!(
                 f,
-                " over {} instants, first {}{unit} at {time}",
+                " over {} {instants}, first {}{unit} at {time}",
                 self.instants,
                 figure(value, beside)
             )?,
-            None => write!(f, " over {} instants", self.instants)?,
+            None => write!(f, " over {} {instants}", self.instants)?,
         }
         match (&self.rival, self.wanted) {
             (Some(rival), Wanted::Below(limit)) if limit.is_nan() => {

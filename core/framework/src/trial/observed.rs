@@ -6,7 +6,7 @@ use super::declare::Trial;
 use crate::compile::Plan;
 use crate::engine::Engine;
 use crate::recording::Event;
-use crate::score::Watch;
+use crate::score::{Mode, Watch};
 use crate::time::{Duration, Instant};
 
 /// What is noted during a run.
@@ -28,7 +28,7 @@ impl Observed {
             .expect
             .iter()
             .flat_map(|expectation| &expectation.slots);
-        let watch = Watch::new(plan);
+        let watch = Watch::new(plan, Mode::OneStep);
         Self {
             truth_times: vec![Vec::new(); watch.truths.len()],
             watch,

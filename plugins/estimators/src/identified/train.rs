@@ -3,8 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    InformationCriteria, NumericsError, Polynomials, PredictionError, PredictionErrorFit, Samples,
-    Standardization, Standardizer,
+    InformationCriteria, NumericsError, Orders, Polynomials, PredictionError, PredictionErrorFit,
+    Samples, Standardization, Standardizer,
 };
 
 use super::follow::{Identified, MOST_SERIES};
@@ -177,7 +177,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let found = self.asked.identify(&samples, pace.series, report)?;
         let truths = self.rows.iter().map(|row| row.truth);
         tell_rows(&self.names, &self.regressors, truths, report);
-        report.notes.push(pace.told());
+        pace.tell(report);
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
@@ -229,6 +229,8 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
+        report.figure("converged", fit.converged);
+        report.figure("steps_of_search", fit.steps);
         if !fit.converged {
             report.notes.push(format!(
                 "the search had not ended after {} steps",
@@ -263,7 +265,7 @@ impl Asked {
             && self.order.is_none()
         {
             return self
-                .search(orders.coefficients())
+                .search(orders, self.penalty)
                 .fit(orders, samples, 0)
                 .map_err(|error| unfit(error, samples));
         }
@@ -272,9 +274,10 @@ impl Asked {
         let mut tried = Vec::new();
         let mut fits = Vec::new();
         let mut failed = None;
+        // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
         for (candidate, orders) in candidates {
             let coefficients = orders.coefficients();
-            match self.search(coefficients).fit(&orders, samples, first) {
+            match self.search(&orders, 0.0).fit(&orders, samples, first) {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     tried.push(Tried {
@@ -282,7 +285,7 @@ impl Asked {
                         coefficients,
                         figures: InformationCriteria::of(fit.rows, coefficients, squares),
                     });
-                    fits.push(fit);
+                    fits.push((fit, orders));
                 }
                 Err(error) => failed = Some(error),
             }
@@ -292,13 +295,23 @@ impl Asked {
             let error = failed.unwrap_or(too_few);
             unfit(error, samples)
         })?;
-        Ok(fits.swap_remove(best))
+        let (fit, orders) = fits.swap_remove(best);
+        if self.penalty == 0.0 || orders.inputs.is_empty() {
+            return Ok(fit);
+        }
+        report.notes.push(
+            "orders are compared without the penalty, with which the chosen one is fitted"
+                .to_owned(),
+        );
+        let search = self.search(&orders, self.penalty);
+        let fit = search.fit(&orders, samples, first);
+        fit.map_err(|error| unfit(error, samples))
     }
 
-    fn search(&self, coefficients: usize) -> PredictionError {
-        let most = MOST_WORK / coefficients.max(1);
+    fn search(&self, orders: &Orders, penalty: f64) -> PredictionError {
+        let most = MOST_WORK / orders.coefficients().max(1);
         PredictionError {
-            penalty: self.penalty,
+            penalty,
             most_steps: most.clamp(20, 100),
         }
     }
@@ -345,6 +358,13 @@ impl Pace {
             truths,
             series: truths.min(MOST_SERIES),
         }
+    }
+
+    fn tell(self, report: &mut TrainingReport) {
+        report.figure("step_s", self.step.secs());
+        report.figure("series", self.series);
+        report.figure("truths_within_a_step", self.truths);
+        report.notes.push(self.told());
     }
 
     fn told(self) -> String {

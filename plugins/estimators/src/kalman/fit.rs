@@ -1,14 +1,16 @@
 //! Decides what a structural model learns from its rows; not how it is followed afterwards.
 
-use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
+use athermal_core::node::{
+    Learner, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+};
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use athermal_numerics::{
-    Followed, Movement, NumericsError, Passage, Series, Standardizer, Structural, follow,
-    most_likely,
+    Movement, NumericsError, Passage, Series, Standardizer, Structural, follow, most_likely,
 };
 
+use super::told::Hourly;
 use super::{Kalman, KalmanPredictor, Noises};
 use crate::conditioning::tell_rows;
 use crate::scaling::Scaling;
@@ -23,6 +25,11 @@ pub(super) struct KalmanTrainer {
     names: Vec<String>,
     unit: String,
     every: Duration,
+    /// How much earlier than a truth the newest one arrived that its prediction knows of: nothing is learned of a truth of
+    /// the same tick.
+    earlier: Duration,
+    /// Whether it will follow truths while it runs.
+    follows: bool,
     most: usize,
     /// Of the rows, one in so many is kept.
     stride: usize,
@@ -51,6 +58,8 @@ impl KalmanTrainer {
         let bytes = size_of::<Kept>() + names.len() * size_of::<f64>();
         Self {
             every: parameters.every.unwrap_or(setup.span),
+            earlier: setup.span.max(setup.ahead + Duration::from_ns(1)),
+            follows: setup.learns,
             parameters,
             unit: setup.error_unit.clone(),
             most: (setup.memory / bytes).clamp(16, MOST_ROWS),
@@ -141,10 +150,10 @@ impl KalmanTrainer {
             ));
         }
         tell_rows(&self.names, &scaled, truths.iter().copied(), report);
-        self.tell(&followed, report);
+        self.tell(followed.model, report);
         let mut filter = followed.filter;
         filter.restart_level(&followed.at_large);
-        Ok(KalmanPredictor {
+        let predictor = KalmanPredictor {
             regressors: self.names.clone(),
             scaling: Scaling {
                 means: standard.means,
@@ -154,23 +163,52 @@ impl KalmanTrainer {
             filter,
             at_large: followed.at_large,
             every: self.every,
-        })
+        };
+        report.in_sample_rmse = Some(self.in_sample_rmse(&predictor));
+        Ok(predictor)
     }
 
-    fn tell(&self, followed: &Followed, report: &mut TrainingReport) {
-        report.in_sample_rmse = Some(followed.innovation_rms);
-        report.notes.push(
-            "the in-sample RMSE is of each row predicted from those before it, while the model was still being \
-             learned; `evaluate` starts with what was learned, so its figure on the same rows is another"
-                .to_owned(),
-        );
+    /// The error of predicting each row as `evaluate` does: the horizon ahead, from the truths that the embargo lets through.
+    fn in_sample_rmse(&self, predictor: &KalmanPredictor) -> f64 {
+        let width = self.names.len();
+        let row = |nth: usize| &self.regressors[nth * width..(nth + 1) * width];
+        let mut following = predictor.following();
+        // The first row that has not been learned from.
+        let mut next = 0;
+        let mut squares = 0.0;
+        for (nth, kept) in self.kept.iter().enumerate() {
+            let newest = if kept.begins {
+                Instant::MAX
+            } else {
+                kept.at - self.earlier
+            };
+            while self.follows && next < nth && self.kept[next].at <= newest {
+                let Kept { at, truth, .. } = self.kept[next];
+                following.learn(row(next), truth, at);
+                next += 1;
+            }
+            if kept.begins {
+                following.segment(Duration::ZERO);
+            }
+            squares += (following.predict(row(nth), kept.at) - kept.truth).powi(2);
+        }
+        (squares / self.kept.len() as f64).sqrt()
+    }
+
+    fn tell(&self, model: Structural, report: &mut TrainingReport) {
         if self.parameters.noises.is_none() {
             let unit = self.unit.parse::<Unit>().map(|unit| unit.difference());
             let unit = unit.map_or_else(|_| self.unit.clone(), |unit| unit.to_string());
-            let told = Told(followed.model, &unit);
-            report.notes.push(format!("most likely are {told}"));
+            let told = Hourly::of(&model);
+            report.figure("noises", told.figure());
+            let noises = told.as_given(&unit);
+            report
+                .notes
+                .push(format!("most likely are noises = {noises}"));
         }
         if self.stride > 1 {
+            report.figure("rows_apart", self.stride);
+            report.figure("rows_followed", self.kept.len());
             report.notes.push(format!(
                 "one row in {} was followed, {} in all",
                 self.stride,
@@ -247,34 +285,4 @@ impl Noises {
             passage: Passage::Continuous,
         })
     }
-}
-
-/// Noises as a graph file would give them, over an hour.
-struct Told<'a>(Structural, &'a str);
-
-impl std::fmt::Display for Told<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self(model, unit) = self;
-        let per: f64 = 3600.0;
-        let observation = significant(model.observation.sqrt());
-        let level = significant((model.level * per).sqrt());
-        write!(f, "noises = {{ observation = \"{observation} {unit}\", ")?;
-        write!(f, "level = \"{level} {unit}\", ")?;
-        if let Some(trend) = model.trend {
-            let trend = significant((trend * per).sqrt() * per);
-            write!(f, "trend = \"{trend} {unit}\", ")?;
-        }
-        write!(f, "per = \"1h\"")?;
-        if model.returning > 0.0
-            && let Some(returns) = Duration::from_secs_f64(significant(1.0 / model.returning))
-        {
-            write!(f, ", returns = \"{returns}\"")?;
-        }
-        write!(f, " }}")
-    }
-}
-
-/// A number to four significant digits.
-fn significant(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }

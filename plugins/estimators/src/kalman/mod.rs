@@ -265,7 +265,13 @@ impl Predictor for KalmanPredictor {
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {
-        Some(Box::new(Following {
+        Some(Box::new(self.following()))
+    }
+}
+
+impl KalmanPredictor {
+    fn following(&self) -> Following {
+        Following {
             known: Known {
                 filter: self.filter.clone(),
                 scaling: self.scaling.clone(),
@@ -274,7 +280,7 @@ impl Predictor for KalmanPredictor {
             at_large: self.at_large.clone(),
             every: self.every,
             row: vec![0.0; self.regressors.len()],
-        }))
+        }
     }
 }
 

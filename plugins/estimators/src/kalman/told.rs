@@ -1,11 +1,64 @@
 //! Decides how a structural model tells its coefficients and noises, on the scale of the data.
 
-use athermal_core::node::{Coefficients, Mode, Noise, Predictor};
+use athermal_core::node::{Coefficients, Figure, Mode, Noise, Predictor};
+use athermal_core::time::Duration;
+use athermal_numerics::Structural;
 
 use super::KalmanPredictor;
 
 /// The time over which noises are told, in s.
 const PER_S: f64 = 3600.0;
+
+/// Noises as a graph file gives them, over an hour, in the unit of the truth.
+pub(super) struct Hourly {
+    observation: f64,
+    level: f64,
+    trend: Option<f64>,
+    returns_s: Option<f64>,
+}
+
+impl Hourly {
+    pub(super) fn of(model: &Structural) -> Self {
+        Self {
+            observation: model.observation.sqrt(),
+            level: (model.level * PER_S).sqrt(),
+            trend: model.trend.map(|trend| (trend * PER_S).sqrt() * PER_S),
+            returns_s: (model.returning > 0.0).then(|| 1.0 / model.returning),
+        }
+    }
+
+    /// For programs.
+    pub(super) fn figure(&self) -> Figure {
+        let always = [
+            ("observation", self.observation),
+            ("level", self.level),
+            ("per_s", PER_S),
+        ];
+        let trend = self.trend.map(|trend| ("trend", trend));
+        let returns = self.returns_s.map(|returns_s| ("returns_s", returns_s));
+        Figure::named(always.into_iter().chain(trend).chain(returns))
+    }
+
+    /// For a graph file, to four significant digits.
+    pub(super) fn as_given(&self, unit: &str) -> String {
+        let noise = |name: &str, value: f64| format!("{name} = \"{} {unit}\"", significant(value));
+        let mut parts = vec![
+            noise("observation", self.observation),
+            noise("level", self.level),
+        ];
+        parts.extend(self.trend.map(|trend| noise("trend", trend)));
+        parts.push("per = \"1h\"".to_owned());
+        let returns = self.returns_s.map(significant);
+        let returns = returns.and_then(Duration::from_secs_f64);
+        parts.extend(returns.map(|returns| format!("returns = \"{returns}\"")));
+        format!("{{ {} }}", parts.join(", "))
+    }
+}
+
+/// A number to four significant digits.
+fn significant(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
 
 /// What a model at rest consists of. The level wanders, so that no constant has a standard error.
 pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
@@ -20,6 +73,7 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
         errors.push(variance.sqrt() / scale);
     }
     let model = filter.model();
+    let hourly = Hourly::of(&model);
     let wandering = |name: &str, deviation: f64| Noise {
         name: name.to_owned(),
         deviation,
@@ -28,12 +82,11 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
     let mut noises = vec![
         Noise {
             per_s: None,
-            ..wandering("observation", model.observation.sqrt())
+            ..wandering("observation", hourly.observation)
         },
-        wandering("level", (model.level * PER_S).sqrt()),
+        wandering("level", hourly.level),
     ];
-    let trend = model.trend;
-    noises.extend(trend.map(|trend| wandering("trend", (trend * PER_S).sqrt() * PER_S)));
+    noises.extend(hourly.trend.map(|trend| wandering("trend", trend)));
     let returns = model.trend.is_none().then(|| Mode {
         of: "level".to_owned(),
         time_constant_s: 1.0 / model.returning,
