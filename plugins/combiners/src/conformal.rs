@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::node::{
+    Combine, Combiner, Evidence, InputPort, Mistake, Restored, State, Votes,
+};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -113,18 +115,24 @@ struct Known {
 
 athermal_core::state!(Known, "conformal/1");
 
+/// A share such as 1 − 0.9 is not what it looks like in binary; a rank must not hang on its last bit.
+const ROUNDING: f64 = 1e-9;
+
 impl Calibrating {
+    /// The fewest errors `n` of which the `⌈(n + 1) · coverage⌉`-th smallest is one.
+    fn needed(&self) -> f64 {
+        let coverage = self.parameters.coverage;
+        ((coverage - ROUNDING) / (1.0 - coverage)).ceil()
+    }
+
     /// How far the interval reaches to either side; none while there are too few errors.
     fn reach(&self) -> Option<f64> {
-        let count = self.sorted.len();
-        let rank = |miscoverage: f64| {
-            // A share such as 1 − 0.9 is not what it looks like in binary; a rank must not hang on its last bit.
-            ((count + 1) as f64 * (1.0 - miscoverage) - 1e-9).ceil()
-        };
-        if rank(1.0 - self.parameters.coverage) > count as f64 {
+        let count = self.sorted.len() as f64;
+        if count < self.needed() {
             return None;
         }
-        let rank = rank(self.known.miscoverage).clamp(0.0, count as f64) as usize;
+        let rank = ((count + 1.0) * (1.0 - self.known.miscoverage) - ROUNDING).ceil();
+        let rank = rank.clamp(0.0, count) as usize;
         Some(rank.checked_sub(1).map_or(0.0, |nth| self.sorted[nth]))
     }
 
@@ -186,6 +194,14 @@ impl Combine for Calibrating {
         for (arrived, _) in &mut self.known.errors {
             *arrived = *arrived + shift;
         }
+    }
+
+    fn evidence(&self) -> Option<Evidence> {
+        Some(Evidence {
+            truths: self.sorted.len() as f64,
+            needed: self.needed(),
+            remedy: "a longer `memory`",
+        })
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
