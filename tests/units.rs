@@ -154,3 +154,37 @@ fn a_point_is_never_taken_for_a_difference() {
         "A063: `b.a` is a difference of temperatures (K), and `a.a` a temperature (Cel)"
     );
 }
+
+#[test]
+fn weights_of_temperatures_make_a_temperature_or_a_difference_and_nothing_else() {
+    let sum = |weights: &str, signal: &str| {
+        format!(
+            "[nodes.n]\ntype = \"sum\"\ninputs.signal = {signal}\n{weights}\n[outputs]\nx = \"n\"\n"
+        )
+    };
+    let both = "[\"point\", \"warmer\"]";
+    let warmer = "[nodes.warmer]\ntype = \"scale\"\ninputs.signal = \"point\"\noffset = \"10 K\"\n";
+    let samples = [1.0, 1.0, 20.0, 1.0];
+    for (weights, value, unit) in [
+        ("weights = [0.25, 0.75]", 27.5, "Cel"),
+        ("weights = [-1.0, 1.0]", 10.0, "K"),
+    ] {
+        let nodes = format!("{warmer}{}", sum(weights, both));
+        assert_eq!(stepped(&nodes, samples), [value]);
+        let plan = compiled(&nodes).unwrap();
+        let found = plan.channels[plan.outputs[0].slot].channel.unit.to_string();
+        assert_eq!(found, unit);
+    }
+    for (weights, total) in [("", 2.0), ("weights = [1.0, 0.5]", 1.5)] {
+        assert_eq!(
+            compiled(&format!("{warmer}{}", sum(weights, both))).unwrap_err(),
+            format!(
+                "A054: weights of temperatures in Cel add up to {total}, which makes neither a temperature nor a difference"
+            )
+        );
+    }
+    // From the absolute zero, 20 Cel and as much again are what they are.
+    let kelvin = "[nodes.absolute]\ntype = \"scale\"\ninputs.signal = \"point\"\nunit = \"K\"\n";
+    let nodes = format!("{kelvin}{}", sum("", "[\"absolute\", \"difference\"]"));
+    assert_eq!(stepped(&nodes, samples), [20.0 + 273.15 + 1.0]);
+}

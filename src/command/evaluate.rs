@@ -131,6 +131,9 @@ impl Evaluate {
             scores.refused,
             &scores.rejected,
         );
+        for lack in &scores.lacks {
+            terminal.warning(lack);
+        }
         if scores.scores.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to score",

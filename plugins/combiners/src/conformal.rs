@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::node::{
+    Combine, Combiner, Evidence, InputPort, Mistake, Restored, State, Votes,
+};
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,12 +16,14 @@ use crate::mean::mean;
 /// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
 /// and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by `gain · (1 − coverage − miss)`, `miss` being
 /// 1 where the truth lay outside of the interval that was given for it and 0 where not (Gibbs and Candès 2021, equation 2).
-/// So the share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep outgrowing
-/// all that are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
+/// As there, `α` may fall below 0 and rise above 1, by `gain` at most (their lemma 4.1): what was missed is made up for. So the
+/// share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep outgrowing all that
+/// are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
 ///
 /// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends. They
-/// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths, and where more is asked for than any
-/// error in memory, it is the largest that counts. `athermal evaluate` tells how often intervals held.
+/// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths. Where more is asked for than any error in
+/// memory, the interval reaches as far as the largest, and not to infinity as in the source: what is missed then is not all made
+/// up for. `athermal evaluate` tells how often intervals held.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Conformal {
@@ -111,18 +115,24 @@ struct Known {
 
 athermal_core::state!(Known, "conformal/1");
 
+/// A share such as 1 − 0.9 is not what it looks like in binary; a rank must not hang on its last bit.
+const ROUNDING: f64 = 1e-9;
+
 impl Calibrating {
+    /// The fewest errors `n` of which the `⌈(n + 1) · coverage⌉`-th smallest is one.
+    fn needed(&self) -> f64 {
+        let coverage = self.parameters.coverage;
+        ((coverage - ROUNDING) / (1.0 - coverage)).ceil()
+    }
+
     /// How far the interval reaches to either side; none while there are too few errors.
     fn reach(&self) -> Option<f64> {
-        let count = self.sorted.len();
-        let rank = |miscoverage: f64| {
-            // A share such as 1 − 0.9 is not what it looks like in binary; a rank must not hang on its last bit.
-            ((count + 1) as f64 * (1.0 - miscoverage) - 1e-9).ceil()
-        };
-        if rank(1.0 - self.parameters.coverage) > count as f64 {
+        let count = self.sorted.len() as f64;
+        if count < self.needed() {
             return None;
         }
-        let rank = rank(self.known.miscoverage).clamp(0.0, count as f64) as usize;
+        let rank = ((count + 1.0) * (1.0 - self.known.miscoverage) - ROUNDING).ceil();
+        let rank = rank.clamp(0.0, count) as usize;
         Some(rank.checked_sub(1).map_or(0.0, |nth| self.sorted[nth]))
     }
 
@@ -159,7 +169,9 @@ impl Combine for Calibrating {
         };
         let Conformal { coverage, gain, .. } = self.parameters;
         let moved = self.known.miscoverage + gain * (1.0 - coverage - miss);
-        self.known.miscoverage = moved.clamp(0.0, 1.0);
+        // In the source nothing is missed once α is below 0, and everything once it is above 1, so that it goes no farther than
+        // this (lemma 4.1). Here the largest error in memory stands for infinity: what lies beyond must not wind α up.
+        self.known.miscoverage = moved.clamp(-gain, 1.0 + gain);
     }
 
     fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
@@ -182,6 +194,14 @@ impl Combine for Calibrating {
         for (arrived, _) in &mut self.known.errors {
             *arrived = *arrived + shift;
         }
+    }
+
+    fn evidence(&self) -> Option<Evidence> {
+        Some(Evidence {
+            truths: self.sorted.len() as f64,
+            needed: self.needed(),
+            remedy: "a longer `memory`",
+        })
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
@@ -296,5 +316,29 @@ mod tests {
             node.judge([-1.0, 1.0], 5.0);
         }
         assert_eq!(reach(&*node), 18.0, "the largest there is");
+    }
+
+    #[test]
+    fn misses_beyond_what_can_be_allowed_for_are_made_up_for_by_one_gain() {
+        let mut node = conformal(0.5, 0.25);
+        for second in 0..19 {
+            node.observe(Votes(&[0.0]), second as f64, s(second));
+        }
+        let mut reach_after = |truth: f64| {
+            node.judge([-1.0, 1.0], truth);
+            node.interval(Votes(&[0.0]))[1]
+        };
+        // α moves by 1/8 from 1/2: to −1/4 and no farther, and stays below 1/20 for two hits more.
+        (0..20).for_each(|_| {
+            reach_after(5.0);
+        });
+        let reached: Vec<f64> = (0..4).map(|_| reach_after(0.0)).collect();
+        assert_eq!(reached, [18.0, 18.0, 17.0, 14.0]);
+        // And to 5/4, where the interval is a point, for as long.
+        (0..20).for_each(|_| {
+            reach_after(0.0);
+        });
+        let reached: Vec<f64> = (0..4).map(|_| reach_after(5.0)).collect();
+        assert_eq!(reached, [0.0, 0.0, 2.0, 4.0]);
     }
 }

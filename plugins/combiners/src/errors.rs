@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::{Combine, Restored, State, Votes};
+use athermal_core::node::{Combine, Evidence, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,11 @@ pub(crate) trait Rule: Send {
 
     fn observe(&self, errors: &mut Errors, votes: Votes<'_>, truth: f64, arrived: Instant) {
         errors.observe(votes, truth, arrived);
+    }
+
+    /// How many errors of a voter it takes for the rule to go by them.
+    fn needed(&self) -> f64 {
+        1.0
     }
 }
 
@@ -60,6 +65,14 @@ impl<R: Rule> Combine for ByErrors<R> {
 
     fn segment(&mut self, shift: Duration) {
         self.errors.shift(shift);
+    }
+
+    fn evidence(&self) -> Option<Evidence> {
+        Some(Evidence {
+            truths: self.errors.most(),
+            needed: self.rule.needed(),
+            remedy: "a longer `memory`",
+        })
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {
@@ -126,6 +139,12 @@ impl Errors {
             Memory::HalfLife(_) => self.counts[voter],
             Memory::Time(_) | Memory::Truths(_) => self.squares[voter].len() as f64,
         }
+    }
+
+    /// How many errors are in memory of the voter that has the most.
+    fn most(&self) -> f64 {
+        let known = (0..self.means.len()).filter(|&voter| self.means[voter].is_some());
+        known.map(|voter| self.count(voter)).fold(0.0, f64::max)
     }
 
     /// Takes the errors of votes whose truth has arrived.

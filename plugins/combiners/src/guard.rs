@@ -152,6 +152,10 @@ impl Rule for Guarding {
             errors.observe_one(self.voters, 0.0, truth, arrived);
         }
     }
+
+    fn needed(&self) -> f64 {
+        self.min_truths
+    }
 }
 
 athermal_core::register!(Guard, Combiner, "guard");

@@ -3,7 +3,9 @@
 #[cfg(test)]
 mod tests;
 
-use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
+use athermal_core::node::{
+    Combine, Combiner, Evidence, InputPort, Mistake, Restored, State, Votes,
+};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{self as numerics, AdwinOptions, MeanChange, PageHinkleyOptions};
 use schemars::JsonSchema;
@@ -450,6 +452,15 @@ where
         let instants = seen.taken.iter_mut().chain(&mut seen.newest);
         let alarm = seen.alarm.iter_mut().map(|(at, _)| at);
         instants.chain(alarm).for_each(|at| *at = *at + shift);
+    }
+
+    fn evidence(&self) -> Option<Evidence> {
+        Some(Evidence {
+            truths: self.seen.count as f64,
+            // As many again must come before an alarm as tell which errors are usual.
+            needed: 2.0 * self.first as f64,
+            remedy: "a shorter `every`, or more data,",
+        })
     }
 
     fn snapshot(&self) -> Option<Box<dyn State>> {

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// The weighted sum of its inputs: `Σ w_i x_i`, such as the mean of two sensors or what one has more than another.
 ///
-/// It exists while all inputs do; each is held up to its maximum age. Of temperatures with weights that add up to zero the
-/// sum is a difference, in kelvin.
+/// It exists while all inputs do; each is held up to its maximum age. Of temperatures in Cel or \[degF\] the weights must add up
+/// to 1, which gives a temperature, or to 0, which gives a difference in K; other sums hang on where the scale has its zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sum {
@@ -119,12 +119,23 @@ impl Feature for Sum {
             }
             total = weights.iter().sum();
         }
-        // Weights that add up to one give a point on the scale again, others something counted from zero.
-        let is_point = first.unit.is_temperature_point() && (total - 1.0).abs() < 1e-12;
-        let unit = if is_point {
-            first.unit.clone()
-        } else {
+        let adds_up_to = |sum: f64| (total - sum).abs() < 1e-9;
+        let is_scale = first.unit.is_temperature_point();
+        if is_scale && !adds_up_to(0.0) && !adds_up_to(1.0) {
+            // What it would be hangs on where the scale has its zero.
+            let message = format!(
+                "weights of temperatures in {} add up to {total}, which makes neither a temperature nor a difference",
+                first.unit
+            );
+            let help = "let `weights` add up to 1, as those of a mean do, or to 0, as those of a difference do; or take temperatures \
+                        in K, by a `scale` with `unit = \"K\"`";
+            let place = self.weights.as_ref().map_or("inputs.signal", |_| "weights");
+            return Err(vec![Mistake::at(place, message).help(help)]);
+        }
+        let unit = if is_scale && adds_up_to(0.0) {
             first.unit.difference()
+        } else {
+            first.unit.clone()
         };
         Ok(vec![OutputPort {
             name: "sum",

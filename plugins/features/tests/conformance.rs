@@ -61,7 +61,10 @@ conformance!(
 conformance!(
     Sum,
     Case::new(""),
-    Case::new("weights = [1.0, -1.0]").input("signal", 2, "Cel"),
+    Case::new("weights = [1.0, -2.5]"),
+    Case::new("weights = [1.0, -1.0]")
+        .input("signal", 2, "Cel")
+        .except(Rule::Ranges, "weights of temperatures add up to 0 or 1"),
 );
 
 conformance!(

@@ -39,7 +39,7 @@ pub use history::{Cursor, History};
 pub(crate) use slots::{Given, Slots};
 
 use crate::compile::{Plan, Step};
-use crate::node::{Predictor, Tick};
+use crate::node::{Evidence, Predictor, Tick};
 use crate::time::{Duration, Instant};
 use blend::Blending;
 use estimate::Estimate;
@@ -331,6 +331,14 @@ impl Engine {
     #[must_use]
     pub fn gathered(&self, gather: usize) -> (&[f64], bool) {
         (&self.gathered[gather].values, self.gathered[gather].fresh)
+    }
+
+    /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
+    pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
+        match &self.nodes[node] {
+            Running::Vote(vote) => vote.evidence(),
+            Running::Operator { .. } | Running::Estimate { .. } => None,
+        }
     }
 
     fn put_out(&mut self, now: Instant) {

@@ -5,7 +5,7 @@ use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::channel::unless_infinite;
 use crate::compile::TruthLink;
-use crate::node::{Combine, Combiner, Restored, Votes};
+use crate::node::{Combine, Combiner, Evidence, Restored, Votes};
 use crate::time::{Duration, Instant};
 
 /// A combiner in a running plan, with the truths that the embargo still withholds from it.
@@ -16,6 +16,8 @@ pub(crate) struct Vote {
     interval: Option<[f64; 2]>,
     /// What each vote of this tick weighs, for whoever reads it or a deviation.
     weights: Vec<f64>,
+    /// How many truths it has been told that there was a vote for.
+    told: u64,
 }
 
 impl Vote {
@@ -28,6 +30,7 @@ impl Vote {
             withheld: link.map(|link| Withheld::new(link, width)),
             interval,
             weights: vec![f64::NAN; voters],
+            told: 0,
         }
     }
 
@@ -48,12 +51,13 @@ impl Vote {
             combine,
             withheld,
             weights,
+            told,
             ..
         } = self;
         if let Some(withheld) = withheld {
             let newest = withheld.newest(now);
             withheld.release(newest, |released| {
-                tell(&mut **combine, weights.len(), released)
+                *told += tell(&mut **combine, weights.len(), released);
             });
             combine.advance(newest);
         }
@@ -138,13 +142,19 @@ impl Vote {
             combine,
             withheld,
             weights,
+            told,
             ..
         } = self;
         if let Some(withheld) = withheld {
             withheld.end_segment(last, |released| {
-                tell(&mut **combine, weights.len(), released)
+                *told += tell(&mut **combine, weights.len(), released);
             });
         }
+    }
+
+    /// How many truths came, and how many of them it goes by.
+    pub(crate) fn evidence(&self) -> Option<(u64, Evidence)> {
+        Some((self.told, self.combine.evidence()?))
     }
 
     /// What the combiner knows, and what is still withheld from it.
@@ -175,10 +185,12 @@ impl Vote {
     }
 }
 
-fn tell(combine: &mut dyn Combine, voters: usize, released: Released<'_>) {
+/// Tells a truth; 1 if there was any vote for it.
+fn tell(combine: &mut dyn Combine, voters: usize, released: Released<'_>) -> u64 {
     let (votes, interval) = released.row.split_at(voters);
     if let &[lower, upper] = interval {
         combine.judge([lower, upper], released.truth);
     }
     combine.observe(Votes(votes), released.truth, released.arrived);
+    u64::from(Votes(votes).present().next().is_some())
 }

@@ -121,6 +121,12 @@ pub trait Combine: Send {
     /// What was learned stays; instants that are kept move by `shift`.
     fn segment(&mut self, _shift: Duration) {}
 
+    /// How many truths it goes by at present, and how many it takes to do what it is for; none for a combiner that does it
+    /// without any. `athermal evaluate` tells of one that hardly ever has enough.
+    fn evidence(&self) -> Option<Evidence> {
+        None
+    }
+
     /// All that was learned; none for a combiner that learns nothing.
     fn snapshot(&self) -> Option<Box<dyn State>> {
         None
@@ -130,6 +136,17 @@ pub trait Combine: Send {
     fn restore(&mut self, _state: Box<dyn State>) -> Restored {
         Restored::cold("the combiner learns nothing")
     }
+}
+
+/// How many truths a combiner goes by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// The truths that count at present.
+    pub truths: f64,
+    /// How many it takes.
+    pub needed: f64,
+    /// What lets more of them count, as the beginning of a sentence: "a longer `memory`".
+    pub remedy: &'static str,
 }
 
 /// The votes for one instant, in the order of the `voters` port; NaN where a voter has none.

@@ -23,7 +23,7 @@ mod registry;
 mod state;
 
 pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
-pub use combiner::{Combine, Combiner, Votes};
+pub use combiner::{Combine, Combiner, Evidence, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{

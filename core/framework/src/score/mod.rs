@@ -1,5 +1,6 @@
 //! Decides how predictions are scored against the truths measured later; not how they are made.
 
+mod evidence;
 mod interval;
 mod table;
 mod trace;
@@ -8,6 +9,7 @@ mod watch;
 use std::sync::Arc;
 
 pub use crate::engine::Mode;
+pub use evidence::Lack;
 pub use interval::IntervalScore;
 pub use table::{RESTRICTS, Score, Scores};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace};

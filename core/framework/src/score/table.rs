@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::watch::{Truth, Watch};
-use super::{IntervalScore, Mode, ScoreOptions};
+use super::{IntervalScore, Lack, Mode, ScoreOptions};
 use crate::compile::Plan;
 use crate::engine::Engine;
 use crate::time::Instant;
@@ -26,6 +26,8 @@ pub struct Scores {
     pub rejected: Vec<(String, u64)>,
     /// A row for each prediction, those of one truth together, in the order of the plan.
     pub scores: Vec<Score>,
+    /// Combiners that went by fewer truths than they take.
+    pub lacks: Vec<Lack>,
 }
 
 /// How well one prediction did. Errors are prediction minus truth, in the unit of the truth.
@@ -98,6 +100,11 @@ pub(super) fn table(
             .truths
             .iter()
             .flat_map(|truth| scores(plan, truth, options))
+            .collect(),
+        lacks: watch
+            .tallies
+            .iter()
+            .filter_map(super::evidence::Tally::lack)
             .collect(),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::evidence::Tally;
 use super::interval::Intervals;
 use crate::compile::{Plan, TruthLink, persistence_lag};
 use crate::engine::mode::{Step, times};
@@ -13,6 +14,7 @@ use crate::time::{Duration, Instant};
 #[derive(Debug)]
 pub(crate) struct Watch {
     pub(crate) truths: Vec<Truth>,
+    pub(super) tallies: Vec<Tally>,
 }
 
 /// A truth and all predictions of it.
@@ -92,6 +94,7 @@ impl Watch {
         }
         Self {
             truths: truths.into_values().collect(),
+            tallies: Tally::all(plan),
         }
     }
 
@@ -102,6 +105,9 @@ impl Watch {
                 Event::Row(now) => truth.look(engine, now),
                 Event::Segment => truth.segment(),
             }
+        }
+        if let Event::Row(_) = event {
+            self.tallies.iter_mut().for_each(|tally| tally.look(engine));
         }
     }
 }

@@ -1,0 +1,118 @@
+//! Decides which combiners are told of as going by too few truths to do what they are for.
+
+use std::fmt;
+
+use crate::compile::{Plan, PlannedRole};
+use crate::engine::Engine;
+
+/// A combiner that had as many truths as it takes at less than this share of the ticks since it first had them lacks them.
+const MOSTLY: f64 = 0.5;
+
+/// A combiner that went by fewer truths than it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lack {
+    /// The combiner: `guard.Z1`.
+    pub node: String,
+    /// How many truths came.
+    pub told: u64,
+    /// How many it takes.
+    pub needed: f64,
+    /// The most that counted at a tick.
+    pub most: f64,
+    /// At which share of the ticks since there first were enough there were; 0 where there never were.
+    pub enough: f64,
+    /// What lets more truths count: "a longer `memory`".
+    pub remedy: &'static str,
+}
+
+impl fmt::Display for Lack {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            node,
+            told,
+            needed,
+            most,
+            enough,
+            remedy,
+        } = self;
+        let truths = if *needed == 1.0 { "truth" } else { "truths" };
+        write!(f, "{node} needs {needed} {truths} and ")?;
+        if *enough > 0.0 {
+            let share = 100.0 * enough;
+            write!(
+                f,
+                "had as many at only {share:.0}% of the ticks since it first did; "
+            )?;
+        } else if (*told as f64) < *needed {
+            return write!(f, "the data have {told} for it, so it acted on none");
+        } else {
+            let most = match (most * 10.0).round() / 10.0 {
+                0.0 => "any".to_owned(),
+                most => format!("more than {most}"),
+            };
+            write!(
+                f,
+                "never had {most} of the {told} that came, so it acted on none; "
+            )?;
+        }
+        write!(f, "{remedy} lets more count")
+    }
+}
+
+/// What is counted of one combiner.
+#[derive(Debug)]
+pub(super) struct Tally {
+    node: usize,
+    lack: Lack,
+    /// Ticks since there first were enough truths, and those at which there were.
+    ticks: u64,
+    enough: u64,
+}
+
+impl Tally {
+    /// One for each combiner that is told truths.
+    pub(super) fn all(plan: &Plan) -> Vec<Self> {
+        let nodes = plan.nodes.iter().enumerate();
+        let told = nodes
+            .filter(|(_, node)| matches!(node.role, PlannedRole::Combiner { truth: Some(_), .. }));
+        told.map(|(node, planned)| Self {
+            node,
+            lack: Lack {
+                node: planned.instance(),
+                told: 0,
+                needed: 0.0,
+                most: 0.0,
+                enough: 0.0,
+                remedy: "",
+            },
+            ticks: 0,
+            enough: 0,
+        })
+        .collect()
+    }
+
+    /// Looks at what a tick did.
+    pub(super) fn look(&mut self, engine: &Engine) {
+        let Some((told, evidence)) = engine.evidence(self.node) else {
+            return;
+        };
+        let lack = &mut self.lack;
+        (lack.told, lack.needed, lack.remedy) = (told, evidence.needed, evidence.remedy);
+        lack.most = lack.most.max(evidence.truths);
+        let enough = evidence.truths >= evidence.needed;
+        if enough || self.ticks > 0 {
+            self.ticks += 1;
+            self.enough += u64::from(enough);
+        }
+    }
+
+    /// What is to be told of it, if anything.
+    pub(super) fn lack(&self) -> Option<Lack> {
+        let enough = self.enough as f64 / self.ticks.max(1) as f64;
+        let lacks = self.lack.told > 0 && enough < MOSTLY;
+        lacks.then(|| Lack {
+            enough,
+            ..self.lack.clone()
+        })
+    }
+}
