@@ -134,6 +134,63 @@ fn a_memory_that_held_enough_truths_only_once_is_told_by_how_often_it_did() {
 }
 
 #[test]
+fn members_of_a_node_that_lack_the_same_are_told_of_once() {
+    let scratch = Scratch::new("members");
+    let graph = scratch.file(
+        "graph.toml",
+        r#"schema = 1
+[sets]
+axis = ["x", "y", "z"]
+[time]
+column = "time_s"
+[signals.out]
+unit = "nm"
+channels = "axis"
+column = "{channel}"
+max_age = "2min"
+[nodes.none]
+type = "zero"
+each = "axis"
+inputs.truth = "out.{axis}"
+ahead = "0s"
+[nodes.vote]
+type = "best"
+each = "axis"
+inputs.voters = "none.{axis}"
+inputs.truth = "out.{axis}"
+memory = "30s"
+[outputs]
+vote = "vote"
+"#,
+    );
+    // `z` has only half of the truths, so that another number is told of it: all 50 are known at the last row, which has none
+    // of its own. Of the others the truth of the last row comes too late.
+    let mut rows = String::from("time_s,x,y,z\n");
+    for row in 0..100 {
+        let z = if row % 2 == 0 { "3" } else { "" };
+        let _ = writeln!(rows, "{},1,2,{z}", 60 * row);
+    }
+    let data = scratch.file("data.csv", rows);
+    let told = athermal_on("evaluate", &graph, &data, &[]).ended(0).told;
+    let warnings: Vec<_> = told
+        .lines()
+        .filter(|line| line.starts_with("warning"))
+        .collect();
+    let never = |who: &str, came: u32| {
+        format!(
+            "warning: {who} needs 1 truth and never had any of the {came} that came, so it acted on none; a longer `memory` lets more count"
+        )
+    };
+    assert_eq!(
+        warnings,
+        [
+            never("vote.x (and 1 more like it)", 99),
+            never("vote.z", 50)
+        ]
+    );
+}
+
+#[test]
 fn data_that_are_too_short_are_told_as_such() {
     assert_eq!(
         warnings(

@@ -19,8 +19,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Score a model's predictions on recorded data
 ///
 /// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
-/// truth that shares nothing with the predicted one; K steps ahead that of K steps before, in a free run none), and the noise of the truth itself. All predictions of a truth are
-/// scored on the instants at which all of them are valid.
+/// truth that shares nothing with the predicted one; K steps ahead that of K steps before, in a free run none), and the
+/// noise of the truth itself. All predictions of a truth are scored on the instants at which all of them are valid.
 ///
 /// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
 /// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is the share of the truth's spread that is told,

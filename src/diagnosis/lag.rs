@@ -10,7 +10,9 @@ use athermal_core::model::Model;
 use athermal_core::recording::{Event, Recording};
 use athermal_core::score::{TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{autocorrelation, cross_correlation, cross_correlation_error};
+use athermal_numerics::{
+    autocorrelation, cross_correlation, cross_correlation_error, cross_correlation_pairs,
+};
 use serde::Serialize;
 
 use super::observation::{Observation, main_prediction};
@@ -184,10 +186,10 @@ fn correlogram(
     lag_s: &[f64],
     from_s: f64,
 ) -> Correlogram {
-    let r = cross_correlation(x, y, lag_s.len() / 2);
-    let pairs = x.iter().zip(y).filter(|(x, y)| !(*x + *y).is_nan());
-    let error = cross_correlation_error(x_smooth, y_smooth, pairs.count());
-    let there = pairs_at(x, y, lag_s.len() / 2);
+    let lags = lag_s.len() / 2;
+    let r = cross_correlation(x, y, lags);
+    let there = cross_correlation_pairs(x, y, lags);
+    let error = cross_correlation_error(x_smooth, y_smooth, there[lags]);
     let most = there.iter().copied().max().unwrap_or(0);
     let counts = |&lag: &usize| SHARE_OF_PAIRS * there[lag] >= most && !r[lag].is_nan();
     let present = (0..r.len()).filter(|lag| counts(lag) && lag_s[*lag] >= from_s);
@@ -198,18 +200,6 @@ fn correlogram(
         r,
         error,
     }
-}
-
-/// How many pairs of values there are at each lag from `-lags` to `lags`.
-fn pairs_at(x: &[f64], y: &[f64], lags: usize) -> Vec<usize> {
-    let pairs = |x: &[f64], y: &[f64]| {
-        let there = x.iter().zip(y).filter(|(x, y)| !(**x + **y).is_nan());
-        there.count()
-    };
-    let after = |of: &'_ [f64], lag: usize| of.len().min(lag);
-    let lead = (1..=lags).rev().map(|lag| pairs(&x[after(x, lag)..], y));
-    let follow = (0..=lags).map(|lag| pairs(x, &y[after(y, lag)..]));
-    lead.chain(follow).collect()
 }
 
 /// The channels that estimators of a truth are offered, the truth itself left out.

@@ -6,7 +6,7 @@ use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
 use serde::Serialize;
 
-use crate::figures::time;
+use crate::figures::{counted, time};
 
 /// As many samples with the very same value look stuck, where the channel changes otherwise.
 const STUCK: u64 = 20;
@@ -184,10 +184,9 @@ impl SensorFacts {
             }
         }
         if self.gaps > 0 {
-            let plural = if self.gaps == 1 { "" } else { "s" };
             remarks.push(format!(
-                "{} gap{plural}, the longest {}",
-                self.gaps,
+                "{}, the longest {}",
+                counted(self.gaps, "gap"),
                 time(self.longest_gap_s)
             ));
         }

@@ -35,9 +35,7 @@ pub fn autocorrelation(x: &[f64], lags: usize) -> Vec<f64> {
 /// How many pairs of values each lag from 0 to `lags` has; of lag 0, how many values there are.
 #[must_use]
 pub fn autocorrelation_pairs(x: &[f64], lags: usize) -> Vec<usize> {
-    let pairs = |lag: usize| x.iter().zip(after(x, lag));
-    let there = |lag: usize| pairs(lag).filter(|(a, b)| !a.is_nan() && !b.is_nan());
-    (0..=lags).map(|lag| there(lag).count()).collect()
+    (0..=lags).map(|lag| pairs(x, after(x, lag))).collect()
 }
 
 /// The standard error of the autocorrelation at each lag from 1 on, were it zero from that lag on (Bartlett 1946):
@@ -119,6 +117,20 @@ pub fn cross_correlation(x: &[f64], y: &[f64], lags: usize) -> Vec<f64> {
     let lead = (1..=lags).rev().map(|lag| pearson(after(&x, lag), &y));
     let follow = (0..=lags).map(|lag| pearson(&x, after(&y, lag)));
     lead.chain(follow).collect()
+}
+
+/// How many pairs of values there are at each lag from `-lags` to `lags`.
+#[must_use]
+pub fn cross_correlation_pairs(x: &[f64], y: &[f64], lags: usize) -> Vec<usize> {
+    let lead = (1..=lags).rev().map(|lag| pairs(after(x, lag), y));
+    let follow = (0..=lags).map(|lag| pairs(x, after(y, lag)));
+    lead.chain(follow).collect()
+}
+
+/// How many instants, from the beginning of both on, have a value in both.
+fn pairs(x: &[f64], y: &[f64]) -> usize {
+    let both = x.iter().zip(y);
+    both.filter(|(x, y)| !x.is_nan() && !y.is_nan()).count()
 }
 
 fn after(x: &[f64], lag: usize) -> &[f64] {

@@ -13,6 +13,8 @@ const MOSTLY: f64 = 0.5;
 pub struct Lack {
     /// The combiner: `guard.Z1`.
     pub node: String,
+    /// How many more members of the same node are to be told of in the same words.
+    pub alike: usize,
     /// How many truths came.
     pub told: u64,
     /// How many it takes.
@@ -27,16 +29,28 @@ pub struct Lack {
 
 impl fmt::Display for Lack {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.node)?;
+        if self.alike > 0 {
+            write!(f, " (and {} more like it)", self.alike)?;
+        }
+        f.write_str(" ")?;
+        self.write_what(f)
+    }
+}
+
+impl Lack {
+    /// What it lacks, whichever combiner it is.
+    fn write_what(&self, f: &mut dyn fmt::Write) -> fmt::Result {
         let Self {
-            node,
             told,
             needed,
             most,
             enough,
             remedy,
+            ..
         } = self;
         let truths = if *needed == 1.0 { "truth" } else { "truths" };
-        write!(f, "{node} needs {needed} {truths} and ")?;
+        write!(f, "needs {needed} {truths} and ")?;
         if *enough > 0.0 {
             let share = 100.0 * enough;
             write!(
@@ -57,6 +71,28 @@ impl fmt::Display for Lack {
         }
         write!(f, "{remedy} lets more count")
     }
+
+    /// Whether another member of the same node is to be told of in the same words.
+    fn is_like(&self, other: &Self) -> bool {
+        let names = [self, other].map(|lack| lack.node.split('.').next());
+        let what = |lack: &Self| {
+            let mut what = String::new();
+            lack.write_what(&mut what).map(|()| what)
+        };
+        names[0] == names[1] && what(self) == what(other)
+    }
+}
+
+/// What is to be told of all combiners, of members of a node that lack the same at once.
+pub(super) fn lacks(tallies: &[Tally]) -> Vec<Lack> {
+    let mut lacks: Vec<Lack> = Vec::new();
+    for lack in tallies.iter().filter_map(Tally::lack) {
+        match lacks.iter_mut().find(|told| told.is_like(&lack)) {
+            Some(told) => told.alike += 1,
+            None => lacks.push(lack),
+        }
+    }
+    lacks
 }
 
 /// What is counted of one combiner.
@@ -79,6 +115,7 @@ impl Tally {
             node,
             lack: Lack {
                 node: planned.instance(),
+                alike: 0,
                 told: 0,
                 needed: 0.0,
                 most: 0.0,
@@ -107,7 +144,7 @@ impl Tally {
     }
 
     /// What is to be told of it, if anything.
-    pub(super) fn lack(&self) -> Option<Lack> {
+    fn lack(&self) -> Option<Lack> {
         let enough = self.enough as f64 / self.ticks.max(1) as f64;
         let lacks = self.lack.told > 0 && enough < MOSTLY;
         lacks.then(|| Lack {

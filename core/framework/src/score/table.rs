@@ -101,11 +101,7 @@ pub(super) fn table(
             .iter()
             .flat_map(|truth| scores(plan, truth, options))
             .collect(),
-        lacks: watch
-            .tallies
-            .iter()
-            .filter_map(super::evidence::Tally::lack)
-            .collect(),
+        lacks: super::evidence::lacks(&watch.tallies),
     }
 }
 
