@@ -318,6 +318,33 @@ fn what_follows_truths_predicts_from_as_many_steps_back_as_are_asked_for() {
 }
 
 #[test]
+fn a_model_that_goes_on_from_the_last_truth_knows_as_many_with_a_horizon_of_one_sample_as_with_none()
+ {
+    let scratch = Scratch::new("modes-horizon");
+    let data = scratch.file("data.csv", csv(&series(400)));
+    let text = GRAPH.replace("LEARN", "") + "followed = \"followed\"\n" + FOLLOWED;
+    let models = ["0s", "10s"].map(|ahead| {
+        let node = format!("inputs.truth = \"output.y\"\nahead = \"{ahead}\"");
+        let text = text.replace("inputs.truth = \"output.y\"\nahead = \"10s\"", &node);
+        let text = text.replace("inputs.truth = \"output.y\"\nahead = \"0s\"", &node);
+        let graph = scratch.file("graph.toml", text);
+        fitted(&scratch, &format!("{ahead}.json"), &graph, &data)
+    });
+    for steps in ["1", "2", "5"] {
+        let mode = ["--mode", "k-step", "--steps", steps];
+        let scores = models.each_ref().map(|model| scores(model, &data, &mode));
+        for node in ["lasting", "level", "followed"] {
+            let [none, one] = scores.each_ref().map(|of| figure(of, node, "rmse"));
+            // The first truths have no run a sample before them.
+            assert!(
+                (one / none - 1.0).abs() < 0.01,
+                "{node} {steps}: {none} {one}"
+            );
+        }
+    }
+}
+
+#[test]
 fn deviations_are_those_of_as_many_steps_as_predictions_are_made_over() {
     let scratch = Scratch::new("modes-deviations");
     let data = scratch.file("data.csv", csv(&series(2000)));

@@ -384,6 +384,13 @@ impl TruthLink {
     pub fn embargo(&self) -> Duration {
         (self.span - self.ahead).max(Duration::ZERO)
     }
+
+    /// Whether the truth of a run's own tick is a regressor that it may have: the window of what it predicts begins where that
+    /// truth's ends, or later.
+    #[must_use]
+    pub fn allows_present(&self) -> bool {
+        self.ahead > Duration::ZERO && self.embargo().is_zero()
+    }
 }
 
 /// Which rows an estimator is fitted on, by the absolute value of the truth.

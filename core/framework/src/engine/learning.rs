@@ -21,6 +21,8 @@ pub(crate) struct Learning {
     freeze: Option<usize>,
     mode: Mode,
     step: Step,
+    /// Whether a run knows of the truth of its own tick.
+    at_once: bool,
     /// A row in which nothing is there.
     nothing: Vec<f64>,
 }
@@ -54,8 +56,10 @@ impl Learning {
         training: TrainingLimits,
     ) -> Option<Self> {
         let width = predictor.uses().len();
+        let learner = predictor.learner()?;
         Some(Self {
-            learner: predictor.learner()?,
+            at_once: truth.allows_present() && learner.extrapolates(),
+            learner,
             // With each row stands whether learning was frozen at the run, or at the arrival of the truth.
             withheld: Withheld::new(truth, width + 1),
             freeze: planned.freeze,
@@ -81,8 +85,11 @@ impl Learning {
         let newest = self.withheld.newest(now);
         match self.mode {
             Mode::OneStep | Mode::FreeRun => newest,
-            // One step knows nothing of a truth of this tick, which several are counted back from.
-            mode => newest.min(now - Duration::from_ns(1)) - mode.earlier(self.step.length()),
+            // Several steps are counted back from the newest truth that one step knows of.
+            mode => {
+                let after = Duration::from_ns(i64::from(!self.at_once));
+                newest.min(now - after) - mode.earlier(self.step.length())
+            }
         }
     }
 
@@ -95,9 +102,14 @@ impl Learning {
         self.learner.deviation(row, of)
     }
 
-    /// The truth to look at after all outputs.
+    /// The slot of the truth.
     pub(crate) fn truth(&self) -> usize {
         self.withheld.link().slot
+    }
+
+    /// Whether a truth is taken before the run of its tick; else it is after all outputs.
+    pub(crate) fn at_once(&self) -> bool {
+        self.at_once
     }
 
     /// Writes the regressors of a run down, where all that are needed were there.

@@ -63,7 +63,7 @@ pub struct Engine {
     histories: Vec<Option<History>>,
     /// The slots that have a history.
     recorded: Vec<usize>,
-    /// The nodes that are told truths, and the slots of these.
+    /// The nodes that are told truths after all outputs, and the slots of these.
     told: Vec<(usize, usize)>,
     nodes: Vec<Running>,
     last: Instant,

@@ -23,11 +23,14 @@ pub(super) enum Running {
 }
 
 impl Running {
-    /// The slot of the truth that it is told.
+    /// The slot of the truth that it is told after all outputs.
     pub(super) fn truth(&self) -> Option<usize> {
         match self {
             Self::Operator { .. } => None,
-            Self::Estimate { estimate, .. } => Some(estimate.as_ref()?.learning.as_ref()?.truth()),
+            Self::Estimate { estimate, .. } => {
+                let learning = estimate.as_ref()?.learning.as_ref()?;
+                (!learning.at_once()).then(|| learning.truth())
+            }
             Self::Vote(vote) => vote.truth(),
         }
     }

@@ -89,10 +89,14 @@ impl Turn<'_> {
             frozen,
         } = self;
         let slot = node.slots.start;
-        if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning())
-            && let Some((became, arrived)) = learning.release(now, gathered, !frozen)
-        {
-            slots.set(slot + 1, f64::from(became as u8), arrived);
+        if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning()) {
+            if learning.at_once() && slots.fresh(learning.truth()) {
+                let truth = slots.values[learning.truth()];
+                learning.observe(truth, now, gathered, !frozen);
+            }
+            if let Some((became, arrived)) = learning.release(now, gathered, !frozen) {
+                slots.set(slot + 1, f64::from(became as u8), arrived);
+            }
         }
         if trigger.is_some_and(|gather| !gathered[gather].fresh) {
             return;

@@ -107,6 +107,12 @@ pub trait Learner: Debug + Send {
         false
     }
 
+    /// Whether it goes on from where the last truths were, as an autoregression goes on from those among its regressors. It is
+    /// then given the truth of a run's own tick before the run, where that would be allowed as a regressor.
+    fn extrapolates(&self) -> bool {
+        self.follows()
+    }
+
     /// Whether the state is where it should be, after as many truths as that takes. Until it is, truths are handed over in a
     /// free run too.
     fn settled(&self) -> bool {

@@ -25,8 +25,7 @@ pub(super) struct KalmanTrainer {
     names: Vec<String>,
     unit: String,
     every: Duration,
-    /// How much earlier than a truth the newest one arrived that its prediction knows of: nothing is learned of a truth of
-    /// the same tick.
+    /// How much earlier than a truth the newest one arrived that its prediction knows of.
     earlier: Duration,
     /// Whether it will follow truths while it runs.
     follows: bool,
@@ -58,7 +57,7 @@ impl KalmanTrainer {
         let bytes = size_of::<Kept>() + names.len() * size_of::<f64>();
         Self {
             every: parameters.every.unwrap_or(setup.span),
-            earlier: setup.span.max(setup.ahead + Duration::from_ns(1)),
+            earlier: setup.span.max(setup.ahead).max(Duration::from_ns(1)),
             follows: setup.learns,
             parameters,
             unit: setup.error_unit.clone(),

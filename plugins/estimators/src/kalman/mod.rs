@@ -318,6 +318,10 @@ impl Known {
 }
 
 impl Learner for Following {
+    fn extrapolates(&self) -> bool {
+        true
+    }
+
     fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
         let Known {
             filter, scaling, ..
