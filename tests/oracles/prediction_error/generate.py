@@ -50,36 +50,32 @@ expected = {}
 
 
 def by_scipy(name):
-    """The first samples are taken as given, as long as the model reaches back; before them, noise and errors are 0."""
+    """The first samples are taken as given, as long as the model reaches back; before them, noise and errors are 0. What the
+    filter of the input gave before is found with the coefficients."""
     model, y = TRUE[name], samples[name].to_numpy()
     sizes = [len(model[key]) for key in "abfcd"]
     integrated = name.startswith("arima")
 
     def errors(theta):
+        theta, before = np.split(theta, [len(theta) - len(model["f"])])
         level, theta = (0.0, theta) if integrated else (theta[0], theta[1:])
         a, b, f, c, d = np.split(theta, np.cumsum(sizes)[:-1])
-        # The input has always been what it was first.
         w = np.zeros(n)
         if len(b):
-            rest = u[0] * b.sum() / (1 + f.sum())
-            w = rest + lfilter(np.r_[0.0, b], p(f), u - u[0])
-            if name == "oe":  # nor has it been elsewhere than where it was measured first, which is left to die away
-                past = lfiltic([1.0], p(f), np.ones(len(f)))
-                w[0] += y[0] - level - rest
-                w[1:] += (y[0] - level - rest) * lfilter([1.0], p(f), np.zeros(n - 1), zi=past)[0]
-        first = (1 if name == "oe" else len(a)) if len(f) else max(len(a), len(b))
+            w = lfilter(np.r_[0.0, b], p(f), u, zi=lfiltic(np.r_[0.0, b], p(f), before, np.zeros(len(b))))[0]
+        first = max(len(a), len(b))
         left = lfilter(p(a), [1.0], y - level) - w
         whitening = np.convolve(p(d), [1.0, -1.0]) if integrated else p(d)
         # Filters of the noise begin with what is known of it.
         white = np.convolve(left[first:], whitening)[len(whitening) - 1 : n - first]
         return lfilter([1.0], p(c), white)
 
-    start = np.r_[[] if integrated else model["level"], *[model[key] for key in "abfcd"]].astype(float)
-    found = least_squares(errors, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    rows = len(errors(found.x))
+    coefficients = np.r_[[] if integrated else model["level"], *[model[key] for key in "abfcd"]].astype(float)
+    found = least_squares(errors, np.r_[coefficients, np.zeros(len(model["f"]))], xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    rows, count = len(errors(found.x)), len(coefficients)
     jacobian = approx_derivative(errors, found.x, method="3-point")
-    covariance = 2 * found.cost / (rows - len(start)) * np.linalg.inv(jacobian.T @ jacobian)
-    return {"coefficients": found.x.tolist(), "errors": np.sqrt(np.diag(covariance)).tolist(),
+    covariance = 2 * found.cost / (rows - len(found.x)) * np.linalg.inv(jacobian.T @ jacobian)
+    return {"coefficients": found.x[:count].tolist(), "errors": np.sqrt(np.diag(covariance))[:count].tolist(),
             "sum_of_squares": 2 * found.cost, "rows": rows}
 
 

@@ -1,7 +1,8 @@
 //! Decides where the search for a model starts: with least squares on long regressions, which need no start.
 
-use super::residuals::{Past, Samples, residuals, sum_of_squares, through};
-use super::{Orders, Polynomials, Transfer};
+use super::brought::{Past, through};
+use super::residuals::{residuals, sum_of_squares};
+use super::{Orders, Polynomials, Samples, Transfer};
 use crate::{GramBlocks, LeastSquares, NumericsError, Standardization};
 
 /// How often the filters of Steiglitz and McBride are renewed.

@@ -3,12 +3,15 @@
 //!
 //! All kinds are cases of one model (Ljung 1999, eq. 4.33): `A(q) (y − μ) = Σ B_i(q)/F_i(q) u_i + C(q)/(D(q) (1 − q⁻¹)^d) e`.
 
+mod brought;
 mod criteria;
 mod initial;
 mod polynomials;
 mod precision;
 mod residuals;
+mod ring;
 mod roots;
+mod samples;
 mod search;
 mod stepper;
 #[cfg(test)]
@@ -16,7 +19,7 @@ mod tests;
 
 pub use criteria::InformationCriteria;
 pub use polynomials::{InputOrders, Orders, Polynomials, Transfer};
-pub use residuals::Samples;
 pub use roots::Fading;
+pub use samples::Samples;
 pub use search::{PredictionError, PredictionErrorFit};
 pub use stepper::Stepper;

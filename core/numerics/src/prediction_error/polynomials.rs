@@ -47,17 +47,20 @@ impl Orders {
     /// The first sample of a segment whose residual has all that it needs.
     #[must_use]
     pub fn first(&self) -> usize {
-        let direct = self
-            .inputs
-            .iter()
-            .filter(|input| input.nf == 0 && input.nb > 0);
-        let reach = direct.map(|input| input.nk + input.nb - 1).max();
-        let reach = self.na.max(reach.unwrap_or(0)) + self.nd + self.differences;
-        let follows = self.na + self.nc + self.nd + self.differences > 0;
-        let filtered = self.inputs.iter().any(|input| input.nf > 0);
-        // The first value says where the filters begin.
-        reach.max(usize::from(filtered && !follows))
+        let reaches = self.inputs.iter().map(|input| reach(input.nk, input.nb));
+        reaches.max().unwrap_or(0).max(self.na) + self.nd + self.differences
     }
+
+    /// How many values that filters gave before a segment have to be found.
+    #[must_use]
+    pub fn starts(&self) -> usize {
+        self.inputs.iter().map(|input| input.nf).sum()
+    }
+}
+
+/// How many samples the oldest value that counts lies back.
+fn reach(delay: usize, b: usize) -> usize {
+    b.checked_sub(1).map_or(0, |b| delay + b)
 }
 
 /// `q^−nk B(q)/F(q)` of one input.
@@ -136,6 +139,18 @@ impl Polynomials {
     #[must_use]
     pub fn follows(&self) -> bool {
         self.a.len() + self.c.len() + self.d.len() + self.differences > 0
+    }
+
+    /// How many samples back the noise is made of what has been measured.
+    pub(super) fn reach(&self) -> usize {
+        let inputs = self.inputs.iter();
+        let reaches = inputs.map(|input| reach(input.delay, input.b.len()));
+        reaches.max().unwrap_or(0).max(self.a.len())
+    }
+
+    /// How many values that filters gave before a segment have to be found.
+    pub(super) fn starts(&self) -> usize {
+        self.inputs.iter().map(|input| input.f.len()).sum()
     }
 
     /// The share of each filter of an input in what they are off by together when the first value is measured: nothing is known

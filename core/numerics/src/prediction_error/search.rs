@@ -3,10 +3,11 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::initial::starts;
-use super::residuals::{counted_from, derivatives, sum_of_squares};
+use super::initial;
+use super::residuals::{Segment, counted_from, sum_of_squares};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
+use crate::state_space::pseudo_inverse_left;
 use crate::{GramBlocks, NumericsError};
 
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
@@ -45,6 +46,8 @@ pub struct PredictionErrorFit {
     pub rows: usize,
     /// How many samples of each segment were not.
     pub first: usize,
+    /// How many values that filters gave before the segments were found beside the coefficients.
+    pub starts: usize,
     /// Steps of the search.
     pub steps: usize,
     /// Whether the search ended since no step was worth it.
@@ -52,18 +55,19 @@ pub struct PredictionErrorFit {
 }
 
 impl PredictionErrorFit {
-    /// The variance of the innovations, for as many coefficients as there are.
+    /// The variance of the innovations, for as many coefficients and starts as there are.
     #[must_use]
     pub fn variance(&self) -> f64 {
-        let left = self.rows.saturating_sub(self.model.flat().len()).max(1);
+        let found = self.model.flat().len() + self.starts;
+        let left = self.rows.saturating_sub(found).max(1);
         self.residual_sum_of_squares / left as f64
     }
 
     /// What it is worth beside others on the same rows.
     #[must_use]
     pub fn criteria(&self) -> InformationCriteria {
-        let coefficients = self.model.flat().len();
-        InformationCriteria::of(self.rows, coefficients, self.residual_sum_of_squares)
+        let found = self.model.flat().len() + self.starts;
+        InformationCriteria::of(self.rows, found, self.residual_sum_of_squares)
     }
 }
 
@@ -89,7 +93,8 @@ impl PredictionError {
         }
         let first = counted_from(orders, first);
         let rows = samples.counted(first);
-        let needed = orders.coefficients() + 2;
+        let starts = samples.starts(orders, first);
+        let needed = orders.coefficients() + starts + 2;
         if rows < needed {
             return Err(NumericsError::TooFewRows {
                 needed: needed as u64,
@@ -97,8 +102,9 @@ impl PredictionError {
             });
         }
         let radius = remembered(samples);
-        let starts = starts(orders, samples, self.penalty, radius)?;
-        self.best_from(starts, samples, first, radius)
+        let begin = initial::starts(orders, samples, self.penalty, radius)?;
+        let fit = self.best_from(begin, samples, first, radius)?;
+        Ok(PredictionErrorFit { starts, ..fit })
     }
 
     /// Searches from the best of several models.
@@ -122,6 +128,7 @@ impl PredictionError {
             model,
             rows: samples.counted(first),
             first,
+            starts: 0,
             steps,
             converged,
         })
@@ -194,12 +201,34 @@ impl PredictionError {
         let flat = model.flat();
         let count = flat.len();
         let mut rows = GramBlocks::with_row_memory(count, 0);
-        derivatives(model, samples, first, |residual, by| {
-            rows.push(by, residual)
-        });
+        let starts = model.starts();
+        let mut by_starts = Mat::<f64>::zeros(count, count);
+        for segment in samples.segments() {
+            let segment = Segment::new(model, samples, segment, first);
+            let mut own = Mat::<f64>::zeros(starts, starts);
+            let mut across = Mat::<f64>::zeros(count, starts);
+            segment.derivatives(&segment.start(), |residual| {
+                rows.push(residual.by, residual.value);
+                for (j, b) in residual.by_start.iter().enumerate() {
+                    for (i, a) in residual.by.iter().enumerate() {
+                        across[(i, j)] += a * b;
+                    }
+                    for (i, a) in residual.by_start.iter().enumerate() {
+                        own[(i, j)] += a * b;
+                    }
+                }
+            });
+            if let Some(inverse) = (starts > 0)
+                .then(|| pseudo_inverse_left(&own, &own).ok())
+                .flatten()
+            {
+                by_starts += &across * inverse * across.transpose();
+            }
+        }
         let moments = rows.total().moments_about(&vec![0.0; count + 1]);
         let mut gradient: Vec<f64> = (0..count).map(|i| moments[(count, i)]).collect();
-        let mut hessian = moments.submatrix(0, 0, count, count).to_owned();
+        // The starts of the segments follow where the coefficients go.
+        let mut hessian = moments.submatrix(0, 0, count, count) - by_starts;
         let of_b = model.penalised();
         for i in (0..count).filter(|&i| of_b[i]) {
             hessian[(i, i)] += self.penalty;

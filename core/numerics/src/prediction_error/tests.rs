@@ -1,4 +1,4 @@
-use super::residuals::{counted_from, derivatives, residuals, sum_of_squares};
+use super::residuals::{Segment, counted_from, residuals, sum_of_squares};
 use super::search::remembered;
 use super::*;
 use crate::draws::uniform as noise;
@@ -122,20 +122,30 @@ fn derivatives_are_those_of_the_residuals() {
         let samples = simulated(&model, 90, 0.3, 7);
         let moved: Vec<f64> = model.flat().iter().map(|at| 0.9 * at + 0.01).collect();
         let at = model.with(&moved);
-        let all = |model: &Polynomials| {
+        let starts: Vec<Vec<f64>> = samples
+            .segments()
+            .map(|segment| Segment::new(&at, &samples, segment, 0).start())
+            .collect();
+        let all = |model: &Polynomials, starts: &[Vec<f64>]| {
             let mut all = Vec::new();
-            derivatives(model, &samples, 0, |residual, by| {
-                all.push((residual, by.to_vec()));
-            });
+            for (segment, start) in samples.segments().zip(starts) {
+                let segment = Segment::new(model, &samples, segment, 0);
+                segment.derivatives(start, |residual| {
+                    all.push((residual.value, [residual.by, residual.by_start].concat()));
+                });
+            }
             all
         };
-        let here = all(&at);
-        for nth in 0..moved.len() {
+        let here = all(&at, &starts);
+        for nth in 0..moved.len() + at.starts() {
             let step = 1e-6;
             let beside = |by: f64| {
-                let mut flat = moved.clone();
-                flat[nth] += by;
-                all(&at.with(&flat))
+                let (mut flat, mut starts) = (moved.clone(), starts.clone());
+                match nth.checked_sub(flat.len()) {
+                    Some(of_start) => starts.iter_mut().for_each(|start| start[of_start] += by),
+                    None => flat[nth] += by,
+                }
+                all(&at.with(&flat), &starts)
             };
             let (above, below) = (beside(step), beside(-step));
             for (sample, (_, derivatives)) in here.iter().enumerate() {
@@ -194,12 +204,66 @@ fn every_kind_is_found_again() {
     }
 }
 
+/// The same samples from a later one on, in segments of so many, with one between them missing.
+fn cut(samples: &Samples, from: usize, length: usize) -> Samples {
+    let mut cut = Samples::new(samples.width());
+    for segment in samples.segments() {
+        let inputs: Vec<Vec<f64>> = (0..samples.width())
+            .map(|nth| samples.input(segment.clone(), nth))
+            .collect();
+        cut.segment();
+        for (sample, &value) in samples.values(segment).iter().enumerate().skip(from) {
+            if (sample - from) % (length + 1) == length {
+                cut.segment();
+            } else {
+                cut.push(inputs.iter().map(|input| input[sample]), value);
+            }
+        }
+    }
+    cut
+}
+
+#[test]
+fn filters_are_found_in_records_that_begin_while_they_ring_and_are_cut() {
+    for (name, model) in models().into_iter().skip(3).take(2) {
+        let samples = simulated(&model, 6000, 0.2, 11);
+        for length in [usize::MAX, 900, 20] {
+            let samples = cut(&samples, 100, length.min(samples.count()));
+            let search = PredictionError::default();
+            let fit = search.fit(&orders(&model), &samples, 0).unwrap();
+            let errors = search.standard_errors(&fit, &samples).unwrap().flat();
+            let found = fit.model.flat();
+            for ((found, expected), error) in found.iter().zip(model.flat()).zip(errors) {
+                assert!(
+                    (found - expected).abs() < 3.5 * error && error < 0.1,
+                    "{name}, {length}: {found} ± {error}, not {expected}"
+                );
+            }
+            let expected = 0.2 * 0.2 / 3.0;
+            assert!((fit.variance() / expected - 1.0).abs() < 0.08, "{name}");
+        }
+    }
+}
+
+#[test]
+fn filters_without_noise_are_found_exactly() {
+    for (name, model) in models().into_iter().skip(3).take(1) {
+        let samples = cut(&simulated(&model, 600, 0.0, 5), 50, 200);
+        let fit = PredictionError::default()
+            .fit(&orders(&model), &samples, 0)
+            .unwrap();
+        for (found, expected) in fit.model.flat().iter().zip(model.flat()) {
+            assert!((found - expected).abs() < 1e-6, "{name}: {fit:?}");
+        }
+    }
+}
+
 #[test]
 fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
     // What the second input brings about grows without end, which no stable filter does.
     let grows = Polynomials {
         a: vec![],
-        inputs: vec![transfer(0, &[0.8], &[-0.7]), transfer(0, &[2.0], &[1.004])],
+        inputs: vec![transfer(0, &[0.8], &[-0.7]), transfer(0, &[2.0], &[1.0005])],
         c: vec![],
         d: vec![],
         differences: 0,
@@ -208,7 +272,7 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
     let (mut u, mut e) = (noise(3), noise(4));
     let (mut samples, mut stepper) = (Samples::new(2), Stepper::new(grows.clone()));
     for nth in 0..400 {
-        let input = [u(), f64::from(u8::from(nth == 1))];
+        let input = [u(), f64::from(u8::from(nth == 100))];
         let expected = stepper.clone().step(|i| input[i], None);
         let value = expected + 0.3 * e();
         stepper.step(|i| input[i], Some(value));

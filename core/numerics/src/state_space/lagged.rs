@@ -159,7 +159,7 @@ pub(super) fn pseudo_inverse(matrix: &Mat<f64>) -> Result<Mat<f64>, NumericsErro
 }
 
 /// The same of what is left of a symmetric matrix when others were taken out of it.
-pub(super) fn pseudo_inverse_left(
+pub(crate) fn pseudo_inverse_left(
     left: &Mat<f64>,
     whole: &Mat<f64>,
 ) -> Result<Mat<f64>, NumericsError> {

@@ -7,6 +7,8 @@ mod model;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use lagged::pseudo_inverse_left;
+
 pub use identify::{Identification, StateOrder, Subspace, Weighting};
 pub use model::{DifferenceEquation, StateSpace};
 

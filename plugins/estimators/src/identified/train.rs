@@ -49,6 +49,7 @@ pub(crate) struct Found {
     /// The standard errors of its coefficients, where they are known; of a polynomial that has none, an empty list.
     pub(crate) errors: Option<Polynomials>,
     pub(crate) residual_sum_of_squares: f64,
+    /// How many residuals are in it that tell how large they are.
     pub(crate) rows: usize,
     /// The variance of an innovation.
     pub(crate) variance: f64,
@@ -229,6 +230,9 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
+        if let Some(note) = pieces(samples, &fit) {
+            report.notes.push(note);
+        }
         report.figure("converged", fit.converged);
         report.figure("steps_of_search", fit.steps);
         if !fit.converged {
@@ -239,7 +243,8 @@ impl Identify for Asked {
         }
         Ok(Found {
             residual_sum_of_squares: fit.residual_sum_of_squares,
-            rows: fit.rows,
+            // Each start that was found has made one of them what it is.
+            rows: fit.rows - fit.starts,
             variance: fit.variance(),
             model: fit.model,
             errors,
@@ -283,7 +288,11 @@ impl Asked {
                     tried.push(Tried {
                         name: self.name(&order, &candidate, orders.differences),
                         coefficients,
-                        figures: InformationCriteria::of(fit.rows, coefficients, squares),
+                        figures: InformationCriteria::of(
+                            fit.rows,
+                            coefficients + fit.starts,
+                            squares,
+                        ),
                     });
                     fits.push((fit, orders));
                 }
@@ -323,6 +332,22 @@ impl Asked {
         let parts: Vec<String> = order.names(orders).chain(differences).collect();
         parts.join(", ")
     }
+}
+
+/// Of pieces without a gap that are shorter on average, noise polynomials come out smaller than they are.
+const SHORT_PIECE: usize = 50;
+
+/// What is to be said of pieces that are too short for a noise model.
+fn pieces(samples: &Samples, fit: &PredictionErrorFit) -> Option<String> {
+    let count = samples.records().count();
+    let length = samples.count() / count.max(1);
+    let has_memory = fit.model.c.len() + fit.model.d.len() > 0;
+    (count > 1 && has_memory && length < SHORT_PIECE).then(|| {
+        format!(
+            "the {count} pieces without a gap have {length} samples on average: of so short ones, each of which begins without \
+             a past, `C` and `D` are found less exactly than their standard errors say"
+        )
+    })
 }
 
 /// Why samples allow no fit: those that count are fewer than all, since others are the past that they are predicted from.
