@@ -2,6 +2,7 @@
 
 use faer::Mat;
 
+use super::residuals::Counted;
 use super::search::{descend, remembered};
 use super::{Polynomials, PredictionError, PredictionErrorFit, Samples};
 use crate::cholesky::inverse_of_factor;
@@ -24,7 +25,11 @@ impl PredictionError {
         fit: &PredictionErrorFit,
         samples: &Samples,
     ) -> Option<Polynomials> {
-        let (hessian, gradient) = self.normal_equations(&fit.model, samples, fit.first);
+        let counted = Counted {
+            first: fit.first,
+            start: fit.start_counts,
+        };
+        let (hessian, gradient) = self.normal_equations(&fit.model, samples, counted);
         let held = held(&fit.model, &hessian, &gradient, remembered(samples))?;
         let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
         let scale = |i: usize| hessian[(free[i], free[i])].sqrt();

@@ -2,7 +2,8 @@
 //! which coefficients are best.
 //!
 //! What the filters of inputs gave before a segment begins is not known: it is found for each segment such that the residuals
-//! are least, which is linear (Ljung 1999, section 10.4). What the noise was before, and that was not foreseen, is taken to be 0.
+//! and how far it is from rest are least together, which is linear (Ljung 1999, section 10.4; as random effects, Robinson 1991).
+//! What the noise was before, and that was not foreseen, is taken to be 0.
 
 use std::ops::Range;
 
@@ -11,7 +12,7 @@ use faer::Mat;
 use super::brought::Brought;
 use super::ring::Ring;
 use super::{Orders, Polynomials, Samples};
-use crate::state_space::pseudo_inverse_left;
+use crate::state_space::{pseudo_inverse_left, spectrum};
 
 /// What is to be known beside the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,8 +36,42 @@ pub(super) struct Segment<'a> {
     model: &'a Polynomials,
     values: Vec<f64>,
     inputs: Vec<Vec<f64>>,
-    /// The residuals before are not counted.
-    first: usize,
+    counted: Counted,
+}
+
+/// What counts in a search.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counted {
+    /// The residuals of a segment before are not counted.
+    pub(super) first: usize,
+    /// What the square of a value that a filter gave before a segment, less what it gives at rest, counts as much as.
+    pub(super) start: f64,
+}
+
+impl Counted {
+    /// From a sample on, wherever filters begin.
+    pub(super) fn from(first: usize) -> Self {
+        Self { first, start: 0.0 }
+    }
+}
+
+/// Where the filters of a segment begin.
+pub(super) struct Start {
+    /// How far off what they gave before is from rest: the newest value of the first filter, the one before and so on, and the
+    /// same of the others.
+    pub(super) values: Vec<f64>,
+    /// How many of them its residuals tell; the others stay at rest.
+    pub(super) told: f64,
+    /// `ln det(I + GᵀG/λ)`, of the derivatives `G` by them and what the square of each counts, `λ`.
+    pub(super) log_determinant: f64,
+}
+
+/// The inverse of products of derivatives by the start, with what the start itself counts.
+pub(super) fn inverse_with(counted: Counted, mut own: Mat<f64>) -> Option<Mat<f64>> {
+    for i in 0..own.nrows() {
+        own[(i, i)] += counted.start;
+    }
+    pseudo_inverse_left(&own, &own).ok()
 }
 
 impl<'a> Segment<'a> {
@@ -44,7 +79,7 @@ impl<'a> Segment<'a> {
         model: &'a Polynomials,
         samples: &Samples,
         segment: Range<usize>,
-        first: usize,
+        counted: Counted,
     ) -> Self {
         let values = samples.values(segment.clone()).iter();
         let inputs = 0..model.inputs.len();
@@ -54,21 +89,24 @@ impl<'a> Segment<'a> {
             inputs: inputs
                 .map(|nth| samples.input(segment.clone(), nth))
                 .collect(),
-            first,
+            counted,
         }
     }
 
-    /// How far off what the filters gave before the segment is from rest such that the residuals are least: the newest value of
-    /// the first filter, the one before and so on, and the same of the others.
-    pub(super) fn start(&self) -> Vec<f64> {
+    /// The start with which residuals and start count least together.
+    pub(super) fn start(&self) -> Start {
         let count = self.model.starts();
-        let rest = vec![0.0; count];
-        if count == 0 {
-            return rest;
+        let mut start = Start {
+            values: vec![0.0; count],
+            told: 0.0,
+            log_determinant: 0.0,
+        };
+        if count == 0 || self.counted.start.is_infinite() {
+            return start;
         }
         let mut own = Mat::<f64>::zeros(count, count);
         let mut with_residual = Mat::<f64>::zeros(count, 1);
-        self.follow(&rest, Derived::ByStart, |residual| {
+        self.follow(&start.values, Derived::ByStart, |residual| {
             for (i, a) in residual.by_start.iter().enumerate() {
                 with_residual[(i, 0)] -= a * residual.value;
                 for (j, b) in residual.by_start.iter().enumerate() {
@@ -76,14 +114,19 @@ impl<'a> Segment<'a> {
                 }
             }
         });
-        match pseudo_inverse_left(&own, &own) {
-            Ok(inverse) => {
-                let start = inverse * with_residual;
-                (0..count).map(|i| start[(i, 0)]).collect()
+        // Where the filters grow beyond all numbers, the residuals tell so.
+        if let Some(inverse) = inverse_with(self.counted, own.clone()) {
+            let values = &inverse * with_residual;
+            start.values = (0..count).map(|i| values[(i, 0)]).collect();
+            let told = inverse * &own;
+            start.told = (0..count).map(|i| told[(i, i)]).sum();
+            if self.counted.start > 0.0 {
+                let own = spectrum(&own).map_or_else(|_| Vec::new(), |(own, _)| own);
+                let each = own.iter().map(|own| (own / self.counted.start).ln_1p());
+                start.log_determinant = each.sum();
             }
-            // The filters grow beyond all numbers, and the residuals tell so.
-            Err(_) => rest,
         }
+        start
     }
 
     /// Goes through the residuals from such a start.
@@ -153,7 +196,7 @@ impl<'a> Segment<'a> {
                 continue;
             }
             ring.whiten(&whitening, &model.c, &integrating, model.d.len(), at);
-            if sample >= self.first {
+            if sample >= self.counted.first {
                 let (by_start, by) = ring.derivatives().split_at(starts);
                 take(Residual {
                     value: ring.residual(),
@@ -165,7 +208,7 @@ impl<'a> Segment<'a> {
     }
 }
 
-/// Goes through the residuals of a model. The first `first` of each segment are left out.
+/// Goes through the residuals of a model, wherever filters begin. The first `first` of each segment are left out.
 pub(super) fn residuals(
     model: &Polynomials,
     samples: &Samples,
@@ -173,16 +216,63 @@ pub(super) fn residuals(
     mut take: impl FnMut(f64),
 ) {
     for segment in samples.segments() {
-        let segment = Segment::new(model, samples, segment, first);
-        segment.residuals(&segment.start(), &mut take);
+        let segment = Segment::new(model, samples, segment, Counted::from(first));
+        segment.residuals(&segment.start().values, &mut take);
     }
 }
 
-/// The sum of the squared residuals; infinite where it is not a number.
+/// What a model leaves.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Left {
+    /// The sum of the squared residuals; infinite where it is not a number.
+    pub(super) squares: f64,
+    /// The sum of the squared starts, less those at rest.
+    pub(super) of_starts: f64,
+    /// How many starts the residuals tell.
+    pub(super) told: f64,
+    /// The sum of those of the starts.
+    pub(super) log_determinant: f64,
+}
+
+impl Left {
+    /// What is made least: the squares of residuals and starts.
+    pub(super) fn sum(&self, counted: Counted) -> f64 {
+        // What counts endlessly is 0.
+        let of_starts = if self.of_starts > 0.0 {
+            counted.start * self.of_starts
+        } else {
+            0.0
+        };
+        self.squares + of_starts
+    }
+
+    /// How unlikely so many residuals are beside starts that are normal: `−2 ln L` but for a constant (Harville 1977).
+    pub(super) fn unlikely(&self, counted: Counted, rows: f64) -> f64 {
+        rows * (self.sum(counted) / rows).ln() + self.log_determinant
+    }
+}
+
+pub(super) fn left(model: &Polynomials, samples: &Samples, counted: Counted) -> Left {
+    let mut left = Left::default();
+    for segment in samples.segments() {
+        let segment = Segment::new(model, samples, segment, counted);
+        let start = segment.start();
+        segment.residuals(&start.values, |residual| {
+            left.squares += residual * residual
+        });
+        left.of_starts += start.values.iter().map(|value| value * value).sum::<f64>();
+        left.told += start.told;
+        left.log_determinant += start.log_determinant;
+    }
+    if !left.squares.is_finite() {
+        left.squares = f64::INFINITY;
+    }
+    left
+}
+
+/// The sum of the squared residuals, wherever filters begin; infinite where it is not a number.
 pub(super) fn sum_of_squares(model: &Polynomials, samples: &Samples, first: usize) -> f64 {
-    let mut sum = 0.0;
-    residuals(model, samples, first, |residual| sum += residual * residual);
-    if sum.is_finite() { sum } else { f64::INFINITY }
+    left(model, samples, Counted::from(first)).squares
 }
 
 /// The first sample of a segment that is counted: `first`, or a later one before which a model of these orders lacks something.

@@ -4,10 +4,9 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::initial;
-use super::residuals::{Segment, counted_from, sum_of_squares};
+use super::residuals::{Counted, Left, Segment, counted_from, inverse_with, left};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
-use crate::state_space::pseudo_inverse_left;
 use crate::{GramBlocks, NumericsError};
 
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
@@ -24,6 +23,9 @@ pub struct PredictionError {
     pub penalty: f64,
     /// The most steps.
     pub most_steps: usize,
+    /// The standard deviation of what filters gave before a segment about what they had given had their inputs always been what
+    /// they are first; infinite where nothing is known of it.
+    pub start_spread: f64,
 }
 
 impl Default for PredictionError {
@@ -31,6 +33,7 @@ impl Default for PredictionError {
         Self {
             penalty: 0.0,
             most_steps: 100,
+            start_spread: f64::INFINITY,
         }
     }
 }
@@ -46,8 +49,10 @@ pub struct PredictionErrorFit {
     pub rows: usize,
     /// How many samples of each segment were not.
     pub first: usize,
-    /// How many values that filters gave before the segments were found beside the coefficients.
+    /// How many values that filters gave before the segments were found beside the coefficients, as far as samples tell them.
     pub starts: usize,
+    /// What the square of each of them counted as much as.
+    pub(super) start_counts: f64,
     /// Steps of the search.
     pub steps: usize,
     /// Whether the search ended since no step was worth it.
@@ -103,8 +108,39 @@ impl PredictionError {
         }
         let radius = remembered(samples);
         let begin = initial::starts(orders, samples, self.penalty, radius)?;
-        let fit = self.best_from(begin, samples, first, radius)?;
-        Ok(PredictionErrorFit { starts, ..fit })
+        let counted = Counted::from(first);
+        if starts == 0 || self.start_spread.is_infinite() {
+            return self.best_from(begin, samples, counted, radius);
+        }
+        self.best_of_starts(begin, samples, counted, radius)
+    }
+
+    /// The same where something is known of starts. How large innovations are, and so what a start counts beside them, is known
+    /// afterwards: it is searched once with starts that count nothing and once with such as count as if all began at rest, then
+    /// from both with what these find, and the likelier is taken.
+    fn best_of_starts(
+        &self,
+        begin: Vec<Polynomials>,
+        samples: &Samples,
+        counted: Counted,
+        radius: f64,
+    ) -> Result<PredictionErrorFit, NumericsError> {
+        let rows = samples.counted(counted.first) as f64;
+        let with = |start: f64| Counted { start, ..counted };
+        let of = |squares: f64| with(squares / rows / (self.start_spread * self.start_spread));
+        let at_rest = |model: &Polynomials| left(model, samples, with(f64::INFINITY)).squares;
+        let least = begin.iter().map(at_rest).fold(f64::INFINITY, f64::min);
+        let mut best: Option<(f64, PredictionErrorFit)> = None;
+        for first in [with(0.0), of(least)] {
+            let found = self.best_from(begin.clone(), samples, first, radius)?;
+            let counted = of(found.residual_sum_of_squares);
+            let fit = self.best_from(vec![found.model], samples, counted, radius)?;
+            let unlikely = left(&fit.model, samples, counted).unlikely(counted, rows);
+            if best.as_ref().is_none_or(|(least, _)| unlikely < *least) {
+                best = Some((unlikely, fit));
+            }
+        }
+        best.map(|(_, fit)| fit).ok_or(NumericsError::NotFinite)
     }
 
     /// Searches from the best of several models.
@@ -112,47 +148,49 @@ impl PredictionError {
         &self,
         starts: Vec<Polynomials>,
         samples: &Samples,
-        first: usize,
+        counted: Counted,
         radius: f64,
     ) -> Result<PredictionErrorFit, NumericsError> {
         let sums = starts
             .into_iter()
-            .map(|start| (self.objective(&start, samples, first), start));
+            .map(|start| (self.objective(&start, samples, counted), start));
         let best = sums
             .filter(|(sum, _)| sum.is_finite())
             .min_by(|(sum, _), (other, _)| sum.total_cmp(other));
         let (_, start) = best.ok_or(NumericsError::NotFinite)?;
-        let (model, steps, converged) = self.search(start, samples, first, radius);
+        let (model, steps, converged) = self.search(start, samples, counted, radius);
+        let Left { squares, told, .. } = left(&model, samples, counted);
         Ok(PredictionErrorFit {
-            residual_sum_of_squares: sum_of_squares(&model, samples, first),
+            residual_sum_of_squares: squares,
             model,
-            rows: samples.counted(first),
-            first,
-            starts: 0,
+            rows: samples.counted(counted.first),
+            first: counted.first,
+            starts: told.round() as usize,
+            start_counts: counted.start,
             steps,
             converged,
         })
     }
 
-    fn objective(&self, model: &Polynomials, samples: &Samples, first: usize) -> f64 {
+    fn objective(&self, model: &Polynomials, samples: &Samples, counted: Counted) -> f64 {
         let b = model.flat().into_iter().zip(model.penalised());
         let squares: f64 = b.filter(|(_, of_b)| *of_b).map(|(b, _)| b * b).sum();
-        sum_of_squares(model, samples, first) + self.penalty * squares
+        left(model, samples, counted).sum(counted) + self.penalty * squares
     }
 
     fn search(
         &self,
         start: Polynomials,
         samples: &Samples,
-        first: usize,
+        counted: Counted,
         radius: f64,
     ) -> (Polynomials, usize, bool) {
         let mut model = start;
-        let mut least = self.objective(&model, samples, first);
+        let mut least = self.objective(&model, samples, counted);
         let mut damping = vec![1e-3; model.flat().len()];
         let mut gained = f64::INFINITY;
         for step in 0..self.most_steps {
-            let (hessian, gradient) = self.normal_equations(&model, samples, first);
+            let (hessian, gradient) = self.normal_equations(&model, samples, counted);
             let flat = model.flat();
             let mut solvable = false;
             loop {
@@ -166,7 +204,7 @@ impl PredictionError {
                 let unstable = tried.as_ref().map(|tried| tried.unstable(radius));
                 let unstable = unstable.filter(|of| of.contains(&true));
                 let found = tried.filter(|_| unstable.is_none());
-                let found = found.map(|tried| (self.objective(&tried, samples, first), tried));
+                let found = found.map(|tried| (self.objective(&tried, samples, counted), tried));
                 if let Some((sum, tried)) = found.filter(|(sum, _)| *sum <= least) {
                     gained = least - sum;
                     (model, least) = (tried, sum);
@@ -196,7 +234,7 @@ impl PredictionError {
         &self,
         model: &Polynomials,
         samples: &Samples,
-        first: usize,
+        counted: Counted,
     ) -> (Mat<f64>, Vec<f64>) {
         let flat = model.flat();
         let count = flat.len();
@@ -204,10 +242,10 @@ impl PredictionError {
         let starts = model.starts();
         let mut by_starts = Mat::<f64>::zeros(count, count);
         for segment in samples.segments() {
-            let segment = Segment::new(model, samples, segment, first);
+            let segment = Segment::new(model, samples, segment, counted);
             let mut own = Mat::<f64>::zeros(starts, starts);
             let mut across = Mat::<f64>::zeros(count, starts);
-            segment.derivatives(&segment.start(), |residual| {
+            segment.derivatives(&segment.start().values, |residual| {
                 rows.push(residual.by, residual.value);
                 for (j, b) in residual.by_start.iter().enumerate() {
                     for (i, a) in residual.by.iter().enumerate() {
@@ -218,9 +256,8 @@ impl PredictionError {
                     }
                 }
             });
-            if let Some(inverse) = (starts > 0)
-                .then(|| pseudo_inverse_left(&own, &own).ok())
-                .flatten()
+            if starts > 0
+                && let Some(inverse) = inverse_with(counted, own)
             {
                 by_starts += &across * inverse * across.transpose();
             }
@@ -295,7 +332,8 @@ mod tests {
             ..Orders::default()
         });
         let search = PredictionError::default();
-        let (model, steps, converged) = search.search(start.clone(), &samples, 0, 0.9);
+        let (model, steps, converged) =
+            search.search(start.clone(), &samples, Counted::from(0), 0.9);
         assert_eq!((model, steps, converged), (start, 0, false));
     }
 }

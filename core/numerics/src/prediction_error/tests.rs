@@ -1,4 +1,4 @@
-use super::residuals::{Segment, counted_from, residuals, sum_of_squares};
+use super::residuals::{Counted, Segment, counted_from, residuals, sum_of_squares};
 use super::search::remembered;
 use super::*;
 use crate::draws::uniform as noise;
@@ -124,12 +124,16 @@ fn derivatives_are_those_of_the_residuals() {
         let at = model.with(&moved);
         let starts: Vec<Vec<f64>> = samples
             .segments()
-            .map(|segment| Segment::new(&at, &samples, segment, 0).start())
+            .map(|segment| {
+                Segment::new(&at, &samples, segment, Counted::from(0))
+                    .start()
+                    .values
+            })
             .collect();
         let all = |model: &Polynomials, starts: &[Vec<f64>]| {
             let mut all = Vec::new();
             for (segment, start) in samples.segments().zip(starts) {
-                let segment = Segment::new(model, &samples, segment, 0);
+                let segment = Segment::new(model, &samples, segment, Counted::from(0));
                 segment.derivatives(start, |residual| {
                     all.push((residual.value, [residual.by, residual.by_start].concat()));
                 });
@@ -229,7 +233,10 @@ fn filters_are_found_in_records_that_begin_while_they_ring_and_are_cut() {
         let samples = simulated(&model, 6000, 0.2, 11);
         for length in [usize::MAX, 900, 20] {
             let samples = cut(&samples, 100, length.min(samples.count()));
-            let search = PredictionError::default();
+            let search = PredictionError {
+                start_spread: 10.0,
+                ..PredictionError::default()
+            };
             let fit = search.fit(&orders(&model), &samples, 0).unwrap();
             let errors = search.standard_errors(&fit, &samples).unwrap().flat();
             let found = fit.model.flat();

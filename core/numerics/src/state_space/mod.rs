@@ -7,7 +7,7 @@ mod model;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use lagged::pseudo_inverse_left;
+pub(crate) use lagged::{pseudo_inverse_left, spectrum};
 
 pub use identify::{Identification, StateOrder, Subspace, Weighting};
 pub use model::{DifferenceEquation, StateSpace};

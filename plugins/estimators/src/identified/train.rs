@@ -319,9 +319,12 @@ impl Asked {
 
     fn search(&self, orders: &Orders, penalty: f64) -> PredictionError {
         let most = MOST_WORK / orders.coefficients().max(1);
+        // Truths are in units of their spread.
+        let filters = orders.inputs.iter().filter(|input| input.nf > 0).count();
         PredictionError {
             penalty,
             most_steps: most.clamp(20, 100),
+            start_spread: START_SPREAD / (filters.max(1) as f64).sqrt(),
         }
     }
 
@@ -333,6 +336,10 @@ impl Asked {
         parts.join(", ")
     }
 }
+
+/// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth: so wide that
+/// it only keeps from starts that a few samples cannot tell.
+const START_SPREAD: f64 = 3.0;
 
 /// Of pieces without a gap that are shorter on average, noise polynomials come out smaller than they are.
 const SHORT_PIECE: usize = 50;
