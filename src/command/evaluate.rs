@@ -12,6 +12,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::data::{self, Data};
+use super::numbers;
 use crate::figures::{counted, number, or_dash, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -59,7 +60,13 @@ pub struct Evaluate {
     #[arg(long, value_enum, default_value = "one-step")]
     mode: Horizon,
     /// How many steps ahead `--mode k-step` predicts
-    #[arg(long, value_name = "K", required_if_eq("mode", "k-step"))]
+    #[arg(
+        long,
+        value_name = "K",
+        required_if_eq("mode", "k-step"),
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<NonZeroU32>("a whole number of steps, 1 or more and below 2^32")
+    )]
     steps: Option<NonZeroU32>,
 }
 

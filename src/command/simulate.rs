@@ -16,6 +16,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::evaluate::load_fitted;
+use super::numbers;
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
 
@@ -41,10 +42,20 @@ pub struct Simulate {
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Length of the recording in days
-    #[arg(long, default_value_t = 7.0)]
+    #[arg(
+        long,
+        default_value_t = 7.0,
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<f64>("a number of days, such as 0.5")
+    )]
     days: f64,
     /// Another seed is another week of weather, motions and noise
-    #[arg(long, default_value_t = 1)]
+    #[arg(
+        long,
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
+    )]
     seed: u64,
     /// Add the true drift of each axis as a column
     #[arg(long)]
