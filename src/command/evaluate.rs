@@ -229,7 +229,7 @@ fn describe(scores: &Scores, mode: Mode) -> String {
         Mode::OneStep => String::new(),
         Mode::Steps(steps) => format!(
             "{} ahead: no truth newer than that is read, but what was predicted of it\n\n",
-            counted(steps.get().into(), "step")
+            counted(steps.get(), "step")
         ),
         Mode::FreeRun => {
             "free run: no measured truth is read where there is a prediction of it\n\n".to_owned()

@@ -93,12 +93,11 @@ impl Simulate {
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() != "-" && terminal.format == Format::Table {
-            let plural = if self.days == 1.0 { "" } else { "s" };
             terminal.note(format_args!(
-                "wrote {}: {}, {} day{plural} of `{name}`, seed {}",
+                "wrote {}: {}, {} of `{name}`, seed {}",
                 output.display(),
                 counted(rows, "row"),
-                self.days,
+                counted(self.days, "day"),
                 self.seed
             ));
         }

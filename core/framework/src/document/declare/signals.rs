@@ -8,7 +8,7 @@ use super::reading::{
     known_keys, length, meant, missing, quantity, table, text, texts, wrong_type,
 };
 use super::sets::Sets;
-use crate::diagnostic::{Diagnostics, Names, Place};
+use crate::diagnostic::{Diagnostics, Names, Place, counted};
 use crate::document::graph_file::SignalDecl;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Value};
@@ -206,11 +206,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         return None;
     };
     let [low, high] = ends.as_slice() else {
-        let found = if ends.len() == 1 {
-            "a list of 1 value".to_owned()
-        } else {
-            format!("a list of {} values", ends.len())
-        };
+        let found = format!("a list of {}", counted(ends.len(), "value"));
         let expected = "a list of two quantities, the low end first".to_owned();
         diagnostics.report(
             value.place,
