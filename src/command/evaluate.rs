@@ -127,7 +127,14 @@ impl Evaluate {
             });
             println!(
                 "{:#}",
-                json!({ "data": files, "mode": self.mode.name(), "steps": self.steps, "period": period, "scores": scores.scores })
+                json!({
+                    "data": files,
+                    "mode": self.mode.name(),
+                    "steps": self.steps,
+                    "period": period,
+                    "scores": scores.scores,
+                    "lacks": scores.lacks,
+                })
             );
         } else {
             print!("{}", describe(&scores, mode));

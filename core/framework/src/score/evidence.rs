@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 use crate::compile::{Plan, PlannedRole};
 use crate::diagnostic::{count, counted};
 use crate::engine::Engine;
@@ -10,7 +12,7 @@ use crate::engine::Engine;
 const MOSTLY: f64 = 0.5;
 
 /// A combiner that went by fewer truths than it takes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lack {
     /// The combiner: `guard.Z1`.
     pub node: String,
