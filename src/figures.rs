@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use athermal::Duration;
+pub use athermal::core::diagnostic::{count, counted};
 
 /// How wide tables may be, in characters.
 const WIDTH: usize = 80;
@@ -30,27 +31,6 @@ pub fn number(value: f64) -> String {
 #[must_use]
 pub fn or_dash(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), number)
-}
-
-/// A count with separators between thousands.
-#[must_use]
-pub fn count(value: u64) -> String {
-    let digits = value.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-/// How many there are of something, which is named as one of them: `1 row`, `8,028 rows`.
-#[must_use]
-pub fn counted(value: u64, what: &str) -> String {
-    let plural = if value == 1 { "" } else { "s" };
-    format!("{} {what}{plural}", count(value))
 }
 
 /// A number to so many significant digits.
@@ -348,18 +328,5 @@ mod tests {
         assert_eq!(told(300_000_000_000), "5min");
         assert_eq!(told(12_345), "12.345us");
         assert_eq!(told(0), "0s");
-    }
-
-    #[test]
-    fn counts_have_separators() {
-        assert_eq!(count(1), "1");
-        assert_eq!(count(1234), "1,234");
-        assert_eq!(count(1_234_567), "1,234,567");
-    }
-
-    #[test]
-    fn of_one_there_is_no_plural() {
-        let told = [0, 1, 2, 1234].map(|value| counted(value, "row"));
-        assert_eq!(told, ["0 rows", "1 row", "2 rows", "1,234 rows"]);
     }
 }

@@ -40,3 +40,46 @@ pub fn command_line() -> ExitCode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::{Command, CommandFactory};
+
+    use super::Arguments;
+
+    /// What is told of each argument of a command, and of those inside it, that is given a text instead of what it takes.
+    fn told(command: &Command, words: &[String]) -> Vec<String> {
+        let mut all = Vec::new();
+        for argument in command
+            .get_arguments()
+            .filter_map(|argument| argument.get_long())
+        {
+            let call = words.iter().cloned().chain([format!("--{argument}=x")]);
+            let refused = Arguments::command().try_get_matches_from(call).err();
+            all.extend(refused.map(|error| error.to_string()));
+        }
+        for inner in command.get_subcommands() {
+            let words = [words, &[inner.get_name().to_owned()]].concat();
+            all.extend(told(inner, &words));
+        }
+        all
+    }
+
+    #[test]
+    fn what_is_no_number_is_told_in_words_of_the_program() {
+        let told = told(&Arguments::command(), &["athermal".to_owned()]);
+        let ours = told
+            .iter()
+            .filter(|told| told.contains("expected ") && told.contains("number"));
+        assert!(ours.count() >= 6, "{told:#?}");
+        for words in [
+            "invalid digit",
+            "invalid float",
+            "non-zero type",
+            "from empty string",
+        ] {
+            let foreign = told.iter().find(|told| told.contains(words));
+            assert_eq!(foreign, None);
+        }
+    }
+}

@@ -4,8 +4,10 @@
 
 mod workbench;
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 
+use serde_json::json;
 use workbench::{Scratch, athermal_on};
 
 /// A graph in which zero is predicted of a measured truth, and put together by combiners with these parameters.
@@ -41,6 +43,22 @@ ahead = "0s"
     text + "[outputs]\n" + &outputs
 }
 
+/// Truths at these instants, in s.
+fn truths(times: impl Iterator<Item = u32>) -> String {
+    let mut rows = String::from("time_s,y\n");
+    for (nth, time) in times.enumerate() {
+        let _ = writeln!(rows, "{time},{}", 1 + nth % 7);
+    }
+    rows
+}
+
+/// What is warned of.
+fn warned(told: &str) -> Vec<String> {
+    let lines = told.lines();
+    let lines = lines.filter_map(|line| line.strip_prefix("warning: "));
+    lines.map(str::to_owned).collect()
+}
+
 /// The warnings of a score of these combiners on truths at these instants, in s.
 fn warnings(
     test: &str,
@@ -49,16 +67,9 @@ fn warnings(
 ) -> Vec<String> {
     let scratch = Scratch::new(test);
     let graph = scratch.file("graph.toml", graph(combiners));
-    let mut rows = String::from("time_s,y\n");
-    for (nth, time) in times.enumerate() {
-        let _ = writeln!(rows, "{time},{}", 1 + nth % 7);
-    }
-    let data = scratch.file("data.csv", rows);
+    let data = scratch.file("data.csv", truths(times));
     let told = athermal_on("evaluate", &graph, &data, &[]).ended(0).told;
-    let lines = told
-        .lines()
-        .filter_map(|line| line.strip_prefix("warning: "));
-    lines.map(str::to_owned).collect()
+    warned(&told)
 }
 
 #[test]
@@ -200,4 +211,48 @@ fn data_that_are_too_short_are_told_as_such() {
         ),
         ["guard needs 5 truths and the data have 2 for it, so it acted on none"]
     );
+}
+
+#[test]
+fn every_command_that_scores_a_combiner_tells_what_it_lacks_to_people_and_to_programs() {
+    let scratch = Scratch::new("commands");
+    let guard = scratch.file("graph.toml", graph(&[("guard", "memory = \"5min\"")]));
+    let data = scratch.file("data.csv", truths((0..100).map(|row| 60 * row)));
+    let told = "guard needs 5 truths and never had more than 4 of the 99 that came, so it acted on none; \
+                a longer `memory` lets more count";
+    let expected = json!([{
+        "node": "guard",
+        "alike": 0,
+        "told": 99,
+        "needed": 5.0,
+        "most": 4.0,
+        "enough": 0.0,
+        "remedy": "a longer `memory`",
+    }]);
+    let of_graph = format!("{}: {told}", guard.display());
+    let on = data.to_str().unwrap();
+    let commands = [
+        ("evaluate", vec![], "/lacks", told),
+        ("compare", vec!["--on", on], "/graphs/0/lacks", &of_graph),
+        ("diagnose", vec!["--no-fit"], "/diagnosis/lacks", told),
+    ];
+    for (command, mut words, place, told) in commands {
+        let call = |words: &[&str]| {
+            let words: Vec<&dyn AsRef<OsStr>> = words.iter().map(|word| word as _).collect();
+            athermal_on(command, &guard, &data, &words).ended(0)
+        };
+        assert_eq!(warned(&call(&words).told), [told], "{command}");
+        words.extend(["--format", "json"]);
+        let programs = call(&words).json();
+        assert_eq!(programs.pointer(place), Some(&expected), "{command}");
+    }
+}
+
+#[test]
+fn programs_are_told_of_no_lack_where_truths_are_enough() {
+    let scratch = Scratch::new("no-lack");
+    let guard = scratch.file("graph.toml", graph(&[("guard", "memory = \"10min\"")]));
+    let data = scratch.file("data.csv", truths((0..100).map(|row| 60 * row)));
+    let json = athermal_on("evaluate", &guard, &data, &[&"--format", &"json"]);
+    assert_eq!(json.ended(0).json()["lacks"], json!([]));
 }

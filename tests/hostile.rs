@@ -362,6 +362,34 @@ fn a_mark_that_is_missing_brings_no_mistake_about_but_those_of_the_syntax() {
     assert!(wrong > 1_000, "{wrong}");
 }
 
+/// Reads and compiles a graph that has mistakes, in which `told` is to be helped with `help`; gives how many errors there are.
+fn told_soon(files: &Memory, told: &str, help: &str) -> usize {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let started = Instant::now();
+    let document = load(Path::new("a.toml"), files, &mut sources, &mut diagnostics);
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    if let Some(graph) = &graph {
+        match compile_part(graph, Wanted::default(), &mut diagnostics) {
+            Ok(plan) => drop(trial::declare(
+                graph,
+                &plan,
+                files,
+                &mut sources,
+                &mut diagnostics,
+            )),
+            Err(part) => trial::mistakes(graph, &part, files, &mut sources, &mut diagnostics),
+        }
+    }
+    let taken = started.elapsed();
+    let one = diagnostics
+        .iter()
+        .find(|found| found.message.contains(told));
+    let found = one.and_then(|found| found.help.as_deref());
+    assert_eq!(found, Some(help), "{told}");
+    assert!(taken < 6 * TOO_LONG, "{told}: {taken:?}");
+    diagnostics.error_count()
+}
+
 #[test]
 fn twenty_thousand_unknown_references_are_told_soon() {
     let mut text = "schema = 1\n[signals.t]\nunit = \"Cel\"\nchannels = [\"a\"]\n".to_owned();
@@ -374,18 +402,117 @@ fn twenty_thousand_unknown_references_are_told_soon() {
     }
     text.push_str("[outputs]\nfirst = \"slope_0000\"\n");
     let files = Memory::new().with("a.toml", text);
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let started = Instant::now();
-    let document = load(Path::new("a.toml"), &files, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph.and_then(|graph| compile(&graph, Wanted::default(), &mut diagnostics));
-    let taken = started.elapsed();
-    assert!(plan.is_none());
-    assert_eq!(diagnostics.error_count(), 20_000);
-    let one = diagnostics
-        .iter()
-        .find(|told| told.message.contains("slop_9999"));
-    let help = one.and_then(|told| told.help.as_deref());
-    assert_eq!(help, Some("did you mean `slope_9999`?"));
-    assert!(taken < 6 * TOO_LONG, "{taken:?}");
+    let errors = told_soon(&files, "slop_9999", "did you mean `slope_9999`?");
+    assert_eq!(errors, 20_000);
+}
+
+/// How many names there are, and how many more are not there, of each sort of names that a file may have many of.
+const MANY: usize = 10_000;
+
+/// A graph of nodes that read a signal, with what each of them has beside its type.
+fn of_nodes(before: &str, each: impl Fn(usize) -> String) -> String {
+    let nodes = (0..MANY).map(|nth| format!("[nodes.slope_{nth:04}]\n{}\n", each(nth)));
+    let nodes: String = nodes.collect();
+    format!("schema = 1\n{before}\n{nodes}[outputs]\nfirst = \"slope_0000\"\n")
+}
+
+fn slope(signal: &str) -> String {
+    format!("type = \"slope\"\nwindows = [\"5min\"]\ninputs.signal = \"{signal}\"")
+}
+
+/// So many of something, one after the other.
+fn many(one: impl Fn(usize) -> String) -> String {
+    (0..MANY).map(one).collect()
+}
+
+const PLATE: &str = "[signals.t]\nunit = \"Cel\"\nchannels = [\"plate\"]\n";
+
+fn signal_of_many() -> String {
+    let channels = many(|nth| format!("\"plate_{nth:04}\", "));
+    format!("[signals.t]\nunit = \"Cel\"\nchannels = [{channels}]\nmax_age = \"1min\"\n")
+}
+
+#[test]
+fn ten_thousand_unknown_channels_are_told_soon() {
+    let text = of_nodes(&signal_of_many(), |nth| slope(&format!("t.plat_{nth:04}")));
+    let files = Memory::new().with("a.toml", text);
+    let errors = told_soon(&files, "plat_9999", "did you mean `plate_9999`?");
+    assert_eq!(errors, MANY);
+
+    let optional = many(|nth| format!("\"plat_{nth:04}\", "));
+    let signal = signal_of_many() + &format!("optional = [{optional}]\n");
+    let files = Memory::new().with("a.toml", format!("schema = 1\n{signal}"));
+    told_soon(&files, "plat_9999", "did you mean \"plate_9999\"?");
+}
+
+#[test]
+fn ten_thousand_unknown_channels_of_tests_are_told_soon() {
+    let node = slope("t");
+    let test = |nth| {
+        format!(
+            "[[tests]]\nname = \"{nth}\"\ninputs = {{ \"t.plat_{nth:04}\" = {{ start = \"1 Cel\" }} }}\n\
+             expect = [{{ of = \"s.plat_{nth:04}\", at = \"1h\", equals = \"1 K/h\" }}]\n"
+        )
+    };
+    let (signal, tests) = (signal_of_many(), many(test));
+    let text = format!("schema = 1\n{signal}[nodes.s]\n{node}\n[outputs]\nfirst = \"s\"\n{tests}");
+    let files = Memory::new().with("a.toml", text);
+    told_soon(&files, "plat_9999", "did you mean `plate_9999`?");
+}
+
+#[test]
+fn ten_thousand_unknown_sets_are_told_soon() {
+    let node = slope("t");
+    let using = |nth| format!("{node}\neach = \"axs_{nth:04}\"");
+    for (members, more) in [("[\"X\"]", 0), ("[]", MANY)] {
+        let sets = many(|nth| format!("axis_{nth:04} = {members}\n"));
+        let text = of_nodes(&format!("[sets]\n{sets}{PLATE}"), using);
+        let files = Memory::new().with("a.toml", text);
+        let errors = told_soon(&files, "axs_9999", "did you mean \"axis_9999\"?");
+        assert_eq!(errors, MANY + more);
+    }
+}
+
+#[test]
+fn ten_thousand_unknown_modules_and_parts_of_modules_are_told_soon() {
+    let inner = "inputs = [\"x\"]\nnodes.s = { type = \"slope\", inputs.signal = \"{x}\", windows = [\"5min\"] }\n";
+    let modules = many(|nth| format!("[modules.mod_{nth:04}]\n{inner}"));
+    let text = of_nodes(&format!("{modules}{PLATE}"), |nth| {
+        format!("module = \"md_{nth:04}\"\ninputs.x = \"t\"")
+    });
+    let files = Memory::new().with("a.toml", text);
+    let errors = told_soon(&files, "md_9999", "did you mean \"mod_9999\"?");
+    assert_eq!(errors, MANY);
+
+    let instance = "[nodes.i]\nmodule = \"m\"\ninputs.x = \"t\"\n";
+    let outputs = many(|nth| format!("outputs.part_{nth:04} = \"s\"\n"));
+    let module = format!("[modules.m]\n{inner}{outputs}{PLATE}{instance}");
+    let text = of_nodes(&module, |nth| slope(&format!("i:prt_{nth:04}")));
+    let files = Memory::new().with("a.toml", text);
+    let errors = told_soon(&files, "prt_9999", "did you mean \"part_9999\"?");
+    assert_eq!(errors, MANY);
+
+    let nodes = many(|nth| {
+        format!(
+            "outputs.part_{nth:04} = \"slop_{nth:04}\"\nnodes.slope_{nth:04} = {{ type = \"slope\", \
+             inputs.signal = \"slo_{nth:04}\", windows = [\"5min\"] }}\n"
+        )
+    });
+    let text = format!("schema = 1\n[modules.m]\ninputs = [\"x\"]\n{nodes}{PLATE}{instance}");
+    let files = Memory::new().with("a.toml", text);
+    told_soon(&files, "\"slop_9999\"", "did you mean \"slope_9999\"?");
+    told_soon(&files, "\"slo_9999\"", "did you mean \"slope_9999\"?");
+}
+
+#[test]
+fn ten_thousand_nodes_that_are_not_there_to_be_removed_are_told_soon() {
+    let removed = many(|nth| format!("nodes.slop_{nth:04} = false\n"));
+    let files = Memory::new()
+        .with(
+            "a.toml",
+            format!("schema = 1\nextends = \"b.toml\"\n{removed}"),
+        )
+        .with("b.toml", of_nodes(PLATE, |_| slope("t")));
+    let errors = told_soon(&files, "slop_9999", "did you mean \"slope_9999\"?");
+    assert_eq!(errors, MANY);
 }

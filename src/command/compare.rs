@@ -6,7 +6,7 @@ use std::time::Instant;
 use athermal::Model;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
-use athermal::core::score::trace;
+use athermal::core::score::{Lack, trace};
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, compare};
 use clap::Args;
 use serde_json::json;
@@ -53,6 +53,8 @@ struct Fitted {
     path: String,
     seconds: f64,
     report: FitReport,
+    /// Combiners that went by too few truths where they were scored.
+    lacks: Vec<Lack>,
 }
 
 impl Compare {
@@ -94,6 +96,7 @@ impl Compare {
                 path,
                 seconds,
                 report,
+                lacks: trace.lacks.clone(),
             });
             contenders.push(Contender {
                 name,
@@ -105,7 +108,14 @@ impl Compare {
         if terminal.format == Format::Json {
             let graphs: Vec<_> = fits
                 .iter()
-                .map(|fit| json!({ "graph": fit.graph, "file": fit.path, "fit_s": fit.seconds }))
+                .map(|fit| {
+                    json!({
+                        "graph": fit.graph,
+                        "file": fit.path,
+                        "fit_s": fit.seconds,
+                        "lacks": fit.lacks,
+                    })
+                })
                 .collect();
             println!(
                 "{:#}",
@@ -121,6 +131,11 @@ impl Compare {
         }
         if comparisons.is_empty() {
             terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
+        }
+        for fit in &fits {
+            for lack in &fit.lacks {
+                terminal.warning(format_args!("{}: {lack}", fit.graph));
+            }
         }
         Ok(if failed(terminal, &fits) {
             Answer::No
@@ -286,6 +301,7 @@ mod tests {
                 path: "a.toml".to_owned(),
                 seconds: 0.0,
                 report: FitReport::default(),
+                lacks: Vec::new(),
             });
         }
     }

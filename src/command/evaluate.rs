@@ -12,6 +12,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::data::{self, Data};
+use super::numbers;
 use crate::figures::{counted, number, or_dash, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -59,7 +60,13 @@ pub struct Evaluate {
     #[arg(long, value_enum, default_value = "one-step")]
     mode: Horizon,
     /// How many steps ahead `--mode k-step` predicts
-    #[arg(long, value_name = "K", required_if_eq("mode", "k-step"))]
+    #[arg(
+        long,
+        value_name = "K",
+        required_if_eq("mode", "k-step"),
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<NonZeroU32>("a whole number of steps, 1 or more and below 2^32")
+    )]
     steps: Option<NonZeroU32>,
 }
 
@@ -120,7 +127,14 @@ impl Evaluate {
             });
             println!(
                 "{:#}",
-                json!({ "data": files, "mode": self.mode.name(), "steps": self.steps, "period": period, "scores": scores.scores })
+                json!({
+                    "data": files,
+                    "mode": self.mode.name(),
+                    "steps": self.steps,
+                    "period": period,
+                    "scores": scores.scores,
+                    "lacks": scores.lacks,
+                })
             );
         } else {
             print!("{}", describe(&scores, mode));
@@ -222,7 +236,7 @@ fn describe(scores: &Scores, mode: Mode) -> String {
         Mode::OneStep => String::new(),
         Mode::Steps(steps) => format!(
             "{} ahead: no truth newer than that is read, but what was predicted of it\n\n",
-            counted(steps.get().into(), "step")
+            counted(steps.get(), "step")
         ),
         Mode::FreeRun => {
             "free run: no measured truth is read where there is a prediction of it\n\n".to_owned()

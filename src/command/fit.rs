@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
+use super::numbers;
 use super::threads::Threads;
 use crate::figures::{count, counted, number, paragraph, table};
 use crate::invocation::{next, program, quoted};
@@ -47,7 +48,13 @@ pub struct Fit {
     #[command(flatten)]
     threads: Threads,
     /// Megabytes of rows to keep; beyond, rows are streamed in a second pass
-    #[arg(long, value_name = "MB", default_value_t = 64)]
+    #[arg(
+        long,
+        value_name = "MB",
+        default_value_t = 64,
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<usize>("a whole number of megabytes, such as 64")
+    )]
     memory: usize,
     /// Tell what else was tried at each step of a selection, and with what score, and all orders that were compared
     #[arg(long)]

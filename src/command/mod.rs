@@ -14,6 +14,7 @@ mod fit;
 mod init;
 mod new;
 mod nodes;
+mod numbers;
 mod parameters;
 mod report;
 mod run;

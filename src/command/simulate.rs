@@ -16,6 +16,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::evaluate::load_fitted;
+use super::numbers;
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
 
@@ -41,10 +42,20 @@ pub struct Simulate {
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Length of the recording in days
-    #[arg(long, default_value_t = 7.0)]
+    #[arg(
+        long,
+        default_value_t = 7.0,
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<f64>("a number of days, such as 0.5")
+    )]
     days: f64,
     /// Another seed is another week of weather, motions and noise
-    #[arg(long, default_value_t = 1)]
+    #[arg(
+        long,
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
+    )]
     seed: u64,
     /// Add the true drift of each axis as a column
     #[arg(long)]
@@ -82,12 +93,11 @@ impl Simulate {
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() != "-" && terminal.format == Format::Table {
-            let plural = if self.days == 1.0 { "" } else { "s" };
             terminal.note(format_args!(
-                "wrote {}: {}, {} day{plural} of `{name}`, seed {}",
+                "wrote {}: {}, {} of `{name}`, seed {}",
                 output.display(),
                 counted(rows, "row"),
-                self.days,
+                counted(self.days, "day"),
                 self.seed
             ));
         }

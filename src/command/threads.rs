@@ -2,11 +2,19 @@
 
 use clap::Args;
 
+use super::numbers;
+
 /// The threads that were asked for.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Threads {
     /// Threads to work with; 0 takes one for each core. The result does not depend on it
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<usize>("a whole number of threads, 0 for one per core")
+    )]
     threads: usize,
 }
 

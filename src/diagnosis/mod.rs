@@ -25,6 +25,7 @@ use athermal_core::compile::Plan;
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
 use athermal_core::recording::Recording;
+use athermal_core::score::Lack;
 use athermal_core::time::Duration;
 use serde::Serialize;
 
@@ -49,6 +50,8 @@ pub struct Diagnosis {
     pub contributions: Vec<sensor::Contribution>,
     /// What could not be told of sensors, and which node gave nothing.
     pub untold: Vec<Untold>,
+    /// Combiners that went by fewer truths than they take, whichever predictions are asked for.
+    pub lacks: Vec<Lack>,
     /// What fits on some days are worth on others; none where it was not asked for, or there are too few days or too many.
     pub days: Option<day::Days>,
     /// How many days the recording has.
@@ -138,6 +141,7 @@ pub fn diagnose(
         designs: regressor::designs(model, recording)?,
         contributions,
         untold,
+        lacks: observation.trace.lacks.clone(),
         days: match options.day {
             Some(day) => day::days(model, recording, &observation, day, progress)?,
             None => None,

@@ -12,6 +12,7 @@ mod machine_file;
 mod mistakes;
 mod mistakes_in_tests;
 mod next;
+mod numbers;
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

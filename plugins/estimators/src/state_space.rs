@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use athermal_core::diagnostic::counted;
 use athermal_core::node::{
     Forms, InputPort, Mistake, Regressors, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
@@ -331,14 +332,14 @@ fn note(found: &athermal_numerics::Identification) -> String {
         .map(|value| format!("{value:.4}"))
         .collect();
     let states = found.model.order();
-    let plural = if states == 1 { "" } else { "s" };
     let stabilised = if found.stabilised {
         "; a mode that grew was brought back"
     } else {
         ""
     };
     format!(
-        "{states} state{plural}, from the singular values {}{stabilised}",
+        "{}, from the singular values {}{stabilised}",
+        counted(states, "state"),
         values.join(", ")
     )
 }

@@ -100,6 +100,9 @@ impl Diagnose {
         }
         let trace = &observation.trace;
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+        for lack in &diagnosis.lacks {
+            terminal.warning(lack);
+        }
         self.tell(terminal, &diagnosis);
         tell_empty(terminal, &model.plan, &diagnosis, &observation);
         let drifts = window::any(&model.plan);

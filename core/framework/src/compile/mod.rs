@@ -13,6 +13,7 @@ mod leak;
 mod learning;
 mod order;
 mod plan;
+mod port_channels;
 mod problem;
 mod provenance;
 mod reference;
@@ -31,10 +32,11 @@ pub use plan::{
     Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
     PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
+pub(crate) use port_channels::PortChannels;
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
 pub use provenance::smallest_lag;
-pub(crate) use reference::{Reference, is_pattern, matches};
+pub(crate) use reference::Reference;
 pub(crate) use scope::outermost;
 
 use std::collections::BTreeSet;

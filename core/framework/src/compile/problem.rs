@@ -33,7 +33,7 @@ pub enum CompileProblem {
     UnknownChannel {
         node: String,
         channel: String,
-        known: Vec<String>,
+        known: Arc<Names>,
     },
     /// An input that the kind does not have.
     UnknownInput {
@@ -175,6 +175,14 @@ fn or_known<T: AsRef<str>>(name: &str, known: &[T], what: &str) -> String {
     match nearest(name, known.iter().map(AsRef::as_ref)) {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("{what} {}", names(known)),
+    }
+}
+
+/// As [`or_known`], of many.
+fn or_one_of(name: &str, known: &Names, what: &str) -> String {
+    match known.nearest(name) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("{what} {}", names(known.iter())),
     }
 }
 
@@ -414,10 +422,7 @@ impl Problem for CompileProblem {
             Self::KindTwice { .. } => {
                 "leave one of the crates out when the program is built".to_owned()
             }
-            Self::UnknownNode { node, known } => match known.nearest(node) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => format!("the graph has {}", names(known.iter())),
-            },
+            Self::UnknownNode { node, known } => or_one_of(node, known, "the graph has"),
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
             Self::UnknownChannel {
                 node,
@@ -427,7 +432,7 @@ impl Problem for CompileProblem {
                 Some((channel, port)) => {
                     format!("a port stands behind the node: `{node}:{port}.{channel}`")
                 }
-                None => or_known(channel, known, "its channels are"),
+                None => or_one_of(channel, known, "its channels are"),
             },
             Self::UnknownInput { input, known, .. } => or_known(input, known, "its inputs are"),
             Self::MissingInput { input, summary, .. } => {

@@ -75,10 +75,18 @@ pub fn is_pattern(text: &str) -> bool {
     text.contains(['*', '?', '{'])
 }
 
-/// Whether a channel name matches a pattern of `*` (any text), `?` (one character) and `{a,b}` (a choice).
-#[must_use]
-pub fn matches(pattern: &str, name: &str) -> bool {
-    choices(pattern).iter().any(|choice| glob(choice, name))
+/// A pattern of channel names: `*` is any text, `?` one character and `{a,b}` a choice.
+pub(crate) struct Pattern(Vec<String>);
+
+impl Pattern {
+    pub(crate) fn new(text: &str) -> Self {
+        Self(choices(text))
+    }
+
+    /// Whether a channel name matches it.
+    pub(crate) fn matches(&self, name: &str) -> bool {
+        self.0.iter().any(|choice| glob(choice, name))
+    }
 }
 
 /// The patterns without choices that a pattern stands for. The number is bounded; beyond it the text is taken as it is.
@@ -104,31 +112,38 @@ fn choices(pattern: &str) -> Vec<String> {
 
 /// Matching with backtracking to the last star only, which is enough and takes at most pattern × name steps.
 fn glob(pattern: &str, name: &str) -> bool {
-    let (pattern, name): (Vec<char>, Vec<char>) =
-        (pattern.chars().collect(), name.chars().collect());
-    let (mut p, mut n) = (0, 0);
+    let (mut pattern, mut name) = (pattern.chars(), name.chars());
+    // What follows the last star, and where in the name it was looked for last.
     let mut star = None;
-    while n < name.len() {
-        if p < pattern.len() && pattern[p] == '*' {
-            star = Some((p, n));
-            p += 1;
-        } else if p < pattern.len() && (pattern[p] == '?' || pattern[p] == name[n]) {
-            p += 1;
-            n += 1;
-        } else if let Some((at, from)) = star {
-            star = Some((at, from + 1));
-            p = at + 1;
-            n = from + 1;
-        } else {
-            return false;
+    loop {
+        let (mut after, mut rest) = (pattern.clone(), name.clone());
+        let Some(letter) = rest.next() else {
+            return pattern.all(|wanted| wanted == '*');
+        };
+        match after.next() {
+            Some('*') => {
+                star = Some((after.clone(), name.clone()));
+                pattern = after;
+            }
+            Some(wanted) if wanted == '?' || wanted == letter => (pattern, name) = (after, rest),
+            _ => {
+                let Some((begin, from)) = &mut star else {
+                    return false;
+                };
+                from.next();
+                (pattern, name) = (begin.clone(), from.clone());
+            }
         }
     }
-    pattern[p..].iter().all(|&c| c == '*')
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn matches(pattern: &str, name: &str) -> bool {
+        Pattern::new(pattern).matches(name)
+    }
 
     #[test]
     fn the_first_dot_or_colon_ends_the_node_and_the_next_dot_ends_the_port() {

@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use indexmap::{IndexMap, IndexSet};
 
+use super::port_channels::PortChannels;
 use super::problem::CompileProblem;
-use super::reference::{Reference, is_pattern, matches};
+use super::reference::Reference;
 use crate::diagnostic::Names;
 
 /// What the names of a graph stand for, as far as it is known.
@@ -21,8 +22,8 @@ pub(crate) struct Scopes {
 /// The output ports of a node or signal, as the rest of the graph sees them.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Scope {
-    /// Ports by name, each with its channels' slots; the first is the default.
-    pub(crate) ports: IndexMap<&'static str, IndexMap<String, usize>>,
+    /// Ports by name; the first is the default.
+    pub(crate) ports: IndexMap<&'static str, PortChannels>,
     /// Set when an error has been told of it, so that references to it say nothing more.
     pub(crate) broken: bool,
     /// Set when it is no node or signal, so that nobody is told to refer to it.
@@ -121,25 +122,14 @@ impl Scopes {
                 known: scope.ports.keys().copied().collect(),
             }));
         };
-        let Some(pattern) = reference.channel else {
-            return Ok(Found::Slots(channels.values().copied().collect()));
-        };
-        let slots: Vec<usize> = if is_pattern(pattern) {
-            channels
-                .iter()
-                .filter(|(name, _)| matches(pattern, name))
-                .map(|(_, &slot)| slot)
-                .collect()
-        } else {
-            channels.get(pattern).into_iter().copied().collect()
-        };
-        if slots.is_empty() {
-            return Err(Box::new(CompileProblem::UnknownChannel {
+        let slots = channels.slots(reference.channel);
+        match reference.channel {
+            Some(channel) if slots.is_empty() => Err(Box::new(CompileProblem::UnknownChannel {
                 node: reference.node.to_owned(),
-                channel: pattern.to_owned(),
-                known: channels.keys().cloned().collect(),
-            }));
+                channel: channel.to_owned(),
+                known: channels.known(),
+            })),
+            _ => Ok(Found::Slots(slots)),
         }
-        Ok(Found::Slots(slots))
     }
 }

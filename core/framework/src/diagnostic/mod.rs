@@ -2,6 +2,7 @@
 
 mod codes;
 mod collector;
+mod counted;
 mod gaps;
 mod names;
 mod nearest;
@@ -10,6 +11,7 @@ mod render;
 
 pub use codes::{CODES, Code, explain};
 pub use collector::{Diagnostic, Diagnostics, Problem, Severity};
+pub use counted::{count, counted};
 pub use names::Names;
 pub use nearest::nearest;
 pub use place::{Place, SourceId, Sources};

@@ -1,8 +1,10 @@
 //! A file laid over the one that it extends; it reads no files and knows only the keys that change how tables merge.
 
+use std::sync::Arc;
+
 use super::problem::DocumentProblem;
 use super::tree::{Data, Entry, Table, Value};
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostics, Names};
 
 /// Lays `over` on `base`: tables merge key by key, all else replaces.
 ///
@@ -76,7 +78,7 @@ fn merge_nodes(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut 
             }
         }
     };
-    let names: Vec<String> = inherited.keys().map(str::to_owned).collect();
+    let names: Arc<Names> = Arc::new(inherited.keys().map(str::to_owned).collect());
     for (name, node) in nodes {
         if node.value.as_bool() == Some(false) {
             if inherited.remove(&name).is_none() {
@@ -84,7 +86,7 @@ fn merge_nodes(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut 
                     node.key,
                     DocumentProblem::NothingToRemove {
                         node: name,
-                        inherited: names.clone(),
+                        inherited: Arc::clone(&names),
                     },
                 );
             }

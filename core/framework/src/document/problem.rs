@@ -2,8 +2,10 @@
 
 mod told;
 
+use std::sync::Arc;
+
 use super::lacks::Lacks;
-use crate::diagnostic::Place;
+use crate::diagnostic::{Names, Place};
 use crate::quantity::QuantityError;
 use crate::time::DurationError;
 use crate::unit::UnitError;
@@ -127,7 +129,7 @@ pub enum DocumentProblem {
         /// The name.
         name: String,
         /// The sets that there are.
-        known: Vec<String>,
+        known: Arc<Names>,
         /// What else to write, where something else than a set may be meant.
         or: Option<String>,
     },
@@ -174,7 +176,7 @@ pub enum DocumentProblem {
         /// The node.
         node: String,
         /// The nodes that are inherited.
-        inherited: Vec<String>,
+        inherited: Arc<Names>,
     },
     /// A number of samples where time is not counted in samples.
     SamplesWithoutClock {
@@ -211,7 +213,7 @@ pub enum DocumentProblem {
         /// The signal.
         signal: String,
         /// Its channels.
-        known: Vec<String>,
+        known: Arc<Names>,
     },
     /// Two keys of `[time]` exclude each other.
     TimeContradiction {
@@ -232,7 +234,7 @@ pub enum DocumentProblem {
         /// The name.
         name: String,
         /// The modules in sight.
-        known: Vec<String>,
+        known: Arc<Names>,
     },
     /// A module that is part of itself, or modules nested too deeply.
     ModuleLoop {
@@ -248,7 +250,7 @@ pub enum DocumentProblem {
         /// The module.
         module: String,
         /// The nodes and inputs that the module has.
-        known: Vec<String>,
+        known: Arc<Names>,
     },
     /// An output that a module does not have.
     UnknownOutput {
@@ -259,6 +261,6 @@ pub enum DocumentProblem {
         /// The module.
         module: String,
         /// Its outputs.
-        known: Vec<String>,
+        known: Arc<Names>,
     },
 }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 use super::gaps::Gaps;
 use super::merge::{lay, merge};
@@ -10,7 +11,7 @@ use super::problem::DocumentProblem;
 use super::salvage::Lost;
 use super::toml_text;
 use super::tree::{Data, Entry, Table, Value};
-use crate::diagnostic::{Diagnostics, Place, SourceId, Sources};
+use crate::diagnostic::{Diagnostics, Names, Place, SourceId, Sources};
 
 /// The largest file that is read, in bytes.
 const LARGEST: usize = 16_000_000;
@@ -178,7 +179,7 @@ impl Chain<'_> {
             );
             return None;
         }
-        let text: std::sync::Arc<str> = text.into();
+        let text: Arc<str> = text.into();
         let source = self.sources.add(shown, text.clone());
         let parsed = toml_text::parse(source, &text, self.diagnostics)?;
         let mut table = parsed.table;
@@ -227,6 +228,8 @@ impl Chain<'_> {
         let Some(modules) = table.get_mut("modules").and_then(Value::as_table_mut) else {
             return;
         };
+        // The modules of each file, listed once for all that are not among them.
+        let mut listed: HashMap<String, Arc<Names>> = HashMap::new();
         for (name, entry) in modules.iter_mut() {
             let Some(from) = entry
                 .value
@@ -249,8 +252,11 @@ impl Chain<'_> {
             let Some(Data::Table(mut module)) =
                 of_file.get(&wanted).map(|module| module.data.clone())
             else {
-                let known = of_file.keys().map(str::to_owned).collect();
-                let name = wanted;
+                let file = from.value.as_text().unwrap_or_default();
+                let known = listed
+                    .entry(file.to_owned())
+                    .or_insert_with(|| Arc::new(of_file.keys().map(str::to_owned).collect()));
+                let (name, known) = (wanted, Arc::clone(known));
                 self.fail(place, DocumentProblem::UnknownModule { name, known });
                 continue;
             };

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Coefficients, Figure, Figures, InputPort, Learner, Learns, Mistake, TrainedRange};
+use crate::diagnostic::{count, counted};
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -233,11 +234,8 @@ impl std::fmt::Display for TrainingError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::TooFewRows { rows, needed } => {
-                let plural = if *rows == 1 { "" } else { "s" };
-                write!(
-                    f,
-                    "{rows} complete row{plural}, and at least {needed} are needed"
-                )
+                let rows = counted(*rows, "complete row");
+                write!(f, "{rows}, and at least {} are needed", count(needed))
             }
             Self::NoTruth {
                 truth,

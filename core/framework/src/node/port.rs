@@ -2,6 +2,7 @@
 
 use super::FeatureFit;
 use crate::channel::Channel;
+use crate::diagnostic::counted;
 use crate::time::Duration;
 
 /// How an input port reads its channels.
@@ -168,11 +169,8 @@ impl Mistake {
         let wrong = lists.iter().filter(|(_, found)| *found != needed);
         wrong
             .map(|(at, found)| {
-                let plural = if *found == 1 { "" } else { "s" };
-                Self::at(
-                    *at,
-                    format!("`{at}` has {found} value{plural} and must have {needed}"),
-                )
+                let found = counted(*found, "value");
+                Self::at(*at, format!("`{at}` has {found} and must have {needed}"))
             })
             .collect()
     }

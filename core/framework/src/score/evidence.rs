@@ -2,14 +2,17 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 use crate::compile::{Plan, PlannedRole};
+use crate::diagnostic::{count, counted};
 use crate::engine::Engine;
 
 /// A combiner that had as many truths as it takes at less than this share of the ticks since it first had them lacks them.
 const MOSTLY: f64 = 0.5;
 
 /// A combiner that went by fewer truths than it takes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lack {
     /// The combiner: `guard.Z1`.
     pub node: String,
@@ -49,8 +52,7 @@ impl Lack {
             remedy,
             ..
         } = self;
-        let truths = if *needed == 1.0 { "truth" } else { "truths" };
-        write!(f, "needs {needed} {truths} and ")?;
+        write!(f, "needs {} and ", counted(*needed, "truth"))?;
         if *enough > 0.0 {
             let share = 100.0 * enough;
             write!(
@@ -58,15 +60,20 @@ impl Lack {
                 "had as many at only {share:.0}% of the ticks since it first did; "
             )?;
         } else if (*told as f64) < *needed {
-            return write!(f, "the data have {told} for it, so it acted on none");
+            return write!(
+                f,
+                "the data have {} for it, so it acted on none",
+                count(told)
+            );
         } else {
             let most = match (most * 10.0).round() / 10.0 {
                 0.0 => "any".to_owned(),
-                most => format!("more than {most}"),
+                most => format!("more than {}", count(most)),
             };
             write!(
                 f,
-                "never had {most} of the {told} that came, so it acted on none; "
+                "never had {most} of the {} that came, so it acted on none; ",
+                count(told)
             )?;
         }
         write!(f, "{remedy} lets more count")

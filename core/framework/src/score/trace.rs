@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Mode, Watch};
+use super::{Lack, Mode, Watch, evidence};
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};
 use crate::fit::{FitError, drive};
@@ -21,6 +21,8 @@ pub struct Trace {
     pub refused: u64,
     /// Samples rejected as infinite or out of range, by measured channel.
     pub rejected: Vec<(String, u64)>,
+    /// Combiners that went by fewer truths than they take.
+    pub lacks: Vec<Lack>,
 }
 
 /// A truth over time: one entry for each instant at which it was measured.
@@ -82,6 +84,7 @@ pub fn trace(
         }
         look(engine, event);
     })?;
+    let lacks = evidence::lacks(&watch.tallies);
     let truths = watch.truths.into_iter().zip(times);
     let truths = truths.map(|(truth, times)| TruthTrace {
         slot: truth.slot,
@@ -109,5 +112,6 @@ pub fn trace(
         ticks: passed.ticks,
         refused: engine.refused(),
         rejected: engine.rejected_channels(),
+        lacks,
     })
 }

@@ -1,121 +1,124 @@
 //! Decides which channels of a plan a test's reference names.
 
+use std::cell::OnceCell;
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::compile::{CompileProblem, Plan, Reference, is_pattern, matches, outermost};
+use indexmap::IndexMap;
+
+use crate::compile::{CompileProblem, Plan, PortChannels, Reference, outermost};
 use crate::diagnostic::Names;
 
-/// The slots of a reference, in the order of the plan. The names of outputs (`predicted.Z1`) are understood too.
-pub(super) fn look_up(plan: &Plan, text: &str) -> Result<Vec<usize>, CompileProblem> {
-    let reference = Reference::parse(text);
-    let named = |(slot, channel): (usize, &'_ crate::compile::PlannedChannel)| {
-        (Reference::parse(&channel.name).node == reference.node).then_some(slot)
-    };
-    let of_node: Vec<usize> = plan.channels.iter().enumerate().filter_map(named).collect();
-    if of_node.is_empty() {
-        return of_outputs(plan, &reference);
-    }
-    let default = default_port(plan, of_node[0]);
-    let port = reference.port.filter(|&port| port != default);
-    let of_port: Vec<usize> = of_node
-        .iter()
-        .copied()
-        .filter(|&slot| Reference::parse(&plan.channels[slot].name).port == port)
-        .collect();
-    if of_port.is_empty() {
-        return Err(CompileProblem::UnknownPort {
-            node: reference.node.to_owned(),
-            port: reference.port.unwrap_or_default().to_owned(),
-            known: ports(plan, of_node[0]),
-        });
-    }
-    let names = of_port
-        .into_iter()
-        .map(|slot| (slot, plan.channels[slot].name.as_str()));
-    matching(&reference, names)
+/// The channels of a plan by what a reference calls them, listed once: a file may have thousands of tests.
+pub(super) struct Channels<'a> {
+    plan: &'a Plan,
+    nodes: HashMap<&'a str, NodeChannels<'a>>,
+    outputs: HashMap<&'a str, PortChannels>,
+    /// What a reference may begin with, once one begins otherwise.
+    known: OnceCell<Arc<Names>>,
 }
 
-/// The measured channels of a reference, as positions among [`Plan::sources`].
-pub(super) fn look_up_measured(
-    plan: &Plan,
-    text: &str,
-) -> Result<Result<Vec<usize>, String>, CompileProblem> {
-    let slots = look_up(plan, text)?;
-    Ok(
-        match slots.iter().find(|&&slot| slot >= plan.sources.len()) {
-            Some(&computed) => Err(plan.channels[computed].name.clone()),
-            None => Ok(slots),
-        },
-    )
+/// The channels of a node or signal.
+struct NodeChannels<'a> {
+    /// Its ports; the first is the default. A signal has none.
+    named: Vec<&'static str>,
+    /// By port; nothing stands for the default.
+    ports: IndexMap<Option<&'a str>, PortChannels>,
 }
 
-fn of_outputs(plan: &Plan, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
-    let outputs: Vec<(usize, &str)> = plan
-        .outputs
-        .iter()
-        .filter(|output| Reference::parse(&output.name).node == reference.node)
-        .map(|output| (output.slot, output.name.as_str()))
-        .collect();
-    if outputs.is_empty() || reference.port.is_some() {
-        return Err(CompileProblem::UnknownNode {
-            node: reference.node.to_owned(),
-            known: names(plan),
-        });
-    }
-    matching(reference, outputs.into_iter())
-}
-
-fn matching<'a>(
-    reference: &Reference<'_>,
-    named: impl Iterator<Item = (usize, &'a str)> + Clone,
-) -> Result<Vec<usize>, CompileProblem> {
-    let Some(pattern) = reference.channel else {
-        return Ok(named.map(|(slot, _)| slot).collect());
-    };
-    let channel = |name: &'a str| Reference::parse(name).channel.unwrap_or_default();
-    let fits = |name: &str| {
-        if is_pattern(pattern) {
-            matches(pattern, name)
-        } else {
-            pattern == name
+impl<'a> Channels<'a> {
+    pub(super) fn of(plan: &'a Plan) -> Self {
+        let mut nodes: HashMap<&str, NodeChannels<'_>> = HashMap::new();
+        for (slot, channel) in plan.channels.iter().enumerate() {
+            let Reference {
+                node,
+                port,
+                channel: name,
+            } = Reference::parse(&channel.name);
+            let node = nodes.entry(node).or_insert_with(|| NodeChannels {
+                named: channel.node.map_or_else(Vec::new, |node| {
+                    let ports = plan.nodes[node].ports.iter();
+                    ports.map(|(name, _)| *name).collect()
+                }),
+                ports: IndexMap::new(),
+            });
+            let port = node.ports.entry(port).or_default();
+            port.insert(name.unwrap_or_default().to_owned(), slot);
         }
-    };
-    let slots: Vec<usize> = named
-        .clone()
-        .filter(|(_, name)| fits(channel(name)))
-        .map(|(slot, _)| slot)
-        .collect();
-    if slots.is_empty() {
-        return Err(CompileProblem::UnknownChannel {
-            node: reference.node.to_owned(),
-            channel: pattern.to_owned(),
-            known: named.map(|(_, name)| channel(name).to_owned()).collect(),
-        });
+        let mut outputs: HashMap<&str, PortChannels> = HashMap::new();
+        for output in &plan.outputs {
+            let Reference { node, channel, .. } = Reference::parse(&output.name);
+            let output_channels = outputs.entry(node).or_default();
+            output_channels.insert(channel.unwrap_or_default().to_owned(), output.slot);
+        }
+        Self {
+            plan,
+            nodes,
+            outputs,
+            known: OnceCell::new(),
+        }
     }
-    Ok(slots)
+
+    /// The slots of a reference, in the order of the plan. The names of outputs (`predicted.Z1`) are understood too.
+    pub(super) fn look_up(&self, text: &str) -> Result<Vec<usize>, CompileProblem> {
+        let reference = Reference::parse(text);
+        let Some(node) = self.nodes.get(reference.node) else {
+            let output = self.outputs.get(reference.node);
+            let output = output.filter(|_| reference.port.is_none());
+            return match output {
+                Some(channels) => matching(&reference, channels),
+                None => Err(CompileProblem::UnknownNode {
+                    node: reference.node.to_owned(),
+                    known: Arc::clone(self.known()),
+                }),
+            };
+        };
+        let default = node.named.first().copied().unwrap_or_default();
+        let port = reference.port.filter(|&port| port != default);
+        match node.ports.get(&port) {
+            Some(channels) => matching(&reference, channels),
+            None => Err(CompileProblem::UnknownPort {
+                node: reference.node.to_owned(),
+                port: reference.port.unwrap_or_default().to_owned(),
+                known: node.named.clone(),
+            }),
+        }
+    }
+
+    /// The measured channels of a reference, as positions among [`Plan::sources`].
+    pub(super) fn look_up_measured(
+        &self,
+        text: &str,
+    ) -> Result<Result<Vec<usize>, String>, CompileProblem> {
+        let slots = self.look_up(text)?;
+        let is_computed = |slot: &&usize| **slot >= self.plan.sources.len();
+        Ok(match slots.iter().find(is_computed) {
+            Some(&computed) => Err(self.plan.channels[computed].name.clone()),
+            None => Ok(slots),
+        })
+    }
+
+    fn known(&self) -> &Arc<Names> {
+        self.known.get_or_init(|| {
+            let channels = self.plan.channels.iter().map(|channel| &channel.name);
+            let outputs = self.plan.outputs.iter().map(|output| &output.name);
+            let all = channels.chain(outputs);
+            outermost(all.map(|name| Reference::parse(name).node))
+        })
+    }
 }
 
-fn default_port(plan: &Plan, slot: usize) -> &'static str {
-    ports(plan, slot).first().copied().unwrap_or_default()
-}
-
-fn ports(plan: &Plan, slot: usize) -> Vec<&'static str> {
-    plan.channels[slot].node.map_or_else(Vec::new, |node| {
-        plan.nodes[node]
-            .ports
-            .iter()
-            .map(|(name, _)| *name)
-            .collect()
-    })
-}
-
-/// What a reference may begin with.
-fn names(plan: &Plan) -> Arc<Names> {
-    let channels = plan.channels.iter().map(|channel| channel.name.as_str());
-    let outputs = plan.outputs.iter().map(|output| output.name.as_str());
-    outermost(
-        channels
-            .chain(outputs)
-            .map(|name| Reference::parse(name).node),
-    )
+fn matching(
+    reference: &Reference<'_>,
+    channels: &PortChannels,
+) -> Result<Vec<usize>, CompileProblem> {
+    let slots = channels.slots(reference.channel);
+    match reference.channel {
+        Some(channel) if slots.is_empty() => Err(CompileProblem::UnknownChannel {
+            node: reference.node.to_owned(),
+            channel: channel.to_owned(),
+            known: channels.known(),
+        }),
+        _ => Ok(slots),
+    }
 }

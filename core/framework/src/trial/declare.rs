@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::channels::{look_up, look_up_measured};
+use super::channels::Channels;
 use super::data::{DataSet, Simulation};
 use super::expectation::Expectation;
 use super::problem::TrialProblem;
@@ -87,6 +87,7 @@ fn read(
     let mut trials: Vec<Trial> = Vec::new();
     let mut names: Vec<(&str, Place)> = Vec::new();
     let mut schedules = Schedules::new();
+    let channels = Channels::of(plan);
     for test in tests {
         let Some(table) = test.as_table() else {
             diagnostics.report(test.place, wrong_type("tests", "a table", test));
@@ -110,6 +111,7 @@ fn read(
         let trial = diagnostics.within(context, |diagnostics| {
             Declaring {
                 plan,
+                channels: &channels,
                 part,
                 reader,
                 sources,
@@ -152,6 +154,7 @@ type Schedules = BTreeMap<(PathBuf, &'static str), Option<Schedule>>;
 /// Reads one test; what it expects is read in a file of its own.
 pub(super) struct Declaring<'a> {
     pub(super) plan: &'a Plan,
+    channels: &'a Channels<'a>,
     /// What of a graph with mistakes is missing in the plan; none where it has no mistakes.
     part: Option<&'a Part>,
     reader: &'a dyn FileReader,
@@ -459,14 +462,15 @@ impl Declaring<'_> {
     }
 
     pub(super) fn channels(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
-        look_up(self.plan, reference)
+        self.channels
+            .look_up(reference)
             .map_err(|problem| self.not_found(reference, place, problem))
             .ok()
     }
 
     fn measured(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
         let plan = self.plan;
-        match look_up_measured(plan, reference) {
+        match self.channels.look_up_measured(reference) {
             Ok(Ok(slots)) => Some(slots),
             Ok(Err(channel)) => {
                 let known = plan.sources.iter().map(|source| source.name.clone());

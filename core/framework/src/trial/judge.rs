@@ -6,6 +6,7 @@ use super::expect::rival_of;
 use super::expectation::{Check, Expectation, Rival, Tolerance};
 use super::observed::Observed;
 use crate::compile::Plan;
+use crate::diagnostic::counted;
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -407,7 +408,7 @@ impl fmt::Display for Wanted {
 }
 
 impl fmt::Display for Finding {
-    /// `vote.Z1: rmse_below: found 41.3 nm/min over 2310 instants, wanted below 40 nm/min`.
+    /// `vote.Z1: rmse_below: found 41.3 nm/min over 2,310 instants, wanted below 40 nm/min`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = match self.unit.as_str() {
             "1" => String::new(),
@@ -424,20 +425,15 @@ impl fmt::Display for Finding {
             Some(found) => write!(f, "found {}{unit}", figure(found, beside))?,
             None => f.write_str("found no value")?,
         }
-        let instants = if self.instants == 1 {
-            "instant"
-        } else {
-            "instants"
-        };
+        let instants = counted(self.instants, "instant");
         match self.first {
             Some((time, value)) if Some(value) == self.found => write!(f, " at {time}")?,
             Some((time, value)) => write!(
                 f,
-                " over {} {instants}, first {}{unit} at {time}",
-                self.instants,
+                " over {instants}, first {}{unit} at {time}",
                 figure(value, beside)
             )?,
-            None => write!(f, " over {} {instants}", self.instants)?,
+            None => write!(f, " over {instants}")?,
         }
         match (&self.rival, self.wanted) {
             (Some(rival), Wanted::Below(limit)) if limit.is_nan() => {

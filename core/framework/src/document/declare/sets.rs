@@ -1,12 +1,13 @@
 //! The members of each set; where sets are used is decided by signals and nodes.
 
-use std::collections::HashSet;
+use std::cell::OnceCell;
+use std::sync::Arc;
 
 use indexmap::{IndexMap, IndexSet};
 
 use super::names::{distinct, is_name};
 use super::reading::{table, texts};
-use crate::diagnostic::{Diagnostics, Place, nearest};
+use crate::diagnostic::{Diagnostics, Names, Place};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::Value;
 
@@ -15,7 +16,11 @@ pub(super) struct Sets {
     /// The members of each.
     pub(super) members: IndexMap<String, Vec<String>>,
     /// Those with mistakes that have been told: nobody is told that they do not exist.
-    broken: HashSet<String>,
+    broken: IndexSet<String>,
+    /// The names of all, once somebody names another: a graph may do so thousands of times.
+    known: OnceCell<Arc<Names>>,
+    /// The same with what may be a set elsewhere.
+    spelt: OnceCell<Names>,
 }
 
 /// Reads the section `[sets]`; what stands `elsewhere`, in a section that is none, may be a set as well.
@@ -27,6 +32,8 @@ pub(super) fn declare(
     let mut declared = Sets {
         members: IndexMap::new(),
         broken: elsewhere.iter().cloned().collect(),
+        known: OnceCell::new(),
+        spelt: OnceCell::new(),
     };
     let Some(sets) = sets.and_then(|sets| table(sets, "sets", diagnostics)) else {
         return declared;
@@ -82,7 +89,7 @@ impl Sets {
         if !self.members.contains_key(name) && !self.is_misspelt(name) {
             let problem = DocumentProblem::UnknownSet {
                 name: name.to_owned(),
-                known: self.members.keys().cloned().collect(),
+                known: Arc::clone(self.known()),
                 or,
             };
             diagnostics.report(place, problem);
@@ -92,9 +99,16 @@ impl Sets {
 
     /// Whether a name that no set has is the right one of a set with mistakes.
     pub(super) fn is_misspelt(&self, name: &str) -> bool {
-        let known = self.members.keys().chain(&self.broken);
-        let near = nearest(name, known.map(String::as_str));
-        self.broken.contains(name)
-            || near.is_some_and(|near| self.broken.contains(near) && !is_name(near, false))
+        if self.broken.is_empty() || self.broken.contains(name) {
+            return self.broken.contains(name);
+        }
+        let all = || self.members.keys().chain(&self.broken).cloned().collect();
+        let near = self.spelt.get_or_init(all).nearest(name);
+        near.is_some_and(|near| self.broken.contains(near) && !is_name(near, false))
+    }
+
+    fn known(&self) -> &Arc<Names> {
+        let listed = || Arc::new(self.members.keys().cloned().collect());
+        self.known.get_or_init(listed)
     }
 }

@@ -1,12 +1,14 @@
 //! `[signals]`: what is measured; whether the data have it is decided when data are read.
 
+use std::sync::Arc;
+
 use super::names::distinct;
 use super::placeholder;
 use super::reading::{
     known_keys, length, meant, missing, quantity, table, text, texts, wrong_type,
 };
 use super::sets::Sets;
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::{Diagnostics, Names, Place, counted};
 use crate::document::graph_file::SignalDecl;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Value};
@@ -204,11 +206,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         return None;
     };
     let [low, high] = ends.as_slice() else {
-        let found = if ends.len() == 1 {
-            "a list of 1 value".to_owned()
-        } else {
-            format!("a list of {} values", ends.len())
-        };
+        let found = format!("a list of {}", counted(ends.len(), "value"));
         let expected = "a list of two quantities, the low end first".to_owned();
         diagnostics.report(
             value.place,
@@ -262,16 +260,17 @@ fn optional(
     diagnostics: &mut Diagnostics,
 ) -> Vec<String> {
     let names = texts(value, "optional", "a list of channels", diagnostics).unwrap_or_default();
+    let known: Names = channels
+        .iter()
+        .map(|(channel, _)| channel.clone())
+        .collect();
+    let known = Arc::new(known);
     for (name, place) in &names {
-        if !channels.iter().any(|(channel, _)| channel == name) {
-            let known = channels
-                .iter()
-                .map(|(channel, _)| channel.clone())
-                .collect();
+        if !known.contains(name) {
             let problem = DocumentProblem::UnknownChannel {
                 name: name.clone(),
                 signal: signal.to_owned(),
-                known,
+                known: Arc::clone(&known),
             };
             diagnostics.report(*place, problem);
         }

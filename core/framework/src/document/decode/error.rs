@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::de::{self, Expected, Unexpected};
 
-use crate::diagnostic::{Diagnostics, Place, nearest};
+use crate::diagnostic::{Diagnostics, Place, counted, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Value};
@@ -279,11 +279,7 @@ impl de::Error for DecodeError {
     }
 
     fn invalid_length(length: usize, expected: &dyn Expected) -> Self {
-        let found = if length == 1 {
-            "a list of 1 value".to_owned()
-        } else {
-            format!("a list of {length} values")
-        };
+        let found = format!("a list of {}", counted(length, "value"));
         Self::wrong_type(found, expected)
     }
 

@@ -3,30 +3,45 @@
 use std::fmt::Write;
 
 use super::DocumentProblem;
-use crate::diagnostic::{Place, Problem, nearest};
+use crate::diagnostic::{Names, Place, Problem, nearest};
 use crate::document::lacks::Lacks;
 use crate::quantity::QuantityError;
 
 /// At most twelve names in quotes, for a list of what there is.
-fn listed(names: &[String]) -> String {
+fn listed<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
     const SHOWN: usize = 12;
+    let count = names.len();
     let mut text = String::new();
-    for (index, name) in names.iter().take(SHOWN).enumerate() {
+    for (index, name) in names.take(SHOWN).enumerate() {
         let _ = write!(text, "{}\"{name}\"", if index == 0 { "" } else { ", " });
     }
-    if names.len() > SHOWN {
-        let _ = write!(text, " and {} more", names.len() - SHOWN);
+    if count > SHOWN {
+        let _ = write!(text, " and {} more", count - SHOWN);
     }
     text
 }
 
 /// "did you mean" or a list of what there is.
 fn suggestion(name: &str, known: &[String], there_are: &str) -> Option<String> {
-    match nearest(name, known.iter().map(String::as_str)) {
-        Some(near) => Some(format!("did you mean \"{near}\"?")),
-        None if known.is_empty() => None,
-        None if known.len() == 1 => Some(format!("there is only {}", listed(known))),
-        None => Some(format!("{there_are} {}", listed(known))),
+    let known = known.iter().map(String::as_str);
+    near_or_all(nearest(name, known.clone()), known, there_are)
+}
+
+/// As [`suggestion`], of many.
+fn one_of(name: &str, known: &Names, there_are: &str) -> Option<String> {
+    near_or_all(known.nearest(name), known.iter(), there_are)
+}
+
+fn near_or_all<'a>(
+    near: Option<&str>,
+    known: impl ExactSizeIterator<Item = &'a str>,
+    there_are: &str,
+) -> Option<String> {
+    match (near, known.len()) {
+        (Some(near), _) => Some(format!("did you mean \"{near}\"?")),
+        (None, 0) => None,
+        (None, 1) => Some(format!("there is only {}", listed(known))),
+        (None, _) => Some(format!("{there_are} {}", listed(known))),
     }
 }
 
@@ -256,7 +271,7 @@ impl Problem for DocumentProblem {
                 Some("nodes, sets and signals share one name space".to_owned())
             }
             Self::UnknownSet { name, known, or } => {
-                let help = suggestion(name, known, "the sets are");
+                let help = one_of(name, known, "the sets are");
                 let help = help.unwrap_or_else(|| "declare it under `[sets]`".to_owned());
                 let or = or.as_ref().filter(|_| !help.ends_with('?'));
                 Some(or.map_or(help.clone(), |or| format!("{help}, or {or}")))
@@ -290,7 +305,7 @@ impl Problem for DocumentProblem {
                 .advice()
                 .map(|advice| format!("write the unit as \"{advice}\"")),
             Self::NothingToRemove { node, inherited } => {
-                suggestion(node, inherited, "the inherited nodes are")
+                one_of(node, inherited, "the inherited nodes are")
                     .or_else(|| Some("leave it out; nothing is inherited here".to_owned()))
             }
             Self::SamplesWithoutClock { .. } => Some(
@@ -304,7 +319,7 @@ impl Problem for DocumentProblem {
                 _ => format!("write it in {unit}, or correct the signal's unit"),
             }),
             Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
-            Self::UnknownChannel { name, known, .. } => suggestion(name, known, "its channels are"),
+            Self::UnknownChannel { name, known, .. } => one_of(name, known, "its channels are"),
             Self::EmptyList { .. } => Some("name at least one".to_owned()),
             Self::TimeContradiction { key, .. } => {
                 Some(format!("leave out `{key}`, or write `unit = \"sample\"`"))
@@ -312,24 +327,20 @@ impl Problem for DocumentProblem {
             Self::ExtendsLoop { .. } => {
                 Some("one of these files must extend none of the others".to_owned())
             }
-            Self::UnknownModule { name, known } => suggestion(name, known, "the modules are")
+            Self::UnknownModule { name, known } => one_of(name, known, "the modules are")
                 .or_else(|| Some(format!("describe it under `[modules.{name}]`"))),
             Self::ModuleLoop { .. } => Some("take one of the modules apart".to_owned()),
-            Self::OutOfReach { name, known, .. } => {
-                let near = nearest(name, known.iter().map(String::as_str));
-                Some(match near {
-                    Some(near) => format!("did you mean \"{near}\"?"),
-                    None => format!(
-                        "name it under the module's `inputs`; there it has {}",
-                        listed(known)
-                    ),
-                })
-            }
-            Self::UnknownOutput { output, known, .. } => {
-                suggestion(output, known, "its outputs are").or_else(|| {
+            Self::OutOfReach { name, known, .. } => Some(match known.nearest(name) {
+                Some(near) => format!("did you mean \"{near}\"?"),
+                None => format!(
+                    "name it under the module's `inputs`; there it has {}",
+                    listed(known.iter())
+                ),
+            }),
+            Self::UnknownOutput { output, known, .. } => one_of(output, known, "its outputs are")
+                .or_else(|| {
                     Some("say which, e.g. `outputs = { predicted = \"vote\" }`".to_owned())
-                })
-            }
+                }),
             _ => None,
         }
     }

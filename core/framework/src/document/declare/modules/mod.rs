@@ -33,6 +33,7 @@ mod module;
 mod references;
 mod substitution;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use indexmap::IndexMap;
@@ -41,7 +42,7 @@ use super::each::{MOST_INSTANCES, MOST_VALUES, own_each, weight};
 use super::placeholder;
 use super::reading::{known_keys, meant, missing, table, text};
 use super::sets::Sets;
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostics, Names};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
 use module::{Module, check, find};
@@ -128,6 +129,7 @@ pub(super) fn expand(
         placed: Vec::with_capacity(nodes.len()),
         values: 0,
         path: Vec::new(),
+        known: HashMap::new(),
         full: false,
         faulty: false,
     };
@@ -206,6 +208,8 @@ struct Expansion<'a> {
     values: usize,
     /// The modules on the way from the graph to the present level, by name and table.
     path: Vec<(String, *const Value)>,
+    /// The names in tables, listed once for all who refer to others.
+    known: HashMap<Vec<*const Table>, Arc<Names>>,
     /// Set when the limit was told, so that nothing more is expanded.
     full: bool,
     /// Set when an instance could not be expanded, since what it refers to has mistakes.
@@ -285,11 +289,10 @@ impl Expansion<'_> {
         let wanted = keys.get("module")?;
         let module_name = text(wanted, "module", self.diagnostics)?;
         let Some((found, sight)) = find(module_name, &level.modules) else {
-            let known = level.modules.iter().rev();
-            let known = known.flat_map(|modules| modules.keys().map(str::to_owned));
+            let tables: Vec<_> = level.modules.iter().rev().copied().collect();
             let problem = DocumentProblem::UnknownModule {
                 name: module_name.to_owned(),
-                known: known.collect(),
+                known: self.known(&tables, []),
             };
             self.diagnostics.report(wanted.place, problem);
             return None;
@@ -330,6 +333,16 @@ impl Expansion<'_> {
         }
         self.path.pop();
         Some(())
+    }
+
+    /// The names that tables have, and others that are the same for all who ask for those of these tables.
+    fn known(&mut self, tables: &[&Table], others: impl IntoIterator<Item = String>) -> Arc<Names> {
+        let places = tables.iter().map(|table| std::ptr::from_ref(*table));
+        let known = self.known.entry(places.collect()).or_insert_with(|| {
+            let names = tables.iter().flat_map(|table| table.keys());
+            Arc::new(names.map(str::to_owned).chain(others).collect())
+        });
+        Arc::clone(known)
     }
 
     fn around(

@@ -1,5 +1,8 @@
 //! What a module declares, and which module a name means; what becomes of its nodes is decided by the expansion.
 
+use std::cell::LazyCell;
+use std::sync::Arc;
+
 use crate::diagnostic::Diagnostics;
 use crate::document::declare::names::{distinct, name_rule};
 use crate::document::declare::reading::{known_keys, meant, missing, table, text, texts};
@@ -111,6 +114,7 @@ impl<'a> Module<'a> {
         for (name, entry) in self.nodes.iter() {
             name_rule(name, entry.key, "node", false, diagnostics);
         }
+        let known = LazyCell::new(|| Arc::new(self.nodes.keys().map(str::to_owned).collect()));
         for (name, entry) in self.outputs.into_iter().flat_map(Table::iter) {
             name_rule(name, entry.key, "output", false, diagnostics);
             let Some(reference) = text(&entry.value, name, diagnostics) else {
@@ -129,7 +133,7 @@ impl<'a> Module<'a> {
                 let problem = DocumentProblem::OutOfReach {
                     name: node.to_owned(),
                     module: self.name.to_owned(),
-                    known: self.nodes.keys().map(str::to_owned).collect(),
+                    known: Arc::clone(&known),
                 };
                 diagnostics.report(entry.value.place, problem);
             }

@@ -113,12 +113,7 @@ impl Expansion<'_> {
                 let problem = DocumentProblem::OutOfReach {
                     name: node.to_owned(),
                     module: given.module.clone(),
-                    known: level
-                        .nodes
-                        .keys()
-                        .map(str::to_owned)
-                        .chain(inputs)
-                        .collect(),
+                    known: self.known(&[level.nodes], inputs),
                 };
                 self.diagnostics.report(place, problem);
             }
@@ -131,7 +126,8 @@ impl Expansion<'_> {
         };
         let target = match output(module, port, &level.modules, DEEPEST) {
             Output::Found(target) => format!("{prefix}{node}/{target}"),
-            Output::Unknown(known) => {
+            Output::Unknown(outputs) => {
+                let known = self.known(outputs.as_slice(), []);
                 let problem = DocumentProblem::UnknownOutput {
                     node: node.to_owned(),
                     output: port.unwrap_or_default().to_owned(),
@@ -189,29 +185,34 @@ fn tables(list: &mut Value) -> impl Iterator<Item = &mut Table> {
 }
 
 /// What an output of a module stands for.
-enum Output {
+enum Output<'a> {
     /// A node inside, and its port where one is named.
     Found(String),
-    /// There is no such output; these there are.
-    Unknown(Vec<String>),
+    /// There is no such output; these there are, if any.
+    Unknown(Option<&'a Table>),
     /// Something has been told of it already.
     Broken,
 }
 
-fn output(module: &str, port: Option<&str>, modules: &[&Table], depth: usize) -> Output {
+fn output<'a>(
+    module: &'a str,
+    port: Option<&str>,
+    modules: &[&'a Table],
+    depth: usize,
+) -> Output<'a> {
     let Some((found, sight)) = find(module, modules).filter(|_| depth > 0) else {
         return Output::Broken;
     };
     let Some(module) = Module::read(module, found, &mut Diagnostics::new()) else {
         return Output::Broken;
     };
-    let outputs = || module.outputs.into_iter().flat_map(Table::iter);
+    let outputs = module.outputs;
     let wanted = match port {
-        None => outputs().next(),
-        Some(port) => outputs().find(|(name, _)| *name == port),
+        None => outputs.and_then(|outputs| outputs.iter().next().map(|(_, entry)| entry)),
+        Some(port) => outputs.and_then(|outputs| outputs.entry(port)),
     };
-    let Some((_, entry)) = wanted else {
-        return Output::Unknown(outputs().map(|(name, _)| name.to_owned()).collect());
+    let Some(entry) = wanted else {
+        return Output::Unknown(outputs);
     };
     let Some(reference) = entry.value.as_text() else {
         return Output::Broken;

@@ -1,0 +1,41 @@
+//! How many there are of something, as it is told; what is counted is named by who counts.
+
+use std::fmt::Display;
+
+/// A count with separators between thousands.
+#[must_use]
+pub fn count(value: impl Display) -> String {
+    let mut text = value.to_string();
+    let whole = text.find('.').unwrap_or(text.len());
+    for at in (1..whole).rev().filter(|at| (whole - at).is_multiple_of(3)) {
+        text.insert(at, ',');
+    }
+    text
+}
+
+/// How many there are of something, which is named as one of them: `1 row`, `8,028 rows`, `0.5 days`.
+#[must_use]
+pub fn counted<N: Display + PartialEq + From<u8>>(value: N, what: &str) -> String {
+    let plural = if value == N::from(1) { "" } else { "s" };
+    format!("{} {what}{plural}", count(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{count, counted};
+
+    #[test]
+    fn counts_have_separators() {
+        let told = [1_u64, 123, 1234, 123_456, 1_234_567].map(count);
+        assert_eq!(told, ["1", "123", "1,234", "123,456", "1,234,567"]);
+        assert_eq!([0.5, 1234.5678].map(count), ["0.5", "1,234.5678"]);
+    }
+
+    #[test]
+    fn of_one_there_is_no_plural() {
+        let told = [0_u64, 1, 2, 1234].map(|value| counted(value, "row"));
+        assert_eq!(told, ["0 rows", "1 row", "2 rows", "1,234 rows"]);
+        let told = [0.5, 1.0].map(|value| counted(value, "day"));
+        assert_eq!(told, ["0.5 days", "1 day"]);
+    }
+}
