@@ -112,7 +112,8 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
             tell(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
-                 truths that miss by more than so many times the recent error, nor so many widths outside the range of the fit",
+                 truths that miss by more than so many times the recent error (both in units of `deviation` where the kind tells it), \
+                 nor so many widths outside the range of the fit",
             );
         }
     }

@@ -12,6 +12,7 @@ mod workbench;
 
 mod embargo;
 mod freezing;
+mod gaps;
 mod kept;
 mod kinds;
 mod machine;

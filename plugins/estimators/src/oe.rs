@@ -15,18 +15,18 @@ use crate::order::Order;
 /// and McBride (1965) end; roots of each `F` stay inside the unit circle. Other truths than the first are not read: it is
 /// as good in a free run as beside a machine.
 ///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
-/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
-/// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
-/// counts as so many steps, rounded; for those that are missing it takes what it had predicted. Running, it goes on by
-/// the features alone.
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
+/// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
+/// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts
+/// as so many steps, rounded. Running, it goes on by the features alone.
 ///
 /// Where truths or rows are missing in the fit, the filters start again: what they gave before is found for each piece
-/// beside the coefficients (Ljung 1999, section 10.4), and counts as found in criteria and errors. Running, a segment
-/// begins at rest, as if the features had always been what they are first, until the first truth says where the filters
-/// are: each has its share of what that differs by, which dies away. So does what comes after more steps without features
-/// than ten, or than the model reaches back where that is more. With `learn = false` it stays at rest. The port
-/// `deviation` is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the
+/// beside the coefficients (Ljung 1999, section 10.4), as far as its samples tell it, and counts as found in criteria and
+/// errors. Running, a segment begins at rest, as if the features had always been what they are first, until the first
+/// truth says where the filters are: each has its share of what that differs by, which dies away. So does what comes after
+/// more steps without features than ten, or than the model reaches back where that is more. With `learn = false` it stays
+/// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Features that are missing are
+/// taken for the last ones, and what that adds to the error is not in it. Since the answer changes with time alone, the
 /// node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -35,17 +35,17 @@ const LARGEST_PAST: usize = 1000;
 /// brought back to one that barely fades. No search is made and no start needed, so that a fit takes little more than
 /// one pass over the rows; `oe` or `armax` may come closer from there.
 ///
-/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed
-/// as a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart:
-/// `every`, by default the span of the truth, since truths whose windows overlap share their noise; where several come
-/// within a step, each begins a series of its own, which are fitted together and followed side by side. The time
-/// between two truths of a series counts as so many steps, rounded. Running, it is told each truth that the embargo
-/// lets through, takes for one that is missing what it had predicted, and for features that are missing the last ones.
-/// Where truths or rows are missing in the fit, windows end and begin again. A segment begins with its first truth, as
-/// if that and the features had always been what they are, and so does what comes after more steps without
-/// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The port `deviation`
-/// is the standard deviation of the truth about its prediction. Since the answer changes with time alone, the node runs
-/// at every tick.
+/// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed as
+/// a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by
+/// default the span of the truth, since truths whose windows overlap share their noise; where several come within a step,
+/// each begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
+/// series counts as so many steps, rounded. Running, it is told each truth that the embargo lets through; what those that
+/// are missing were is told from the truths that follow too, as in a Kalman filter (Jones 1980). Where truths or rows are
+/// missing in the fit, windows end and begin again. A segment begins with its first truth, as if that and the features had
+/// always been what they are, and so does what comes after more steps without features than ten, or than the model reaches
+/// back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard deviation of the
+/// truth about its prediction, larger after truths that are missing. Features that are missing are taken for the last ones,
+/// and what that adds to the error is not in it. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateSpace {

@@ -347,7 +347,8 @@ pub struct Beside {
 /// How an estimator goes on learning while it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedLearning {
-    /// A truth that misses its prediction by more than this multiple of the recent error is not learned from.
+    /// A truth that misses its prediction by more than this multiple of the recent error is not learned from; both in units of
+    /// the learner's deviation, where it tells one.
     pub outliers: f64,
     /// By which multiple of its width a regressor may lie outside its range in the fit.
     pub margin: f64,

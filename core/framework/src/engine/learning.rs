@@ -253,8 +253,10 @@ impl Gate {
             return Became::OutsideRange;
         }
         let error = truth - learner.predict(row, arrived);
+        let deviation = learner.deviation(row, arrived);
+        let most = self.planned.outliers;
         // What has yet to find out where it is may be far off.
-        if learner.settled() && !self.recent.admits(error, self.planned.outliers) {
+        if learner.settled() && !self.recent.admits(error, deviation, most) {
             return Became::Outlier;
         }
         learner.learn(row, truth, arrived);

@@ -3,6 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 /// The mean square of the recent errors: the arithmetic mean of the first, an exponentially weighted one later.
+///
+/// Errors of a learner that tells how unsure a prediction is are weighed by that: after a gap in which a process has moved, or
+/// far from what is known, it may be off by more than it usually is.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(crate) struct RecentError {
     seen: u32,
@@ -10,6 +13,9 @@ pub(crate) struct RecentError {
     /// How many in a row have been too large.
     #[serde(default)]
     refused: u32,
+    /// Whether errors are in units of the standard deviation of what was predicted; once none was.
+    #[serde(default)]
+    weighed: bool,
 }
 
 impl RecentError {
@@ -20,17 +26,23 @@ impl RecentError {
     /// How many in a row can be too large: after a long rest all of a machine that moves again would be for much longer.
     const PATIENCE: u32 = 20;
 
-    /// Whether an error is below so many times the recent root mean square.
+    /// Whether an error is below so many times the recent root mean square, both in units of the standard deviation of what was
+    /// predicted where there is one, which is finite and above 0. What was kept in other units is forgotten.
     ///
     /// One that is not counts as if it were as large as that, so that what has changed for good is learned after a few; when
     /// as many as there is patience for have been, what was before is forgotten.
-    pub(super) fn admits(&mut self, error: f64, multiple: f64) -> bool {
+    pub(super) fn admits(&mut self, error: f64, deviation: f64, multiple: f64) -> bool {
+        let weighed = deviation > 0.0 && deviation < f64::INFINITY;
+        let error = if weighed { error / deviation } else { error };
         let square = error * error;
         if !square.is_finite() {
             return false;
         }
-        if self.refused >= Self::PATIENCE {
-            *self = Self::default();
+        if self.refused >= Self::PATIENCE || weighed != self.weighed {
+            *self = Self {
+                weighed,
+                ..Self::default()
+            };
         }
         // Errors that were all 0, as of a machine at rest, say nothing of how large one may be.
         let judged = self.seen >= Self::FIRST && self.mean_square > 0.0;
@@ -55,12 +67,16 @@ mod tests {
     fn a_spike_is_held_off_and_a_lasting_change_is_let_in_after_a_few() {
         let mut recent = RecentError::default();
         for i in 0..200 {
-            assert!(recent.admits(if i % 2 == 0 { 1.0 } else { -1.0 }, 6.0));
+            assert!(recent.admits(if i % 2 == 0 { 1.0 } else { -1.0 }, f64::NAN, 6.0));
         }
-        assert!(!recent.admits(20.0, 6.0), "a spike");
-        assert!(recent.admits(1.0, 6.0));
-        assert!(!recent.admits(f64::NAN, 6.0) && !recent.admits(f64::INFINITY, 6.0));
-        let refused = (0..100).take_while(|_| !recent.admits(20.0, 6.0)).count();
+        assert!(!recent.admits(20.0, f64::NAN, 6.0), "a spike");
+        assert!(recent.admits(1.0, f64::NAN, 6.0));
+        assert!(
+            !recent.admits(f64::NAN, f64::NAN, 6.0) && !recent.admits(f64::INFINITY, f64::NAN, 6.0)
+        );
+        let refused = (0..100)
+            .take_while(|_| !recent.admits(20.0, f64::NAN, 6.0))
+            .count();
         assert!((1..10).contains(&refused), "{refused}");
     }
 
@@ -68,7 +84,7 @@ mod tests {
     fn the_first_errors_are_let_in_whatever_they_are() {
         let mut recent = RecentError::default();
         for error in [1e-3, 1e3, 0.0, 5.0] {
-            assert!(recent.admits(error, 6.0));
+            assert!(recent.admits(error, f64::NAN, 6.0));
         }
     }
 
@@ -76,23 +92,52 @@ mod tests {
     fn a_long_rest_does_not_make_outliers_of_what_follows_for_longer_than_a_few() {
         let mut recent = RecentError::default();
         for _ in 0..100 {
-            assert!(recent.admits(1.0, 6.0));
+            assert!(recent.admits(1.0, f64::NAN, 6.0));
         }
         for _ in 0..5000 {
-            assert!(recent.admits(0.0, 6.0));
+            assert!(recent.admits(0.0, f64::NAN, 6.0));
         }
-        let refused = (0..1000).take_while(|_| !recent.admits(1.0, 6.0)).count();
+        let refused = (0..1000)
+            .take_while(|_| !recent.admits(1.0, f64::NAN, 6.0))
+            .count();
         assert_eq!(refused, RecentError::PATIENCE as usize);
-        assert!((0..100).all(|_| recent.admits(1.0, 6.0)));
-        assert!(!recent.admits(20.0, 6.0), "a spike after that");
+        assert!((0..100).all(|_| recent.admits(1.0, f64::NAN, 6.0)));
+        assert!(!recent.admits(20.0, f64::NAN, 6.0), "a spike after that");
     }
 
     #[test]
     fn errors_that_were_all_zero_do_not_end_learning() {
         let mut recent = RecentError::default();
         for _ in 0..100 {
-            assert!(recent.admits(0.0, 6.0));
+            assert!(recent.admits(0.0, f64::NAN, 6.0));
         }
-        assert!(recent.admits(1.0, 6.0));
+        assert!(recent.admits(1.0, f64::NAN, 6.0));
+    }
+
+    #[test]
+    fn an_error_is_as_large_as_the_prediction_was_unsure() {
+        let mut recent = RecentError::default();
+        for _ in 0..100 {
+            assert!(recent.admits(1.0, 0.5, 6.0));
+        }
+        assert!(!recent.admits(20.0, 0.5, 6.0), "a spike");
+        assert!(recent.admits(20.0, 10.0, 6.0), "after a gap");
+        assert!(!recent.admits(f64::INFINITY, 10.0, 6.0));
+    }
+
+    #[test]
+    fn what_was_kept_in_other_units_says_nothing_of_an_error() {
+        for (before, now) in [(f64::NAN, 1e-3), (1e-3, 0.0), (1e-3, f64::INFINITY)] {
+            let mut recent = RecentError::default();
+            for _ in 0..100 {
+                assert!(recent.admits(1e-3, before, 6.0));
+            }
+            assert!(recent.admits(1.0, now, 6.0), "{before}, {now}");
+        }
+        // As it was written when no error was weighed.
+        let written = r#"{"seen":50,"mean_square":1e-6,"refused":0}"#;
+        let mut recent: RecentError = serde_json::from_str(written).unwrap();
+        assert!(!recent.admits(1.0, f64::NAN, 6.0));
+        assert!(recent.admits(1.0, 1e-3, 6.0));
     }
 }

@@ -91,7 +91,8 @@ pub trait Learner: Debug + Send {
     /// The prediction of the truth that will be measured at `of`, from present values of the used regressors.
     fn predict(&self, regressors: &[f64], of: Instant) -> f64;
 
-    /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known.
+    /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known. Truths
+    /// that miss by too much in units of it are not handed over.
     fn deviation(&self, _regressors: &[f64], _of: Instant) -> f64 {
         f64::NAN
     }

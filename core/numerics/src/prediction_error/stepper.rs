@@ -1,16 +1,19 @@
 //! Decides what a model predicts from sample to sample, and what it makes of samples that are missing.
 
+mod doubt;
+
 use serde::{Deserialize, Serialize};
 
 use super::Polynomials;
 use crate::NumericsError;
 use crate::checks::check_length;
-use crate::scratch::Scratch;
+use doubt::Doubt;
 
 /// A model, followed sample by sample. Nothing is allocated once it is built.
 ///
-/// Of a sample that is missing it takes what it had predicted for it, so that predictions several samples ahead are steps
-/// without one (Ljung 1999, section 3.2).
+/// A sample that is missing is at first taken for what was predicted of it, so that predictions several samples ahead are steps
+/// without one (Ljung 1999, section 3.2). How unsure that is, is kept, so that the samples that follow also tell what it was: the
+/// Kalman filter of the model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Saved")]
 pub struct Stepper {
@@ -20,13 +23,7 @@ pub struct Stepper {
     past: Vec<f64>,
     noise: Vec<f64>,
     innovations: Vec<f64>,
-    /// How unsure the innovations were at the newest sample that was there, each with each, in the variance of one.
-    doubt: Vec<f64>,
-    /// How many samples have been missing since then.
-    missed: usize,
-    /// `P w` of this doubt `P`, while it is worked out.
-    #[serde(skip)]
-    shared: Scratch,
+    doubt: Doubt,
     inputs: Vec<PastInput>,
 }
 
@@ -39,10 +36,8 @@ struct Saved {
     past: Vec<f64>,
     noise: Vec<f64>,
     innovations: Vec<f64>,
+    /// Row after row; nothing where nothing is in doubt.
     doubt: Vec<f64>,
-    /// Once it was not written.
-    #[serde(default)]
-    missed: usize,
     inputs: Vec<PastInput>,
 }
 
@@ -56,17 +51,19 @@ impl TryFrom<Saved> for Stepper {
             past,
             noise,
             innovations,
-            doubt,
-            missed,
+            doubt: written,
             inputs,
         } = saved;
-        let order = model.c.len();
         let of_noise = model.d.len().saturating_add(model.differences);
         check_length("past", model.a.len(), past.len())?;
         check_length("whitening", of_noise, whitening.len())?;
         check_length("noise", of_noise, noise.len())?;
-        check_length("innovations", order, innovations.len())?;
-        check_length("doubt", order * order, doubt.len())?;
+        check_length("innovations", model.c.len(), innovations.len())?;
+        let mut doubt = Doubt::none(&model, &whitening);
+        if !written.is_empty() {
+            check_length("doubt", doubt.places(), written.len())?;
+        }
+        doubt.read(&written);
         check_length("inputs", model.inputs.len(), inputs.len())?;
         for (past, of) in inputs.iter().zip(&model.inputs) {
             let reach = of.delay.saturating_add(of.b.len());
@@ -80,8 +77,6 @@ impl TryFrom<Saved> for Stepper {
             noise,
             innovations,
             doubt,
-            missed,
-            shared: Scratch(vec![0.0; order]),
             inputs,
         })
     }
@@ -109,9 +104,7 @@ impl Stepper {
             past: vec![0.0; model.a.len()],
             noise: vec![0.0; whitening.len()],
             innovations: vec![0.0; model.c.len()],
-            doubt: vec![0.0; model.c.len() * model.c.len()],
-            missed: 0,
-            shared: Scratch(vec![0.0; model.c.len()]),
+            doubt: Doubt::none(&model, &whitening),
             inputs: inputs.collect(),
             whitening,
             model,
@@ -139,13 +132,7 @@ impl Stepper {
     /// What was not foreseen until now is not known, but for its variance.
     fn doubt_innovations(&mut self) {
         self.innovations.fill(0.0);
-        self.missed = 0;
-        self.doubt.fill(0.0);
-        let count = self.innovations.len();
-        self.doubt
-            .iter_mut()
-            .step_by(count + 1)
-            .for_each(|own| *own = 1.0);
+        self.doubt.begin();
     }
 
     /// Where it is has been measured: what the inputs do not explain of it has always been there, in the noise, or where there
@@ -180,6 +167,28 @@ impl Stepper {
 
     /// Goes on by one sample, and gives what was predicted of it.
     pub fn step(&mut self, input: impl Fn(usize) -> f64, value: Option<f64>) -> f64 {
+        let (expected, noise) = self.expect(input);
+        let level = self.model.level;
+        match value {
+            Some(value) => self.take_value(value - level, expected, noise),
+            None => {
+                self.push(expected, noise, 0.0);
+                self.doubt.miss();
+            }
+        }
+        level + expected
+    }
+
+    /// As [`step`](Self::step) by a sample that is missing, on the way to a prediction: how unsure it is of that is not worked
+    /// out, so that no value must follow.
+    pub fn foresee(&mut self, input: impl Fn(usize) -> f64) -> f64 {
+        let (expected, noise) = self.expect(input);
+        self.push(expected, noise, 0.0);
+        self.model.level + expected
+    }
+
+    /// What is expected of the next value, without the level, and of the noise in it. Takes the inputs.
+    fn expect(&mut self, input: impl Fn(usize) -> f64) -> (f64, f64) {
         let mut brought = 0.0;
         for (nth, (past, of)) in self.inputs.iter_mut().zip(&self.model.inputs).enumerate() {
             push(&mut past.values, input(nth));
@@ -190,107 +199,57 @@ impl Stepper {
         }
         let noise =
             product(&self.model.c, &self.innovations) - product(&self.whitening, &self.noise);
-        let expected = brought + noise - product(&self.model.a, &self.past);
-        let innovation = value.map_or(0.0, |value| value - self.model.level - expected);
-        push(&mut self.past, expected + innovation);
-        push(&mut self.noise, noise + innovation);
-        self.take_innovation(value.map(|_| innovation));
-        self.model.level + expected
+        (brought + noise - product(&self.model.a, &self.past), noise)
     }
 
-    /// Shares what was off among the newest innovation and those before it, as far as these are in doubt: the Kalman filter of
-    /// `C(q) e` (Ansley 1979). Its gain is that of `C` as soon as the start is forgotten, and for a root on the unit circle,
-    /// where it never is, that of a mean.
-    fn take_innovation(&mut self, off: Option<f64>) {
-        let Some(off) = off else {
-            // It is taken for as it was foreseen.
-            self.missed = self.missed.saturating_add(1);
-            return push(&mut self.innovations, 0.0);
-        };
-        self.pass_missed();
-        if self.is_sure() {
-            return push(&mut self.innovations, off);
+    /// Shares what was off among the innovation and the past, as far as that is in doubt.
+    ///
+    /// Where the start is all that is in doubt, that is the Kalman filter of `C(q) e` (Ansley 1979). Its gain is that of `C` as
+    /// soon as the start is forgotten, and for a root on the unit circle, where it never is, that of a mean.
+    fn take_value(&mut self, value: f64, expected: f64, noise: f64) {
+        let off = value - expected;
+        if self.doubt.is_sure() {
+            return self.push(expected + off, noise + off, off);
         }
-        let count = self.innovations.len();
-        let c = &self.model.c;
-        let shared = &mut self.shared.0;
-        let mut variance = 1.0;
-        for (nth, shared) in shared.iter_mut().enumerate() {
-            *shared = product(c, &self.doubt[nth * count..]);
-            variance += c[nth] * *shared;
+        let innovation = off / self.doubt.observe();
+        // What is put right of past values is the noise's.
+        let mut of_noise = noise + off;
+        let mut shared = self.doubt.shared().iter();
+        for (a, (past, shared)) in self
+            .model
+            .a
+            .iter()
+            .zip(self.past.iter_mut().zip(&mut shared))
+        {
+            *past += shared * innovation;
+            of_noise += a * shared * innovation;
         }
-        let newest = off / variance;
-        for (of, shared) in self.innovations.iter_mut().zip(&*shared) {
-            *of += shared * newest;
+        let others = self.noise.iter_mut().chain(&mut self.innovations);
+        for (of, shared) in others.zip(shared) {
+            *of += shared * innovation;
         }
-        for (nth, doubt) in self.doubt.iter_mut().enumerate() {
-            *doubt -= shared[nth / count] * shared[nth % count] / variance;
-        }
-        shared.iter_mut().for_each(|of| *of /= -variance);
-        push(&mut self.innovations, newest);
-        self.pass(1.0 - 1.0 / variance);
-        let mut own = self.doubt.iter().step_by(count + 1);
-        if own.all(|&own| own < 4.0 * f64::EPSILON) {
-            self.doubt.fill(0.0);
-        }
+        self.push(expected + off, of_noise, innovation);
     }
 
-    /// Whether no innovation is in doubt.
-    fn is_sure(&self) -> bool {
-        let count = self.innovations.len();
-        let mut own = self.doubt.iter().step_by(count + 1);
-        own.all(|&own| own == 0.0)
+    /// Puts the newest before those of the past.
+    fn push(&mut self, value: f64, noise: f64, innovation: f64) {
+        push(&mut self.past, value);
+        push(&mut self.noise, noise);
+        push(&mut self.innovations, innovation);
     }
 
-    /// How many samples have been missing since the newest that was there.
+    /// How many numbers of the past it goes by, beside those of the inputs.
     #[must_use]
-    pub fn missed(&self) -> usize {
-        self.missed
+    pub fn remembers(&self) -> usize {
+        self.past.len() + self.noise.len() + self.innovations.len()
     }
 
     /// By how much the variance of what is predicted so many samples ahead is larger than that of
-    /// [`variances`](Polynomials::variances), in that of an innovation: more than 0 after a start, until what was not foreseen
-    /// before it counts no more (Ansley 1979). What the innovations `e` are in doubt leads to `w e` in the sample asked for,
-    /// with `w_i = Σ_m h_(steps − m) c_(m + i)` and the [`response`](Polynomials::response) `h` of the model, of which the last
-    /// counts for all beyond.
-    pub fn doubt(&mut self, response: &[f64], steps: usize) -> f64 {
-        if self.is_sure() {
-            return 0.0;
-        }
-        let ahead = self.missed.saturating_add(steps).min(response.len());
-        let (c, shared) = (&self.model.c, &mut self.shared.0);
-        for (nth, of) in shared.iter_mut().enumerate() {
-            let back = response[..ahead].iter().rev();
-            *of = c[nth..].iter().zip(back).map(|(c, h)| c * h).sum();
-        }
-        let rows = self.doubt.chunks_exact(c.len().max(1));
-        let each = rows.zip(&*shared);
-        each.map(|(row, own)| own * product(shared, row)).sum()
-    }
-
-    /// Puts the samples that have been missing before the innovations that are in doubt: they are in none.
-    fn pass_missed(&mut self) {
-        self.shared.0.fill(0.0);
-        for _ in 0..self.missed.min(self.innovations.len()) {
-            self.pass(0.0);
-        }
-        self.missed = 0;
-    }
-
-    /// Puts the doubt of an innovation, by itself and together with each of them, before that of those of the past.
-    fn pass(&mut self, own: f64) {
-        let count = self.innovations.len();
-        // One row and one column further; what stands in the first of them is written anew.
-        if let Some(rest) = self.doubt.len().checked_sub(count + 1) {
-            self.doubt.copy_within(..rest, count + 1);
-        }
-        for nth in 1..count {
-            self.doubt[nth] = self.shared.0[nth - 1];
-            self.doubt[nth * count] = self.shared.0[nth - 1];
-        }
-        if let Some(first) = self.doubt.first_mut() {
-            *first = own;
-        }
+    /// [`variances`](Polynomials::variances), in that of an innovation: more than 0 after a start or samples that were missing,
+    /// until they count no more. It is worked out in `room` for as many numbers as it [`remembers`](Self::remembers).
+    #[must_use]
+    pub fn doubt(&self, steps: usize, room: &mut [f64]) -> f64 {
+        self.doubt.ahead(steps, room)
     }
 
     /// Takes over where another stepper is, unless it has other orders.
@@ -298,8 +257,7 @@ impl Stepper {
         let shape = |of: &Self| {
             let inputs = of.inputs.iter();
             let inputs: Vec<_> = inputs.map(|p| (p.values.len(), p.filtered.len())).collect();
-            let innovations = (of.innovations.len(), of.doubt.len());
-            (of.past.len(), of.noise.len(), innovations, inputs)
+            (of.past.len(), of.noise.len(), of.innovations.len(), inputs)
         };
         let alike = shape(self) == shape(other);
         if alike {
@@ -310,11 +268,15 @@ impl Stepper {
 
     /// Takes over where another of the same orders is, without making room.
     pub fn take(&mut self, other: &Self) {
+        self.take_past(other);
+        self.doubt.take(&other.doubt);
+    }
+
+    /// As [`take`](Self::take), but for how unsure it is of that: to [`foresee`](Self::foresee) from there.
+    pub fn take_past(&mut self, other: &Self) {
         self.past.copy_from_slice(&other.past);
         self.noise.copy_from_slice(&other.noise);
         self.innovations.copy_from_slice(&other.innovations);
-        self.doubt.copy_from_slice(&other.doubt);
-        self.missed = other.missed;
         for (to, from) in self.inputs.iter_mut().zip(&other.inputs) {
             to.values.copy_from_slice(&from.values);
             to.filtered.copy_from_slice(&from.filtered);

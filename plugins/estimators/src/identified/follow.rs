@@ -116,17 +116,23 @@ struct Known {
     inputs: VecDeque<f64>,
 }
 
-athermal_core::state!(Known, "identified/2");
+athermal_core::state!(Known, "identified/3");
+
+/// How it was kept while what was predicted in a gap was taken for measured.
+#[derive(Debug, Serialize, Deserialize)]
+struct Before {}
+
+athermal_core::state!(Before, "identified/2");
 
 /// Follows a model.
 #[derive(Debug)]
 struct Following {
     known: Known,
     deviations: Vec<f64>,
-    /// Of the noise, for as many steps.
-    response: Vec<f64>,
     /// For predictions, which leave no trace.
     scratch: RefCell<Stepper>,
+    /// To work out in how unsure they are.
+    room: RefCell<Vec<f64>>,
 }
 
 impl Following {
@@ -148,7 +154,7 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
-            response: of.model.response(of.deviations.len()),
+            room: RefCell::new(vec![0.0; stepper.remembers()]),
             scratch: RefCell::new(stepper),
         }
     }
@@ -172,36 +178,24 @@ impl Known {
         self.begun = true;
     }
 
-    /// Goes on to `of` in so many steps, the last one with the inputs of `row` and maybe a truth. Tells what was predicted.
-    fn advance(
-        &self,
-        stepper: &mut Stepper,
-        from: Instant,
-        of: Instant,
-        row: &[f64],
-        truth: Option<f64>,
-    ) -> f64 {
-        let steps = self.steps(from, of);
-        for nth in 1..steps {
-            let at = from + part(of - from, nth, steps);
-            self.pass(stepper, at, row);
+    /// The inputs of the last run that predicted this instant or one before; those of `row` where there was none.
+    fn inputs_at<'a>(&'a self, at: Instant, row: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
+        let count = self.runs.partition_point(|&of| of <= at);
+        let run = count.checked_sub(1);
+        let Scaling { means, scales, .. } = &self.scaling;
+        move |nth| {
+            let input = match run {
+                Some(run) => self.inputs[run * means.len() + nth],
+                None => row[nth],
+            };
+            (input - means[nth]) / scales[nth]
         }
-        stepper.step(self.scaling.of(row), truth)
     }
 
-    /// A step without a truth, with the inputs of the last run that predicted this instant or one before; with those of `row`
-    /// where there was none.
-    fn pass(&self, stepper: &mut Stepper, at: Instant, row: &[f64]) {
-        let count = self.runs.partition_point(|&of| of <= at);
-        let width = self.scaling.means.len();
-        let Scaling { means, scales, .. } = &self.scaling;
-        match count.checked_sub(1) {
-            Some(run) => stepper.step(
-                |nth| (self.inputs[run * width + nth] - means[nth]) / scales[nth],
-                None,
-            ),
-            None => stepper.step(self.scaling.of(row), None),
-        };
+    /// The instants between two that are so many steps apart.
+    fn between(&self, from: Instant, to: Instant) -> impl Iterator<Item = Instant> + use<> {
+        let steps = self.steps(from, to);
+        (1..steps).map(move |nth| from + part(to - from, nth, steps))
     }
 
     /// Whether too long ago there was a run, of a model that has inputs.
@@ -280,19 +274,19 @@ impl Learner for Following {
             if next > overdue {
                 continue;
             }
-            let scratch = self.scratch.get_mut();
-            scratch.take(&known.series[nth].stepper);
             let steps = ((overdue - at).secs() / known.step.secs()) as i64;
             if steps > 10_000 {
                 next = next + part(known.step, steps - 10_000, 1);
             }
+            let stepper = self.scratch.get_mut();
+            std::mem::swap(stepper, &mut known.series[nth].stepper);
             let mut last = at;
             while next <= overdue {
-                known.pass(scratch, next, regressors);
+                stepper.step(known.inputs_at(next, regressors), None);
                 last = next;
                 next = next + known.step;
             }
-            known.series[nth].stepper.take(scratch);
+            std::mem::swap(stepper, &mut known.series[nth].stepper);
             known.series[nth].at = last;
         }
         let width = known.scaling.means.len();
@@ -314,10 +308,12 @@ impl Learner for Following {
         if !self.known.begun || blind {
             return f64::NAN;
         }
-        let mut scratch = self.scratch.borrow_mut();
-        scratch.take(&followed.stepper);
-        self.known
-            .advance(&mut scratch, followed.at, of, regressors, None)
+        let mut ahead = self.scratch.borrow_mut();
+        ahead.take_past(&followed.stepper);
+        for at in self.known.between(followed.at, of) {
+            ahead.foresee(self.known.inputs_at(at, regressors));
+        }
+        ahead.foresee(self.known.scaling.of(regressors))
     }
 
     fn deviation(&self, _regressors: &[f64], of: Instant) -> f64 {
@@ -328,12 +324,9 @@ impl Learner for Following {
             return known(last);
         }
         let steps = usize::try_from(self.known.steps(followed.at, of)).unwrap_or(usize::MAX);
-        let ahead = followed.stepper.missed().saturating_add(steps);
-        let mut scratch = self.scratch.borrow_mut();
-        scratch.take(&followed.stepper);
+        let doubt = followed.stepper.doubt(steps, &mut self.room.borrow_mut());
         // The first is that of an innovation.
-        let doubt = scratch.doubt(&self.response, steps) * known(0).powi(2);
-        (known(last.min(ahead - 1)).powi(2) + doubt).sqrt()
+        (known(last.min(steps - 1)).powi(2) + doubt * known(0).powi(2)).sqrt()
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
@@ -355,15 +348,18 @@ impl Learner for Following {
         if at < soonest {
             return;
         }
-        let scratch = self.scratch.get_mut();
-        scratch.take(&followed.stepper);
-        self.known
-            .advance(scratch, followed.at, at, regressors, Some(truth));
-        if followed.told == 0 {
-            scratch.settle_on(truth);
+        let (from, is_first) = (followed.at, followed.told == 0);
+        let (known, stepper) = (&mut self.known, self.scratch.get_mut());
+        std::mem::swap(stepper, &mut known.series[nth].stepper);
+        for between in known.between(from, at) {
+            stepper.step(known.inputs_at(between, regressors), None);
         }
-        let followed = &mut self.known.series[nth];
-        followed.stepper.take(scratch);
+        stepper.step(known.scaling.of(regressors), Some(truth));
+        if is_first {
+            stepper.settle_on(truth);
+        }
+        let followed = &mut known.series[nth];
+        std::mem::swap(stepper, &mut followed.stepper);
         followed.at = at;
         followed.told = followed.told.saturating_add(1);
     }
@@ -377,9 +373,12 @@ impl Learner for Following {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let known = match state.known::<Known>() {
-            Ok(known) => known,
-            Err(cold) => return cold,
+        let state = state.into_any();
+        if state.is::<Before>() {
+            return Restored::cold("it was kept without how unsure a gap had left it");
+        }
+        let Ok(known) = state.downcast::<Known>() else {
+            return Restored::cold("the state belongs to another kind of node");
         };
         if known.regressors != self.known.regressors {
             return Restored::cold("it was followed with other inputs");
@@ -413,163 +412,4 @@ impl Learner for Following {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use athermal_numerics::Transfer;
-
-    /// A model that sums its input up, nearly.
-    fn identified(step: Duration) -> Identified {
-        Identified {
-            regressors: vec!["input".to_owned()],
-            scaling: Scaling {
-                means: vec![0.0],
-                scales: vec![1.0],
-                truth: 0.0,
-            },
-            model: Polynomials {
-                a: vec![-0.9995],
-                inputs: vec![Transfer {
-                    delay: 0,
-                    b: vec![0.1],
-                    f: Vec::new(),
-                }],
-                c: Vec::new(),
-                d: Vec::new(),
-                differences: 0,
-                level: 0.0,
-            },
-            errors: None,
-            step,
-            series: 1,
-            deviations: vec![1.0],
-        }
-    }
-
-    #[test]
-    fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() {
-        let mut model = identified(Duration::from_ns(1_000_000_000));
-        model.model.a = vec![-0.9, 0.1];
-        for (errors, mistakes) in [(vec![], 0), (vec![0.1], 1), (vec![0.1, 0.2], 0)] {
-            model.errors = Some(Polynomials {
-                a: errors,
-                ..model.model.clone()
-            });
-            assert_eq!(model.mistakes().len(), mistakes);
-        }
-    }
-
-    /// What it predicts of a truth of 0 around a pause of so many steps.
-    fn around_a_pause(steps: i64) -> Vec<f64> {
-        let step = Duration::from_ns(1_000_000_000);
-        let model = identified(step);
-        assert_eq!(model.mistakes(), []);
-        let mut learner = Following::new(&model);
-        let instants = (0..20).chain(20 + steps..40 + steps);
-        let predicted = instants.map(|nth| {
-            let of = Instant::from_ns(0) + part(step, nth, 1);
-            learner.run(&[1.0], of, of - step);
-            let predicted = learner.predict(&[1.0], of);
-            learner.learn(&[1.0], 0.0, of);
-            predicted
-        });
-        predicted.collect()
-    }
-
-    #[test]
-    fn right_after_a_start_the_deviation_is_larger_by_what_was_not_foreseen_before_it() {
-        let step = Duration::from_ns(1_000_000_000);
-        let mut model = identified(step);
-        model.model.c = vec![0.5];
-        model.deviations = vec![2.0, 3.0];
-        let mut learner = Following::new(&model);
-        let mut deviations = Vec::new();
-        for nth in 0..60 {
-            let of = Instant::from_ns(0) + part(step, nth, 1);
-            learner.run(&[1.0], of, of - step);
-            deviations.push(learner.deviation(&[1.0], of));
-            learner.learn(&[1.0], 0.0, of);
-        }
-        // Of nothing it knows least; then the innovation before the first truth counts by half.
-        assert_eq!(deviations[..2], [3.0, 2.0 * f64::sqrt(1.25)]);
-        assert!(
-            deviations[1..].is_sorted_by(|a, b| a >= b),
-            "{deviations:?}"
-        );
-        assert_eq!(deviations[59], 2.0);
-    }
-
-    /// The deviations of a moving average about each of the truths that follow so many, while none of them is told.
-    fn deviations_after(truths: i64, count: i64) -> Vec<f64> {
-        let step = Duration::from_ns(1_000_000_000);
-        let mut model = identified(step);
-        model.model.a.clear();
-        model.model.c = vec![0.8];
-        let variances = model.model.variances(10);
-        model.deviations = variances.iter().map(|variance| variance.sqrt()).collect();
-        let mut learner = Following::new(&model);
-        let deviations = (0..truths + count).map(|nth| {
-            let of = Instant::from_ns(0) + part(step, nth, 1);
-            learner.run(&[1.0], of, of - step);
-            let deviation = learner.deviation(&[1.0], of);
-            if nth < truths {
-                learner.learn(&[1.0], 0.0, of);
-            }
-            deviation
-        });
-        deviations.skip(truths as usize).collect()
-    }
-
-    #[test]
-    fn of_truths_that_are_not_told_the_deviation_is_that_of_as_many_steps() {
-        let spread = f64::sqrt(1.64);
-        let near = |found: Vec<f64>, expected: [f64; 3]| {
-            let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
-            assert!(
-                off.fold(0.0, f64::max) < 1e-9,
-                "{found:?}, not {expected:?}"
-            );
-        };
-        near(deviations_after(200, 3), [1.0, spread, spread]);
-        // After one truth, what was not foreseen before it counts in the first of them alone.
-        near(deviations_after(1, 3), [spread, spread, spread]);
-    }
-
-    #[test]
-    fn a_short_pause_is_bridged_with_the_inputs_before_it() {
-        let predicted = around_a_pause(5);
-        assert!(predicted[0].is_nan(), "nothing has been told");
-        assert!(
-            predicted[1..].iter().all(|value| value.abs() < 0.7),
-            "{predicted:?}"
-        );
-    }
-
-    #[test]
-    fn after_a_long_pause_it_begins_anew() {
-        let predicted = around_a_pause(100);
-        assert!(
-            predicted[20].is_nan(),
-            "nothing has been told: {predicted:?}"
-        );
-        assert!(
-            predicted[21..].iter().all(|value| value.abs() < 0.2),
-            "{predicted:?}"
-        );
-    }
-
-    #[test]
-    fn of_truths_that_come_much_faster_than_a_step_each_series_takes_one_a_step() {
-        let second = Duration::from_ns(1_000_000_000);
-        let mut model = identified(part(second, 99, 1));
-        model.series = MOST_SERIES;
-        let mut learner = Following::new(&model);
-        for nth in (0..1000).step_by(2) {
-            let at = Instant::from_ns(0) + part(second, nth, 1);
-            learner.run(&[1.0], at, at - part(second, 99, 1));
-            learner.learn(&[1.0], 0.0, at);
-        }
-        for followed in &learner.known.series {
-            assert!((10..=11).contains(&followed.told), "{followed:?}");
-        }
-    }
-}
+mod tests;

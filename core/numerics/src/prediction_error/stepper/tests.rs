@@ -1,5 +1,6 @@
 //! What a stepper makes of samples that are there, that are missing, and of those before the first.
 
+use super::super::roots::is_within;
 use super::super::{Orders, Transfer};
 use super::*;
 use crate::draws::uniform;
@@ -82,20 +83,20 @@ fn right_after_a_start_predictions_of_a_moving_average_are_less_sure_by_what_cam
     // The variances of the innovations algorithm (Brockwell and Davis 1991, example 5.2.1).
     let mut variance = 1.0 + c * c;
     for _ in 0..20 {
-        assert!((1.0 + stepper.doubt(&[1.0], 1) - variance).abs() < 1e-12);
+        assert!((1.0 + doubt(&stepper, 1) - variance).abs() < 1e-12);
         stepper.step(|_| 0.0, Some(0.3));
         variance = 1.0 + c * c - c * c / variance;
     }
     for _ in 0..200 {
         stepper.step(|_| 0.0, Some(0.3));
     }
-    assert_eq!(stepper.doubt(&[1.0], 1), 0.0);
+    assert_eq!(doubt(&stepper, 1), 0.0);
 }
 
-/// The variance of what is `ahead` samples after the newest of so many, which all follow a start at which all but the
-/// innovations was known: of the samples as sums of innovations, the part that those measured do not tell.
-fn variance_by_hand(model: &Polynomials, known: usize, ahead: usize) -> f64 {
-    let (before, all) = (model.c.len(), known + ahead);
+/// What the last of so many samples is expected to be and with which variance, where some of those before it are known and a
+/// start at which all but the innovations was 0: of the samples as sums of innovations, what those known tell.
+fn expected_by_hand(model: &Polynomials, known: &[Option<f64>]) -> (f64, f64) {
+    let (before, all) = (model.c.len(), known.len() + 1);
     let mut filter = vec![1.0];
     let differences = std::iter::repeat_n(&[-1.0][..], model.differences);
     for polynomial in [&model.a[..], &model.d].into_iter().chain(differences) {
@@ -123,33 +124,137 @@ fn variance_by_hand(model: &Polynomials, known: usize, ahead: usize) -> f64 {
         samples
     });
     let covariance = &samples * samples.transpose();
-    let among = covariance.submatrix(0, 0, known, known);
-    let with = covariance.submatrix(0, all - 1, known, 1);
-    let told = faer::linalg::solvers::Solve::solve(&among.partial_piv_lu(), &with);
-    let told: f64 = (0..known).map(|nth| told[(nth, 0)] * with[(nth, 0)]).sum();
-    covariance[(all - 1, all - 1)] - told
+    let told = known.iter().enumerate();
+    let told: Vec<(usize, f64)> = told
+        .filter_map(|(nth, value)| Some((nth, (*value)?)))
+        .collect();
+    let count = told.len();
+    let among = faer::Mat::from_fn(count, count, |i, j| covariance[(told[i].0, told[j].0)]);
+    let with = faer::Mat::from_fn(count, 1, |i, _| covariance[(told[i].0, all - 1)]);
+    let weights = faer::linalg::solvers::Solve::solve(&among.partial_piv_lu(), &with);
+    let each = || (0..count).map(|i| (weights[(i, 0)], i));
+    let expected = each().map(|(weight, i)| weight * told[i].1).sum();
+    let explained: f64 = each().map(|(weight, i)| weight * with[(i, 0)]).sum();
+    (expected, covariance[(all - 1, all - 1)] - explained)
 }
 
-#[test]
-fn the_doubt_of_a_start_is_carried_to_the_sample_that_is_predicted() {
-    let noise = |a: &[f64], c: &[f64], d: &[f64], differences: usize| Polynomials {
+/// The variance of what is `ahead` samples after the newest of so many that are all known.
+fn variance_by_hand(model: &Polynomials, known: usize, ahead: usize) -> f64 {
+    let mut samples = vec![Some(0.0); known];
+    samples.resize(known + ahead - 1, None);
+    expected_by_hand(model, &samples).1
+}
+
+fn doubt(stepper: &Stepper, steps: usize) -> f64 {
+    stepper.doubt(steps, &mut vec![0.0; stepper.remembers()])
+}
+
+fn noise(a: &[f64], c: &[f64], d: &[f64], differences: usize) -> Polynomials {
+    Polynomials {
         a: a.to_vec(),
         inputs: vec![],
         c: c.to_vec(),
         d: d.to_vec(),
         differences,
         level: 0.0,
-    };
-    let models = [
+    }
+}
+
+/// Models of every kind of past.
+fn noises() -> [Polynomials; 9] {
+    [
         noise(&[], &[0.8], &[], 0),
+        noise(&[-0.7], &[], &[], 0),
         noise(&[-0.7], &[0.5], &[], 0),
         noise(&[-1.2, 0.4], &[0.4, -0.3, 0.6], &[], 0),
         noise(&[], &[0.6, 0.2], &[-0.7], 0),
+        noise(&[], &[], &[-1.1, 0.3], 1),
         noise(&[-0.5], &[-0.9], &[], 1),
         noise(&[], &[-1.0], &[], 1),
-    ];
-    for model in models {
-        let (response, variances) = (model.response(30), model.variances(30));
+        noise(&[-0.6, 0.2], &[0.4], &[-0.7], 2),
+    ]
+}
+
+#[test]
+fn where_samples_are_missing_predictions_and_their_variances_are_what_the_others_tell() {
+    for model in noises() {
+        for seed in 0..4 {
+            let (mut chance, mut known) = (uniform(seed), Vec::new());
+            let mut stepper = Stepper::new(model.clone());
+            stepper.settle_on(0.0);
+            for nth in 0..25 {
+                let (expected, variance) = expected_by_hand(&model, &known);
+                let ahead = 1.0 + doubt(&stepper, 1);
+                assert!(
+                    (ahead - variance).abs() < 1e-7 * variance,
+                    "{model:?}, {nth}: {ahead}, not {variance}"
+                );
+                let value = (chance() > -0.2).then(|| 3.0 * chance());
+                let found = stepper.step(|_| 0.0, value);
+                assert!(
+                    (found - expected).abs() < 1e-7 * (1.0 + expected.abs()),
+                    "{model:?}, {nth} of {known:?}: {found}, not {expected}"
+                );
+                known.push(value);
+            }
+        }
+    }
+}
+
+#[test]
+fn some_samples_after_a_gap_nothing_is_in_doubt() {
+    for model in noises() {
+        // Innovations before a root near the unit circle are forgotten slowly, or never.
+        if !is_within(&model.c, 0.85) {
+            continue;
+        }
+        let mut stepper = Stepper::new(model.clone());
+        stepper.settle_on(0.0);
+        (0..300).for_each(|_| _ = stepper.step(|_| 0.0, Some(0.1)));
+        assert_eq!(doubt(&stepper, 1), 0.0, "{model:?}");
+        (0..3000).for_each(|_| _ = stepper.step(|_| 0.0, None));
+        assert!(doubt(&stepper, 1) > 0.0, "{model:?}");
+        (0..300).for_each(|_| _ = stepper.step(|_| 0.0, Some(0.1)));
+        assert_eq!(doubt(&stepper, 1), 0.0, "{model:?}");
+    }
+}
+
+#[test]
+fn a_model_that_grows_without_end_is_followed_again_after_a_gap_in_which_it_did() {
+    let mut stepper = Stepper::new(noise(&[-1.5], &[0.3], &[], 0));
+    stepper.settle_on(0.0);
+    stepper.step(|_| 0.0, Some(0.0));
+    (0..1200).for_each(|_| _ = stepper.step(|_| 0.0, None));
+    for value in [1.0, 1.0] {
+        stepper.step(|_| 0.0, Some(value));
+    }
+    let predicted = stepper.step(|_| 0.0, None);
+    assert!(
+        predicted.is_finite() && predicted.abs() < 3.0,
+        "{predicted}"
+    );
+}
+
+#[test]
+fn what_is_foreseen_is_what_steps_without_samples_predict() {
+    for model in noises() {
+        let mut stepper = Stepper::new(model);
+        stepper.settle_on(1.0);
+        for value in [Some(0.4), None, Some(-0.2)] {
+            stepper.step(|_| 0.0, value);
+        }
+        let mut other = Stepper::new(stepper.model().clone());
+        other.take_past(&stepper);
+        for _ in 0..5 {
+            assert_eq!(other.foresee(|_| 0.0), stepper.step(|_| 0.0, None));
+        }
+    }
+}
+
+#[test]
+fn the_doubt_of_a_start_is_carried_to_the_sample_that_is_predicted() {
+    for model in noises() {
+        let variances = model.variances(30);
         for known in 0..6 {
             let mut stepper = Stepper::new(model.clone());
             stepper.settle_on(0.0);
@@ -160,7 +265,7 @@ fn the_doubt_of_a_start_is_carried_to_the_sample_that_is_predicted() {
             for missed in 0..4 {
                 for steps in 1..4 {
                     let ahead = missed + steps;
-                    let found = variances[ahead - 1] + stepper.doubt(&response, steps);
+                    let found = variances[steps - 1] + doubt(&stepper, steps);
                     let expected = variance_by_hand(&model, known, ahead);
                     assert!(
                         (found - expected).abs() < 1e-9 * expected,
@@ -185,7 +290,7 @@ fn two_samples_after_a_truth_a_moving_average_of_one_is_known_no_worse_than_its_
     };
     let mut stepper = Stepper::new(model.clone());
     stepper.settle_on(1.0);
-    let variance = model.variances(2)[1] + stepper.doubt(&model.response(2), 2);
+    let variance = model.variances(2)[1] + doubt(&stepper, 2);
     assert!((variance - (1.0 + c * c)).abs() < 1e-12, "{variance}");
 }
 

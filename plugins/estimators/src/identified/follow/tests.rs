@@ -1,0 +1,237 @@
+//! What a followed model predicts around pauses and gaps, and how sure it says it is of that.
+
+use super::*;
+use athermal_numerics::Transfer;
+
+/// A model that sums its input up, nearly.
+fn identified(step: Duration) -> Identified {
+    Identified {
+        regressors: vec!["input".to_owned()],
+        scaling: Scaling {
+            means: vec![0.0],
+            scales: vec![1.0],
+            truth: 0.0,
+        },
+        model: Polynomials {
+            a: vec![-0.9995],
+            inputs: vec![Transfer {
+                delay: 0,
+                b: vec![0.1],
+                f: Vec::new(),
+            }],
+            c: Vec::new(),
+            d: Vec::new(),
+            differences: 0,
+            level: 0.0,
+        },
+        errors: None,
+        step,
+        series: 1,
+        deviations: vec![1.0],
+    }
+}
+
+#[test]
+fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() {
+    let mut model = identified(Duration::from_ns(1_000_000_000));
+    model.model.a = vec![-0.9, 0.1];
+    for (errors, mistakes) in [(vec![], 0), (vec![0.1], 1), (vec![0.1, 0.2], 0)] {
+        model.errors = Some(Polynomials {
+            a: errors,
+            ..model.model.clone()
+        });
+        assert_eq!(model.mistakes().len(), mistakes);
+    }
+}
+
+/// What it predicts of a truth of 0 around a pause of so many steps.
+fn around_a_pause(steps: i64) -> Vec<f64> {
+    let step = Duration::from_ns(1_000_000_000);
+    let model = identified(step);
+    assert_eq!(model.mistakes(), []);
+    let mut learner = Following::new(&model);
+    let instants = (0..20).chain(20 + steps..40 + steps);
+    let predicted = instants.map(|nth| {
+        let of = Instant::from_ns(0) + part(step, nth, 1);
+        learner.run(&[1.0], of, of - step);
+        let predicted = learner.predict(&[1.0], of);
+        learner.learn(&[1.0], 0.0, of);
+        predicted
+    });
+    predicted.collect()
+}
+
+#[test]
+fn right_after_a_start_the_deviation_is_larger_by_what_was_not_foreseen_before_it() {
+    let step = Duration::from_ns(1_000_000_000);
+    let mut model = identified(step);
+    model.model.c = vec![0.5];
+    model.deviations = vec![2.0, 3.0];
+    let mut learner = Following::new(&model);
+    let mut deviations = Vec::new();
+    for nth in 0..60 {
+        let of = Instant::from_ns(0) + part(step, nth, 1);
+        learner.run(&[1.0], of, of - step);
+        deviations.push(learner.deviation(&[1.0], of));
+        learner.learn(&[1.0], 0.0, of);
+    }
+    // Of nothing it knows least; then the innovation before the first truth counts by half.
+    assert_eq!(deviations[..2], [3.0, 2.0 * f64::sqrt(1.25)]);
+    assert!(
+        deviations[1..].is_sorted_by(|a, b| a >= b),
+        "{deviations:?}"
+    );
+    assert_eq!(deviations[59], 2.0);
+}
+
+/// The deviations of a moving average about each of the truths that follow so many, while none of them is told.
+fn deviations_after(truths: i64, count: i64) -> Vec<f64> {
+    let step = Duration::from_ns(1_000_000_000);
+    let mut model = identified(step);
+    model.model.a.clear();
+    model.model.c = vec![0.8];
+    let variances = model.model.variances(10);
+    model.deviations = variances.iter().map(|variance| variance.sqrt()).collect();
+    let mut learner = Following::new(&model);
+    let deviations = (0..truths + count).map(|nth| {
+        let of = Instant::from_ns(0) + part(step, nth, 1);
+        learner.run(&[1.0], of, of - step);
+        let deviation = learner.deviation(&[1.0], of);
+        if nth < truths {
+            learner.learn(&[1.0], 0.0, of);
+        }
+        deviation
+    });
+    deviations.skip(truths as usize).collect()
+}
+
+#[test]
+fn of_truths_that_are_not_told_the_deviation_is_that_of_as_many_steps() {
+    let spread = f64::sqrt(1.64);
+    let near = |found: Vec<f64>, expected: [f64; 3]| {
+        let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(
+            off.fold(0.0, f64::max) < 1e-9,
+            "{found:?}, not {expected:?}"
+        );
+    };
+    near(deviations_after(200, 3), [1.0, spread, spread]);
+    // After one truth, what was not foreseen before it counts in the first of them alone.
+    near(deviations_after(1, 3), [spread, spread, spread]);
+}
+
+#[test]
+fn a_short_pause_is_bridged_with_the_inputs_before_it() {
+    let predicted = around_a_pause(5);
+    assert!(predicted[0].is_nan(), "nothing has been told");
+    assert!(
+        predicted[1..].iter().all(|value| value.abs() < 0.7),
+        "{predicted:?}"
+    );
+}
+
+#[test]
+fn after_a_long_pause_it_begins_anew() {
+    let predicted = around_a_pause(100);
+    assert!(
+        predicted[20].is_nan(),
+        "nothing has been told: {predicted:?}"
+    );
+    assert!(
+        predicted[21..].iter().all(|value| value.abs() < 0.2),
+        "{predicted:?}"
+    );
+}
+
+#[test]
+fn of_truths_that_come_much_faster_than_a_step_each_series_takes_one_a_step() {
+    let second = Duration::from_ns(1_000_000_000);
+    let mut model = identified(part(second, 99, 1));
+    model.series = MOST_SERIES;
+    let mut learner = Following::new(&model);
+    for nth in (0..1000).step_by(2) {
+        let at = Instant::from_ns(0) + part(second, nth, 1);
+        learner.run(&[1.0], at, at - part(second, 99, 1));
+        learner.learn(&[1.0], 0.0, at);
+    }
+    for followed in &learner.known.series {
+        assert!((10..=11).contains(&followed.told), "{followed:?}");
+    }
+}
+
+/// A file of the Kalman filter of statsmodels, see `tests/oracles/missing/generate.py`.
+fn oracle(file: &str) -> String {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/oracles/missing");
+    std::fs::read_to_string(std::path::Path::new(folder).join(file)).unwrap()
+}
+
+#[test]
+fn where_truths_are_missing_predictions_and_deviations_are_those_of_a_kalman_filter() {
+    #[derive(Deserialize)]
+    struct Filtered {
+        model: Polynomials,
+        variance: f64,
+    }
+    let models = serde_json::from_str(&oracle("models.json")).unwrap();
+    let models: std::collections::BTreeMap<String, Filtered> = models;
+    let step = Duration::from_ns(1_000_000_000);
+    assert_eq!(models.len(), 6);
+    for (name, Filtered { model, variance }) in models {
+        let width = model.inputs.len();
+        let ahead = model.variances(64).into_iter();
+        let mut followed = identified(step);
+        followed.regressors.truncate(width);
+        followed.scaling.means.truncate(width);
+        followed.scaling.scales.truncate(width);
+        followed.deviations = ahead.map(|of| (variance * of).sqrt()).collect();
+        followed.model = model;
+        assert_eq!(followed.mistakes(), []);
+        let mut learner = Following::new(&followed);
+        let rows = oracle(&format!("{name}.csv"));
+        let (mut compared, mut missing) = (0, 0);
+        for (nth, row) in rows.lines().skip(1).enumerate() {
+            let row: Vec<Option<f64>> = row.split(',').map(|field| field.parse().ok()).collect();
+            let [Some(u), truth, Some(predicted), Some(deviation)] = row[..] else {
+                panic!("{row:?}");
+            };
+            let (input, of) = ([u], Instant::from_ns(0) + part(step, nth as i64, 1));
+            learner.run(&input[..width], of, of - step);
+            // Until then the filters know of different pasts.
+            if nth >= 120 {
+                let found = learner.predict(&input[..width], of);
+                let unsure = learner.deviation(&input[..width], of);
+                assert!(
+                    (found - predicted).abs() < 1e-8 * (1.0 + predicted.abs()),
+                    "{name}, {nth}: {found}, not {predicted}"
+                );
+                assert!(
+                    (unsure - deviation).abs() < 1e-8 * deviation,
+                    "{name}, {nth}: {unsure}, not {deviation}"
+                );
+                compared += 1;
+                missing += usize::from(truth.is_none());
+            }
+            if let Some(truth) = truth {
+                learner.learn(&input[..width], truth, of);
+            }
+        }
+        assert!(compared == 380 && missing > 100, "{name}: {missing}");
+    }
+}
+
+#[test]
+fn a_state_that_does_not_tell_how_unsure_a_gap_left_it_is_answered_with_that() {
+    let model = identified(Duration::from_ns(1_000_000_000));
+    let mut written = serde_json::to_value(Following::new(&model).snapshot()).unwrap();
+    assert_eq!(written["state"], "identified/3");
+    let mut learner = Following::new(&model);
+    let read = serde_json::from_value(written.clone()).unwrap();
+    assert_eq!(learner.restore(read), Restored::Accepted);
+    written["state"] = "identified/2".into();
+    written["series"][0]["stepper"]["missed"] = 2.into();
+    let read = serde_json::from_value(written).unwrap();
+    assert_eq!(
+        learner.restore(read),
+        Restored::cold("it was kept without how unsure a gap had left it")
+    );
+}

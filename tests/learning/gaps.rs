@@ -1,0 +1,90 @@
+//! Truths that follow a gap in which a process has moved are learned from; ones that are off for no such reason are not.
+
+use athermal::core::engine::Engine;
+use athermal::core::fit::{FitOptions, fit};
+use athermal::core::prng::Prng;
+use athermal::core::recording::Table;
+
+use crate::workbench::{plan, secs};
+
+const LEARNED: f64 = 0.0;
+const OUTLIER: f64 = 3.0;
+
+fn graph(node: &str) -> String {
+    format!(
+        r#"
+schema = 1
+[signals.shift]
+unit = "nm"
+channels = ["Z"]
+max_age = "10s"
+[nodes.model]
+{node}
+inputs.truth = "shift"
+ahead = "0s"
+[outputs]
+out = "model"
+deviation = "model:deviation"
+learning = "model:learning"
+"#
+    )
+}
+
+/// A tick every 10 s: what comes back to 0 by a hundredth of itself each, with noise of 0.1.
+fn wandering(count: usize) -> Vec<f64> {
+    let mut random = Prng::stream(4, "wandering");
+    let mut shift = 0.0;
+    let next = |_| {
+        shift = 0.99 * shift + 0.1 * random.normal();
+        shift
+    };
+    (0..count).map(next).collect()
+}
+
+/// What the port `learning` tells of each truth of some rows, after a fit on others; a truth that is NaN has no value.
+fn became(node: &str, rows: &[f64]) -> Vec<f64> {
+    let plan = plan(&graph(node));
+    let mut table = Table::default();
+    for (tick, shift) in wandering(2000).into_iter().enumerate() {
+        table.push(secs(10.0 * tick as f64), &[shift]);
+    }
+    let (fitted, _) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    let mut engine = Engine::new(plan, &fitted).unwrap();
+    let outputs = rows.iter().enumerate().map(|(tick, &shift)| {
+        let outputs = engine.step(secs(10.0 * tick as f64), &[shift]).unwrap();
+        outputs[2]
+    });
+    outputs.collect()
+}
+
+/// Whoever moves while no truth comes says that it may have.
+const FOLLOWING: [&str; 2] = [
+    "type = \"arma\"\nna = 1\nnc = 1",
+    "type = \"kalman\"\nnoises = { observation = \"0.01 nm\", level = \"0.1 nm\", per = \"10s\" }",
+];
+
+#[test]
+fn after_a_gap_in_which_the_process_moved_good_truths_are_learned_from() {
+    for node in FOLLOWING {
+        let mut rows = wandering(300);
+        let missed = 200..260;
+        rows[missed.clone()].fill(f64::NAN);
+        // One and a half times as far as it usually goes meanwhile, and more than ten times as far as within a step.
+        let off = rows[199] + 1.2 - rows[260];
+        rows[260..].iter_mut().for_each(|shift| *shift += off);
+        let became = became(node, &rows);
+        let learned = became[261..].iter().filter(|&&of| of == LEARNED).count();
+        assert_eq!(learned, 39, "{node}: {:?}", &became[255..]);
+    }
+}
+
+#[test]
+fn an_outlier_is_not_learned_from_while_truths_come() {
+    for node in FOLLOWING {
+        let mut rows = wandering(300);
+        rows[250] += 1.2;
+        let became = became(node, &rows);
+        let refused = became.iter().filter(|&&of| of == OUTLIER).count();
+        assert_eq!(refused, 1, "{node}: {became:?}");
+    }
+}
