@@ -153,21 +153,6 @@ impl Polynomials {
         self.inputs.iter().map(|input| input.f.len()).sum()
     }
 
-    /// The share of each filter of an input in what they are off by together when the first value is measured: nothing is known
-    /// of which it is. In a model that follows, the noise is off.
-    pub(super) fn share(&self) -> f64 {
-        let filters = self
-            .inputs
-            .iter()
-            .filter(|input| !input.f.is_empty())
-            .count();
-        if self.follows() || filters == 0 {
-            0.0
-        } else {
-            1.0 / filters as f64
-        }
-    }
-
     /// `D(q) (1 − q⁻¹)^d`, without its leading 1.
     pub(super) fn whitening(&self) -> Vec<f64> {
         let mut product: Vec<f64> = std::iter::once(1.0).chain(self.d.iter().copied()).collect();

@@ -4,7 +4,7 @@ mod doubt;
 
 use serde::{Deserialize, Serialize};
 
-use super::Polynomials;
+use super::{Polynomials, Transfer};
 use crate::NumericsError;
 use crate::checks::check_length;
 use doubt::Doubt;
@@ -138,6 +138,11 @@ impl Stepper {
     /// Where it is has been measured: what the inputs do not explain of it has always been there, in the noise, or where there
     /// is no model of that, in the filters of the inputs.
     pub fn settle_on(&mut self, value: f64) {
+        self.settle_between(value, f64::from(u8::from(!self.model.follows())));
+    }
+
+    /// The same where the filters of the inputs have this share of what the inputs do not explain, and the noise the rest.
+    pub fn settle_between(&mut self, value: f64, filters: f64) {
         let value = value - self.model.level;
         let brought: f64 = self
             .inputs
@@ -148,19 +153,17 @@ impl Stepper {
                 None => of.gain() * past.values.first().copied().unwrap_or(0.0),
             })
             .sum();
-        let share = self.model.share();
-        for (past, of) in self.inputs.iter_mut().zip(&self.model.inputs) {
-            let off = if of.f.is_empty() {
-                0.0
-            } else {
-                share * (value - brought)
-            };
-            past.filtered
-                .iter_mut()
-                .for_each(|filtered| *filtered += off);
+        let filtered = |of: &&Transfer| !of.f.is_empty();
+        let count = self.model.inputs.iter().filter(filtered).count();
+        // Which of the filters is off, nobody knows.
+        let off = filters * (value - brought) / count.max(1) as f64;
+        for past in &mut self.inputs {
+            let before = past.filtered.iter_mut();
+            before.for_each(|filtered| *filtered += off);
         }
         self.past.fill(value);
-        let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - brought;
+        let explained = brought + off * count as f64;
+        let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - explained;
         self.noise.fill(noise);
         self.doubt_innovations();
     }

@@ -129,6 +129,8 @@ athermal_core::state!(Before, "identified/2");
 struct Following {
     known: Known,
     deviations: Vec<f64>,
+    /// The share of the filters of the inputs in what the first truth is off by.
+    of_filters: f64,
     /// For predictions, which leave no trace.
     scratch: RefCell<Stepper>,
     /// To work out in how unsure they are.
@@ -154,9 +156,28 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
+            of_filters: of_filters(of),
             room: RefCell::new(vec![0.0; stepper.remembers()]),
             scratch: RefCell::new(stepper),
         }
+    }
+}
+
+/// The share of the filters of the inputs in what the first truth is off by: that of the variance which inputs as in the fit,
+/// staying as they are for long, give them beside that of the noise. Noise that is integrated has all, since it may be anywhere.
+fn of_filters(of: &Identified) -> f64 {
+    let model = &of.model;
+    if !model.follows() {
+        return 1.0;
+    }
+    let filters = model.inputs.iter().filter(|input| !input.f.is_empty());
+    let filters: f64 = filters.map(|input| input.gain().powi(2)).sum();
+    let noise = of.deviations.last().map_or(f64::NAN, |of| of.powi(2));
+    let share = filters / (filters + noise);
+    if model.differences == 0 && share.is_finite() {
+        share
+    } else {
+        0.0
     }
 }
 
@@ -356,7 +377,7 @@ impl Learner for Following {
         }
         stepper.step(known.scaling.of(regressors), Some(truth));
         if is_first {
-            stepper.settle_on(truth);
+            stepper.settle_between(truth, self.of_filters);
         }
         let followed = &mut known.series[nth];
         std::mem::swap(stepper, &mut followed.stepper);
