@@ -182,6 +182,13 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
+        // That of the variance of the truth that the noise does not explain; noise that is integrated may be anywhere.
+        let noise = variances.last().map_or(0.0, |sum| variance * sum);
+        let of_filters = if found.model.differences == 0 {
+            (1.0 - noise / samples.spread().powi(2)).max(0.0)
+        } else {
+            0.0
+        };
         Ok(Identified {
             regressors: self.names.clone(),
             scaling: Scaling {
@@ -193,6 +200,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 .iter()
                 .map(|sum| (variance * sum).sqrt())
                 .collect(),
+            of_filters,
             model: found.model,
             errors: found.errors,
             step: pace.step,
