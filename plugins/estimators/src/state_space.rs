@@ -29,10 +29,11 @@ const LARGEST_PAST: usize = 1000;
 /// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter
 /// 4; Ljung 1999, section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the
 /// features meanwhile, is decomposed by singular values: as many as count, and chance does not explain (Wachter 1980),
-/// are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how those go on. `B` and `D` are then
-/// found such that one-step errors are least. The singular values are printed and kept. A mode that would grow is
-/// brought back to one that barely fades. No search is made and no start needed, so that a fit takes little more than
-/// one pass over the rows; `oe` or `armax` may come closer from there.
+/// are states, and `A` and `C` follow by least squares from how those go on. `B`, `D`, the Kalman gain `K` and the states
+/// in which records begin are then found such that one-step errors are least: a few steps by Gauss and Newton (Ljung
+/// 1999, section 10.2) from the gain that the covariances of what is left give. The singular values are printed and
+/// kept. A mode that would grow is brought back to one that barely fades. `A` and `C` are not searched for, so that a
+/// fit takes a few passes over the rows; `oe` or `armax` may come closer from there.
 ///
 /// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed
 /// as a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart:
