@@ -15,6 +15,7 @@ use athermal_simulation::{table_columns, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::data;
 use super::evaluate::load_fitted;
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
@@ -80,6 +81,7 @@ impl Simulate {
             )));
         }
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
+        data::check_ending(output)?;
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() != "-" && terminal.format == Format::Table {
             let plural = if self.days == 1.0 { "" } else { "s" };

@@ -21,6 +21,8 @@ const USUAL: usize = 10;
 const LONGEST: usize = 100;
 /// The most states.
 const MOST_STATES: usize = 20;
+/// A spread of truths below this share of their mean is rounding.
+const ROUNDING: f64 = 1e-13;
 /// Values of a past: more would take the memory of many rows.
 const LARGEST_PAST: usize = 1000;
 
@@ -252,8 +254,14 @@ impl Identify for StateSpace {
         let mean = outputs().sum::<f64>() / count;
         let squares: f64 = outputs().map(|y| (y - mean).powi(2)).sum();
         let scale = (squares / count).sqrt();
-        // Where the truth does not vary, the identification says so.
-        let scale = if scale > 0.0 { scale } else { 1.0 };
+        if scale <= ROUNDING * mean.abs() {
+            let truth = outputs().next().copied().unwrap_or(mean);
+            return Err(TrainingError::Unsolvable {
+                reason: format!(
+                    "the truth is {truth} on all rows, so there are no states to find; it takes rows on which the truth moves"
+                ),
+            });
+        }
         let scaled: Vec<Vec<f64>> = samples
             .records()
             .map(|record| record.outputs.iter().map(|y| (y - mean) / scale).collect())
@@ -283,6 +291,11 @@ impl Identify for StateSpace {
                     }
                 },
             },
+            NumericsError::NoStates => TrainingError::Unsolvable {
+                reason: "what was before tells nothing of the truth beside what the features of the same time tell, so there \
+                         are no states to find; `linear` fits what features do at once"
+                    .to_owned(),
+            },
             error => told(error),
         })?;
         report.figure("states", found.model.order());
@@ -308,10 +321,14 @@ impl Identify for StateSpace {
             f: Vec::new(),
         });
         let rows = rows.max(1);
+        // As many as armax counts of the same orders: each coefficient, and the level.
+        let of_inputs: usize = equation.b.iter().map(Vec::len).sum();
+        let coefficients = equation.a.len() + of_inputs + equation.c.len() + 1;
+        let left = rows.saturating_sub(coefficients).max(1);
         Ok(Found {
             residual_sum_of_squares: squares * scale * scale,
             rows,
-            variance: squares * scale * scale / rows as f64,
+            variance: squares * scale * scale / left as f64,
             errors: None,
             model: Polynomials {
                 a: equation.a,
@@ -411,6 +428,31 @@ mod tests {
         assert!(
             !notes.iter().any(|note| note.contains("horizon")),
             "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn a_truth_without_states_is_told_with_its_cause_and_a_way_out() {
+        let told = |truth: fn([f64; 2]) -> f64| {
+            let mut prng = Prng::stream(7, "state space");
+            let mut samples = Samples::new(2);
+            samples.segment();
+            for _ in 0..400 {
+                let inputs = [prng.between(-0.5, 0.5), prng.between(-0.5, 0.5)];
+                samples.push(inputs, truth(inputs));
+            }
+            let asked = asking(States::default(), None);
+            let found = asked.identify(&samples, 1, &mut TrainingReport::default());
+            found.unwrap_err().to_string()
+        };
+        assert_eq!(
+            told(|[a, b]| 1.0 + a - b),
+            "what was before tells nothing of the truth beside what the features of the same time tell, so there are no \
+             states to find; `linear` fits what features do at once"
+        );
+        assert_eq!(
+            told(|_| 20.1),
+            "the truth is 20.1 on all rows, so there are no states to find; it takes rows on which the truth moves"
         );
     }
 

@@ -15,6 +15,8 @@ use crate::checks::check_parameter;
 pub const MOST_STATES: usize = 20;
 /// The slowest mode that is allowed: one that grows is brought back to this.
 const SLOWEST: f64 = 0.9995;
+/// Singular values below this share of the largest have rounding in them and nothing else.
+const ROUNDING: f64 = 1e-8;
 /// Steps of the Riccati recursion.
 const MOST_STEPS: usize = 10_000;
 
@@ -95,7 +97,8 @@ impl Subspace {
     ///
     /// # Errors
     /// [`NumericsError::Parameter`], [`NumericsError::TooFewStretches`] when there are not twice as many as a past has values,
-    /// [`NumericsError::NotFinite`], [`NumericsError::NoConvergence`] for outputs that do not vary.
+    /// [`NumericsError::NotFinite`], [`NumericsError::NoStates`] for outputs that the inputs of the same time explain but for
+    /// rounding, [`NumericsError::NoConvergence`].
     pub fn identify(
         &self,
         records: &[Record<'_>],
@@ -112,6 +115,9 @@ impl Subspace {
             });
         }
         let projected = lagged.projected()?;
+        if !projected.leaves_outputs() {
+            return Err(NumericsError::NoStates);
+        }
         let (values, observability) = self.ranked(&projected)?;
         let order = match self.order {
             StateOrder::Given(order) => order,
@@ -226,7 +232,7 @@ impl Subspace {
         };
         let values: Vec<f64> = squares.iter().map(|square| square.sqrt()).collect();
         if values.first().is_none_or(|&largest| largest <= 0.0) {
-            return Err(NumericsError::NoConvergence);
+            return Err(NumericsError::NoStates);
         }
         let scaled = Mat::from_fn(shown.nrows(), shown.ncols(), |i, j| {
             shown[(i, j)] * values[j].sqrt()
@@ -250,7 +256,8 @@ impl StateOrder {
             }
             Self::LargestGap => {
                 let most = (horizon / 2).max(1).min(values.len() - 1);
-                let falls = |nth: usize| values[nth - 1] / values[nth].max(f64::MIN_POSITIVE);
+                let least = (ROUNDING * values[0]).max(f64::MIN_POSITIVE);
+                let falls = |nth: usize| values[nth - 1].max(least) / values[nth].max(least);
                 (1..=most)
                     .reduce(|a, b| if falls(b) > falls(a) { b } else { a })
                     .unwrap_or(1)

@@ -141,6 +141,14 @@ pub(super) struct Projected {
     pub(super) least_output: f64,
 }
 
+impl Projected {
+    /// Whether the future inputs leave more of the future outputs than rounding.
+    pub(super) fn leaves_outputs(&self) -> bool {
+        let left = &self.outputs_left;
+        (0..left.nrows()).any(|i| left[(i, i)] > self.least_output)
+    }
+}
+
 /// Eigenvalues in falling order, none below 0, and the vectors that belong to them.
 pub(super) fn spectrum(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), NumericsError> {
     let order = matrix.nrows();

@@ -13,6 +13,8 @@ const MOST_HALVINGS: u32 = 8;
 /// The share of the squares of errors that a step takes away where another is worth its pass over the rows. Steps beyond it
 /// follow the noise: they lower these squares and no others.
 const WORTH: f64 = 0.01;
+/// The share of the squares of outputs that errors have where there is no noise, and so nothing to find a gain from.
+const EXACT: f64 = 1e-18;
 /// Time constants that pass within the longest record: a filter that forgets more slowly than so is not looked for, since the
 /// states in which records begin could then explain anything.
 const FORGOTTEN: f64 = 5.0;
@@ -25,6 +27,7 @@ const SLOWEST_FILTER: f64 = 0.9995;
 /// With the gain given, that is linear (Ljung 1999, section 10.6); with it, steps by Gauss and Newton (Ljung 1999, section
 /// 10.2), halved where errors would become larger. The covariances of what a regression on states leaves have in them how
 /// uncertain those states are, with which the gain from them is too small on few rows; this one does not go by them.
+/// Without noise the gain is 0.
 pub(super) fn refine(
     model: &mut StateSpace,
     records: &[Record<'_>],
@@ -46,8 +49,14 @@ pub(super) fn refine(
     };
     let mut best = blank.moved(&search.step(&blank, Free::Inputs)?, 1.0);
     let mut left = search.squares(&best);
+    let mut most = MOST_STEPS;
+    let outputs = records.iter().flat_map(|record| record.outputs);
+    if left <= EXACT * outputs.map(|y| y * y).sum::<f64>() {
+        best.model.k = vec![0.0; order];
+        most = 0;
+    }
     let slowest = search.slowest(&best.model);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..most {
         let step = search.step(&best, Free::InputsAndGain)?;
         let better = (0..MOST_HALVINGS).find_map(|halvings| {
             let shorter = best.moved(&step, 0.5_f64.powi(halvings.cast_signed()));

@@ -282,7 +282,8 @@ fn wrong_requests_are_refused() {
         inputs: &inputs,
         outputs: &still,
     };
-    assert!(PLAIN.identify(&[still], 2).is_err());
+    let still = PLAIN.identify(&[still], 2).unwrap_err();
+    assert_eq!(still, NumericsError::NoStates);
 }
 
 /// A record whose first input is the last output, as far as so much noise lets it be, its second the mean of the last two.
@@ -341,7 +342,7 @@ fn armax(samples: usize, seed: u64, skipped: usize) -> (Vec<f64>, Vec<f64>, f64)
 
 #[test]
 fn on_some_hundred_rows_the_gain_is_near_that_of_the_true_model() {
-    for weighting in [Weighting::N4sid, Weighting::Moesp, Weighting::Cva] {
+    for weighting in WEIGHTINGS {
         for seed in 0..5 {
             let (inputs, outputs, squares) = armax(400, seed, 10);
             let record = Record {
@@ -362,5 +363,50 @@ fn on_some_hundred_rows_the_gain_is_near_that_of_the_true_model() {
             near(c[0], 0.6, 0.15);
             near(c[1], 0.0, 0.15);
         }
+    }
+}
+
+const WEIGHTINGS: [Weighting; 3] = [Weighting::N4sid, Weighting::Moesp, Weighting::Cva];
+
+#[test]
+fn outputs_that_inputs_explain_at_once_have_no_states() {
+    let (inputs, _, _) = scaled();
+    let outputs: Vec<f64> = inputs.chunks_exact(2).map(|u| u[0] - u[1]).collect();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    for weighting in WEIGHTINGS {
+        let how = Subspace { weighting, ..PLAIN };
+        let found = how.identify(&[record], 2).unwrap_err();
+        assert_eq!(found, NumericsError::NoStates, "{weighting:?}");
+    }
+}
+
+#[test]
+fn without_noise_the_states_are_exact_and_the_gain_is_nothing() {
+    let (inputs, _, _) = scaled();
+    let mut states = [0.0; 2];
+    let mut outputs = Vec::new();
+    for u in inputs.chunks_exact(2) {
+        outputs.push(states[0] + states[1] + 0.3 * u[0]);
+        states = [0.9 * states[0] + u[0], 0.6 * states[1] + u[1] - u[0]];
+    }
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    for weighting in WEIGHTINGS {
+        let how = Subspace {
+            weighting,
+            order: StateOrder::LargestGap,
+            refined: true,
+            ..PLAIN
+        };
+        let found = how.identify(&[record], 2).unwrap();
+        assert_eq!(found.model.k, [0.0; 2], "{weighting:?}");
+        let equation = found.model.difference_equation();
+        near(equation.a[0], -1.5, 1e-6);
+        near(equation.a[1], 0.54, 1e-6);
     }
 }
