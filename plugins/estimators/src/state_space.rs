@@ -437,8 +437,11 @@ mod tests {
             let mut prng = Prng::stream(7, "state space");
             let mut samples = Samples::new(2);
             samples.segment();
-            for _ in 0..400 {
+            // Each with its negative, so that inputs are about 0 as those of a fit are.
+            for _ in 0..200 {
                 let inputs = [prng.between(-0.5, 0.5), prng.between(-0.5, 0.5)];
+                samples.push(inputs, truth(inputs));
+                let inputs = inputs.map(|input| -input);
                 samples.push(inputs, truth(inputs));
             }
             let asked = asking(States::default(), None);
