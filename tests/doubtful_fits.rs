@@ -269,3 +269,17 @@ fn a_narx_without_a_term_says_that_it_predicts_the_mean() {
     );
     assert!(!told.contains("error-reduction"), "{told}");
 }
+
+#[test]
+fn values_whose_squares_overflow_are_told_with_their_name() {
+    let text = explained(200) + "200,1e200,0,0\n" + "201,0,0,0\n";
+    for node in [
+        "type = \"linear\"",
+        "type = \"kalman\"",
+        "type = \"state_space\"",
+        "type = \"linear\"\nselection = { method = \"forward\" }",
+    ] {
+        let told = fit("overflow", &format!("{node}\n{FEATURES}"), &text, &[]).ended(1);
+        told.tells(&["values of `in.u` are as large as 1e200", "a `range`"]);
+    }
+}

@@ -1,9 +1,10 @@
 //! Decides how recorded data are named on the command line, and what is told of them after reading.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use athermal::core::model::DataCard;
-use athermal::files::{Dataset, Options, Report};
+use athermal::files::{Dataset, Format, Options, Report};
 use clap::Args;
 
 use crate::figures::{count, counted};
@@ -106,13 +107,47 @@ impl Data {
     }
 }
 
-/// Tells of rows and cells that were not taken, and of samples that were rejected.
+/// Checks that the ending of a file that is to be written names a format; one without an ending is CSV.
+///
+/// # Errors
+/// When there is an ending that names none.
+pub fn check_ending(output: &Path) -> Result<(), Failure> {
+    match output.extension() {
+        Some(ending) if Format::from_path(output).is_none() => Err(Failure::Request(format!(
+            "{}: the ending `.{}` names no format; `.csv`, `.tsv` and `.txt` are CSV, `.jsonl`, `.ndjson` and `.json` are \
+             JSON lines",
+            output.display(),
+            ending.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Tells of files that are given more than once, whose rows count as often.
+fn tell_repeated(terminal: &Terminal, files: impl Iterator<Item = impl AsRef<str>>) {
+    let mut known: BTreeMap<PathBuf, u64> = BTreeMap::new();
+    for file in files {
+        if let Ok(path) = std::fs::canonicalize(file.as_ref()) {
+            let times = known.entry(path).or_default();
+            *times += 1;
+            if *times == 2 {
+                terminal.warning(format_args!(
+                    "{}: this file is given more than once, and so often its rows count",
+                    file.as_ref()
+                ));
+            }
+        }
+    }
+}
+
+/// Tells of rows and cells that were not taken, of samples that were rejected, and of files that count more than once.
 pub fn tell(
     terminal: &Terminal,
     reports: &[(String, Report)],
     refused: u64,
     rejected: &[(String, u64)],
 ) {
+    tell_repeated(terminal, reports.iter().map(|(file, _)| file));
     for (file, report) in reports {
         let counted = [
             (&report.bad_cells, "unreadable cell", "taken as missing"),

@@ -29,7 +29,7 @@ pub struct Run {
     /// CSV or JSON lines; `-` is standard input
     #[arg(long, short, value_name = "FILE")]
     input: PathBuf,
-    /// CSV or JSON lines by its ending; `-` is standard output, as CSV
+    /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV
     #[arg(long, short, value_name = "FILE", default_value = "-")]
     output: PathBuf,
     /// Take cells and rows that cannot be read as missing, and count them
@@ -64,6 +64,7 @@ impl Run {
     /// # Errors
     /// When the model or the input cannot be used, or the output not written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        data::check_ending(&self.output)?;
         let model = Model::load(&self.model)?;
         self.tell_unread(terminal, &model);
         check_fitted(&model, &self.model)?;

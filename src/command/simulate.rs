@@ -15,6 +15,7 @@ use athermal_simulation::{table_columns, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::data;
 use super::evaluate::load_fitted;
 use super::numbers;
 use crate::figures::counted;
@@ -91,6 +92,7 @@ impl Simulate {
             )));
         }
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
+        data::check_ending(output)?;
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() != "-" && terminal.format == Format::Table {
             terminal.note(format_args!(

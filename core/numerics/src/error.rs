@@ -53,6 +53,8 @@ pub enum NumericsError {
         /// How many there are.
         found: usize,
     },
+    /// What was before tells nothing of the outputs beside what the inputs meanwhile do.
+    NoStates,
     /// The statistics contain NaN or infinities.
     NotFinite,
     /// A column's scale is not a positive finite number.
@@ -134,6 +136,10 @@ impl fmt::Display for NumericsError {
             } => write!(
                 f,
                 "{found} stretches of {length} rows without a gap, and at least {needed} are needed"
+            ),
+            Self::NoStates => write!(
+                f,
+                "the past tells nothing of the outputs beside what the inputs meanwhile do"
             ),
             Self::NotFinite => write!(f, "the rows contain NaN or infinite values"),
             Self::Scale { column, scale } => write!(

@@ -20,7 +20,8 @@ pub enum Solver {
     /// are kept; above 10⁶ it says so.
     Ols {},
     /// Stochastic gradients with L2 penalty over the rows in their order (Bottou 2010): the step size of row `t` is
-    /// `eta0 / t^power`.
+    /// `eta0 / t^power`. Coefficients start at 0 and the intercept at the mean of the truth; where others start it at 0, as
+    /// scikit-learn does, fits after few epochs differ.
     Sgd {
         /// The penalty per row, at least 0.
         #[serde(default = "small_penalty")]

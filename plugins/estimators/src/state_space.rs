@@ -22,6 +22,8 @@ const USUAL: usize = 10;
 const LONGEST: usize = 100;
 /// The most states.
 const MOST_STATES: usize = 20;
+/// A spread of truths below this share of their mean is rounding.
+const ROUNDING: f64 = 1e-13;
 /// Values of a past: more would take the memory of many rows.
 const LARGEST_PAST: usize = 1000;
 
@@ -30,10 +32,11 @@ const LARGEST_PAST: usize = 1000;
 /// `x(t + 1) = A x(t) + B u(t) + K e(t)`, `y(t) = ȳ + C x(t) + D u(t) + e(t)` (Van Overschee and De Moor 1996, chapter
 /// 4; Ljung 1999, section 10.6). The part of the next `horizon` truths that past truths and features tell, beside the
 /// features meanwhile, is decomposed by singular values: as many as count, and chance does not explain (Wachter 1980),
-/// are states, and `A`, `C` and the Kalman gain `K` follow by least squares from how those go on. `B` and `D` are then
-/// found such that one-step errors are least. The singular values are printed and kept. A mode that would grow is
-/// brought back to one that barely fades. No search is made and no start needed, so that a fit takes little more than
-/// one pass over the rows; `oe` or `armax` may come closer from there.
+/// are states, and `A` and `C` follow by least squares from how those go on. `B`, `D`, the Kalman gain `K` and the states
+/// in which records begin are then found such that one-step errors are least: a few steps by Gauss and Newton (Ljung
+/// 1999, section 10.2) from the gain that the covariances of what is left give. The singular values are printed and
+/// kept. A mode that would grow is brought back to one that barely fades. `A` and `C` are not searched for, so that a
+/// fit takes a few passes over the rows; `oe` or `armax` may come closer from there.
 ///
 /// The fitted model keeps the difference equation that says the same, `A(q) y = Σ B_i(q) u_i + C(q) e`, and is followed as
 /// a filter in it. A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by
@@ -252,8 +255,14 @@ impl Identify for StateSpace {
         let mean = outputs().sum::<f64>() / count;
         let squares: f64 = outputs().map(|y| (y - mean).powi(2)).sum();
         let scale = (squares / count).sqrt();
-        // Where the truth does not vary, the identification says so.
-        let scale = if scale > 0.0 { scale } else { 1.0 };
+        if scale <= ROUNDING * mean.abs() {
+            let truth = outputs().next().copied().unwrap_or(mean);
+            return Err(TrainingError::Unsolvable {
+                reason: format!(
+                    "the truth is {truth} on all rows, so there are no states to find; it takes rows on which the truth moves"
+                ),
+            });
+        }
         let scaled: Vec<Vec<f64>> = samples
             .records()
             .map(|record| record.outputs.iter().map(|y| (y - mean) / scale).collect())
@@ -283,6 +292,11 @@ impl Identify for StateSpace {
                     }
                 },
             },
+            NumericsError::NoStates => TrainingError::Unsolvable {
+                reason: "what was before tells nothing of the truth beside what the features of the same time tell, so there \
+                         are no states to find; `linear` fits what features do at once"
+                    .to_owned(),
+            },
             error => told(error),
         })?;
         report.figure("states", found.model.order());
@@ -308,10 +322,14 @@ impl Identify for StateSpace {
             f: Vec::new(),
         });
         let rows = rows.max(1);
+        // As many as armax counts of the same orders: each coefficient, and the level.
+        let of_inputs: usize = equation.b.iter().map(Vec::len).sum();
+        let coefficients = equation.a.len() + of_inputs + equation.c.len() + 1;
+        let left = rows.saturating_sub(coefficients).max(1);
         Ok(Found {
             residual_sum_of_squares: squares * scale * scale,
             rows,
-            variance: squares * scale * scale / rows as f64,
+            variance: squares * scale * scale / left as f64,
             errors: None,
             model: Polynomials {
                 a: equation.a,
@@ -411,6 +429,34 @@ mod tests {
         assert!(
             !notes.iter().any(|note| note.contains("horizon")),
             "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn a_truth_without_states_is_told_with_its_cause_and_a_way_out() {
+        let told = |truth: fn([f64; 2]) -> f64| {
+            let mut prng = Prng::stream(7, "state space");
+            let mut samples = Samples::new(2);
+            samples.segment();
+            // Each with its negative, so that inputs are about 0 as those of a fit are.
+            for _ in 0..200 {
+                let inputs = [prng.between(-0.5, 0.5), prng.between(-0.5, 0.5)];
+                samples.push(inputs, truth(inputs));
+                let inputs = inputs.map(|input| -input);
+                samples.push(inputs, truth(inputs));
+            }
+            let asked = asking(States::default(), None);
+            let found = asked.identify(&samples, 1, &mut TrainingReport::default());
+            found.unwrap_err().to_string()
+        };
+        assert_eq!(
+            told(|[a, b]| 1.0 + a - b),
+            "what was before tells nothing of the truth beside what the features of the same time tell, so there are no \
+             states to find; `linear` fits what features do at once"
+        );
+        assert_eq!(
+            told(|_| 20.1),
+            "the truth is 20.1 on all rows, so there are no states to find; it takes rows on which the truth moves"
         );
     }
 

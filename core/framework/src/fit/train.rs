@@ -18,6 +18,8 @@ pub(super) struct Making {
     row: Vec<f64>,
     all: Vec<f64>,
     truths: Truths,
+    /// The largest values, in size, of the candidates that were kept and of the truth.
+    largest: Vec<f64>,
     incomplete: u64,
 }
 
@@ -34,6 +36,9 @@ impl Sink for Making {
             self.incomplete += 1;
         } else {
             self.truths.count(truth);
+            for (largest, value) in self.largest.iter_mut().zip(self.row.iter().chain([&truth])) {
+                *largest = largest.max(value.abs());
+            }
             self.trainer.row_at(at, &self.row, truth);
         }
     }
@@ -83,6 +88,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
     Making {
         trainer,
         row: Vec::with_capacity(kept.len()),
+        largest: vec![0.0; kept.len() + 1],
         all: Vec::new(),
         kept,
         truths: Truths::default(),
@@ -94,6 +100,8 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
 const LEAST_ROWS: u64 = 2;
 /// A fit whose error is larger than that of the mean by this factor is no better than none.
 const WORSE_THAN_MEAN: f64 = 1.1;
+/// Squares of larger values overflow when some of them are summed.
+const LARGEST: f64 = 1e150;
 /// The share of a mean that rounding may make up.
 const ROUNDING: f64 = 1e-9;
 
@@ -165,7 +173,17 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
             needed: LEAST_ROWS as usize,
         })
     } else {
-        making.trainer.finish()
+        let overflows = making.largest.iter().position(|value| *value > LARGEST);
+        let too_large = overflows.map(|nth| TrainingError::TooLarge {
+            name: match making.kept.get(nth) {
+                Some(&candidate) => regressors[candidate].name.clone(),
+                None => truth.name.clone(),
+            },
+            largest: making.largest[nth],
+        });
+        let trained = making.trainer.finish();
+        // What a trainer says of sums that overflowed is not their cause.
+        trained.map_err(|error| too_large.unwrap_or(error))
     };
     let (outcome, predictor) = match trained {
         Ok(Trained {

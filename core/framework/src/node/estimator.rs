@@ -205,7 +205,7 @@ pub trait Trainer: Send {
 }
 
 /// Why a fit gave nothing.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum TrainingError {
     /// Fewer rows than are needed.
     TooFewRows {
@@ -222,6 +222,13 @@ pub enum TrainingError {
         outside_limits: u64,
         /// How many came before the estimator had run at the right time.
         too_early: u64,
+    },
+    /// Squares of values overflow.
+    TooLarge {
+        /// Of what they are.
+        name: String,
+        /// The largest, in size.
+        largest: f64,
     },
     /// The numbers allow no solution.
     Unsolvable {
@@ -257,6 +264,11 @@ impl std::fmt::Display for TrainingError {
                      before it could first be predicted; there is no other"
                 ),
             },
+            Self::TooLarge { name, largest } => write!(
+                f,
+                "values of `{name}` are as large as {largest:.0e}, of which no squares can be summed; a `range` on its signal \
+                 takes such values as missing"
+            ),
             Self::Unsolvable { reason } => write!(f, "{reason}"),
         }
     }

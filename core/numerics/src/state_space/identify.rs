@@ -4,10 +4,9 @@ use std::ops::RangeInclusive;
 
 use faer::Mat;
 
-use super::lagged::{
-    Lagged, Projected, power, pseudo_inverse, pseudo_inverse_left, spectrum, windows,
-};
+use super::lagged::{Lagged, Projected, power, pseudo_inverse, spectrum, windows};
 use super::model::{product, spectral_radius};
+use super::refine::refine;
 use super::{Record, StateSpace};
 use crate::NumericsError;
 use crate::checks::check_parameter;
@@ -16,6 +15,8 @@ use crate::checks::check_parameter;
 pub const MOST_STATES: usize = 20;
 /// The slowest mode that is allowed: one that grows is brought back to this.
 const SLOWEST: f64 = 0.9995;
+/// Singular values below this share of the largest have rounding in them and nothing else.
+const ROUNDING: f64 = 1e-8;
 /// Steps of the Riccati recursion.
 const MOST_STEPS: usize = 10_000;
 
@@ -23,7 +24,7 @@ const MOST_STEPS: usize = 10_000;
 ///
 /// The part of the future outputs that the past tells beside the future inputs has a rank: the number of states. Its singular
 /// vectors give the states themselves, with which the matrices are least squares; the covariances of what those leave give the
-/// Kalman gain. With `refined`, `B` and `D` are then found anew, so that one-step forecasts err least.
+/// Kalman gain. With `refined`, `B`, `D` and the gain are then found anew, so that one-step forecasts err least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subspace {
     /// How many samples past and future have each, 2 or more.
@@ -36,7 +37,7 @@ pub struct Subspace {
     pub alike: usize,
     /// Whether inputs act on the output of the same sample.
     pub feedthrough: bool,
-    /// Whether `B` and `D` are found anew.
+    /// Whether `B`, `D` and the gain are found anew.
     pub refined: bool,
 }
 
@@ -96,7 +97,8 @@ impl Subspace {
     ///
     /// # Errors
     /// [`NumericsError::Parameter`], [`NumericsError::TooFewStretches`] when there are not twice as many as a past has values,
-    /// [`NumericsError::NotFinite`], [`NumericsError::NoConvergence`] for outputs that do not vary.
+    /// [`NumericsError::NotFinite`], [`NumericsError::NoStates`] for outputs that the inputs of the same time explain but for
+    /// rounding, [`NumericsError::NoConvergence`].
     pub fn identify(
         &self,
         records: &[Record<'_>],
@@ -113,6 +115,9 @@ impl Subspace {
             });
         }
         let projected = lagged.projected()?;
+        if !projected.leaves_outputs() {
+            return Err(NumericsError::NoStates);
+        }
         let (values, observability) = self.ranked(&projected)?;
         let order = match self.order {
             StateOrder::Given(order) => order,
@@ -142,7 +147,7 @@ impl Subspace {
         }
         let mut errors = (0.0, 0);
         for record in records {
-            let expected = model.one_step(record);
+            let expected = model.one_step(record, &vec![0.0; order]);
             for (y, expected) in record.outputs.iter().zip(&expected).skip(self.horizon) {
                 errors.0 += (y - expected).powi(2);
                 errors.1 += 1;
@@ -227,7 +232,7 @@ impl Subspace {
         };
         let values: Vec<f64> = squares.iter().map(|square| square.sqrt()).collect();
         if values.first().is_none_or(|&largest| largest <= 0.0) {
-            return Err(NumericsError::NoConvergence);
+            return Err(NumericsError::NoStates);
         }
         let scaled = Mat::from_fn(shown.nrows(), shown.ncols(), |i, j| {
             shown[(i, j)] * values[j].sqrt()
@@ -251,7 +256,8 @@ impl StateOrder {
             }
             Self::LargestGap => {
                 let most = (horizon / 2).max(1).min(values.len() - 1);
-                let falls = |nth: usize| values[nth - 1] / values[nth].max(f64::MIN_POSITIVE);
+                let least = (ROUNDING * values[0]).max(f64::MIN_POSITIVE);
+                let falls = |nth: usize| values[nth - 1].max(least) / values[nth].max(least);
                 (1..=most)
                     .reduce(|a, b| if falls(b) > falls(a) { b } else { a })
                     .unwrap_or(1)
@@ -392,89 +398,4 @@ impl Regression {
             vec![0.0; order]
         }
     }
-}
-
-/// Finds `B`, `D` and the state in which each record begins such that one-step forecasts err least: with `A`, `C` and the gain
-/// given, that is linear (Ljung 1999, section 10.6).
-fn refine(
-    model: &mut StateSpace,
-    records: &[Record<'_>],
-    width: usize,
-    feedthrough: bool,
-) -> Result<(), NumericsError> {
-    let order = model.order();
-    let of_inputs = order * width + if feedthrough { width } else { 0 };
-    let columns = of_inputs + order;
-    if of_inputs == 0 {
-        return Ok(());
-    }
-    let filter = Mat::from_fn(order, order, |i, j| {
-        model.a[(i, j)] - model.k[i] * model.c[j]
-    });
-    let mut own = Mat::<f64>::zeros(columns, columns);
-    let mut with_output = Mat::<f64>::zeros(columns, 1);
-    let mut whole = Mat::<f64>::zeros(of_inputs, of_inputs);
-    let mut total_own = Mat::<f64>::zeros(of_inputs, of_inputs);
-    let mut total_with = Mat::<f64>::zeros(of_inputs, 1);
-    for record in records {
-        own.fill(0.0);
-        with_output.fill(0.0);
-        let mut known = vec![0.0; order];
-        // Each column is the state that a unit of one coefficient brings about.
-        let mut brought = Mat::<f64>::zeros(order, columns);
-        for i in 0..order {
-            brought[(i, of_inputs + i)] = 1.0;
-        }
-        for t in 0..record.len() {
-            let input = record.input(t);
-            let mut row: Vec<f64> = (0..columns)
-                .map(|j| (0..order).map(|i| model.c[i] * brought[(i, j)]).sum())
-                .collect();
-            if feedthrough {
-                for (j, u) in input.iter().enumerate() {
-                    row[order * width + j] += u;
-                }
-            }
-            let rest = record.outputs[t] - product(&model.c, &known);
-            for (i, a) in row.iter().enumerate() {
-                with_output[(i, 0)] += a * rest;
-                for (j, b) in row.iter().enumerate() {
-                    own[(i, j)] += a * b;
-                }
-            }
-            let carried = |state: &[f64], i: usize| -> f64 {
-                (0..order).map(|l| filter[(i, l)] * state[l]).sum()
-            };
-            known = (0..order)
-                .map(|i| carried(&known, i) + model.k[i] * record.outputs[t])
-                .collect();
-            brought = &filter * &brought;
-            for (j, u) in input.iter().enumerate() {
-                for i in 0..order {
-                    brought[(i, j * order + i)] += u;
-                    if feedthrough {
-                        brought[(i, order * width + j)] -= model.k[i] * u;
-                    }
-                }
-            }
-        }
-        // The beginning is this record's own: it is taken out before records are summed.
-        let begin = own.submatrix(of_inputs, of_inputs, order, order).to_owned();
-        let across = own.submatrix(0, of_inputs, of_inputs, order) * pseudo_inverse(&begin)?;
-        whole += own.submatrix(0, 0, of_inputs, of_inputs);
-        total_own += own.submatrix(0, 0, of_inputs, of_inputs)
-            - &across * own.submatrix(of_inputs, 0, order, of_inputs);
-        total_with +=
-            with_output.subrows(0, of_inputs) - &across * with_output.subrows(of_inputs, order);
-    }
-    let found = pseudo_inverse_left(&total_own, &whole)? * total_with;
-    for j in 0..width {
-        for i in 0..order {
-            model.b[(i, j)] = found[(j * order + i, 0)];
-        }
-        if feedthrough {
-            model.d[j] = found[(order * width + j, 0)];
-        }
-    }
-    Ok(())
 }

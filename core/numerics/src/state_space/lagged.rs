@@ -8,7 +8,7 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use super::Record;
 use crate::NumericsError;
 
-/// Windows are summed so many at a time.
+/// Rows are summed so many at a time.
 const AT_ONCE: usize = 256;
 /// Directions in which a matrix is below this share of its largest have rounding in them and nothing else.
 const ROUNDING: f64 = 1e-13;
@@ -18,6 +18,44 @@ const LEFT: f64 = 1e-8;
 /// Where the windows of twice the horizon begin that lie in a record.
 pub(super) fn windows(record: &Record<'_>, horizon: usize) -> Range<usize> {
     0..(record.len() + 1).saturating_sub(2 * horizon)
+}
+
+/// The sums of products of rows of numbers.
+pub(super) struct Products {
+    sum: Mat<f64>,
+    rows: Vec<f64>,
+}
+
+impl Products {
+    pub(super) fn new(columns: usize) -> Self {
+        Self {
+            sum: Mat::zeros(columns, columns),
+            rows: Vec::with_capacity(AT_ONCE * columns),
+        }
+    }
+
+    pub(super) fn add(&mut self, row: &[f64]) {
+        self.rows.extend_from_slice(row);
+        if self.rows.len() >= AT_ONCE * row.len() {
+            self.sum_up();
+        }
+    }
+
+    pub(super) fn summed(mut self) -> Mat<f64> {
+        self.sum_up();
+        self.sum
+    }
+
+    fn sum_up(&mut self) {
+        let columns = self.sum.nrows();
+        let rows = self.rows.len() / columns;
+        if rows > 0 {
+            let block = MatRef::from_column_major_slice(&self.rows, columns, rows);
+            let sum = self.sum.as_mut();
+            matmul(sum, Accum::Add, block, block.transpose(), 1.0, Par::Seq);
+            self.rows.clear();
+        }
+    }
 }
 
 /// The mean products of past inputs and outputs, future inputs and future outputs, in this order, over all windows.
@@ -32,38 +70,23 @@ impl Lagged {
     /// Over windows of twice the horizon.
     pub(super) fn of(records: &[Record<'_>], width: usize, horizon: usize) -> Self {
         let order = 2 * horizon * (width + 1);
-        let mut sum = Mat::<f64>::zeros(order, order);
-        let mut rows: Vec<f64> = Vec::with_capacity(AT_ONCE * order);
+        let mut sum = Products::new(order);
+        let mut row = Vec::with_capacity(order);
         let mut count = 0;
-        let mut add = |rows: &mut Vec<f64>| {
-            let block = MatRef::from_column_major_slice(rows, order, rows.len() / order);
-            matmul(
-                sum.as_mut(),
-                Accum::Add,
-                block,
-                block.transpose(),
-                1.0,
-                Par::Seq,
-            );
-            rows.clear();
-        };
         for record in records {
             for begin in windows(record, horizon) {
+                row.clear();
                 for half in [begin, begin + horizon] {
                     for at in half..half + horizon {
-                        rows.extend_from_slice(record.input(at));
+                        row.extend_from_slice(record.input(at));
                     }
-                    rows.extend_from_slice(&record.outputs[half..half + horizon]);
+                    row.extend_from_slice(&record.outputs[half..half + horizon]);
                 }
+                sum.add(&row);
                 count += 1;
-                if rows.len() == AT_ONCE * order {
-                    add(&mut rows);
-                }
             }
         }
-        if !rows.is_empty() {
-            add(&mut rows);
-        }
+        let sum = sum.summed();
         let mean = count.max(1) as f64;
         Self {
             products: Mat::from_fn(order, order, |i, j| sum[(i, j)] / mean),
@@ -116,6 +139,14 @@ pub(super) struct Projected {
     pub(super) outputs_left: Mat<f64>,
     /// What is left of outputs in a direction in which there is more than rounding.
     pub(super) least_output: f64,
+}
+
+impl Projected {
+    /// Whether the future inputs leave more of the future outputs than rounding.
+    pub(super) fn leaves_outputs(&self) -> bool {
+        let left = &self.outputs_left;
+        (0..left.nrows()).any(|i| left[(i, i)] > self.least_output)
+    }
 }
 
 /// Eigenvalues in falling order, none below 0, and the vectors that belong to them.

@@ -4,6 +4,7 @@
 mod identify;
 mod lagged;
 mod model;
+mod refine;
 #[cfg(test)]
 mod tests;
 

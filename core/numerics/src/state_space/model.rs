@@ -74,10 +74,10 @@ impl StateSpace {
         }
     }
 
-    /// The forecasts of each sample of a record from those before, from a state of 0 on.
+    /// The forecasts of each sample of a record from those before, from a state on.
     #[must_use]
-    pub fn one_step(&self, record: &Record<'_>) -> Vec<f64> {
-        let mut state = vec![0.0; self.order()];
+    pub fn one_step(&self, record: &Record<'_>, start: &[f64]) -> Vec<f64> {
+        let mut state = start.to_vec();
         (0..record.len())
             .map(|t| {
                 let input = record.input(t);

@@ -1,8 +1,7 @@
 //! The identification against `sippy_unipi`, and models that are known.
 
 use super::{Record, StateOrder, Subspace, Weighting};
-use crate::NumericsError;
-use crate::oracle;
+use crate::{NumericsError, draws, oracle};
 
 const PLAIN: Subspace = Subspace {
     horizon: 8,
@@ -101,7 +100,7 @@ fn the_difference_equation_forecasts_what_the_states_do() {
         ..PLAIN
     };
     let model = how.identify(&[record], 2).unwrap().model;
-    let by_states = model.one_step(&record);
+    let by_states = model.one_step(&record, &[0.0; 3]);
     let equation = model.difference_equation();
     assert_eq!(
         (equation.a.len(), equation.b.len(), equation.c.len()),
@@ -283,7 +282,8 @@ fn wrong_requests_are_refused() {
         inputs: &inputs,
         outputs: &still,
     };
-    assert!(PLAIN.identify(&[still], 2).is_err());
+    let still = PLAIN.identify(&[still], 2).unwrap_err();
+    assert_eq!(still, NumericsError::NoStates);
 }
 
 /// A record whose first input is the last output, as far as so much noise lets it be, its second the mean of the last two.
@@ -316,5 +316,97 @@ fn canonical_correlations_are_1_at_most_where_an_input_is_the_last_output() {
         let found = how.identify(&[record], 2).unwrap();
         let values = found.singular_values;
         assert!(values[0] < 1.0 + 1e-4, "{noise}: {values:?}");
+    }
+}
+
+/// So many samples of `y(t) = (q⁻¹ + 0.5 q⁻²)/A u(t) + (1 + 0.6 q⁻¹)/A e(t)`, `A = 1 − 1.5 q⁻¹ + 0.54 q⁻²`, with `e` of
+/// variance 0.25; the sum of the squares of `e` after the first `skipped`.
+fn armax(samples: usize, seed: u64, skipped: usize) -> (Vec<f64>, Vec<f64>, f64) {
+    let mut normal = draws::normal(seed);
+    let (mut u, mut e, mut y) = ([0.0; 2], 0.0, [0.0; 2]);
+    let (mut inputs, mut outputs, mut squares) = (Vec::new(), Vec::new(), 0.0);
+    for t in 0..samples + 100 {
+        let (now, innovation) = (normal(), 0.5 * normal());
+        let output = 1.5 * y[0] - 0.54 * y[1] + u[0] + 0.5 * u[1] + innovation + 0.6 * e;
+        (u, e, y) = ([now, u[0]], innovation, [output, y[0]]);
+        if t >= 100 {
+            inputs.push(now);
+            outputs.push(output);
+        }
+        if t >= 100 + skipped {
+            squares += innovation * innovation;
+        }
+    }
+    (inputs, outputs, squares)
+}
+
+#[test]
+fn on_some_hundred_rows_the_gain_is_near_that_of_the_true_model() {
+    for weighting in WEIGHTINGS {
+        for seed in 0..5 {
+            let (inputs, outputs, squares) = armax(400, seed, 10);
+            let record = Record {
+                inputs: &inputs,
+                outputs: &outputs,
+            };
+            let how = Subspace {
+                horizon: 10,
+                weighting,
+                order: StateOrder::Given(2),
+                refined: true,
+                ..PLAIN
+            };
+            let found = how.identify(&[record], 1).unwrap();
+            let ratio = (found.errors.0 / squares).sqrt();
+            assert!(ratio < 1.05, "{weighting:?} {seed}: {ratio}");
+            let c = found.model.difference_equation().c;
+            near(c[0], 0.6, 0.15);
+            near(c[1], 0.0, 0.15);
+        }
+    }
+}
+
+const WEIGHTINGS: [Weighting; 3] = [Weighting::N4sid, Weighting::Moesp, Weighting::Cva];
+
+#[test]
+fn outputs_that_inputs_explain_at_once_have_no_states() {
+    let (inputs, _, _) = scaled();
+    let outputs: Vec<f64> = inputs.chunks_exact(2).map(|u| u[0] - u[1]).collect();
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    for weighting in WEIGHTINGS {
+        let how = Subspace { weighting, ..PLAIN };
+        let found = how.identify(&[record], 2).unwrap_err();
+        assert_eq!(found, NumericsError::NoStates, "{weighting:?}");
+    }
+}
+
+#[test]
+fn without_noise_the_states_are_exact_and_the_gain_is_nothing() {
+    let (inputs, _, _) = scaled();
+    let mut states = [0.0; 2];
+    let mut outputs = Vec::new();
+    for u in inputs.chunks_exact(2) {
+        outputs.push(states[0] + states[1] + 0.3 * u[0]);
+        states = [0.9 * states[0] + u[0], 0.6 * states[1] + u[1] - u[0]];
+    }
+    let record = Record {
+        inputs: &inputs,
+        outputs: &outputs,
+    };
+    for weighting in WEIGHTINGS {
+        let how = Subspace {
+            weighting,
+            order: StateOrder::LargestGap,
+            refined: true,
+            ..PLAIN
+        };
+        let found = how.identify(&[record], 2).unwrap();
+        assert_eq!(found.model.k, [0.0; 2], "{weighting:?}");
+        let equation = found.model.difference_equation();
+        near(equation.a[0], -1.5, 1e-6);
+        near(equation.a[1], 0.54, 1e-6);
     }
 }

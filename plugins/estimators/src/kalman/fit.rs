@@ -204,6 +204,12 @@ impl KalmanTrainer {
             report
                 .notes
                 .push(format!("most likely are noises = {noises}"));
+            if told.is_still() {
+                report.notes.push(
+                    "the level does not move: the rows are as likely without a noise of it"
+                        .to_owned(),
+                );
+            }
         }
         if self.stride > 1 {
             report.figure("rows_apart", self.stride);

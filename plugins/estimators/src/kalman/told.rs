@@ -23,8 +23,13 @@ impl Hourly {
             observation: model.observation.sqrt(),
             level: (model.level * PER_S).sqrt(),
             trend: model.trend.map(|trend| (trend * PER_S).sqrt() * PER_S),
-            returns_s: (model.returning > 0.0).then(|| 1.0 / model.returning),
+            returns_s: (model.returning > 0.0 && model.level > 0.0).then(|| 1.0 / model.returning),
         }
+    }
+
+    /// Whether nothing moves the level; the time in which it would return then means nothing.
+    pub(super) fn is_still(&self) -> bool {
+        self.level == 0.0 && self.trend.is_none_or(|trend| trend == 0.0)
     }
 
     /// For programs.
@@ -50,7 +55,8 @@ impl Hourly {
         parts.push("per = \"1h\"".to_owned());
         let returns = self.returns_s.map(significant);
         let returns = returns.and_then(Duration::from_secs_f64);
-        parts.extend(returns.map(|returns| format!("returns = \"{returns}\"")));
+        let least = Duration::from_ns(1);
+        parts.extend(returns.map(|returns| format!("returns = \"{}\"", returns.max(least))));
         format!("{{ {} }}", parts.join(", "))
     }
 }
@@ -87,7 +93,7 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
         wandering("level", hourly.level),
     ];
     noises.extend(hourly.trend.map(|trend| wandering("trend", trend)));
-    let returns = model.trend.is_none().then(|| Mode {
+    let returns = (model.trend.is_none() && !hourly.is_still()).then(|| Mode {
         of: "level".to_owned(),
         time_constant_s: 1.0 / model.returning,
         period_s: None,
@@ -96,5 +102,37 @@ pub(super) fn coefficients(of: &KalmanPredictor) -> Coefficients {
         noises,
         modes: returns.into_iter().collect(),
         ..Coefficients::linear(of.predict(&vec![0.0; scales.len()]), &values, Some(&errors))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use athermal_numerics::Passage;
+
+    use super::*;
+
+    fn given(level: f64, returning: f64) -> String {
+        let model = Structural {
+            observation: 4.0,
+            level,
+            trend: None,
+            returning,
+            passage: Passage::Continuous,
+        };
+        Hourly::of(&model).as_given("V")
+    }
+
+    #[test]
+    fn a_level_that_nothing_moves_has_no_time_in_which_it_returns() {
+        assert_eq!(
+            given(0.0, 55.0),
+            "{ observation = \"2 V\", level = \"0 V\", per = \"1h\" }"
+        );
+    }
+
+    #[test]
+    fn a_level_that_returns_at_once_does_so_in_a_time_that_can_be_given() {
+        let told = given(1.0, 1e15);
+        assert!(told.ends_with("returns = \"1ns\" }"), "{told}");
     }
 }
