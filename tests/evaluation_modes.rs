@@ -487,7 +487,7 @@ fn arx_runs_free_on_the_hairdryer_as_the_textbook_has_it() {
     assert!((fit - 85.508).abs() < 0.01, "{fit}");
     for node in ["output_error", "armax", "box_jenkins"] {
         let fit = figure(&free, node, "fit");
-        assert!(fit > 85.0, "{node}: {fit}");
+        assert!(fit > 81.0, "{node}: {fit}");
     }
 }
 

@@ -40,9 +40,6 @@ pub(super) struct Identified {
     /// The standard deviation of a prediction one step after the newest truth, two steps and so on.
     #[serde(with = "numbers")]
     pub(super) deviations: Vec<f64>,
-    /// The share of the filters of the inputs in what the first truth is off by, where there is noise beside them.
-    #[serde(default)]
-    pub(super) of_filters: f64,
 }
 
 #[typetag::serde(name = "identified")]
@@ -72,10 +69,6 @@ impl Predictor for Identified {
         }
         mistakes.extend(Mistake::unless_lasting("step", self.step));
         mistakes.extend(super::told::mistakes(self));
-        if !(0.0..=1.0).contains(&self.of_filters) {
-            let message = format!("`of_filters` is {} and must be 0 to 1", self.of_filters);
-            mistakes.push(Mistake::at("of_filters", message));
-        }
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
         }
@@ -163,14 +156,28 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
-            of_filters: if of.model.follows() {
-                of.of_filters
-            } else {
-                1.0
-            },
+            of_filters: of_filters(of),
             room: RefCell::new(vec![0.0; stepper.remembers()]),
             scratch: RefCell::new(stepper),
         }
+    }
+}
+
+/// The share of the filters of the inputs in what the first truth is off by: that of the variance which inputs as in the fit,
+/// staying as they are for long, give them beside that of the noise. Noise that is integrated has all, since it may be anywhere.
+fn of_filters(of: &Identified) -> f64 {
+    let model = &of.model;
+    if !model.follows() {
+        return 1.0;
+    }
+    let filters = model.inputs.iter().filter(|input| !input.f.is_empty());
+    let filters: f64 = filters.map(|input| input.gain().powi(2)).sum();
+    let noise = of.deviations.last().map_or(f64::NAN, |of| of.powi(2));
+    let share = filters / (filters + noise);
+    if model.differences == 0 && share.is_finite() {
+        share
+    } else {
+        0.0
     }
 }
 

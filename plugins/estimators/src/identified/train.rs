@@ -182,13 +182,6 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
-        // That of the variance of the truth that the noise does not explain; noise that is integrated may be anywhere.
-        let noise = variances.last().map_or(0.0, |sum| variance * sum);
-        let of_filters = if found.model.differences == 0 {
-            (1.0 - noise / samples.spread().powi(2)).max(0.0)
-        } else {
-            0.0
-        };
         Ok(Identified {
             regressors: self.names.clone(),
             scaling: Scaling {
@@ -200,7 +193,6 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 .iter()
                 .map(|sum| (variance * sum).sqrt())
                 .collect(),
-            of_filters,
             model: found.model,
             errors: found.errors,
             step: pace.step,
@@ -329,10 +321,15 @@ impl Asked {
         let most = MOST_WORK / orders.coefficients().max(1);
         // Truths are in units of their spread.
         let filters = orders.inputs.iter().filter(|input| input.nf > 0).count();
+        let spread = if orders.nc + orders.nd > 0 {
+            START_SPREAD_IN_NOISE
+        } else {
+            START_SPREAD
+        };
         PredictionError {
             penalty,
             most_steps: most.clamp(20, 100),
-            start_spread: START_SPREAD / (filters.max(1) as f64).sqrt(),
+            start_spread: spread / (filters.max(1) as f64).sqrt(),
         }
     }
 
@@ -345,9 +342,11 @@ impl Asked {
     }
 }
 
-/// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth: so wide that
-/// it only keeps from starts that a few samples cannot tell.
+/// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth: wide, to keep
+/// only from starts that few samples tell.
 const START_SPREAD: f64 = 3.0;
+/// The same beside a noise model, from which a slow filter that begins far away is hardly told.
+const START_SPREAD_IN_NOISE: f64 = 1.0;
 
 /// Of pieces without a gap that are shorter on average, noise polynomials come out smaller than they are.
 const SHORT_PIECE: usize = 50;

@@ -27,7 +27,6 @@ fn identified(step: Duration) -> Identified {
         errors: None,
         step,
         series: 1,
-        of_filters: 0.0,
         deviations: vec![1.0],
     }
 }
