@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::roots::{is_within, reflected};
+use super::roots::{is_within, on_edge, reflected};
 
 /// How many coefficients each polynomial has, in the letters of Ljung (1999), chapter 4.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -224,6 +224,24 @@ impl Polynomials {
             *p = reflected(p, 1.0);
         }
         self.c = reflected(&self.c, radius);
+        self
+    }
+
+    /// The same with those `F` and `C` of which coefficients are held, in the order of [`flat`](Self::flat), at the edge of what
+    /// is stable within this radius.
+    pub(super) fn on_edge(mut self, held: &[bool], radius: f64) -> Self {
+        let mut at = usize::from(self.differences == 0) + self.a.len();
+        let mut edge = |p: &mut Vec<f64>, skipped: usize| {
+            at += skipped;
+            if held[at..at + p.len()].contains(&true) {
+                *p = on_edge(p, radius);
+            }
+            at += p.len();
+        };
+        for input in &mut self.inputs {
+            edge(&mut input.f, input.b.len());
+        }
+        edge(&mut self.c, 0);
         self
     }
 

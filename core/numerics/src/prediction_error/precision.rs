@@ -49,7 +49,7 @@ impl PredictionError {
 
 /// Which coefficients, in the order of [`flat`](Polynomials::flat), are of a polynomial that would be better outside of the
 /// bound of stability.
-fn held(
+pub(super) fn held(
     model: &Polynomials,
     hessian: &Mat<f64>,
     gradient: &[f64],

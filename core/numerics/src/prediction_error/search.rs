@@ -4,6 +4,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::initial;
+use super::precision::held;
 use super::residuals::{Counted, Left, Segment, counted_from, inverse_with, left};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
@@ -14,6 +15,10 @@ const TOLERANCE: f64 = 1e-14;
 /// A search that ends while it still gains more than this has not converged.
 const SMALL: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e12;
+/// Sums that differ by this share are the same but for rounding.
+const SAME: f64 = 1e-12;
+/// Steps by the gradient alone at the end.
+const POLISHING: usize = 4;
 
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B`, by damped Gauss–Newton
 /// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models.
@@ -112,35 +117,41 @@ impl PredictionError {
         if starts == 0 || self.start_spread.is_infinite() {
             return self.best_from(begin, samples, counted, radius);
         }
-        self.best_of_starts(begin, samples, counted, radius)
+        self.best_of_starts(&begin, samples, counted, radius)
     }
 
     /// The same where something is known of starts. How large innovations are, and so what a start counts beside them, is known
     /// afterwards: it is searched once with starts that count nothing and once with such as count as if all began at rest, then
-    /// from both with what these find, and the likelier is taken.
+    /// from both with what the latter find, and from the likelier with what that finds.
     fn best_of_starts(
         &self,
-        begin: Vec<Polynomials>,
+        begin: &[Polynomials],
         samples: &Samples,
         counted: Counted,
         radius: f64,
     ) -> Result<PredictionErrorFit, NumericsError> {
         let rows = samples.counted(counted.first) as f64;
         let with = |start: f64| Counted { start, ..counted };
-        let of = |squares: f64| with(squares / rows / (self.start_spread * self.start_spread));
+        let of = |sum: f64| with(sum / rows / (self.start_spread * self.start_spread));
+        let search = |from: &[Polynomials], counted| {
+            let found = self.best_from(from.to_vec(), samples, counted, radius)?;
+            // Of all sums this one, being least, is the surest.
+            let sum = left(&found.model, samples, counted).sum(counted);
+            Ok::<_, NumericsError>((sum, found.model))
+        };
         let at_rest = |model: &Polynomials| left(model, samples, with(f64::INFINITY)).squares;
         let least = begin.iter().map(at_rest).fold(f64::INFINITY, f64::min);
-        let mut best: Option<(f64, PredictionErrorFit)> = None;
-        for first in [with(0.0), of(least)] {
-            let found = self.best_from(begin.clone(), samples, first, radius)?;
-            let counted = of(found.residual_sum_of_squares);
-            let fit = self.best_from(vec![found.model], samples, counted, radius)?;
-            let unlikely = left(&fit.model, samples, counted).unlikely(counted, rows);
-            if best.as_ref().is_none_or(|(least, _)| unlikely < *least) {
-                best = Some((unlikely, fit));
-            }
-        }
-        best.map(|(_, fit)| fit).ok_or(NumericsError::NotFinite)
+        let (_, free) = search(begin, with(0.0))?;
+        let (sum, held) = search(begin, of(least))?;
+        let counted = of(sum);
+        let unlikely = |model: &Polynomials| left(model, samples, counted).unlikely(counted, rows);
+        let (free, held) = (search(&[free], counted)?, search(&[held], counted)?);
+        let (sum, model) = if unlikely(&free.1) < unlikely(&held.1) {
+            free
+        } else {
+            held
+        };
+        self.best_from(vec![model], samples, of(sum), radius)
     }
 
     /// Searches from the best of several models.
@@ -159,6 +170,7 @@ impl PredictionError {
             .min_by(|(sum, _), (other, _)| sum.total_cmp(other));
         let (_, start) = best.ok_or(NumericsError::NotFinite)?;
         let (model, steps, converged) = self.search(start, samples, counted, radius);
+        let model = self.polished(model, samples, counted, radius);
         let Left { squares, told, .. } = left(&model, samples, counted);
         Ok(PredictionErrorFit {
             residual_sum_of_squares: squares,
@@ -227,6 +239,43 @@ impl PredictionError {
             }
         }
         (model, self.most_steps, gained <= SMALL * least)
+    }
+
+    /// A few whole steps more, with what is held back from instability at its edge. Where the sum hardly changes it is known less
+    /// exactly than its gradient, by which they go.
+    fn polished(
+        &self,
+        mut model: Polynomials,
+        samples: &Samples,
+        counted: Counted,
+        radius: f64,
+    ) -> Polynomials {
+        let most = self.objective(&model, samples, counted) * (1.0 + SAME);
+        for _ in 0..POLISHING {
+            let (hessian, gradient) = self.normal_equations(&model, samples, counted);
+            let Some(held) = held(&model, &hessian, &gradient, radius) else {
+                break;
+            };
+            let at_edge = model.clone().on_edge(&held, radius);
+            let (hessian, gradient) = self.normal_equations(&at_edge, samples, counted);
+            let damping = held
+                .iter()
+                .map(|&held| if held { f64::INFINITY } else { 0.0 });
+            let Some(change) = descend(&hessian, &gradient, &damping.collect::<Vec<_>>()) else {
+                break;
+            };
+            let flat = at_edge.flat();
+            let moved: Vec<f64> = flat.iter().zip(&change).map(|(at, by)| at - by).collect();
+            let tried = at_edge.with(&moved);
+            let stable = !tried.unstable(radius).contains(&true);
+            // Written so that NaN fails.
+            let as_good = stable && self.objective(&tried, samples, counted) <= most;
+            if !as_good {
+                break;
+            }
+            model = tried;
+        }
+        model
     }
 
     /// `JᵀJ` and `Jᵀε`, with the penalty.
