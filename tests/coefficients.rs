@@ -305,8 +305,9 @@ fn polynomials_and_their_standard_errors_are_those_of_the_oracle_in_the_units_of
         };
         let wanted = list("coefficients").into_iter().zip(list("errors"));
         for (nth, (term, (value, error))) in found.terms.iter().zip(wanted).enumerate() {
+            // What is known of starts, of which the oracle knows nothing, moves a coefficient by next to nothing of its error.
             assert!(
-                (term.value - value).abs() < 5e-5,
+                (term.value - value).abs() < 5e-5_f64.max(1e-3 * error),
                 "{name}: {term:?}, not {value}"
             );
             // The constant of a model with inputs has none.

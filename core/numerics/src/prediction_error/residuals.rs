@@ -12,7 +12,7 @@ use faer::Mat;
 use super::brought::Brought;
 use super::ring::Ring;
 use super::{Orders, Polynomials, Samples};
-use crate::state_space::{pseudo_inverse_left, spectrum};
+use crate::state_space::pseudo_inverse_left;
 
 /// What is to be known beside the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +55,34 @@ impl Counted {
     }
 }
 
+/// Sums of the products of all of one list with all of another.
+pub(super) struct Products {
+    columns: usize,
+    rows: Vec<f64>,
+}
+
+impl Products {
+    pub(super) fn new(rows: usize, columns: usize) -> Self {
+        Self {
+            columns,
+            rows: vec![0.0; rows * columns],
+        }
+    }
+
+    pub(super) fn add(&mut self, rows: &[f64], columns: &[f64]) {
+        for (sums, a) in self.rows.chunks_exact_mut(self.columns.max(1)).zip(rows) {
+            for (sum, b) in sums.iter_mut().zip(columns) {
+                *sum += a * b;
+            }
+        }
+    }
+
+    pub(super) fn sums(&self) -> Mat<f64> {
+        let count = self.rows.len() / self.columns.max(1);
+        Mat::from_fn(count, self.columns, |i, j| self.rows[i * self.columns + j])
+    }
+}
+
 /// Where the filters of a segment begin.
 pub(super) struct Start {
     /// How far off what they gave before is from rest: the newest value of the first filter, the one before and so on, and the
@@ -62,8 +90,6 @@ pub(super) struct Start {
     pub(super) values: Vec<f64>,
     /// How many of them its residuals tell; the others stay at rest.
     pub(super) told: f64,
-    /// `ln det(I + GᵀG/λ)`, of the derivatives `G` by them and what the square of each counts, `λ`.
-    pub(super) log_determinant: f64,
 }
 
 /// The inverse of products of derivatives by the start, with what the start itself counts.
@@ -99,32 +125,23 @@ impl<'a> Segment<'a> {
         let mut start = Start {
             values: vec![0.0; count],
             told: 0.0,
-            log_determinant: 0.0,
         };
         if count == 0 || self.counted.start.is_infinite() {
             return start;
         }
-        let mut own = Mat::<f64>::zeros(count, count);
-        let mut with_residual = Mat::<f64>::zeros(count, 1);
+        let mut own = Products::new(count, count);
+        let mut with_residual = Products::new(count, 1);
         self.follow(&start.values, Derived::ByStart, |residual| {
-            for (i, a) in residual.by_start.iter().enumerate() {
-                with_residual[(i, 0)] -= a * residual.value;
-                for (j, b) in residual.by_start.iter().enumerate() {
-                    own[(i, j)] += a * b;
-                }
-            }
+            own.add(residual.by_start, residual.by_start);
+            with_residual.add(residual.by_start, &[-residual.value]);
         });
+        let (own, with_residual) = (own.sums(), with_residual.sums());
         // Where the filters grow beyond all numbers, the residuals tell so.
         if let Some(inverse) = inverse_with(self.counted, own.clone()) {
             let values = &inverse * with_residual;
             start.values = (0..count).map(|i| values[(i, 0)]).collect();
             let told = inverse * &own;
             start.told = (0..count).map(|i| told[(i, i)]).sum();
-            if self.counted.start > 0.0 {
-                let own = spectrum(&own).map_or_else(|_| Vec::new(), |(own, _)| own);
-                let each = own.iter().map(|own| (own / self.counted.start).ln_1p());
-                start.log_determinant = each.sum();
-            }
         }
         start
     }
@@ -230,8 +247,6 @@ pub(super) struct Left {
     pub(super) of_starts: f64,
     /// How many starts the residuals tell.
     pub(super) told: f64,
-    /// The sum of those of the starts.
-    pub(super) log_determinant: f64,
 }
 
 impl Left {
@@ -245,11 +260,6 @@ impl Left {
         };
         self.squares + of_starts
     }
-
-    /// How unlikely so many residuals are beside starts that are normal: `−2 ln L` but for a constant (Harville 1977).
-    pub(super) fn unlikely(&self, counted: Counted, rows: f64) -> f64 {
-        rows * (self.sum(counted) / rows).ln() + self.log_determinant
-    }
 }
 
 pub(super) fn left(model: &Polynomials, samples: &Samples, counted: Counted) -> Left {
@@ -262,7 +272,6 @@ pub(super) fn left(model: &Polynomials, samples: &Samples, counted: Counted) -> 
         });
         left.of_starts += start.values.iter().map(|value| value * value).sum::<f64>();
         left.told += start.told;
-        left.log_determinant += start.log_determinant;
     }
     if !left.squares.is_finite() {
         left.squares = f64::INFINITY;

@@ -3,27 +3,6 @@
 
 use faer::Mat;
 
-/// The same polynomial with all roots so many times as large that the largest just lies within the radius.
-pub(super) fn on_edge(p: &[f64], radius: f64) -> Vec<f64> {
-    let scaled = |by: f64| -> Vec<f64> {
-        let powers = (1..).map(|power| by.powi(power));
-        p.iter().zip(powers).map(|(p, by)| p * by).collect()
-    };
-    let (mut inside, mut outside) = (1.0, 2.0);
-    while outside - inside > f64::EPSILON {
-        let middle = 0.5 * (inside + outside);
-        if middle <= inside || middle >= outside {
-            break;
-        }
-        if is_within(&scaled(middle), radius) {
-            inside = middle;
-        } else {
-            outside = middle;
-        }
-    }
-    scaled(inside)
-}
-
 /// How far inside the circle a root must lie that is brought there, as a share of the radius.
 const LARGEST: f64 = 0.9995;
 
@@ -49,6 +28,27 @@ pub(super) fn is_within(polynomial: &[f64], radius: f64) -> bool {
             .collect();
     }
     true
+}
+
+/// The same polynomial with all roots so many times as large that the largest just lies within the radius.
+pub(super) fn on_edge(p: &[f64], radius: f64) -> Vec<f64> {
+    let scaled = |by: f64| -> Vec<f64> {
+        let powers = (1..).map(|power| by.powi(power));
+        p.iter().zip(powers).map(|(p, by)| p * by).collect()
+    };
+    let (mut inside, mut outside) = (1.0, 2.0);
+    while outside - inside > f64::EPSILON {
+        let middle = 0.5 * (inside + outside);
+        if middle <= inside || middle >= outside {
+            break;
+        }
+        if is_within(&scaled(middle), radius) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    scaled(inside)
 }
 
 /// The polynomial with its roots outside of the unit circle reflected into it, and those that are then outside of the circle

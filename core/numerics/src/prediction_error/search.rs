@@ -5,7 +5,7 @@ use faer::{Mat, Side};
 
 use super::initial;
 use super::precision::held;
-use super::residuals::{Counted, Left, Segment, counted_from, inverse_with, left};
+use super::residuals::{Counted, Left, Products, Segment, counted_from, inverse_with, left};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
 use crate::{GramBlocks, NumericsError};
@@ -117,15 +117,14 @@ impl PredictionError {
         if starts == 0 || self.start_spread.is_infinite() {
             return self.best_from(begin, samples, counted, radius);
         }
-        self.best_of_starts(&begin, samples, counted, radius)
+        self.best_of_starts(begin, samples, counted, radius)
     }
 
     /// The same where something is known of starts. How large innovations are, and so what a start counts beside them, is known
-    /// afterwards: it is searched once with starts that count nothing and once with such as count as if all began at rest, then
-    /// from both with what the latter find, and from the likelier with what that finds.
+    /// afterwards: it is searched with what the models to begin with leave wherever their filters begin, then once more.
     fn best_of_starts(
         &self,
-        begin: &[Polynomials],
+        begin: Vec<Polynomials>,
         samples: &Samples,
         counted: Counted,
         radius: f64,
@@ -133,25 +132,12 @@ impl PredictionError {
         let rows = samples.counted(counted.first) as f64;
         let with = |start: f64| Counted { start, ..counted };
         let of = |sum: f64| with(sum / rows / (self.start_spread * self.start_spread));
-        let search = |from: &[Polynomials], counted| {
-            let found = self.best_from(from.to_vec(), samples, counted, radius)?;
-            // Of all sums this one, being least, is the surest.
-            let sum = left(&found.model, samples, counted).sum(counted);
-            Ok::<_, NumericsError>((sum, found.model))
-        };
-        let at_rest = |model: &Polynomials| left(model, samples, with(f64::INFINITY)).squares;
-        let least = begin.iter().map(at_rest).fold(f64::INFINITY, f64::min);
-        let (_, free) = search(begin, with(0.0))?;
-        let (sum, held) = search(begin, of(least))?;
-        let counted = of(sum);
-        let unlikely = |model: &Polynomials| left(model, samples, counted).unlikely(counted, rows);
-        let (free, held) = (search(&[free], counted)?, search(&[held], counted)?);
-        let (sum, model) = if unlikely(&free.1) < unlikely(&held.1) {
-            free
-        } else {
-            held
-        };
-        self.best_from(vec![model], samples, of(sum), radius)
+        let free = |model: &Polynomials| left(model, samples, with(0.0)).squares;
+        let least = begin.iter().map(free).fold(f64::INFINITY, f64::min);
+        let found = self.best_from(begin, samples, of(least), radius)?;
+        // Of all sums the one that is least is the surest.
+        let sum = left(&found.model, samples, of(least)).sum(of(least));
+        self.best_from(vec![found.model], samples, of(sum), radius)
     }
 
     /// Searches from the best of several models.
@@ -292,19 +278,14 @@ impl PredictionError {
         let mut by_starts = Mat::<f64>::zeros(count, count);
         for segment in samples.segments() {
             let segment = Segment::new(model, samples, segment, counted);
-            let mut own = Mat::<f64>::zeros(starts, starts);
-            let mut across = Mat::<f64>::zeros(count, starts);
+            let mut own = Products::new(starts, starts);
+            let mut across = Products::new(count, starts);
             segment.derivatives(&segment.start().values, |residual| {
                 rows.push(residual.by, residual.value);
-                for (j, b) in residual.by_start.iter().enumerate() {
-                    for (i, a) in residual.by.iter().enumerate() {
-                        across[(i, j)] += a * b;
-                    }
-                    for (i, a) in residual.by_start.iter().enumerate() {
-                        own[(i, j)] += a * b;
-                    }
-                }
+                own.add(residual.by_start, residual.by_start);
+                across.add(residual.by, residual.by_start);
             });
+            let (own, across) = (own.sums(), across.sums());
             if starts > 0
                 && let Some(inverse) = inverse_with(counted, own)
             {

@@ -150,7 +150,7 @@ impl Projected {
 }
 
 /// Eigenvalues in falling order, none below 0, and the vectors that belong to them.
-pub(crate) fn spectrum(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), NumericsError> {
+pub(super) fn spectrum(matrix: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), NumericsError> {
     let order = matrix.nrows();
     if order == 0 {
         return Ok((Vec::new(), Mat::zeros(0, 0)));
