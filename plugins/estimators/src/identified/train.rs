@@ -321,15 +321,10 @@ impl Asked {
         let most = MOST_WORK / orders.coefficients().max(1);
         // Truths are in units of their spread.
         let filters = orders.inputs.iter().filter(|input| input.nf > 0).count();
-        let spread = if orders.nc + orders.nd > 0 {
-            START_SPREAD_IN_NOISE
-        } else {
-            START_SPREAD
-        };
         PredictionError {
             penalty,
             most_steps: most.clamp(20, 100),
-            start_spread: spread / (filters.max(1) as f64).sqrt(),
+            start_spread: START_SPREAD / (filters.max(1) as f64).sqrt(),
         }
     }
 
@@ -342,11 +337,8 @@ impl Asked {
     }
 }
 
-/// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth: wide, to keep
-/// only from starts that few samples tell.
-const START_SPREAD: f64 = 3.0;
-/// The same beside a noise model, from which a slow filter that begins far away is hardly told.
-const START_SPREAD_IN_NOISE: f64 = 1.0;
+/// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth.
+const START_SPREAD: f64 = 1.0;
 
 /// Of pieces without a gap that are shorter on average, noise polynomials come out smaller than they are.
 const SHORT_PIECE: usize = 50;
