@@ -1,7 +1,7 @@
 //! Decides where the search for a model starts: with least squares on long regressions, which need no start.
 
 use super::brought::{Past, through};
-use super::residuals::{residuals, sum_of_squares};
+use super::residuals::{Counted, Left};
 use super::{Orders, Polynomials, Samples, Transfer};
 use crate::{GramBlocks, LeastSquares, NumericsError, Standardization};
 
@@ -189,22 +189,14 @@ fn hannan_rissanen(
 
 /// The residuals by segment; NaN where there is none.
 fn residuals_of(model: &Polynomials, samples: &Samples) -> Vec<Vec<f64>> {
-    let mut all = Vec::new();
-    for segment in samples.segments() {
-        let mut alone = Samples::new(samples.width());
-        let inputs: Vec<Vec<f64>> = (0..samples.width())
-            .map(|nth| samples.input(segment.clone(), nth))
-            .collect();
-        for (sample, value) in samples.values(segment.clone()).iter().enumerate() {
-            alone.push(inputs.iter().map(|input| input[sample]), *value);
-        }
-        let mut found = Vec::with_capacity(segment.len());
-        residuals(model, &alone, 0, |residual| found.push(residual));
+    let found = Left::by(model, samples, Counted::from(0)).residuals;
+    let segments = samples.segments().zip(found);
+    let filled = segments.map(|(segment, found)| {
         let mut own = vec![f64::NAN; segment.len() - found.len()];
         own.extend(found);
-        all.push(own);
-    }
-    all
+        own
+    });
+    filled.collect()
 }
 
 /// `C` and `D` of what the plant leaves over.
@@ -297,7 +289,7 @@ fn steiglitz_mcbride(
             };
         }
         model.level = level_left(&model, samples);
-        let sum = sum_of_squares(&model, samples, 0);
+        let sum = Left::by(&model, samples, Counted::from(0)).squares;
         if sum.is_finite() && best.as_ref().is_none_or(|(least, _)| sum < *least) {
             best = Some((sum, model));
         }

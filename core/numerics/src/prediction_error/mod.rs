@@ -13,6 +13,7 @@ mod ring;
 mod roots;
 mod samples;
 mod search;
+mod starts;
 mod stepper;
 #[cfg(test)]
 mod tests;

@@ -58,6 +58,12 @@ impl Orders {
     }
 }
 
+/// What a polynomial without its leading 1 makes of the values until now, of which the last is the newest.
+pub(super) fn back(polynomial: &[f64], values: &[f64]) -> f64 {
+    let back = polynomial.iter().zip(values.iter().rev());
+    back.map(|(p, value)| p * value).sum()
+}
+
 /// How many samples the oldest value that counts lies back.
 fn reach(delay: usize, b: usize) -> usize {
     b.checked_sub(1).map_or(0, |b| delay + b)
@@ -172,14 +178,10 @@ impl Polynomials {
     pub fn response(&self, most: usize) -> Vec<f64> {
         let whitening = self.whitening();
         let (mut noise, mut response) = (Vec::with_capacity(most), Vec::with_capacity(most));
-        let past = |polynomial: &[f64], values: &[f64]| -> f64 {
-            let back = polynomial.iter().zip(values.iter().rev());
-            back.map(|(p, value)| p * value).sum()
-        };
         for nth in 0..most {
-            let own = f64::from(u8::from(nth == 0)) - past(&whitening, &noise);
+            let own = f64::from(u8::from(nth == 0)) - back(&whitening, &noise);
             noise.push(own);
-            response.push(own - past(&self.a, &response));
+            response.push(own - back(&self.a, &response));
         }
         response
     }
@@ -191,8 +193,7 @@ impl Polynomials {
         let response = self.response(most);
         let mut sum = 0.0;
         let variances = (0..most).map(|nth| {
-            let back = response[..nth].iter().rev().zip(&self.c);
-            let brought = response[nth] + back.map(|(h, c)| h * c).sum::<f64>();
+            let brought = response[nth] + back(&self.c, &response[..nth]);
             sum += brought * brought;
             sum
         });
@@ -271,6 +272,12 @@ impl Polynomials {
         }
         model.c.iter_mut().chain(&mut model.d).for_each(&mut next);
         model
+    }
+
+    /// The same with coefficients less so much, in the order of [`flat`](Self::flat).
+    pub(super) fn moved(&self, by: &[f64]) -> Self {
+        let moved = self.flat().into_iter().zip(by).map(|(at, by)| at - by);
+        self.with(&moved.collect::<Vec<_>>())
     }
 
     /// Which of the coefficients, in the order of [`flat`](Self::flat), are of a `B`.

@@ -29,7 +29,8 @@ impl PredictionError {
             first: fit.first,
             start: fit.start_counts,
         };
-        let (hessian, gradient) = self.normal_equations(&fit.model, samples, counted);
+        let at = self.judged(fit.model.clone(), samples, counted);
+        let (hessian, gradient) = self.normal_equations(&at, samples, counted);
         let held = held(&fit.model, &hessian, &gradient, remembered(samples))?;
         let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
         let scale = |i: usize| hessian[(free[i], free[i])].sqrt();
@@ -55,12 +56,11 @@ pub(super) fn held(
     gradient: &[f64],
     radius: f64,
 ) -> Option<Vec<bool>> {
-    let flat = model.flat();
-    let mut damping = vec![0.0; flat.len()];
+    let mut damping = vec![0.0; gradient.len()];
     loop {
         let change = descend(hessian, gradient, &damping)?;
-        let moved = flat.iter().zip(&change).map(|(at, by)| at - SHARE * by);
-        let moved = model.with(&moved.collect::<Vec<_>>());
+        let share: Vec<f64> = change.iter().map(|by| SHARE * by).collect();
+        let moved = model.moved(&share);
         let held_before = damping.clone();
         for (of, unstable) in damping.iter_mut().zip(moved.unstable(radius)) {
             if unstable {

@@ -5,13 +5,17 @@ use faer::{Mat, Side};
 
 use super::initial;
 use super::precision::held;
-use super::residuals::{Counted, Left, Products, Segment, counted_from, inverse_with, left};
+use super::residuals::{Counted, Left, Segment, counted_from};
 use super::{InformationCriteria, Orders, Polynomials, Samples};
 use crate::checks::check_penalty;
 use crate::{GramBlocks, NumericsError};
 
+/// What a step of the polishing promises that is the last, as a share of the sum.
+const SETTLED: f64 = 1e-22;
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
 const TOLERANCE: f64 = 1e-14;
+/// The same where only the size of the sum is asked for.
+const ROUGH: f64 = 1e-4;
 /// A search that ends while it still gains more than this has not converged.
 const SMALL: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e12;
@@ -81,6 +85,15 @@ impl PredictionErrorFit {
     }
 }
 
+/// A model beside others.
+#[derive(Debug)]
+pub(super) struct Judged {
+    pub(super) model: Polynomials,
+    left: Left,
+    /// What is made least.
+    pub(super) sum: f64,
+}
+
 impl PredictionError {
     /// Fits a model of these orders. The first `first` samples of each segment are not counted, or those before which the
     /// model lacks something, whichever are more: models of several orders that are to be compared need the same.
@@ -103,7 +116,12 @@ impl PredictionError {
         }
         let first = counted_from(orders, first);
         let rows = samples.counted(first);
-        let starts = samples.starts(orders, first);
+        // Of which nothing is known beforehand, samples must tell.
+        let starts = if self.start_spread.is_infinite() {
+            samples.starts(orders, first)
+        } else {
+            0
+        };
         let needed = orders.coefficients() + starts + 2;
         if rows < needed {
             return Err(NumericsError::TooFewRows {
@@ -112,105 +130,105 @@ impl PredictionError {
             });
         }
         let radius = remembered(samples);
-        let begin = initial::starts(orders, samples, self.penalty, radius)?;
-        let counted = Counted::from(first);
-        if starts == 0 || self.start_spread.is_infinite() {
-            return self.best_from(begin, samples, counted, radius);
+        let mut begin = initial::starts(orders, samples, self.penalty, radius)?;
+        let mut counted = Counted::from(first);
+        let mut before = 0;
+        if orders.starts() > 0 && self.start_spread.is_finite() {
+            (counted, before, begin) = self.roughly(begin, samples, counted, radius)?;
         }
-        self.best_of_starts(begin, samples, counted, radius)
+        let start = self.best(begin, samples, counted)?;
+        let (found, steps, converged) = self.search(start, samples, counted, radius, TOLERANCE);
+        let Judged { model, left, .. } = self.polished(found, samples, counted, radius);
+        Ok(PredictionErrorFit {
+            residual_sum_of_squares: left.squares,
+            model,
+            rows,
+            first,
+            starts: left.told().round() as usize,
+            start_counts: counted.start,
+            steps: before + steps,
+            converged,
+        })
     }
 
-    /// The same where something is known of starts. How large innovations are, and so what a start counts beside them, is known
-    /// afterwards: it is searched with what the models to begin with leave wherever their filters begin, then once more.
-    fn best_of_starts(
+    /// What starts count where something is known of them. How large innovations are, and so what a start counts beside them, is
+    /// known afterwards: it is searched roughly, with what the models to begin with leave wherever their filters begin. Returns
+    /// how many steps that took, and the model that it led to.
+    fn roughly(
         &self,
         begin: Vec<Polynomials>,
         samples: &Samples,
         counted: Counted,
         radius: f64,
-    ) -> Result<PredictionErrorFit, NumericsError> {
+    ) -> Result<(Counted, usize, Vec<Polynomials>), NumericsError> {
         let rows = samples.counted(counted.first) as f64;
-        let with = |start: f64| Counted { start, ..counted };
-        let of = |sum: f64| with(sum / rows / (self.start_spread * self.start_spread));
-        let free = |model: &Polynomials| left(model, samples, with(0.0)).squares;
-        let least = begin.iter().map(free).fold(f64::INFINITY, f64::min);
-        let found = self.best_from(begin, samples, of(least), radius)?;
-        // Of all sums the one that is least is the surest.
-        let sum = left(&found.model, samples, of(least)).sum(of(least));
-        self.best_from(vec![found.model], samples, of(sum), radius)
+        let of = |sum: f64| Counted {
+            start: sum / rows / (self.start_spread * self.start_spread),
+            ..counted
+        };
+        let free = |model: &Polynomials| Left::by(model, samples, counted).squares;
+        let least = of(begin.iter().map(free).fold(f64::INFINITY, f64::min));
+        let start = self.best(begin, samples, least)?;
+        let (Judged { model, left, .. }, steps, _) =
+            self.search(start, samples, least, radius, ROUGH);
+        Ok((of(left.sum(least)), steps, vec![model]))
     }
 
-    /// Searches from the best of several models.
-    fn best_from(
+    fn best(
         &self,
-        starts: Vec<Polynomials>,
+        of: Vec<Polynomials>,
         samples: &Samples,
         counted: Counted,
-        radius: f64,
-    ) -> Result<PredictionErrorFit, NumericsError> {
-        let sums = starts
-            .into_iter()
-            .map(|start| (self.objective(&start, samples, counted), start));
-        let best = sums
-            .filter(|(sum, _)| sum.is_finite())
-            .min_by(|(sum, _), (other, _)| sum.total_cmp(other));
-        let (_, start) = best.ok_or(NumericsError::NotFinite)?;
-        let (model, steps, converged) = self.search(start, samples, counted, radius);
-        let model = self.polished(model, samples, counted, radius);
-        let Left { squares, told, .. } = left(&model, samples, counted);
-        Ok(PredictionErrorFit {
-            residual_sum_of_squares: squares,
-            model,
-            rows: samples.counted(counted.first),
-            first: counted.first,
-            starts: told.round() as usize,
-            start_counts: counted.start,
-            steps,
-            converged,
-        })
+    ) -> Result<Judged, NumericsError> {
+        of.into_iter()
+            .map(|model| self.judged(model, samples, counted))
+            .filter(|of| of.sum.is_finite())
+            .min_by(|of, other| of.sum.total_cmp(&other.sum))
+            .ok_or(NumericsError::NotFinite)
     }
 
-    fn objective(&self, model: &Polynomials, samples: &Samples, counted: Counted) -> f64 {
+    pub(super) fn judged(&self, model: Polynomials, samples: &Samples, counted: Counted) -> Judged {
         let b = model.flat().into_iter().zip(model.penalised());
         let squares: f64 = b.filter(|(_, of_b)| *of_b).map(|(b, _)| b * b).sum();
-        left(model, samples, counted).sum(counted) + self.penalty * squares
+        let left = Left::by(&model, samples, counted);
+        Judged {
+            sum: left.sum(counted) + self.penalty * squares,
+            model,
+            left,
+        }
     }
 
     fn search(
         &self,
-        start: Polynomials,
+        start: Judged,
         samples: &Samples,
         counted: Counted,
         radius: f64,
-    ) -> (Polynomials, usize, bool) {
-        let mut model = start;
-        let mut least = self.objective(&model, samples, counted);
-        let mut damping = vec![1e-3; model.flat().len()];
+        tolerance: f64,
+    ) -> (Judged, usize, bool) {
+        let mut at = start;
+        let mut damping = vec![1e-3; at.model.flat().len()];
         let mut gained = f64::INFINITY;
         for step in 0..self.most_steps {
-            let (hessian, gradient) = self.normal_equations(&model, samples, counted);
-            let flat = model.flat();
+            let (hessian, gradient) = self.normal_equations(&at, samples, counted);
             let mut solvable = false;
             loop {
-                let tried = descend(&hessian, &gradient, &damping).map(|change| {
-                    let moved: Vec<f64> =
-                        flat.iter().zip(&change).map(|(at, by)| at - by).collect();
-                    model.with(&moved)
-                });
+                let tried =
+                    descend(&hessian, &gradient, &damping).map(|change| at.model.moved(&change));
                 solvable |= tried.is_some();
                 // What would become unstable is held back alone: the others go on, and find the best beside it.
                 let unstable = tried.as_ref().map(|tried| tried.unstable(radius));
                 let unstable = unstable.filter(|of| of.contains(&true));
                 let found = tried.filter(|_| unstable.is_none());
-                let found = found.map(|tried| (self.objective(&tried, samples, counted), tried));
-                if let Some((sum, tried)) = found.filter(|(sum, _)| *sum <= least) {
-                    gained = least - sum;
-                    (model, least) = (tried, sum);
+                let found = found.map(|tried| self.judged(tried, samples, counted));
+                if let Some(tried) = found.filter(|tried| tried.sum <= at.sum) {
+                    gained = at.sum - tried.sum;
+                    at = tried;
                     for of in &mut damping {
                         *of = (*of / 10.0).max(1e-12);
                     }
-                    if gained <= TOLERANCE * least {
-                        return (model, step + 1, true);
+                    if gained <= tolerance * at.sum {
+                        return (at, step + 1, true);
                     }
                     break;
                 }
@@ -220,82 +238,92 @@ impl PredictionError {
                     }
                 }
                 if damping.iter().all(|of| *of > MOST_DAMPING) {
-                    return (model, step, solvable);
+                    return (at, step, solvable);
                 }
             }
         }
-        (model, self.most_steps, gained <= SMALL * least)
+        let converged = gained <= SMALL * at.sum;
+        (at, self.most_steps, converged)
     }
 
     /// A few whole steps more, with what is held back from instability at its edge. Where the sum hardly changes it is known less
     /// exactly than its gradient, by which they go.
-    fn polished(
-        &self,
-        mut model: Polynomials,
-        samples: &Samples,
-        counted: Counted,
-        radius: f64,
-    ) -> Polynomials {
-        let most = self.objective(&model, samples, counted) * (1.0 + SAME);
+    fn polished(&self, mut at: Judged, samples: &Samples, counted: Counted, radius: f64) -> Judged {
+        let most = at.sum * (1.0 + SAME);
         for _ in 0..POLISHING {
-            let (hessian, gradient) = self.normal_equations(&model, samples, counted);
-            let Some(held) = held(&model, &hessian, &gradient, radius) else {
+            let (mut hessian, mut gradient) = self.normal_equations(&at, samples, counted);
+            let Some(held) = held(&at.model, &hessian, &gradient, radius) else {
                 break;
             };
-            let at_edge = model.clone().on_edge(&held, radius);
-            let (hessian, gradient) = self.normal_equations(&at_edge, samples, counted);
+            let mut from = at.model.clone();
+            if held.contains(&true) {
+                let edge = self.judged(from.on_edge(&held, radius), samples, counted);
+                (hessian, gradient) = self.normal_equations(&edge, samples, counted);
+                from = edge.model;
+            }
             let damping = held
                 .iter()
                 .map(|&held| if held { f64::INFINITY } else { 0.0 });
             let Some(change) = descend(&hessian, &gradient, &damping.collect::<Vec<_>>()) else {
                 break;
             };
-            let flat = at_edge.flat();
-            let moved: Vec<f64> = flat.iter().zip(&change).map(|(at, by)| at - by).collect();
-            let tried = at_edge.with(&moved);
-            let stable = !tried.unstable(radius).contains(&true);
+            let tried = from.moved(&change);
+            if tried.unstable(radius).contains(&true) {
+                break;
+            }
+            let tried = self.judged(tried, samples, counted);
             // Written so that NaN fails.
-            let as_good = stable && self.objective(&tried, samples, counted) <= most;
+            let as_good = tried.sum <= most;
             if !as_good {
                 break;
             }
-            model = tried;
+            at = tried;
+            let gain: f64 = change
+                .iter()
+                .zip(&gradient)
+                .map(|(by, slope)| by * slope)
+                .sum();
+            if gain <= SETTLED * most {
+                break;
+            }
         }
-        model
+        at
     }
 
     /// `JᵀJ` and `Jᵀε`, with the penalty.
     pub(super) fn normal_equations(
         &self,
-        model: &Polynomials,
+        at: &Judged,
         samples: &Samples,
         counted: Counted,
     ) -> (Mat<f64>, Vec<f64>) {
+        let Judged { model, left, .. } = at;
         let flat = model.flat();
         let count = flat.len();
         let mut rows = GramBlocks::with_row_memory(count, 0);
-        let starts = model.starts();
-        let mut by_starts = Mat::<f64>::zeros(count, count);
-        for segment in samples.segments() {
+        let starts = left.free.starts();
+        let mut followed = Mat::<f64>::zeros(count, count);
+        for (nth, segment) in samples.segments().enumerate() {
             let segment = Segment::new(model, samples, segment, counted);
-            let mut own = Products::new(starts, starts);
-            let mut across = Products::new(count, starts);
-            segment.derivatives(&segment.start().values, |residual| {
-                rows.push(residual.by, residual.value);
-                own.add(residual.by_start, residual.by_start);
-                across.add(residual.by, residual.by_start);
+            let residuals = left.residuals[nth].len();
+            let lasting = left.free.lasting(residuals);
+            let mut across = Mat::<f64>::zeros(count, starts);
+            let mut row = 0;
+            segment.derivatives(&left.starts[nth].values, |residual, by| {
+                rows.push(by, residual);
+                if row < lasting {
+                    left.free.add_products(row, by, &mut across);
+                }
+                row += 1;
             });
-            let (own, across) = (own.sums(), across.sums());
-            if starts > 0
-                && let Some(inverse) = inverse_with(counted, own)
-            {
-                by_starts += &across * inverse * across.transpose();
+            if let Some(by_start) = left.free.followed(&across, residuals) {
+                followed += by_start;
             }
         }
         let moments = rows.total().moments_about(&vec![0.0; count + 1]);
         let mut gradient: Vec<f64> = (0..count).map(|i| moments[(count, i)]).collect();
         // The starts of the segments follow where the coefficients go.
-        let mut hessian = moments.submatrix(0, 0, count, count) - by_starts;
+        let mut hessian = moments.submatrix(0, 0, count, count) - followed;
         let of_b = model.penalised();
         for i in (0..count).filter(|&i| of_b[i]) {
             hessian[(i, i)] += self.penalty;
@@ -343,6 +371,7 @@ pub(super) fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> 
 mod tests {
     use super::*;
     use crate::InputOrders;
+    use crate::draws::uniform;
 
     #[test]
     fn a_search_of_which_no_step_can_be_solved_has_not_converged() {
@@ -362,8 +391,45 @@ mod tests {
             ..Orders::default()
         });
         let search = PredictionError::default();
-        let (model, steps, converged) =
-            search.search(start.clone(), &samples, Counted::from(0), 0.9);
-        assert_eq!((model, steps, converged), (start, 0, false));
+        let (model, steps, converged) = search.search(
+            search.judged(start.clone(), &samples, Counted::from(0)),
+            &samples,
+            Counted::from(0),
+            0.9,
+            TOLERANCE,
+        );
+        assert_eq!((model.model, steps, converged), (start, 0, false));
+    }
+
+    #[test]
+    fn samples_that_do_not_tell_every_start_are_enough_where_something_is_known_of_starts() {
+        let (mut samples, mut u) = (Samples::new(1), uniform(7));
+        for _ in 0..4 {
+            samples.segment();
+            (0..2).for_each(|_| samples.push([u()], u()));
+        }
+        let input = InputOrders {
+            nb: 1,
+            nf: 1,
+            nk: 0,
+        };
+        let orders = Orders {
+            inputs: vec![input],
+            ..Orders::default()
+        };
+        let fit = |start_spread| {
+            let search = PredictionError {
+                start_spread,
+                ..PredictionError::default()
+            };
+            search.fit(&orders, &samples, 0)
+        };
+        // Of eight samples three coefficients, four starts and two more.
+        let few = NumericsError::TooFewRows {
+            needed: 9,
+            found: 8,
+        };
+        assert_eq!(fit(f64::INFINITY), Err(few));
+        assert!(fit(1.0).unwrap().variance().is_finite());
     }
 }

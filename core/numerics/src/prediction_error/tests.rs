@@ -1,4 +1,6 @@
-use super::residuals::{Counted, Segment, counted_from, residuals, sum_of_squares};
+use faer::Mat;
+
+use super::residuals::{Counted, Left, Segment};
 use super::search::remembered;
 use super::*;
 use crate::draws::uniform as noise;
@@ -122,20 +124,24 @@ fn derivatives_are_those_of_the_residuals() {
         let samples = simulated(&model, 90, 0.3, 7);
         let moved: Vec<f64> = model.flat().iter().map(|at| 0.9 * at + 0.01).collect();
         let at = model.with(&moved);
-        let starts: Vec<Vec<f64>> = samples
-            .segments()
-            .map(|segment| {
-                Segment::new(&at, &samples, segment, Counted::from(0))
-                    .start()
-                    .values
-            })
-            .collect();
+        let left = Left::by(&at, &samples, Counted::from(0));
+        let starts: Vec<Vec<f64>> = left.starts.iter().map(|of| of.values.clone()).collect();
         let all = |model: &Polynomials, starts: &[Vec<f64>]| {
             let mut all = Vec::new();
             for (segment, start) in samples.segments().zip(starts) {
                 let segment = Segment::new(model, &samples, segment, Counted::from(0));
-                segment.derivatives(start, |residual| {
-                    all.push((residual.value, [residual.by, residual.by_start].concat()));
+                let mut row = 0;
+                segment.derivatives(start, |residual, by| {
+                    let mut by_start = Mat::zeros(1, start.len());
+                    if row < left.free.lasting(usize::MAX) {
+                        left.free.add_products(row, &[1.0], &mut by_start);
+                    }
+                    let by_start = (0..start.len()).map(|nth| by_start[(0, nth)]);
+                    all.push((
+                        residual,
+                        by.iter().copied().chain(by_start).collect::<Vec<_>>(),
+                    ));
+                    row += 1;
                 });
             }
             all
@@ -168,8 +174,9 @@ fn derivatives_are_those_of_the_residuals() {
 fn a_stepper_errs_by_the_residuals() {
     for (name, model) in models() {
         let samples = simulated(&model, 90, 0.3, 3);
-        let mut found = Vec::new();
-        residuals(&model, &samples, 0, |residual| found.push(residual));
+        let found = Left::by(&model, &samples, Counted::from(0))
+            .residuals
+            .concat();
         // What the noise was before the first sample is not known; it is forgotten.
         let last: f64 = found[found.len() - 1];
         let segment = samples.segments().last().unwrap();
@@ -285,27 +292,41 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
         stepper.step(|i| input[i], Some(value));
         samples.push(input, value);
     }
-    let fit = PredictionError::default()
-        .fit(&orders(&grows), &samples, 0)
-        .unwrap();
+    // Near the edge nothing but that tells what both filters began with, and their sum, from each other.
+    let search = PredictionError {
+        start_spread: 10.0,
+        ..PredictionError::default()
+    };
+    let fit = search.fit(&orders(&grows), &samples, 0).unwrap();
     let edge = fit.model.inputs[1].f[0];
     assert!(fit.converged && (0.99..1.0).contains(&edge), "{fit:?}");
-    let errors = PredictionError::default().standard_errors(&fit, &samples);
-    // Both filters end there, and what they are multiplied by does not.
+    let errors = search.standard_errors(&fit, &samples);
+    // The second filter ends there; what it is multiplied by does not, nor does anything else.
     let errors = errors.unwrap();
     assert!(errors.level.is_finite());
-    for input in errors.inputs {
-        assert!(input.f.is_empty() && input.b[0].is_finite(), "{input:?}");
-    }
-    let (at, first) = (fit.model.flat(), counted_from(&orders(&grows), 0));
+    assert_eq!([errors.inputs[0].f.len(), errors.inputs[1].f.len()], [1, 0]);
+    let known = errors
+        .inputs
+        .iter()
+        .flat_map(|input| input.b.iter().chain(&input.f));
+    assert!(
+        known.into_iter().all(|error| error.is_finite()),
+        "{errors:?}"
+    );
+    let at = fit.model.flat();
+    let counted = Counted {
+        first: fit.first,
+        start: fit.start_counts,
+    };
+    let least = search.judged(fit.model.clone(), &samples, counted).sum;
     let mut compared = 0;
     for (nth, by) in (0..at.len()).flat_map(|nth| [(nth, 1e-3), (nth, -1e-3)]) {
         let mut moved = at.clone();
         moved[nth] += by;
         let moved = fit.model.with(&moved);
         if !moved.unstable(remembered(&samples)).contains(&true) {
-            let sum = sum_of_squares(&moved, &samples, first);
-            assert!(sum > fit.residual_sum_of_squares, "{nth} by {by}: {fit:?}");
+            let sum = search.judged(moved, &samples, counted).sum;
+            assert!(sum > least, "{nth} by {by}: {fit:?}");
             compared += 1;
         }
     }

@@ -186,19 +186,23 @@ pub(super) fn power(
 
 /// The pseudo-inverse of a symmetric matrix, its rows and columns on one scale.
 pub(super) fn pseudo_inverse(matrix: &Mat<f64>) -> Result<Mat<f64>, NumericsError> {
-    inverse(matrix, matrix, 0.0)
+    pseudo_inverse_above(matrix, matrix, 0.0)
 }
 
 /// The same of what is left of a symmetric matrix when others were taken out of it.
-pub(crate) fn pseudo_inverse_left(
+pub(super) fn pseudo_inverse_left(
     left: &Mat<f64>,
     whole: &Mat<f64>,
 ) -> Result<Mat<f64>, NumericsError> {
-    inverse(left, whole, LEFT)
+    pseudo_inverse_above(left, whole, LEFT)
 }
 
 /// The pseudo-inverse on the scale of a matrix, directions in which it is not more than `least` there left out.
-fn inverse(matrix: &Mat<f64>, of: &Mat<f64>, least: f64) -> Result<Mat<f64>, NumericsError> {
+pub(crate) fn pseudo_inverse_above(
+    matrix: &Mat<f64>,
+    of: &Mat<f64>,
+    least: f64,
+) -> Result<Mat<f64>, NumericsError> {
     let order = matrix.nrows();
     let root = |i: usize| {
         let own = of[(i, i)];

@@ -8,7 +8,7 @@ mod refine;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use lagged::pseudo_inverse_left;
+pub(crate) use lagged::pseudo_inverse_above;
 
 pub use identify::{Identification, StateOrder, Subspace, Weighting};
 pub use model::{DifferenceEquation, StateSpace};

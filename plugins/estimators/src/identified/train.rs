@@ -244,7 +244,7 @@ impl Identify for Asked {
         Ok(Found {
             residual_sum_of_squares: fit.residual_sum_of_squares,
             // Each start that was found has made one of them what it is.
-            rows: fit.rows - fit.starts,
+            rows: fit.rows.saturating_sub(fit.starts).max(1),
             variance: fit.variance(),
             model: fit.model,
             errors,
