@@ -10,8 +10,8 @@ use athermal::core::engine::Fitted;
 use athermal::core::fit::{FitOptions, FitReport, fit};
 use athermal::core::model::Model;
 use athermal::core::node::{
-    Encoder, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Predictor, Tick,
-    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Encoder, Estimator, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs,
+    Predictor, Regressors, Tick, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal::core::recording::{Event, Table};
 use athermal::core::time::Duration;
@@ -174,6 +174,33 @@ impl Operator for Summing {
 
 athermal::core::register!(Along, Feature, "test_along");
 
+/// The same as an estimator.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Weighing {
+    label: String,
+}
+
+impl Estimator for Weighing {
+    fn inputs() -> &'static [InputPort] {
+        Along::inputs()
+    }
+
+    fn regressors(&self) -> Regressors {
+        Regressors {
+            feature_lags: now(),
+            ..Regressors::default()
+        }
+    }
+
+    fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
+        let (label, lags) = (self.label.clone(), now());
+        Along { label, lags }.trainer(setup)
+    }
+}
+
+athermal::core::register!(Weighing, Estimator, "test_weighing");
+
 /// An encoder of the temperatures, and an estimator of what it gives.
 fn nodes(label: &str, more: &str) -> String {
     format!(
@@ -279,6 +306,25 @@ ahead = \"30s\"
     let (fitted, _) = fitted(&plan(&with_output(&stacked, "stack")));
     assert_eq!(fits("stacked").len(), 1, "two fits mean different things");
     assert_eq!(fitted.len(), 3);
+}
+
+#[test]
+fn what_is_stacked_is_fitted_without_each_third_of_the_data_and_what_is_not_is_fitted_once() {
+    let weighing = |label: &str| {
+        format!(
+            "[nodes.{label}]\ntype = \"test_weighing\"\ninputs.features = \"code\"\ninputs.truth = \"position.Z\"\n\
+             ahead = \"30s\"\nlabel = \"{label}\"\n"
+        )
+    };
+    let graph = format!(
+        "{}{}{}[nodes.stack]\ntype = \"stack\"\ninputs.voters = [\"plain\", \"voter\"]\n\
+         inputs.truth = \"position.Z\"\nahead = \"30s\"\n",
+        nodes("beside", ""),
+        weighing("voter"),
+        weighing("alone")
+    );
+    fitted(&plan(&with_output(&graph, "stack")));
+    assert_eq!([fits("voter").len(), fits("alone").len()], [4, 1]);
 }
 
 /// A model of the graph, in which nothing has been fitted yet.

@@ -28,6 +28,8 @@ pub(super) struct Fitting<'a> {
 #[derive(Default)]
 struct Level {
     nodes: Vec<usize>,
+    /// Those of them that feed others that are fitted.
+    feeding: Vec<usize>,
     /// Whether an estimator feeds one of them.
     of_predictions: bool,
 }
@@ -117,12 +119,14 @@ impl<'a> Fitting<'a> {
             course.levels = level + 1;
             let plan = self.plan;
             let open = |node: &&usize| !course.fitted.contains_key(&plan.nodes[**node].instance());
-            let nodes: Vec<_> = self.levels[level]
-                .nodes
-                .iter()
-                .filter(open)
-                .copied()
-                .collect();
+            // Without a fold only what levels above learn from it is asked for.
+            let Level { nodes, feeding, .. } = &self.levels[level];
+            let asked = if course.share.without.is_empty() {
+                nodes
+            } else {
+                feeding
+            };
+            let nodes: Vec<_> = asked.iter().filter(open).copied().collect();
             if nodes.is_empty() {
                 continue;
             }
@@ -257,5 +261,29 @@ fn levels(plan: &Plan) -> Vec<Level> {
         }
         of_slot[node.slots.clone()].fill(after);
     }
+    let feeds = feeds(plan);
+    for level in &mut levels {
+        let feeding = |node: &&usize| feeds[plan.nodes[**node].slots.clone()].contains(&true);
+        level.feeding = level.nodes.iter().filter(feeding).copied().collect();
+    }
     levels
+}
+
+/// Of each slot whether a node that needs a fit reads it, or what others make of it.
+fn feeds(plan: &Plan) -> Vec<bool> {
+    let mut feeds = vec![false; plan.channels.len()];
+    let mut changed = true;
+    // Once, and again for what loops bring back.
+    while changed {
+        changed = false;
+        for node in plan.nodes.iter().rev() {
+            if node.rows().is_some() || feeds[node.slots.clone()].contains(&true) {
+                let gathers = node.role.inputs();
+                for entry in gathers.flat_map(|gather| &plan.gathers[gather].entries) {
+                    changed |= !std::mem::replace(&mut feeds[entry.slot], true);
+                }
+            }
+        }
+    }
+    feeds
 }
