@@ -222,7 +222,6 @@ fn every_command_that_scores_a_combiner_tells_what_it_lacks_to_people_and_to_pro
                 a longer `memory` lets more count";
     let expected = json!([{
         "node": "guard",
-        "alike": 0,
         "told": 99,
         "needed": 5.0,
         "most": 4.0,
@@ -235,6 +234,7 @@ fn every_command_that_scores_a_combiner_tells_what_it_lacks_to_people_and_to_pro
         ("evaluate", vec![], "/lacks", told),
         ("compare", vec!["--on", on], "/graphs/0/lacks", &of_graph),
         ("diagnose", vec!["--no-fit"], "/diagnosis/lacks", told),
+        ("report", vec![], "/lacks", told),
     ];
     for (command, mut words, place, told) in commands {
         let call = |words: &[&str]| {

@@ -133,8 +133,8 @@ impl Compare {
             terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
         }
         for fit in &fits {
-            for lack in &fit.lacks {
-                terminal.warning(format_args!("{}: {lack}", fit.graph));
+            for told in Lack::told(&fit.lacks) {
+                terminal.warning(format_args!("{}: {told}", fit.graph));
             }
         }
         Ok(if failed(terminal, &fits) {

@@ -7,7 +7,7 @@ use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::model::ModelError;
 use athermal::core::quantity::Quantity;
-use athermal::core::score::{Mode, Score, ScoreOptions, Scores, score};
+use athermal::core::score::{Lack, Mode, Score, ScoreOptions, Scores, score};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
@@ -145,8 +145,8 @@ impl Evaluate {
             scores.refused,
             &scores.rejected,
         );
-        for lack in &scores.lacks {
-            terminal.warning(lack);
+        for told in Lack::told(&scores.lacks) {
+            terminal.warning(told);
         }
         if scores.scores.is_empty() {
             terminal.warning(

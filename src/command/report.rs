@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use athermal::chart::Plot;
 use athermal::core::fit::FitError;
+use athermal::core::score::Lack;
 use athermal::report::{WANTED, gather, page, plots, text};
 use clap::Args;
 
@@ -61,6 +62,9 @@ impl Report {
             course.refused,
             &course.rejected,
         );
+        for told in Lack::told(&facts.lacks) {
+            terminal.warning(told);
+        }
         if course.axes.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is little to report",

@@ -39,7 +39,7 @@ Faults: missing, stuck, offset, spike, drift, noise; `from`, `for` and `size` ma
 pub struct Simulate {
     /// The machine; all are listed when none is named
     machine: Option<String>,
-    /// CSV, or JSON lines if it ends in .jsonl; `-` is standard output
+    /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Length of the recording in days

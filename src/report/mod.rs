@@ -25,7 +25,7 @@ pub use worth::{Settling, StepLoss, Worth};
 use athermal_core::compile::Wanted;
 use athermal_core::model::{Card, Model};
 use athermal_core::recording::Recording;
-use athermal_core::score::{Score, ScoreOptions, Scores, score};
+use athermal_core::score::{Lack, Score, ScoreOptions, Scores, score};
 use serde::Serialize;
 
 use crate::diagnosis::lag::{Lags, lags};
@@ -43,6 +43,8 @@ pub struct Facts {
     pub verdicts: Vec<Verdict>,
     /// The scores of every prediction over all truths.
     pub scores: Vec<Score>,
+    /// The combiners that went by fewer truths than they take.
+    pub lacks: Vec<Lack>,
     /// The figures of the article beside ours, for a machine of the same kind.
     pub published: Vec<Published>,
     /// What happened over time.
@@ -119,7 +121,7 @@ pub fn gather(
     recording: &dyn Recording,
     data: Vec<String>,
 ) -> Result<Facts, ReportError> {
-    let Scores { scores, .. } = score(
+    let Scores { scores, lacks, .. } = score(
         &model.plan,
         &model.fitted,
         recording,
@@ -141,6 +143,7 @@ pub fn gather(
         lags: lags(model, recording, &observation, &[])?,
         responses: responses(model, &observation)?,
         scores,
+        lacks,
         course,
         worth,
         card: model.card.clone(),

@@ -1,11 +1,9 @@
 //! Truths that follow a gap in which a process has moved are learned from; ones that are off for no such reason are not.
 
 use athermal::core::engine::Engine;
-use athermal::core::fit::{FitOptions, fit};
 use athermal::core::prng::Prng;
-use athermal::core::recording::Table;
 
-use crate::workbench::{plan, secs};
+use crate::world::{fitted_on, run};
 
 const LEARNED: f64 = 0.0;
 const OUTLIER: f64 = 3.0;
@@ -24,7 +22,6 @@ inputs.truth = "shift"
 ahead = "0s"
 [outputs]
 out = "model"
-deviation = "model:deviation"
 learning = "model:learning"
 "#
     )
@@ -43,18 +40,11 @@ fn wandering(count: usize) -> Vec<f64> {
 
 /// What the port `learning` tells of each truth of some rows, after a fit on others; a truth that is NaN has no value.
 fn became(node: &str, rows: &[f64]) -> Vec<f64> {
-    let plan = plan(&graph(node));
-    let mut table = Table::default();
-    for (tick, shift) in wandering(2000).into_iter().enumerate() {
-        table.push(secs(10.0 * tick as f64), &[shift]);
-    }
-    let (fitted, _) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    let each = |rows: &[f64]| rows.iter().map(|&shift| [shift]).collect::<Vec<_>>();
+    let (plan, fitted) = fitted_on(&graph(node), &each(&wandering(2000)));
     let mut engine = Engine::new(plan, &fitted).unwrap();
-    let outputs = rows.iter().enumerate().map(|(tick, &shift)| {
-        let outputs = engine.step(secs(10.0 * tick as f64), &[shift]).unwrap();
-        outputs[2]
-    });
-    outputs.collect()
+    let outputs = run(&mut engine, 0, &each(rows));
+    outputs.into_iter().map(|outputs| outputs[1]).collect()
 }
 
 /// Whoever moves while no truth comes says that it may have.

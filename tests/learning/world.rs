@@ -68,10 +68,15 @@ pub fn rows(seed: u64, count: usize, change: usize) -> Vec<Row> {
 
 /// The plan of a graph, and its fit on 500 rows without a change.
 pub fn fitted(text: &str) -> (Arc<Plan>, Fitted) {
+    fitted_on(text, &rows(1, 500, usize::MAX))
+}
+
+/// The same on other rows, a tick every 10 s.
+pub fn fitted_on(text: &str, rows: &[impl AsRef<[f64]>]) -> (Arc<Plan>, Fitted) {
     let plan = plan(text);
     let mut table = Table::default();
-    for (tick, row) in rows(1, 500, usize::MAX).iter().enumerate() {
-        table.push(secs(10.0 * tick as f64), row);
+    for (tick, row) in rows.iter().enumerate() {
+        table.push(secs(10.0 * tick as f64), row.as_ref());
     }
     let (fitted, report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
     for estimator in report.estimators {
@@ -89,10 +94,10 @@ pub fn engine(text: &str) -> Engine {
 }
 
 /// Steps through rows that begin at a tick; what each gave.
-pub fn run(engine: &mut Engine, first: usize, rows: &[Row]) -> Vec<Vec<f64>> {
-    let step = |(tick, row): (usize, &Row)| {
+pub fn run(engine: &mut Engine, first: usize, rows: &[impl AsRef<[f64]>]) -> Vec<Vec<f64>> {
+    let step = |(tick, row): (usize, &_)| {
         let time = secs(10.0 * (first + tick) as f64);
-        engine.step(time, row).unwrap().to_vec()
+        engine.step(time, AsRef::as_ref(row)).unwrap().to_vec()
     };
     rows.iter().enumerate().map(step).collect()
 }

@@ -23,9 +23,10 @@ use crate::order::Order;
 /// steps ahead of the newest as there are.
 ///
 /// Where truths or rows are missing in the fit, the filters start again: what those of the features gave before is found
-/// for each piece beside the coefficients (Ljung 1999, section 10.4), as far as its samples tell it, and counts as found in
+/// for each piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it, and counts as found in
 /// criteria and errors; the noise begins without a past. Running, a segment begins with its first truth, as if that and the
-/// features had always been what they are, and so does what comes after more steps without features than ten, or than the
+/// features had always been what they are; what they do not explain of it the filters and the noise share by how much each
+/// varies. So does what comes after more steps without features than ten, or than the
 /// model reaches back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard
 /// deviation of the truth about its prediction, larger after truths that are missing. Features that are missing are taken
 /// for the last ones, and what that adds to the error is not in it. Since the answer changes with time alone, the node runs

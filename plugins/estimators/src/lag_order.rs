@@ -68,6 +68,7 @@ impl LagOrder {
             tried.push(Tried {
                 name: self.order.names(&orders).collect::<Vec<_>>().join(", "),
                 coefficients,
+                starts: 0,
                 figures,
             });
             all.push(columns);

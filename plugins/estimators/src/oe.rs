@@ -21,7 +21,7 @@ use crate::order::Order;
 /// as so many steps, rounded. Running, it goes on by the features alone.
 ///
 /// Where truths or rows are missing in the fit, the filters start again: what they gave before is found for each piece
-/// beside the coefficients (Ljung 1999, section 10.4), as far as its samples tell it, and counts as found in criteria and
+/// beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it, and counts as found in criteria and
 /// errors. Running, a segment begins at rest, as if the features had always been what they are first, until the first
 /// truth says where the filters are: each has its share of what that differs by, which dies away. So does what comes after
 /// more steps without features than ten, or than the model reaches back where that is more. With `learn = false` it stays

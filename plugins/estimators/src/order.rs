@@ -58,7 +58,7 @@ impl<'de> Deserialize<'de> for OrderRange {
 
 /// Which orders are compared, and by what. All are fitted on the same rows.
 ///
-/// With `N` rows, `V` the mean square of the residuals, `p` coefficients and `k = p + 1`: AIC `N ln V + 2k`, AICc
+/// With `N` rows, `V` the mean square of the residuals, `p` coefficients, beside which `oe` and `bj` count the starts that were found, and `k = p + 1`: AIC `N ln V + 2k`, AICc
 /// `AIC + 2k(k + 1)/(N − k − 1)`, BIC `N ln V + k ln N`, FPE `V (N + p)/(N − p)` (Ljung 1999, section 16.4; Hurvich and Tsai
 /// 1989). They take rows for independent; those of a drift whose windows overlap are not, and the order then comes out large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -93,6 +93,8 @@ pub(crate) struct Tried {
     /// What is open of its orders, as a report tells it.
     pub(crate) name: String,
     pub(crate) coefficients: usize,
+    /// The starts of filters that were found beside them.
+    pub(crate) starts: usize,
     pub(crate) figures: InformationCriteria,
 }
 
@@ -190,11 +192,12 @@ impl Order {
         report: &mut TrainingReport,
     ) -> Result<usize, NumericsError> {
         let count = tried.len();
-        let least = tried.iter().map(|tried| tried.coefficients).min();
+        let found = |tried: &Tried| tried.coefficients + tried.starts;
+        let least = tried.iter().map(found).min();
         let ranked: Vec<(usize, Tried)> = tried
             .into_iter()
             .enumerate()
-            .filter(|(_, tried)| tried.coefficients + LEFT_OVER <= rows)
+            .filter(|(_, tried)| found(tried) + LEFT_OVER <= rows)
             .collect();
         let places: Vec<usize> = ranked.iter().map(|(place, _)| *place).collect();
         let told = ranked.into_iter().map(|(_, tried)| TriedOrder {

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use athermal::Duration;
 use athermal::core::compile::{Plan, Wanted};
+use athermal::core::score::Lack;
 use athermal::diagnosis::{
     Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
 };
@@ -100,8 +101,8 @@ impl Diagnose {
         }
         let trace = &observation.trace;
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
-        for lack in &diagnosis.lacks {
-            terminal.warning(lack);
+        for told in Lack::told(&diagnosis.lacks) {
+            terminal.warning(told);
         }
         self.tell(terminal, &diagnosis);
         tell_empty(terminal, &model.plan, &diagnosis, &observation);

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::slot_set::SlotSet;
 use crate::channel::Channel;
 use crate::document::TimeBase;
 use crate::node::{Inputs, Kind, NodeSpec, Predictor, Read, Regressor, Role};
@@ -363,6 +364,22 @@ impl Plan {
         let entries = gathers.flat_map(|gather| &self.gathers[gather].entries);
         let truth = node.role.truth().map(|truth| truth.slot);
         entries.map(|entry| entry.slot).chain(truth)
+    }
+
+    /// These slots and every one that they depend on.
+    pub(crate) fn behind(&self, slots: impl Iterator<Item = usize>) -> SlotSet {
+        let mut behind = SlotSet::default();
+        let mut open: Vec<usize> = slots.collect();
+        let mut seen = vec![false; self.nodes.len()];
+        while let Some(slot) = open.pop() {
+            if behind.insert(slot)
+                && let Some(node) = self.channels[slot].node
+                && !std::mem::replace(&mut seen[node], true)
+            {
+                open.extend(self.reads(&self.nodes[node]));
+            }
+        }
+        behind
     }
 }
 

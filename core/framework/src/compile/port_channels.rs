@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use indexmap::IndexMap;
 
-use super::reference::{Pattern, is_pattern};
+use super::CompileProblem;
+use super::reference::{Pattern, Reference, is_pattern};
 use crate::diagnostic::Names;
 
 /// The channels of a port, each with its slot.
@@ -23,8 +24,24 @@ impl PortChannels {
         self.slots.insert(name, slot)
     }
 
-    /// The slots of the channels that a name or a pattern stands for, in order; of all of them where there is none.
-    pub(crate) fn slots(&self, wanted: Option<&str>) -> Vec<usize> {
+    /// The slots of the channels that a reference to this port stands for, in order.
+    ///
+    /// # Errors
+    /// [`CompileProblem::UnknownChannel`].
+    pub(crate) fn find(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
+        let slots = self.slots(reference.channel);
+        match reference.channel {
+            Some(channel) if slots.is_empty() => Err(CompileProblem::UnknownChannel {
+                node: reference.node.to_owned(),
+                channel: channel.to_owned(),
+                known: self.known(),
+            }),
+            _ => Ok(slots),
+        }
+    }
+
+    /// Those that a name or a pattern stands for; all of them where there is none.
+    fn slots(&self, wanted: Option<&str>) -> Vec<usize> {
         match wanted {
             None => self.slots.values().copied().collect(),
             Some(text) if is_pattern(text) => {
@@ -37,7 +54,7 @@ impl PortChannels {
     }
 
     /// The names of all of them.
-    pub(crate) fn known(&self) -> Arc<Names> {
+    fn known(&self) -> Arc<Names> {
         let listed = || Arc::new(self.slots.keys().cloned().collect());
         Arc::clone(self.known.get_or_init(listed))
     }

@@ -122,14 +122,6 @@ impl Scopes {
                 known: scope.ports.keys().copied().collect(),
             }));
         };
-        let slots = channels.slots(reference.channel);
-        match reference.channel {
-            Some(channel) if slots.is_empty() => Err(Box::new(CompileProblem::UnknownChannel {
-                node: reference.node.to_owned(),
-                channel: channel.to_owned(),
-                known: channels.known(),
-            })),
-            _ => Ok(Found::Slots(slots)),
-        }
+        Ok(Found::Slots(channels.find(&reference)?))
     }
 }

@@ -4,23 +4,23 @@ use std::ops::Range;
 
 /// Some of the slots of a plan.
 #[derive(Debug, Clone, Default)]
-pub(super) struct SlotSet(Vec<bool>);
+pub(crate) struct SlotSet(Vec<bool>);
 
 impl SlotSet {
     /// Takes a slot in; whether it was not there before.
-    pub(super) fn insert(&mut self, slot: usize) -> bool {
+    pub(crate) fn insert(&mut self, slot: usize) -> bool {
         if slot >= self.0.len() {
             self.0.resize(slot + 1, false);
         }
         !std::mem::replace(&mut self.0[slot], true)
     }
 
-    pub(super) fn contains(&self, slot: usize) -> bool {
+    pub(crate) fn contains(&self, slot: usize) -> bool {
         self.0.get(slot).is_some_and(|marked| *marked)
     }
 
     /// Whether any slot of a range is in it.
-    pub(super) fn has_any(&self, mut slots: Range<usize>) -> bool {
+    pub(crate) fn has_any(&self, mut slots: Range<usize>) -> bool {
         slots.any(|slot| self.contains(slot))
     }
 }

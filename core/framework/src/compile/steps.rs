@@ -140,7 +140,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
             diagnostics.report(output.place, problem);
         }
     }
-    let used = used(plan);
+    let used = plan.behind(plan.outputs.iter().map(|output| output.slot));
     let used_nodes: HashSet<&str> = plan
         .nodes
         .iter()
@@ -194,20 +194,4 @@ fn fed(plan: &Plan) -> SlotSet {
             return fed;
         }
     }
-}
-
-/// Every slot that some output depends on.
-fn used(plan: &Plan) -> SlotSet {
-    let mut used = SlotSet::default();
-    let mut open: Vec<usize> = plan.outputs.iter().map(|output| output.slot).collect();
-    let mut seen = vec![false; plan.nodes.len()];
-    while let Some(slot) = open.pop() {
-        if used.insert(slot)
-            && let Some(node) = plan.channels[slot].node
-            && !std::mem::replace(&mut seen[node], true)
-        {
-            open.extend(plan.reads(&plan.nodes[node]));
-        }
-    }
-    used
 }

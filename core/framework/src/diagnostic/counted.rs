@@ -7,7 +7,11 @@ use std::fmt::Display;
 pub fn count(value: impl Display) -> String {
     let mut text = value.to_string();
     let whole = text.find('.').unwrap_or(text.len());
-    for at in (1..whole).rev().filter(|at| (whole - at).is_multiple_of(3)) {
+    let sign = usize::from(text.starts_with('-'));
+    for at in (sign + 1..whole)
+        .rev()
+        .filter(|at| (whole - at).is_multiple_of(3))
+    {
         text.insert(at, ',');
     }
     text
@@ -28,6 +32,7 @@ mod tests {
     fn counts_have_separators() {
         let told = [1_u64, 123, 1234, 123_456, 1_234_567].map(count);
         assert_eq!(told, ["1", "123", "1,234", "123,456", "1,234,567"]);
+        assert_eq!([-123, -1234].map(count), ["-123", "-1,234"]);
         assert_eq!([0.5, 1234.5678].map(count), ["0.5", "1,234.5678"]);
     }
 

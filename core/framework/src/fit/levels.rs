@@ -261,29 +261,11 @@ fn levels(plan: &Plan) -> Vec<Level> {
         }
         of_slot[node.slots.clone()].fill(after);
     }
-    let feeds = feeds(plan);
+    let fitted = plan.nodes.iter().filter(|node| node.rows().is_some());
+    let feeds = plan.behind(fitted.flat_map(|node| plan.reads(node)));
     for level in &mut levels {
-        let feeding = |node: &&usize| feeds[plan.nodes[**node].slots.clone()].contains(&true);
+        let feeding = |node: &&usize| feeds.has_any(plan.nodes[**node].slots.clone());
         level.feeding = level.nodes.iter().filter(feeding).copied().collect();
     }
     levels
-}
-
-/// Of each slot whether a node that needs a fit reads it, or what others make of it.
-fn feeds(plan: &Plan) -> Vec<bool> {
-    let mut feeds = vec![false; plan.channels.len()];
-    let mut changed = true;
-    // Once, and again for what loops bring back.
-    while changed {
-        changed = false;
-        for node in plan.nodes.iter().rev() {
-            if node.rows().is_some() || feeds[node.slots.clone()].contains(&true) {
-                let gathers = node.role.inputs();
-                for entry in gathers.flat_map(|gather| &plan.gathers[gather].entries) {
-                    changed |= !std::mem::replace(&mut feeds[entry.slot], true);
-                }
-            }
-        }
-    }
-    feeds
 }

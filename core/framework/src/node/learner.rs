@@ -61,6 +61,10 @@ pub enum Learns {
 /// }
 ///
 /// impl Learner for Last {
+///     fn extrapolates(&self) -> bool {
+///         true
+///     }
+///
 ///     fn predict(&self, _regressors: &[f64], _of: Instant) -> f64 {
 ///         self.value
 ///     }
@@ -92,7 +96,8 @@ pub trait Learner: Debug + Send {
     fn predict(&self, regressors: &[f64], of: Instant) -> f64;
 
     /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known. Truths
-    /// that miss by too much in units of it are not handed over.
+    /// that miss by too much in units of it are not handed over. How large misses are is learned anew where it comes or goes: one
+    /// that is known should stay so.
     fn deviation(&self, _regressors: &[f64], _of: Instant) -> f64 {
         f64::NAN
     }

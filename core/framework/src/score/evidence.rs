@@ -1,7 +1,5 @@
 //! Decides which combiners are told of as going by too few truths to do what they are for.
 
-use std::fmt;
-
 use serde::Serialize;
 
 use crate::compile::{Plan, PlannedRole};
@@ -16,8 +14,6 @@ const MOSTLY: f64 = 0.5;
 pub struct Lack {
     /// The combiner: `guard.Z1`.
     pub node: String,
-    /// How many more members of the same node are to be told of in the same words.
-    pub alike: usize,
     /// How many truths came.
     pub told: u64,
     /// How many it takes.
@@ -30,20 +26,30 @@ pub struct Lack {
     pub remedy: &'static str,
 }
 
-impl fmt::Display for Lack {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.node)?;
-        if self.alike > 0 {
-            write!(f, " (and {} more like it)", self.alike)?;
-        }
-        f.write_str(" ")?;
-        self.write_what(f)
-    }
-}
-
 impl Lack {
+    /// A sentence for each; for members of a node of which the same is to be told, one.
+    #[must_use]
+    pub fn told(lacks: &[Self]) -> Vec<String> {
+        let mut groups: Vec<(&Self, usize)> = Vec::new();
+        for lack in lacks {
+            match groups.iter_mut().find(|(told, _)| told.is_like(lack)) {
+                Some((_, more)) => *more += 1,
+                None => groups.push((lack, 0)),
+            }
+        }
+        let sentence = |(lack, more): (&Self, usize)| {
+            let Self { node, .. } = lack;
+            let what = lack.what();
+            match more {
+                0 => format!("{node} {what}"),
+                more => format!("{node} (and {more} more like it) {what}"),
+            }
+        };
+        groups.into_iter().map(sentence).collect()
+    }
+
     /// What it lacks, whichever combiner it is.
-    fn write_what(&self, f: &mut dyn fmt::Write) -> fmt::Result {
+    fn what(&self) -> String {
         let Self {
             told,
             needed,
@@ -52,54 +58,36 @@ impl Lack {
             remedy,
             ..
         } = self;
-        write!(f, "needs {} and ", counted(*needed, "truth"))?;
+        let needs = format!("needs {} and", counted(*needed, "truth"));
         if *enough > 0.0 {
             let share = 100.0 * enough;
-            write!(
-                f,
-                "had as many at only {share:.0}% of the ticks since it first did; "
-            )?;
-        } else if (*told as f64) < *needed {
-            return write!(
-                f,
-                "the data have {} for it, so it acted on none",
-                count(told)
+            return format!(
+                "{needs} had as many at only {share:.0}% of the ticks since it first did; {remedy} lets more count"
             );
-        } else {
-            let most = match (most * 10.0).round() / 10.0 {
-                0.0 => "any".to_owned(),
-                most => format!("more than {}", count(most)),
-            };
-            write!(
-                f,
-                "never had {most} of the {} that came, so it acted on none; ",
-                count(told)
-            )?;
         }
-        write!(f, "{remedy} lets more count")
+        let came = count(told);
+        if (*told as f64) < *needed {
+            return format!("{needs} the data have {came} for it, so it acted on none");
+        }
+        let most = match (most * 10.0).round() / 10.0 {
+            0.0 => "any".to_owned(),
+            most => format!("more than {}", count(most)),
+        };
+        format!(
+            "{needs} never had {most} of the {came} that came, so it acted on none; {remedy} lets more count"
+        )
     }
 
     /// Whether another member of the same node is to be told of in the same words.
     fn is_like(&self, other: &Self) -> bool {
         let names = [self, other].map(|lack| lack.node.split('.').next());
-        let what = |lack: &Self| {
-            let mut what = String::new();
-            lack.write_what(&mut what).map(|()| what)
-        };
-        names[0] == names[1] && what(self) == what(other)
+        names[0] == names[1] && self.what() == other.what()
     }
 }
 
-/// What is to be told of all combiners, of members of a node that lack the same at once.
+/// What is to be told of all combiners.
 pub(super) fn lacks(tallies: &[Tally]) -> Vec<Lack> {
-    let mut lacks: Vec<Lack> = Vec::new();
-    for lack in tallies.iter().filter_map(Tally::lack) {
-        match lacks.iter_mut().find(|told| told.is_like(&lack)) {
-            Some(told) => told.alike += 1,
-            None => lacks.push(lack),
-        }
-    }
-    lacks
+    tallies.iter().filter_map(Tally::lack).collect()
 }
 
 /// What is counted of one combiner.
@@ -122,7 +110,6 @@ impl Tally {
             node,
             lack: Lack {
                 node: planned.instance(),
-                alike: 0,
                 told: 0,
                 needed: 0.0,
                 most: 0.0,

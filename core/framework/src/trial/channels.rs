@@ -66,7 +66,7 @@ impl<'a> Channels<'a> {
             let output = self.outputs.get(reference.node);
             let output = output.filter(|_| reference.port.is_none());
             return match output {
-                Some(channels) => matching(&reference, channels),
+                Some(channels) => channels.find(&reference),
                 None => Err(CompileProblem::UnknownNode {
                     node: reference.node.to_owned(),
                     known: Arc::clone(self.known()),
@@ -76,7 +76,7 @@ impl<'a> Channels<'a> {
         let default = node.named.first().copied().unwrap_or_default();
         let port = reference.port.filter(|&port| port != default);
         match node.ports.get(&port) {
-            Some(channels) => matching(&reference, channels),
+            Some(channels) => channels.find(&reference),
             None => Err(CompileProblem::UnknownPort {
                 node: reference.node.to_owned(),
                 port: reference.port.unwrap_or_default().to_owned(),
@@ -105,20 +105,5 @@ impl<'a> Channels<'a> {
             let all = channels.chain(outputs);
             outermost(all.map(|name| Reference::parse(name).node))
         })
-    }
-}
-
-fn matching(
-    reference: &Reference<'_>,
-    channels: &PortChannels,
-) -> Result<Vec<usize>, CompileProblem> {
-    let slots = channels.slots(reference.channel);
-    match reference.channel {
-        Some(channel) if slots.is_empty() => Err(CompileProblem::UnknownChannel {
-            node: reference.node.to_owned(),
-            channel: channel.to_owned(),
-            known: channels.known(),
-        }),
-        _ => Ok(slots),
     }
 }

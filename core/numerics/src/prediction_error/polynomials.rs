@@ -174,8 +174,7 @@ impl Polynomials {
 
     /// What comes of 1 that is added to the noise before its filters, `1/(A(q) D(q) (1 − q⁻¹)^d)`: in the same sample, in the
     /// next one and so on.
-    #[must_use]
-    pub fn response(&self, most: usize) -> Vec<f64> {
+    fn response(&self, most: usize) -> Vec<f64> {
         let whitening = self.whitening();
         let (mut noise, mut response) = (Vec::with_capacity(most), Vec::with_capacity(most));
         for nth in 0..most {

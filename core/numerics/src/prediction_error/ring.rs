@@ -44,8 +44,7 @@ impl Ring {
         (self.now + self.rows.len() - lag) % self.rows.len()
     }
 
-    /// `ε = D (1 − q⁻¹)^d/C` of the noise, and the same of its first `at` derivatives; then those by `C` and `D` themselves, where
-    /// there is room for them.
+    /// `ε = D (1 − q⁻¹)^d/C` of the noise, and the same of its first `at` derivatives; then those by `C` and `D` themselves.
     pub(super) fn whiten(
         &mut self,
         whitening: &[f64],
@@ -64,12 +63,10 @@ impl Ring {
                 *to += d * from;
             }
         }
-        let derived = if new.len() > at { c.len() } else { 0 };
-        for j in 0..derived {
+        for j in 0..c.len() {
             new[at + j] = -self.rows[self.back(j + 1)].residual;
         }
-        let derived = if new.len() > at { nd } else { 0 };
-        for j in 0..derived {
+        for j in 0..nd {
             // The noise, integrated back, `j + 1` samples ago.
             let mut noise = self.rows[self.back(j + 1)].noise;
             for (i, d) in integrating.iter().enumerate() {

@@ -6,8 +6,8 @@ use faer::{Mat, Side};
 use super::initial;
 use super::precision::held;
 use super::residuals::{Counted, Left, Segment, counted_from};
-use super::{InformationCriteria, Orders, Polynomials, Samples};
-use crate::checks::check_penalty;
+use super::{Orders, Polynomials, Samples};
+use crate::checks::{check_parameter, check_penalty};
 use crate::{GramBlocks, NumericsError};
 
 /// What a step of the polishing promises that is the last, as a share of the sum.
@@ -24,16 +24,17 @@ const SAME: f64 = 1e-12;
 /// Steps by the gradient alone at the end.
 const POLISHING: usize = 4;
 
-/// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B`, by damped Gauss–Newton
+/// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B` and on how far from rest
+/// filters begin, by damped Gauss–Newton
 /// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictionError {
     /// What is added to the sum: so many times the squares of the coefficients of `B`.
     pub penalty: f64,
-    /// The most steps.
+    /// The most steps; where something is known of starts, of each of two searches.
     pub most_steps: usize,
     /// The standard deviation of what filters gave before a segment about what they had given had their inputs always been what
-    /// they are first; infinite where nothing is known of it.
+    /// they are first, above 0; infinite where nothing is known of it.
     pub start_spread: f64,
 }
 
@@ -62,7 +63,7 @@ pub struct PredictionErrorFit {
     pub starts: usize,
     /// What the square of each of them counted as much as.
     pub(super) start_counts: f64,
-    /// Steps of the search.
+    /// Steps of the search, with those that went before to find what starts count.
     pub steps: usize,
     /// Whether the search ended since no step was worth it.
     pub converged: bool,
@@ -75,13 +76,6 @@ impl PredictionErrorFit {
         let found = self.model.flat().len() + self.starts;
         let left = self.rows.saturating_sub(found).max(1);
         self.residual_sum_of_squares / left as f64
-    }
-
-    /// What it is worth beside others on the same rows.
-    #[must_use]
-    pub fn criteria(&self) -> InformationCriteria {
-        let found = self.model.flat().len() + self.starts;
-        InformationCriteria::of(self.rows, found, self.residual_sum_of_squares)
     }
 }
 
@@ -108,6 +102,8 @@ impl PredictionError {
         first: usize,
     ) -> Result<PredictionErrorFit, NumericsError> {
         check_penalty(self.penalty)?;
+        let spread = self.start_spread;
+        check_parameter("start_spread", spread, spread > 0.0, "above 0")?;
         if orders.inputs.len() != samples.width() {
             return Err(NumericsError::Width {
                 expected: orders.inputs.len(),

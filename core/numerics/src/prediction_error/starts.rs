@@ -1,5 +1,5 @@
 //! Decides where the filters of inputs begin in a segment: such that its residuals and how far the filters are from rest are least
-//! together, which is linear (Ljung 1999, section 10.4; as random effects, Robinson 1991).
+//! together, which is linear (Ljung 1999, section 10.5; as random effects, Robinson 1991).
 
 use std::collections::BTreeMap;
 

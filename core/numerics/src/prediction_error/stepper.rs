@@ -135,13 +135,8 @@ impl Stepper {
         self.doubt.begin();
     }
 
-    /// Where it is has been measured: what the inputs do not explain of it has always been there, in the noise, or where there
-    /// is no model of that, in the filters of the inputs.
-    pub fn settle_on(&mut self, value: f64) {
-        self.settle_between(value, f64::from(u8::from(!self.model.follows())));
-    }
-
-    /// The same where the filters of the inputs have this share of what the inputs do not explain, and the noise the rest.
+    /// Where it is has been measured: of what the inputs do not explain of it their filters have this share, and the noise the
+    /// rest, as if it had always been there.
     pub fn settle_between(&mut self, value: f64, filters: f64) {
         let value = value - self.model.level;
         let brought: f64 = self
@@ -270,12 +265,13 @@ impl Stepper {
     }
 
     /// Takes over where another of the same orders is, without making room.
-    pub fn take(&mut self, other: &Self) {
+    fn take(&mut self, other: &Self) {
         self.take_past(other);
         self.doubt.take(&other.doubt);
     }
 
-    /// As [`take`](Self::take), but for how unsure it is of that: to [`foresee`](Self::foresee) from there.
+    /// Takes over where another of the same orders is, but for how unsure it is of that, without making room: to
+    /// [`foresee`](Self::foresee) from there.
     pub fn take_past(&mut self, other: &Self) {
         self.past.copy_from_slice(&other.past);
         self.noise.copy_from_slice(&other.noise);

@@ -49,7 +49,7 @@ pub(crate) struct Found {
     /// The standard errors of its coefficients, where they are known; of a polynomial that has none, an empty list.
     pub(crate) errors: Option<Polynomials>,
     pub(crate) residual_sum_of_squares: f64,
-    /// How many residuals are in it that tell how large they are.
+    /// How many residuals are in it.
     pub(crate) rows: usize,
     /// The variance of an innovation.
     pub(crate) variance: f64,
@@ -230,9 +230,7 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
-        if let Some(note) = pieces(samples, &fit) {
-            report.notes.push(note);
-        }
+        tell_pieces(samples, &fit.model, report);
         report.figure("converged", fit.converged);
         report.figure("steps_of_search", fit.steps);
         if !fit.converged {
@@ -243,8 +241,7 @@ impl Identify for Asked {
         }
         Ok(Found {
             residual_sum_of_squares: fit.residual_sum_of_squares,
-            // Each start that was found has made one of them what it is.
-            rows: fit.rows.saturating_sub(fit.starts).max(1),
+            rows: fit.rows,
             variance: fit.variance(),
             model: fit.model,
             errors,
@@ -288,6 +285,7 @@ impl Asked {
                     tried.push(Tried {
                         name: self.name(&order, &candidate, orders.differences),
                         coefficients,
+                        starts: fit.starts,
                         figures: InformationCriteria::of(
                             fit.rows,
                             coefficients + fit.starts,
@@ -340,20 +338,29 @@ impl Asked {
 /// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth.
 const START_SPREAD: f64 = 1.0;
 
-/// Of pieces without a gap that are shorter on average, noise polynomials come out smaller than they are.
+/// In pieces of fewer samples on average, polynomials of the noise are found less exactly than the theory says.
 const SHORT_PIECE: usize = 50;
 
-/// What is to be said of pieces that are too short for a noise model.
-fn pieces(samples: &Samples, fit: &PredictionErrorFit) -> Option<String> {
-    let count = samples.records().count();
-    let length = samples.count() / count.max(1);
-    let has_memory = fit.model.c.len() + fit.model.d.len() > 0;
-    (count > 1 && has_memory && length < SHORT_PIECE).then(|| {
-        format!(
-            "the {count} pieces without a gap have {length} samples on average: of so short ones, each of which begins without \
-             a past, `C` and `D` are found less exactly than their standard errors say"
-        )
-    })
+/// Tells of pieces that are too short for a model of the noise.
+fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingReport) {
+    let pieces = samples.records().count();
+    let length = samples.count() / pieces.max(1);
+    let of_noise = [("`C`", &model.c), ("`D`", &model.d)];
+    let of_noise = of_noise.iter().filter(|(_, of)| !of.is_empty());
+    let names: Vec<&str> = of_noise.map(|(name, _)| *name).collect();
+    if pieces < 2 || length >= SHORT_PIECE || names.is_empty() {
+        return;
+    }
+    report.figure("pieces", pieces);
+    report.figure("samples_per_piece", length);
+    report.notes.push(format!(
+        "its samples are in {pieces} pieces of {length} on average, each of which begins without a past: in so short ones {} found \
+         less exactly than the standard errors say",
+        match names[..] {
+            [name] => format!("{name} is"),
+            _ => format!("{} are", names.join(" and ")),
+        }
+    ));
 }
 
 /// Why samples allow no fit: those that count are fewer than all, since others are the past that they are predicted from.

@@ -44,6 +44,33 @@ fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() 
     }
 }
 
+#[test]
+fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noise_give() {
+    let step = Duration::from_ns(1_000_000_000);
+    // The filter gives 0.2 of an input, whose variance is 1, and the noise has a variance of 0.04, as has that.
+    let mut model = identified(step);
+    model.model.a = Vec::new();
+    model.model.inputs[0].f = vec![-0.5];
+    model.model.d = vec![-0.8];
+    model.deviations = vec![0.1, 0.2];
+    let second = |model: &Identified| {
+        let mut learner = Following::new(model);
+        let first = Instant::from_ns(0);
+        learner.run(&[0.0], first, first - step);
+        learner.learn(&[0.0], 1.0, first);
+        learner.run(&[0.0], first + step, first);
+        learner.predict(&[0.0], first + step)
+    };
+    let of_both = 0.5 * 0.5 + 0.8 * 0.5;
+    assert!((second(&model) - of_both).abs() < 1e-12);
+    // Noise that may be anywhere has all, and where there is no model of it the filter has.
+    model.model.d = Vec::new();
+    model.model.differences = 1;
+    assert!((second(&model) - 1.0).abs() < 1e-12);
+    model.model.differences = 0;
+    assert!((second(&model) - 0.5).abs() < 1e-12);
+}
+
 /// What it predicts of a truth of 0 around a pause of so many steps.
 fn around_a_pause(steps: i64) -> Vec<f64> {
     let step = Duration::from_ns(1_000_000_000);
