@@ -465,6 +465,34 @@ mod tests {
     use super::*;
 
     #[test]
+    fn short_pieces_are_told_with_the_polynomials_that_they_blur() {
+        let mut samples = Samples::new(0);
+        for _ in 0..3 {
+            samples.segment();
+            (0..20).for_each(|nth| samples.push([], f64::from(nth % 2)));
+        }
+        let told = |nc: usize, nd: usize| {
+            let model = Polynomials::zero(&Orders {
+                nc,
+                nd,
+                ..Orders::default()
+            });
+            let mut report = TrainingReport::default();
+            tell_pieces(&samples, &model, &mut report);
+            report.notes
+        };
+        let expected = |of: &str| {
+            format!(
+                "its samples are in 3 pieces of 20 on average, each of which begins without a past: in so short ones {of} found \
+                 less exactly than the standard errors say"
+            )
+        };
+        assert_eq!(told(1, 0), [expected("`C` is")]);
+        assert_eq!(told(1, 2), [expected("`C` and `D` are")]);
+        assert!(told(0, 0).is_empty());
+    }
+
+    #[test]
     fn of_truths_that_come_much_faster_than_a_step_the_samples_are_a_step_apart() {
         let second = Duration::from_ns(1_000_000_000);
         let at = |nth: i64| Instant::from_ns(0) + Duration::from_ns(nth * 2_000_000_000);
