@@ -189,7 +189,7 @@ fn hannan_rissanen(
 
 /// The residuals by segment; NaN where there is none.
 fn residuals_of(model: &Polynomials, samples: &Samples) -> Vec<Vec<f64>> {
-    let found = Left::by(model, samples, Counted::from(0)).residuals;
+    let found = Left::by(model, samples, &Counted::from(0)).residuals;
     let segments = samples.segments().zip(found);
     let filled = segments.map(|(segment, found)| {
         let mut own = vec![f64::NAN; segment.len() - found.len()];
@@ -289,7 +289,7 @@ fn steiglitz_mcbride(
             };
         }
         model.level = level_left(&model, samples);
-        let sum = Left::by(&model, samples, Counted::from(0)).squares;
+        let sum = Left::by(&model, samples, &Counted::from(0)).squares;
         if sum.is_finite() && best.as_ref().is_none_or(|(least, _)| sum < *least) {
             best = Some((sum, model));
         }

@@ -27,10 +27,10 @@ impl PredictionError {
     ) -> Option<Polynomials> {
         let counted = Counted {
             first: fit.first,
-            start: fit.start_counts,
+            starts: fit.start_counts.clone(),
         };
-        let at = self.judged(fit.model.clone(), samples, counted);
-        let (hessian, gradient) = self.normal_equations(&at, samples, counted);
+        let at = self.judged(fit.model.clone(), samples, &counted);
+        let (hessian, gradient) = self.normal_equations(&at, samples, &counted);
         let held = held(&fit.model, &hessian, &gradient, remembered(samples))?;
         let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
         let scale = |i: usize| hessian[(free[i], free[i])].sqrt();

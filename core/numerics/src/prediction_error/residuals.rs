@@ -16,26 +16,29 @@ pub(super) struct Segment<'a> {
     model: &'a Polynomials,
     values: Vec<f64>,
     inputs: Vec<Vec<f64>>,
-    counted: Counted,
+    counted: &'a Counted,
 }
 
 /// What counts in a search.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Counted {
     /// The residuals of a segment before are not counted.
     pub(super) first: usize,
-    /// What the square of a value that a filter gave before a segment, less what it gives at rest, counts as much as.
-    pub(super) start: f64,
+    /// What the squares of the values of a start count; nothing where there are none.
+    pub(super) starts: Vec<f64>,
 }
 
 impl Counted {
     /// From a sample on, wherever filters begin.
     pub(super) fn from(first: usize) -> Self {
-        Self { first, start: 0.0 }
+        Self {
+            first,
+            starts: Vec::new(),
+        }
     }
 
     /// The first residual that is counted of a model, which has none before it knows all that the noise is made of.
-    pub(super) fn begin(self, model: &Polynomials) -> usize {
+    pub(super) fn begin(&self, model: &Polynomials) -> usize {
         self.first.max(model.reach() + model.whitening().len())
     }
 }
@@ -45,7 +48,7 @@ impl<'a> Segment<'a> {
         model: &'a Polynomials,
         samples: &Samples,
         segment: Range<usize>,
-        counted: Counted,
+        counted: &'a Counted,
     ) -> Self {
         let values = samples.values(segment.clone()).iter();
         let inputs = 0..model.inputs.len();
@@ -141,6 +144,32 @@ impl<'a> Segment<'a> {
     }
 }
 
+/// The mean square of how far from rest the filter of each value of a start is, over all samples but the first of each segment.
+pub(super) fn off_rest(model: &Polynomials, samples: &Samples, starts: &[Start]) -> Vec<f64> {
+    let mut sums = vec![0.0; model.inputs.len()];
+    let mut count = 0;
+    let counted = Counted::from(0);
+    for (segment, start) in samples.segments().zip(starts) {
+        let segment = Segment::new(model, samples, segment, &counted);
+        count += segment.values.len().saturating_sub(1);
+        let brought = segment.brought(&start.values, false);
+        for (nth, sum) in sums.iter_mut().enumerate() {
+            let rest = model.inputs[nth].gain();
+            let before = brought[nth]
+                .whole
+                .iter()
+                .zip(segment.inputs[nth].iter().skip(1));
+            *sum += before
+                .map(|(whole, input)| (whole - rest * input).powi(2))
+                .sum::<f64>();
+        }
+    }
+    let of_each = model.inputs.iter().zip(&sums);
+    of_each
+        .flat_map(|(transfer, sum)| vec![sum / count.max(1) as f64; transfer.f.len()])
+        .collect()
+}
+
 /// What a model leaves, wherever its filters begin.
 #[derive(Debug)]
 pub(super) struct Left {
@@ -150,12 +179,12 @@ pub(super) struct Left {
     pub(super) free: FreeResponses,
     /// The sum of the squared residuals; infinite where it is not a number.
     pub(super) squares: f64,
-    /// The sum of the squared starts, less those at rest.
+    /// What the squares of the starts count.
     of_starts: f64,
 }
 
 impl Left {
-    pub(super) fn by(model: &Polynomials, samples: &Samples, counted: Counted) -> Self {
+    pub(super) fn by(model: &Polynomials, samples: &Samples, counted: &Counted) -> Self {
         let free = FreeResponses::new(model, samples, counted);
         let (mut all, mut starts) = (Vec::new(), Vec::new());
         let rest = vec![0.0; free.starts()];
@@ -170,7 +199,10 @@ impl Left {
         let sum = squares(&mut all.iter().flatten());
         Self {
             squares: if sum.is_finite() { sum } else { f64::INFINITY },
-            of_starts: squares(&mut starts.iter().flat_map(|start| &start.values)),
+            of_starts: starts
+                .iter()
+                .map(|start| start.counting(&counted.starts))
+                .sum(),
             residuals: all,
             starts,
             free,
@@ -178,14 +210,8 @@ impl Left {
     }
 
     /// What is made least: the squares of residuals and starts.
-    pub(super) fn sum(&self, counted: Counted) -> f64 {
-        // What counts endlessly is 0.
-        let of_starts = if self.of_starts > 0.0 {
-            counted.start * self.of_starts
-        } else {
-            0.0
-        };
-        self.squares + of_starts
+    pub(super) fn sum(&self) -> f64 {
+        self.squares + self.of_starts
     }
 
     /// How many starts the residuals tell.

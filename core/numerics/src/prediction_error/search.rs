@@ -5,7 +5,7 @@ use faer::{Mat, Side};
 
 use super::initial;
 use super::precision::held;
-use super::residuals::{Counted, Left, Segment, counted_from};
+use super::residuals::{Counted, Left, Segment, counted_from, off_rest};
 use super::{Orders, Polynomials, Samples};
 use crate::checks::{check_parameter, check_penalty};
 use crate::{GramBlocks, NumericsError};
@@ -21,6 +21,8 @@ const SMALL: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e12;
 /// Sums that differ by this share are the same but for rounding.
 const SAME: f64 = 1e-12;
+/// The least mean square of how far from rest a filter begins, so that what its start counts is a number.
+const LEAST_SQUARE: f64 = 1e-12;
 /// Steps by the gradient alone at the end.
 const POLISHING: usize = 4;
 
@@ -33,8 +35,9 @@ pub struct PredictionError {
     pub penalty: f64,
     /// The most steps; where something is known of starts, of each of two searches.
     pub most_steps: usize,
-    /// The standard deviation of what filters gave before a segment about what they had given had their inputs always been what
-    /// they are first, above 0; infinite where nothing is known of it.
+    /// How far what filters gave before a segment may together be off from what they had given had their inputs always been what
+    /// they are first, as a standard deviation above 0. Each is taken to be as far off as it is at samples anywhere, but that their
+    /// squares are together no more than the square of this. Infinite where nothing is known of it.
     pub start_spread: f64,
 }
 
@@ -62,7 +65,7 @@ pub struct PredictionErrorFit {
     /// How many values that filters gave before the segments were found beside the coefficients, as far as samples tell them.
     pub starts: usize,
     /// What the square of each of them counted as much as.
-    pub(super) start_counts: f64,
+    pub(super) start_counts: Vec<f64>,
     /// Steps of the search, with those that went before to find what starts count.
     pub steps: usize,
     /// Whether the search ended since no step was worth it.
@@ -130,51 +133,60 @@ impl PredictionError {
         let mut counted = Counted::from(first);
         let mut before = 0;
         if orders.starts() > 0 && self.start_spread.is_finite() {
-            (counted, before, begin) = self.roughly(begin, samples, counted, radius)?;
+            (counted, before, begin) = self.roughly(begin, samples, first, radius)?;
         }
-        let start = self.best(begin, samples, counted)?;
-        let (found, steps, converged) = self.search(start, samples, counted, radius, TOLERANCE);
-        let Judged { model, left, .. } = self.polished(found, samples, counted, radius);
+        let start = self.best(begin, samples, &counted)?;
+        let (found, steps, converged) = self.search(start, samples, &counted, radius, TOLERANCE);
+        let Judged { model, left, .. } = self.polished(found, samples, &counted, radius);
         Ok(PredictionErrorFit {
             residual_sum_of_squares: left.squares,
             model,
             rows,
             first,
             starts: left.told().round() as usize,
-            start_counts: counted.start,
+            start_counts: counted.starts,
             steps: before + steps,
             converged,
         })
     }
 
-    /// What starts count where something is known of them. How large innovations are, and so what a start counts beside them, is
-    /// known afterwards: it is searched roughly, with what the models to begin with leave wherever their filters begin. Returns
-    /// how many steps that took, and the model that it led to.
+    /// What starts count where something is known of them: pieces begin anywhere, so that each filter is as far from rest there as
+    /// it is on average. That, and how large innovations are, is known afterwards: it is searched roughly, with what the models to
+    /// begin with leave wherever their filters begin. Returns how many steps that took, and the model that it led to.
     fn roughly(
         &self,
         begin: Vec<Polynomials>,
         samples: &Samples,
-        counted: Counted,
+        first: usize,
         radius: f64,
     ) -> Result<(Counted, usize, Vec<Polynomials>), NumericsError> {
-        let rows = samples.counted(counted.first) as f64;
-        let of = |sum: f64| Counted {
-            start: sum / rows / (self.start_spread * self.start_spread),
-            ..counted
+        let rows = samples.counted(first) as f64;
+        let most = self.start_spread * self.start_spread;
+        // Squares that are together more than may be are all as much smaller.
+        let counts = |sum: f64, squares: &[f64]| {
+            let scale = (most / squares.iter().sum::<f64>()).min(1.0);
+            let of = |square: &f64| sum / rows / (scale * square).max(LEAST_SQUARE);
+            Counted {
+                first,
+                starts: squares.iter().map(of).collect(),
+            }
         };
-        let free = |model: &Polynomials| Left::by(model, samples, counted).squares;
-        let least = of(begin.iter().map(free).fold(f64::INFINITY, f64::min));
-        let start = self.best(begin, samples, least)?;
+        let free = |model: &Polynomials| Left::by(model, samples, &Counted::from(first)).squares;
+        let least = begin.iter().map(free).fold(f64::INFINITY, f64::min);
+        let starts = begin.first().map_or(0, Polynomials::starts);
+        let counted = counts(least, &vec![most; starts]);
+        let start = self.best(begin, samples, &counted)?;
         let (Judged { model, left, .. }, steps, _) =
-            self.search(start, samples, least, radius, ROUGH);
-        Ok((of(left.sum(least)), steps, vec![model]))
+            self.search(start, samples, &counted, radius, ROUGH);
+        let squares = off_rest(&model, samples, &left.starts);
+        Ok((counts(left.sum(), &squares), steps, vec![model]))
     }
 
     fn best(
         &self,
         of: Vec<Polynomials>,
         samples: &Samples,
-        counted: Counted,
+        counted: &Counted,
     ) -> Result<Judged, NumericsError> {
         of.into_iter()
             .map(|model| self.judged(model, samples, counted))
@@ -183,12 +195,17 @@ impl PredictionError {
             .ok_or(NumericsError::NotFinite)
     }
 
-    pub(super) fn judged(&self, model: Polynomials, samples: &Samples, counted: Counted) -> Judged {
+    pub(super) fn judged(
+        &self,
+        model: Polynomials,
+        samples: &Samples,
+        counted: &Counted,
+    ) -> Judged {
         let b = model.flat().into_iter().zip(model.penalised());
         let squares: f64 = b.filter(|(_, of_b)| *of_b).map(|(b, _)| b * b).sum();
         let left = Left::by(&model, samples, counted);
         Judged {
-            sum: left.sum(counted) + self.penalty * squares,
+            sum: left.sum() + self.penalty * squares,
             model,
             left,
         }
@@ -198,7 +215,7 @@ impl PredictionError {
         &self,
         start: Judged,
         samples: &Samples,
-        counted: Counted,
+        counted: &Counted,
         radius: f64,
         tolerance: f64,
     ) -> (Judged, usize, bool) {
@@ -244,7 +261,13 @@ impl PredictionError {
 
     /// A few whole steps more, with what is held back from instability at its edge. Where the sum hardly changes it is known less
     /// exactly than its gradient, by which they go.
-    fn polished(&self, mut at: Judged, samples: &Samples, counted: Counted, radius: f64) -> Judged {
+    fn polished(
+        &self,
+        mut at: Judged,
+        samples: &Samples,
+        counted: &Counted,
+        radius: f64,
+    ) -> Judged {
         let most = at.sum * (1.0 + SAME);
         for _ in 0..POLISHING {
             let (mut hessian, mut gradient) = self.normal_equations(&at, samples, counted);
@@ -291,7 +314,7 @@ impl PredictionError {
         &self,
         at: &Judged,
         samples: &Samples,
-        counted: Counted,
+        counted: &Counted,
     ) -> (Mat<f64>, Vec<f64>) {
         let Judged { model, left, .. } = at;
         let flat = model.flat();
@@ -388,9 +411,9 @@ mod tests {
         });
         let search = PredictionError::default();
         let (model, steps, converged) = search.search(
-            search.judged(start.clone(), &samples, Counted::from(0)),
+            search.judged(start.clone(), &samples, &Counted::from(0)),
             &samples,
-            Counted::from(0),
+            &Counted::from(0),
             0.9,
             TOLERANCE,
         );

@@ -43,8 +43,18 @@ struct Told {
     inverse: Option<Mat<f64>>,
 }
 
+impl Start {
+    /// What its squares count.
+    pub(super) fn counting(&self, counts: &[f64]) -> f64 {
+        let counted = self.values.iter().zip(counts);
+        // What counts endlessly is 0.
+        let counted = counted.filter(|(value, _)| **value != 0.0);
+        counted.map(|(value, of)| of * value * value).sum()
+    }
+}
+
 impl FreeResponses {
-    pub(super) fn new(model: &Polynomials, samples: &Samples, counted: Counted) -> Self {
+    pub(super) fn new(model: &Polynomials, samples: &Samples, counted: &Counted) -> Self {
         let mut responses = Vec::with_capacity(model.starts());
         for f in model.inputs.iter().map(|transfer| &transfer.f) {
             let of = |nth| free_response(model, f, nth, samples.longest(), counted);
@@ -57,7 +67,7 @@ impl FreeResponses {
             }),
             told: BTreeMap::new(),
         };
-        if free.starts() > 0 && counted.start.is_finite() {
+        if free.starts() > 0 && counted.starts.iter().all(|of| of.is_finite()) {
             for segment in samples.segments() {
                 let rows = free.lasting(segment.len().saturating_sub(counted.begin(model)));
                 if !free.told.contains_key(&rows) {
@@ -90,12 +100,12 @@ impl FreeResponses {
         }
     }
 
-    fn told_by(&self, rows: usize, counted: Counted) -> Told {
+    fn told_by(&self, rows: usize, counted: &Counted) -> Told {
         let derivatives = self.derivatives.subrows(0, rows);
         let own = derivatives.transpose() * derivatives;
         let mut with_start = own.clone();
-        for i in 0..self.starts() {
-            with_start[(i, i)] += counted.start;
+        for (i, of) in counted.starts.iter().enumerate() {
+            with_start[(i, i)] += of;
         }
         Told {
             inverse: pseudo_inverse_above(&with_start, &with_start, DISTINCT).ok(),
@@ -147,7 +157,7 @@ fn free_response(
     f: &[f64],
     nth: usize,
     longest: usize,
-    counted: Counted,
+    counted: &Counted,
 ) -> Vec<f64> {
     let whitening = model.whitening();
     let memory = f.len().max(whitening.len()).max(model.c.len());

@@ -124,12 +124,13 @@ fn derivatives_are_those_of_the_residuals() {
         let samples = simulated(&model, 90, 0.3, 7);
         let moved: Vec<f64> = model.flat().iter().map(|at| 0.9 * at + 0.01).collect();
         let at = model.with(&moved);
-        let left = Left::by(&at, &samples, Counted::from(0));
+        let counted = Counted::from(0);
+        let left = Left::by(&at, &samples, &counted);
         let starts: Vec<Vec<f64>> = left.starts.iter().map(|of| of.values.clone()).collect();
         let all = |model: &Polynomials, starts: &[Vec<f64>]| {
             let mut all = Vec::new();
             for (segment, start) in samples.segments().zip(starts) {
-                let segment = Segment::new(model, &samples, segment, Counted::from(0));
+                let segment = Segment::new(model, &samples, segment, &counted);
                 let mut row = 0;
                 segment.derivatives(start, |residual, by| {
                     let mut by_start = Mat::zeros(1, start.len());
@@ -174,7 +175,7 @@ fn derivatives_are_those_of_the_residuals() {
 fn a_stepper_errs_by_the_residuals() {
     for (name, model) in models() {
         let samples = simulated(&model, 90, 0.3, 3);
-        let found = Left::by(&model, &samples, Counted::from(0))
+        let found = Left::by(&model, &samples, &Counted::from(0))
             .residuals
             .concat();
         // What the noise was before the first sample is not known; it is forgotten.
@@ -316,16 +317,16 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
     let at = fit.model.flat();
     let counted = Counted {
         first: fit.first,
-        start: fit.start_counts,
+        starts: fit.start_counts.clone(),
     };
-    let least = search.judged(fit.model.clone(), &samples, counted).sum;
+    let least = search.judged(fit.model.clone(), &samples, &counted).sum;
     let mut compared = 0;
     for (nth, by) in (0..at.len()).flat_map(|nth| [(nth, 1e-3), (nth, -1e-3)]) {
         let mut moved = at.clone();
         moved[nth] += by;
         let moved = fit.model.with(&moved);
         if !moved.unstable(remembered(&samples)).contains(&true) {
-            let sum = search.judged(moved, &samples, counted).sum;
+            let sum = search.judged(moved, &samples, &counted).sum;
             assert!(sum > least, "{nth} by {by}: {fit:?}");
             compared += 1;
         }

@@ -317,12 +317,10 @@ impl Asked {
 
     fn search(&self, orders: &Orders, penalty: f64) -> PredictionError {
         let most = MOST_WORK / orders.coefficients().max(1);
-        // Truths are in units of their spread.
-        let filters = orders.inputs.iter().filter(|input| input.nf > 0).count();
         PredictionError {
             penalty,
             most_steps: most.clamp(20, 100),
-            start_spread: START_SPREAD / (filters.max(1) as f64).sqrt(),
+            start_spread: START_SPREAD,
         }
     }
 
@@ -335,8 +333,10 @@ impl Asked {
     }
 }
 
-/// The standard deviation of what filters give together where a piece begins, about rest, in spreads of the truth.
-const START_SPREAD: f64 = 1.0;
+/// The largest standard deviation, about rest, of what all filters give where a piece begins, in spreads of the truth, which the
+/// truths that are fitted are in. That of filters that do not go along is at most 1; twice the square leaves room for some that do,
+/// and none for filters that are large and cancel out.
+const START_SPREAD: f64 = std::f64::consts::SQRT_2;
 
 /// In pieces of fewer samples on average, polynomials of the noise are found less exactly than the theory says.
 const SHORT_PIECE: usize = 50;
