@@ -44,7 +44,7 @@ pub enum Format {
 }
 
 /// Where the program speaks.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Terminal {
     /// The form of what is printed.
     pub format: Format,

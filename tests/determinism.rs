@@ -165,6 +165,34 @@ fn row_by_row_through_a_pipe_gives_the_same_bytes() {
 }
 
 #[test]
+fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
+    let text = std::fs::read_to_string(&fitted().test).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .arg("run")
+        .arg(&fitted().model)
+        .args(["--input", "-", "--output", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let mut told = BufReader::new(child.stderr.take().unwrap());
+    for line in text.lines().take(3).chain(text.lines().skip(1).take(1)) {
+        writeln!(input, "{line}").unwrap();
+    }
+    input.flush().unwrap();
+    let mut first = String::new();
+    told.read_line(&mut first).unwrap();
+    assert_eq!(
+        first,
+        "warning: standard input:4: the time `0` is not after `10`; the row was left out; others like it are counted\n"
+    );
+    drop(input);
+    assert!(child.wait().unwrap().success());
+}
+
+#[test]
 fn any_number_of_threads_gives_the_same_model() {
     let one = std::fs::read_to_string(&fitted().model).unwrap();
     for threads in ["1", "2", "5", "64"] {

@@ -2,7 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod workbench;
+
 use std::process::{Command, Output};
+
+use workbench::Scratch;
 
 fn athermal(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_athermal"))
@@ -94,4 +98,47 @@ fn a_warning_is_a_no_only_where_that_is_asked_for() {
         (&"A060".into(), &"warning".into(), &4.into(), &10.into())
     );
     std::fs::remove_file(file).unwrap();
+}
+
+#[test]
+fn a_model_that_could_not_be_fitted_differs_from_one_that_was() {
+    let scratch = Scratch::new("unfitted");
+    let graph = scratch.file(
+        "graph.toml",
+        r#"schema = 1
+[time]
+column = "time_s"
+[signals.t]
+unit = "Cel"
+channels = ["a"]
+column = "{channel}"
+max_age = "1min"
+[signals.z]
+unit = "nm"
+channels = ["z"]
+column = "{channel}"
+max_age = "1min"
+[nodes.plain]
+type = "linear"
+inputs.features = "t"
+inputs.truth = "z"
+ahead = "0s"
+[outputs]
+out = "plain"
+"#,
+    );
+    let rows: String = (0..60)
+        .map(|row| format!("{},{},{}\n", 10 * row, 20 + row % 7, row % 7))
+        .collect();
+    let header = "time_s,a,z\n";
+    let full = scratch.file("full.csv", format!("{header}{rows}"));
+    let empty = scratch.file("empty.csv", header);
+    let models = [(full, "fitted.json", 0), (empty, "unfitted.json", 1)];
+    let [fitted, unfitted] = models.map(|(data, model, status)| {
+        let model = scratch.path(model);
+        workbench::athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(status);
+        model
+    });
+    let told = workbench::athermal(&[&"diff", &fitted, &unfitted]).ended(1);
+    assert_eq!(told.out, "fitted parameters\n  ~ plain\n");
 }

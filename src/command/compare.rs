@@ -123,7 +123,7 @@ impl Compare {
             );
         } else {
             for comparison in &comparisons {
-                println!("{}", describe(comparison));
+                println!("{}", describe(comparison, fits.len() > 1));
             }
             for fit in &fits {
                 println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
@@ -171,11 +171,8 @@ fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
     failed
 }
 
-fn describe(comparison: &Comparison) -> String {
-    let several = comparison
-        .rows
-        .iter()
-        .any(|row| row.graph != comparison.rows[0].graph);
+/// A table, with the names of graphs where there are several.
+fn describe(comparison: &Comparison, several: bool) -> String {
     let columns: Vec<String> = comparison.truths.iter().map(|of| of.name.clone()).collect();
     let plain = |of: fn(&Column) -> Option<f64>| -> Vec<String> {
         let truths = comparison.truths.iter();
@@ -274,20 +271,28 @@ mod tests {
 
     #[test]
     fn the_best_row_may_be_worse_than_no_model() {
-        assert!(describe(&one_row(100, 8.49)).contains(" *!8.49"));
-        assert!(describe(&one_row(100, 2.0)).contains(" *2.00"));
+        assert!(describe(&one_row(100, 8.49), false).contains(" *!8.49"));
+        assert!(describe(&one_row(100, 2.0), false).contains(" *2.00"));
     }
 
     #[test]
     fn with_few_instants_it_is_said_that_the_best_may_be_chance() {
-        assert!(describe(&one_row(19, 2.0)).contains("best may be chance"));
-        assert!(!describe(&one_row(20, 2.0)).contains("best may be chance"));
+        assert!(describe(&one_row(19, 2.0), false).contains("best may be chance"));
+        assert!(!describe(&one_row(20, 2.0), false).contains("best may be chance"));
+    }
+
+    #[test]
+    fn of_several_graphs_each_row_stands_below_the_name_of_its_own() {
+        let told = describe(&one_row(100, 2.0), true);
+        let lines: Vec<&str> = told.lines().map(str::trim_end).collect();
+        let at = lines.iter().position(|line| *line == "  a").unwrap();
+        assert!(lines[at + 1].starts_with("    vote (mean)"), "{told}");
     }
 
     #[test]
     fn a_single_instant_is_no_plural() {
-        assert!(describe(&one_row(1, 2.0)).contains("ahead, 1 instant; *"));
-        assert!(describe(&one_row(2, 2.0)).contains("ahead, 2 instants; *"));
+        assert!(describe(&one_row(1, 2.0), false).contains("ahead, 1 instant; *"));
+        assert!(describe(&one_row(2, 2.0), false).contains("ahead, 2 instants; *"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `athermal diff`: what differs in meaning between two graphs or models.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use athermal::Model;
@@ -52,16 +53,25 @@ impl Diff {
     }
 }
 
-/// The instances of both whose fitted parameters differ, where both have any.
+/// The instances of both whose fitted parameters differ, or of which one alone has any, where both are models that were fitted.
 fn fitted(before: &Model, after: &Model) -> Vec<String> {
-    let differs = |instance: &&String| {
+    if before.card.is_none() || after.card.is_none() {
+        return Vec::new();
+    }
+    let instances = |model: &Model| -> BTreeSet<String> {
+        let nodes = model.plan.nodes.iter();
+        nodes.map(|node| node.instance()).collect()
+    };
+    let differs = |instance: &String| {
         let parameters = |model: &Model| {
             let predictor = model.fitted.get(instance.as_str())?;
             serde_json::to_value(&**predictor).ok()
         };
-        before.fitted.contains_key(instance.as_str()) && parameters(before) != parameters(after)
+        parameters(before) != parameters(after)
     };
-    after.fitted.keys().filter(differs).cloned().collect()
+    let (before_has, after_has) = (instances(before), instances(after));
+    let both = before_has.intersection(&after_has);
+    both.filter(|instance| differs(instance)).cloned().collect()
 }
 
 fn show(plans: &PlanDiff, fitted: &[String]) {

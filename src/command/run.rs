@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use athermal::core::document::TimeBase;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair};
 use athermal::core::recording::Event;
-use athermal::files::{Flush, Options, Reader, WithRevision, Writer, layout};
+use athermal::files::{Flush, Layout, Options, Reader, WithRevision, Writer, layout};
 use athermal::{Engine, Model};
 use clap::Args;
 
@@ -78,7 +78,7 @@ impl Run {
             lenient: self.lenient,
             ..Options::default()
         };
-        let mut reader = Reader::open(&self.input, layout(&plan), options)?;
+        let mut reader = self.open(terminal, layout(&plan), options)?;
         let TimeBase::Column { column, .. } = &plan.time;
         let columns: Vec<String> = plan
             .outputs
@@ -100,7 +100,7 @@ impl Run {
             ..Options::default()
         };
         let layout = layout(&swap::reading(&model, &swaps, &feed));
-        let mut reader = Reader::open(&self.input, layout, options)?;
+        let mut reader = self.open(terminal, layout, options)?;
         let live = LiveOptions {
             channels: feed,
             ..LiveOptions::default()
@@ -181,6 +181,23 @@ impl Run {
             sections.join(", "),
             instead.join("; ")
         ));
+    }
+
+    fn open(
+        &self,
+        terminal: &Terminal,
+        layout: Layout,
+        options: Options,
+    ) -> Result<Reader, Failure> {
+        let mut reader = Reader::open(&self.input, layout, options)?;
+        if self.input.as_os_str() == "-" {
+            // Beside a machine the input does not end, and nor would the wait for what is told then.
+            let terminal = *terminal;
+            reader.tell_first(move |first| {
+                terminal.warning(format_args!("{first}; others like it are counted"));
+            });
+        }
+        Ok(reader)
     }
 
     fn flush(&self) -> Flush {

@@ -1,7 +1,7 @@
 //! Decides how features are compared with truths and residuals over a range of lags (Mandelli, Dankwart and Napoli, Fig. 3).
 //!
-//! Features, truths and residuals are sampled on one regular grid, each value held as long as it counts. At a positive lag the
-//! truth follows the feature, so that the feature can tell of it beforehand.
+//! Features, truths and residuals are set on one regular grid: of a feature the last value, of a truth the next one, as long as
+//! each counts. At a positive lag the truth follows the feature, so that the feature can tell of it beforehand.
 
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::Engine;
@@ -312,7 +312,8 @@ impl Grid {
         }
     }
 
-    /// Values of a truth's instants, each held as long as it counts.
+    /// Values of a truth's instants, each from the one before on, as far back as it counts: beside an instant of the grid stands
+    /// the truth that follows it, so that no feature is set against a truth of before its time.
     fn place(&self, plan: &Plan, truth: &TruthTrace, values: &[f64]) -> Vec<f64> {
         let mut placed = vec![f64::NAN; self.len()];
         let own = plan.channels[truth.slot].channel.default_max_age();
@@ -325,15 +326,14 @@ impl Grid {
             let Some(&(_, begin, place)) = self.begins.get(after.wrapping_sub(1)) else {
                 continue;
             };
-            let next = truth.times.get(nth + 1);
-            let until = match next {
-                Some(&(of, next)) if of == segment => next.min(at + held),
-                _ => at + held,
+            let before = nth.checked_sub(1).map(|before| truth.times[before]);
+            let since = match before {
+                Some((of, before)) if of == segment => before.max(at - held),
+                _ => at - held,
             };
-            let first = (at - begin).as_ns().div_euclid(step)
-                + i64::from((at - begin).as_ns().rem_euclid(step) > 0);
-            let end = (until - begin).as_ns().div_euclid(step)
-                + i64::from((until - begin).as_ns().rem_euclid(step) > 0);
+            // The first instant of the grid after the truth before, and the last one that is not after this one.
+            let first = (since - begin).as_ns().div_euclid(step) + 1;
+            let end = (at - begin).as_ns().div_euclid(step) + 1;
             let room = self.end_before(after).min(placed.len());
             let from = (place + first.max(0) as usize).min(room);
             let to = (place + end.max(0) as usize).min(room);

@@ -20,6 +20,8 @@ pub struct Verdict {
     pub error: Option<f64>,
     /// The drift itself on the same instants: the error of no model.
     pub no_model: Option<f64>,
+    /// Whether the drift was measured at any instant.
+    pub measured: bool,
     /// The noise of the measured drift.
     pub noise: Option<f64>,
     /// Drift over all that is corrected, without the correction.
@@ -57,6 +59,7 @@ impl Verdict {
             unit: axis.unit.clone(),
             error: rms(both().map(|(_, e)| *e)),
             no_model: rms(both().map(|(y, _)| *y)),
+            measured: axis.truth.value.iter().any(|y| !y.is_nan()),
             noise: score.and_then(|score| score.truth_noise),
             without_correction: corrected.map(|both| both.0),
             with_correction: corrected.map(|both| both.1),
@@ -79,7 +82,11 @@ impl Verdict {
     #[must_use]
     pub fn sentence(&self) -> String {
         let (Some(error), Some(no_model)) = (self.error, self.no_model) else {
-            return format!("{} gave no prediction on these data.", self.node);
+            return if self.measured {
+                format!("{} gave no prediction on these data.", self.node)
+            } else {
+                format!("these data have no truth to compare {} with.", self.node)
+            };
         };
         let mut text = format!(
             "{} predicts the drift of {} {} RMS to {}",
@@ -137,6 +144,7 @@ mod tests {
             unit: "nm/min".into(),
             error: Some(20.0),
             no_model: Some(50.0),
+            measured: true,
             noise: Some(3.85),
             without_correction: Some(60.0),
             with_correction: Some(15.0),
@@ -156,5 +164,10 @@ mod tests {
         );
         verdict.error = None;
         assert_eq!(verdict.sentence(), "vote gave no prediction on these data.");
+        verdict.measured = false;
+        assert_eq!(
+            verdict.sentence(),
+            "these data have no truth to compare vote with."
+        );
     }
 }

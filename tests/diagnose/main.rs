@@ -294,6 +294,39 @@ fn a_pause_and_missing_truths_leave_residuals_what_they_are() {
 }
 
 #[test]
+fn no_feature_is_set_against_a_truth_of_before_its_time() {
+    let terms = [("temperature.a", 0.0)];
+    let text = TWO_SENSORS
+        .replace("\"gradients\"", "\"temperature\"")
+        .replace("\"drift.z\"", "\"position.z\"")
+        .replace("ahead = \"0s\"", "ahead = \"150s\"");
+    let model = model("ahead", &text, &[("thermal", linear(&terms, 0.0))]);
+    let (mut random, mut table) = (Prng::stream(5, "ahead"), Table::default());
+    let mut course = vec![0.0];
+    for row in 0..16_000_usize {
+        let a = 0.5 * course[row] + random.normal();
+        course.push(a);
+        // What it follows lies 120 s back, and is not known 150 s before.
+        let follows = row % 8 == 0 && row > 12;
+        let z = if follows {
+            course[row + 1 - 12]
+        } else {
+            f64::NAN
+        };
+        table.push(secs(10.0 * row as f64), &[a, random.normal(), z]);
+    }
+    let observation = observe(&model, &table).unwrap();
+    let found = lag::lags(&model, &table, &observation, &[]).unwrap();
+    let left = &found[0].features[0].residual;
+    assert!(
+        left.best.abs() < 0.2,
+        "{} at {}",
+        left.best,
+        left.best_lag_s
+    );
+}
+
+#[test]
 fn missing_truths_leave_the_lag_of_a_feature_where_it_is() {
     let terms = [("temperature.a", 1000.0)];
     let text = TWO_SENSORS

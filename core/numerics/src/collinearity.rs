@@ -36,6 +36,12 @@ impl Collinearity {
             return Err(NumericsError::NotFinite);
         }
         let problem = Problem::new(true, gram, columns, &vec![1.0; width]);
+        if problem.active.is_empty() {
+            return Ok(Self {
+                condition: f64::NAN,
+                inflation: vec![f64::NAN; columns.len()],
+            });
+        }
         let condition = condition_of(&problem.standard)?;
         let eigen = problem
             .standard
@@ -43,7 +49,7 @@ impl Collinearity {
             .map_err(|_| NumericsError::NoConvergence)?;
         let (vectors, values) = (eigen.U(), eigen.S().column_vector());
         let order = problem.active.len();
-        let largest = if order > 0 { values[order - 1] } else { 0.0 };
+        let largest = values[order - 1];
         let rounding = f64::EPSILON * order as f64 * largest;
         // The diagonal of the inverse correlation matrix, direction by direction.
         let inverse = |row: usize| -> f64 {
@@ -105,6 +111,13 @@ mod tests {
         assert_eq!(found.condition, f64::INFINITY);
         assert!(found.inflation[..3].iter().all(|factor| *factor > 1e12));
         assert!((found.inflation[3] - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn of_columns_that_all_stay_as_they_are_nothing_is_known() {
+        let found = gram((0..100).map(|_| [1.0, 5.0, 2.0, 1.0]));
+        let found = Collinearity::of(&found, &[0, 1]).unwrap();
+        assert!(found.condition.is_nan() && found.inflation.iter().all(|of| of.is_nan()));
     }
 
     #[test]

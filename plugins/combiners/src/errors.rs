@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::memory::Memory;
 
+/// The largest square of an error that is remembered: of so many as there may be in a memory the sum is a number.
+const LARGEST: f64 = 1e290;
+
 /// A combiner that goes by the recent errors of its voters.
 pub(crate) struct ByErrors<R> {
     rule: R,
@@ -154,9 +157,12 @@ impl Errors {
         }
     }
 
-    /// Takes the error of one vote whose truth has arrived.
+    /// Takes the error of one vote whose truth has arrived, unless it is so large that no mean of squares with it is a number.
     pub(crate) fn observe_one(&mut self, voter: usize, vote: f64, truth: f64, arrived: Instant) {
-        self.remember(voter, arrived, (vote - truth) * (vote - truth));
+        let square = (vote - truth) * (vote - truth);
+        if square <= LARGEST {
+            self.remember(voter, arrived, square);
+        }
     }
 
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {

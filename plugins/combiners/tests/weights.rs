@@ -235,3 +235,19 @@ fn a_vote_that_has_run_for_long_weighs_as_one_that_has_just_begun() {
         }
     }
 }
+
+#[test]
+fn a_truth_so_large_that_its_squares_are_no_numbers_does_not_silence_the_vote() {
+    for memory in [r#""10min""#, r#"{ "half_life": "5min" }"#] {
+        let mut running = AutoWeighted {
+            memory: serde_json::from_str(memory).unwrap(),
+            ..vote(1, 2.0, Weighting::InversePower)
+        }
+        .build(2);
+        running.observe(Votes(&[1.0, 2.0]), 1.0, s(0));
+        running.observe(Votes(&[1.0, 2.0]), 1e200, s(10));
+        running.observe(Votes(&[1.0, 2.0]), 1.1, s(20));
+        let vote = running.combine(Votes(&[1.0, 2.0]));
+        assert!((1.0..1.1).contains(&vote), "{memory}: {vote}");
+    }
+}

@@ -27,15 +27,22 @@ pub struct Count {
 }
 
 impl Count {
-    fn add(&mut self, error: impl FnOnce() -> FileError) {
+    fn add(&mut self, error: impl FnOnce() -> FileError, tell: &mut Option<Tell>) {
         self.count += 1;
-        self.first.get_or_insert_with(error);
+        if self.first.is_none() {
+            let first = self.first.insert(error());
+            tell.iter_mut().for_each(|tell| tell(first));
+        }
     }
 }
+
+/// Who is told at once of what is met for the first time.
+pub(crate) type Tell = Box<dyn FnMut(&FileError) + Send>;
 
 /// The account that a reader keeps.
 pub(crate) struct Ledger {
     pub report: Report,
+    pub tell: Option<Tell>,
     lenient: bool,
     last_ns: Option<i64>,
 }
@@ -44,6 +51,7 @@ impl Ledger {
     pub fn new(lenient: bool) -> Self {
         Self {
             report: Report::default(),
+            tell: None,
             lenient,
             last_ns: None,
         }
@@ -53,11 +61,12 @@ impl Ledger {
     pub fn accepts(&mut self, time_ns: i64, form: TimeForm, place: impl FnOnce() -> Place) -> bool {
         match self.last_ns {
             Some(previous_ns) if time_ns <= previous_ns => {
-                self.report.refused_time.add(|| FileError::TimeNotAfter {
+                let error = || FileError::TimeNotAfter {
                     place: place(),
                     time: form.text(time_ns),
                     previous: form.text(previous_ns),
-                });
+                };
+                self.report.refused_time.add(error, &mut self.tell);
                 false
             }
             _ => {
@@ -74,7 +83,7 @@ impl Ledger {
         if !self.lenient {
             return Err(error());
         }
-        self.report.bad_cells.add(error);
+        self.report.bad_cells.add(error, &mut self.tell);
         Ok(())
     }
 
@@ -84,7 +93,7 @@ impl Ledger {
         if !self.lenient {
             return Err(error());
         }
-        self.report.refused_rows.add(error);
+        self.report.refused_rows.add(error, &mut self.tell);
         Ok(())
     }
 }

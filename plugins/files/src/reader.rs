@@ -100,6 +100,11 @@ impl Reader {
         }
     }
 
+    /// Tells of what is met for the first time as soon as it is: who reads what never ends gets no report at its end.
+    pub fn tell_first(&mut self, tell: impl FnMut(&FileError) + Send + 'static) {
+        self.ledger.tell = Some(Box::new(tell));
+    }
+
     /// What was met so far.
     pub fn report(&self) -> &Report {
         &self.ledger.report

@@ -4,7 +4,7 @@ use athermal::diagnosis::Main;
 use athermal::diagnosis::lag::FeatureLags;
 
 use super::Diagnose;
-use super::tables::{SAYS_SOMETHING, Tables};
+use super::tables::{SAYS_SOMETHING, Tables, is_of};
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 
@@ -29,7 +29,7 @@ impl Diagnose {
         let name = &feature.feature;
         let users: Vec<&str> = tables.users_of(main, name).collect();
         let why = format!("What {} leaves goes with {name}, ", main.prediction);
-        let (why, look) = if users.contains(&main.prediction.as_str()) {
+        let (why, look) = if users.iter().any(|user| is_of(&main.prediction, user)) {
             let model = quoted(&self.model.display().to_string());
             let node = quoted(&main.prediction);
             let words = [

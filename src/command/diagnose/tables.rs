@@ -103,7 +103,7 @@ impl<'a> Tables<'a> {
     /// Whether a prediction is that of an estimator, and not a vote of several.
     pub(super) fn is_estimator(&self, main: &Main) -> bool {
         let mut designs = self.diagnosis.designs.iter();
-        designs.any(|of| of.node == main.prediction)
+        designs.any(|of| is_of(&main.prediction, &of.node))
     }
 
     /// Whether all that is left of any truth may be noise.
@@ -451,6 +451,12 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
     )
 }
 
+/// Whether a prediction is what an instance puts out: `thermal.Z1` is, of itself and of `thermal`.
+pub(super) fn is_of(prediction: &str, node: &str) -> bool {
+    let rest = prediction.strip_prefix(node);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
 /// What is alike in `by` together, in the order in which the first of each comes.
 pub(super) fn grouped<T, K: PartialEq>(
     all: impl Iterator<Item = T>,
@@ -512,6 +518,15 @@ fn seconds(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_prediction_is_of_its_instance_and_of_its_node_and_of_none_that_begins_alike() {
+        let of = ["thermal", "thermal.Z1", "therm", "thermal.Z"];
+        assert_eq!(
+            of.map(|node| is_of("thermal.Z1", node)),
+            [true, true, false, false]
+        );
+    }
 
     #[test]
     fn lags_are_told_to_the_second_from_a_minute_on_and_to_the_minute_from_an_hour_on() {
