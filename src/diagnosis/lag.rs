@@ -114,7 +114,10 @@ pub fn lags(
         .min()
         .map_or(step, |horizon| fitted_into(horizon, step));
     let count = (plan.warm_up.as_ns() / step.as_ns()).clamp(FEWEST_LAGS, MOST_LAGS) as usize;
-    let mut grid = Grid::new(plan, slots, step, count);
+    // Truths that come at a regular pace then lie on it.
+    let firsts = truths.iter().filter_map(|truth| truth.times.first());
+    let through = firsts.map(|&(_, at)| at).min();
+    let mut grid = Grid::new(plan, slots, step, count, through);
     trace(
         &model.plan,
         &model.fitted,
@@ -227,6 +230,8 @@ fn features(plan: &Plan, truth: usize) -> Vec<usize> {
 /// Slots sampled at regular instants.
 struct Grid {
     step: Duration,
+    /// An instant that is on the grid, as far as it is continued.
+    through: Option<Instant>,
     /// Instants without values between segments, and for longer pauses, so that no pair reaches across.
     apart: usize,
     slots: Vec<usize>,
@@ -240,7 +245,13 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(plan: &Plan, slots: Vec<usize>, step: Duration, apart: usize) -> Self {
+    fn new(
+        plan: &Plan,
+        slots: Vec<usize>,
+        step: Duration,
+        apart: usize,
+        through: Option<Instant>,
+    ) -> Self {
         let max_age = |&slot: &usize| {
             let own = plan.channels[slot].channel.default_max_age();
             own.unwrap_or(step).max(step)
@@ -248,6 +259,7 @@ impl Grid {
         Self {
             step,
             apart,
+            through,
             max_age: slots.iter().map(max_age).collect(),
             held: vec![(f64::NAN, Instant::MIN); slots.len()],
             next: None,
@@ -279,8 +291,12 @@ impl Grid {
             self.stand_apart();
         }
         if self.next.is_none() {
-            self.next = Some(now);
-            self.begins.push((self.segment, now, self.len()));
+            let begin = self.through.map_or(now, |through| {
+                let ahead = (through - now).as_ns().rem_euclid(self.step.as_ns());
+                now + Duration::from_ns(ahead)
+            });
+            self.next = Some(begin);
+            self.begins.push((self.segment, begin, self.len()));
         }
         self.sample(now - Duration::from_ns(1));
         for (held, &slot) in self.held.iter_mut().zip(&self.slots) {
