@@ -485,9 +485,13 @@ fn arx_runs_free_on_the_hairdryer_as_the_textbook_has_it() {
     let fit = figure(&free, "arx", "fit");
     assert!(fit >= 85.0, "{fit}");
     assert!((fit - 85.508).abs() < 0.01, "{fit}");
-    for node in ["output_error", "armax", "box_jenkins"] {
+    for (node, least) in [
+        ("output_error", 81.0),
+        ("armax", 85.0),
+        ("box_jenkins", 85.0),
+    ] {
         let fit = figure(&free, node, "fit");
-        assert!(fit > 81.0, "{node}: {fit}");
+        assert!(fit > least, "{node}: {fit}");
     }
 }
 
