@@ -408,12 +408,38 @@ fn created() -> Option<String> {
         .map(|time| time.to_string())
 }
 
-/// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one.
+/// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one. What is there and
+/// is no file, such as `/dev/null` or a pipe, is written to instead: it would be no more.
 pub fn write_aside(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+    let failed = |error| Failure::Outside(format!("cannot write {}: {error}", path.display()));
+    if std::fs::metadata(path).is_ok_and(|of| !of.is_file() && !of.is_dir()) {
+        return std::fs::write(path, text).map_err(failed);
+    }
     let mut aside = path.as_os_str().to_owned();
     aside.push(".part");
     let aside = PathBuf::from(aside);
     std::fs::write(&aside, text)
         .and_then(|()| std::fs::rename(&aside, path))
-        .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
+        .map_err(failed)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::write_aside;
+
+    #[test]
+    fn what_is_no_file_is_written_to_and_stays_what_it_is() {
+        let name = format!("athermal-pipe-{}", std::process::id());
+        let pipe = std::env::temp_dir().join(name);
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || std::fs::read_to_string(pipe).unwrap()
+        });
+        write_aside(&pipe, "a model").unwrap();
+        assert_eq!(reader.join().unwrap(), "a model");
+        assert!(!std::fs::metadata(&pipe).unwrap().is_file());
+        std::fs::remove_file(&pipe).unwrap();
+    }
 }
