@@ -127,18 +127,20 @@ fn a_changed_sample_changes_the_bytes_from_there_on() {
     );
 }
 
+/// The model, run on what comes through a pipe.
+fn from_a_pipe() -> Command {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_athermal"));
+    run.arg("run").arg(&fitted().model);
+    run.args(["--input", "-", "--output", "-"])
+        .stdin(Stdio::piped());
+    run
+}
+
 #[test]
 fn row_by_row_through_a_pipe_gives_the_same_bytes() {
     let whole = predictions(&fitted().test);
     let text = std::fs::read_to_string(&fitted().test).unwrap();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
-        .arg("run")
-        .arg(&fitted().model)
-        .args(["--input", "-", "--output", "-"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = from_a_pipe().stdout(Stdio::piped()).spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let mut output = BufReader::new(child.stdout.take().unwrap());
     let mut lines = text.lines();
@@ -167,15 +169,9 @@ fn row_by_row_through_a_pipe_gives_the_same_bytes() {
 #[test]
 fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
     let text = std::fs::read_to_string(&fitted().test).unwrap();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
-        .arg("run")
-        .arg(&fitted().model)
-        .args(["--input", "-", "--output", "-"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut run = from_a_pipe();
+    run.stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = run.spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let mut told = BufReader::new(child.stderr.take().unwrap());
     for line in text.lines().take(3).chain(text.lines().skip(1).take(1)) {
