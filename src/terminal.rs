@@ -298,7 +298,9 @@ impl From<FileError> for Failure {
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
-            RunError::Source(error) | RunError::Sink(error) => outside(error),
+            RunError::Source(error) | RunError::Sink(error) | RunError::Keep(error) => {
+                outside(error)
+            }
             RunError::Engine(error) => Self::Request(error.to_string()),
         }
     }

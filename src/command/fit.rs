@@ -410,15 +410,15 @@ fn created() -> Option<String> {
 
 /// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one. What is there and
 /// is no file, such as `/dev/null` or a pipe, is written to instead: it would be no more.
-pub fn write_aside(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+pub fn write_aside(path: &std::path::Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
     let failed = |error| Failure::Outside(format!("cannot write {}: {error}", path.display()));
     if std::fs::metadata(path).is_ok_and(|of| !of.is_file() && !of.is_dir()) {
-        return std::fs::write(path, text).map_err(failed);
+        return std::fs::write(path, content).map_err(failed);
     }
     let mut aside = path.as_os_str().to_owned();
     aside.push(".part");
     let aside = PathBuf::from(aside);
-    std::fs::write(&aside, text)
+    std::fs::write(&aside, content)
         .and_then(|()| std::fs::rename(&aside, path))
         .map_err(failed)
 }

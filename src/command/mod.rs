@@ -12,6 +12,7 @@ mod evaluate;
 mod explain;
 mod fit;
 mod init;
+mod kept;
 mod new;
 mod nodes;
 mod numbers;

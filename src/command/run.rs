@@ -11,6 +11,7 @@ use clap::Args;
 
 use super::data;
 use super::evaluate::check_fitted;
+use super::kept::Kept;
 use super::swap;
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
@@ -38,6 +39,10 @@ pub struct Run {
     /// Let nothing learn while it runs
     #[arg(long)]
     frozen: bool,
+    /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: when the input ends, and at least once a
+    /// minute while rows come. Rows up to the last one known are passed over
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["swap_at", "watch"])]
+    state: Option<PathBuf>,
     #[command(flatten)]
     swap: swap::Options,
 }
@@ -72,13 +77,14 @@ impl Run {
             return self.run_replaceable(terminal, model);
         }
         let mut engine = model.engine()?;
-        engine.freeze(self.frozen);
         let plan = std::sync::Arc::clone(engine.plan());
         let options = Options {
             lenient: self.lenient,
             ..Options::default()
         };
         let mut reader = self.open(terminal, layout(&plan), options)?;
+        let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
+        engine.freeze(self.frozen);
         let TimeBase::Column { column, .. } = &plan.time;
         let columns: Vec<String> = plan
             .outputs
@@ -86,7 +92,10 @@ impl Run {
             .map(|output| output.name.clone())
             .collect();
         let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
-        live::run(&mut engine, &mut reader, &mut writer)?;
+        let mut rest = kept.rest(terminal, &mut reader);
+        let mut keep = |engine: &Engine| kept.after_tick(engine);
+        live::run_keeping(&mut engine, &mut rest, &mut writer, &mut keep)?;
+        kept.write(&engine)?;
         self.tell(terminal, &engine, &reader);
         Ok(Answer::Fine)
     }

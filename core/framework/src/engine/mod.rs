@@ -207,6 +207,13 @@ impl Engine {
         Ok(&self.outputs)
     }
 
+    /// The instant of the last tick; none before the first.
+    #[must_use]
+    pub fn last(&self) -> Option<Instant> {
+        let within = (self.last > Instant::MIN).then_some(self.last);
+        within.or(self.before_break)
+    }
+
     /// Whether a tick at this instant would be taken.
     pub(crate) fn takes(&self, time: Instant) -> bool {
         time > self.last
@@ -307,6 +314,12 @@ impl Engine {
     #[must_use]
     pub fn refused(&self) -> u64 {
         self.refused
+    }
+
+    /// Counts rejected samples and refused ticks from here on: those before are another run's.
+    pub fn count_afresh(&mut self) {
+        self.rejected.fill(0);
+        self.refused = 0;
     }
 
     /// Whether a slot was given something at the present tick, be it nothing.

@@ -27,7 +27,7 @@ mod stepper;
 pub use control::{Control, Notice, StageError, Staged};
 pub use handover::Feed;
 pub use refit::Refit;
-pub use run::{RunError, run};
+pub use run::{RunError, run, run_keeping};
 pub use shadow::{Compared, Shadow, Verdict};
 pub use sink::{Frame, Sink, SinkError};
 pub use source::{Samples, Source, SourceError};

@@ -18,6 +18,20 @@ pub fn run(
     source: &mut dyn Source,
     sink: &mut dyn Sink,
 ) -> Result<(), RunError> {
+    run_keeping(engine, source, sink, &mut |_| Ok(()))
+}
+
+/// The same, with a look at the engine after each tick that has been put out: to keep a
+/// [`snapshot`](Engine::snapshot) now and then, from which another run goes on.
+///
+/// # Errors
+/// When the source, the sink, the engine or `keep` fails.
+pub fn run_keeping(
+    engine: &mut Engine,
+    source: &mut dyn Source,
+    sink: &mut dyn Sink,
+    keep: &mut dyn FnMut(&Engine) -> Result<(), SinkError>,
+) -> Result<(), RunError> {
     let revision = engine.revision().to_owned();
     let mut samples = Samples::default();
     while let Some(event) = source.next(&mut samples).map_err(RunError::Source)? {
@@ -37,6 +51,7 @@ pub fn run(
             outputs,
         };
         sink.put(&frame).map_err(RunError::Sink)?;
+        keep(engine).map_err(RunError::Keep)?;
     }
     sink.finish().map_err(RunError::Sink)
 }
@@ -50,12 +65,14 @@ pub enum RunError {
     Engine(EngineError),
     /// The outputs cannot be put out.
     Sink(SinkError),
+    /// What the engine knows cannot be kept.
+    Keep(SinkError),
 }
 
 impl fmt::Display for RunError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Source(error) | Self::Sink(error) => error.fmt(f),
+            Self::Source(error) | Self::Sink(error) | Self::Keep(error) => error.fmt(f),
             Self::Engine(error) => error.fmt(f),
         }
     }

@@ -1,0 +1,168 @@
+//! Decides where a run goes on from, and how often what it knows is kept; not what an engine knows.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant as Clock};
+
+use athermal::core::live::{Samples, SinkError, Source, SourceError};
+use athermal::core::recording::Event;
+use athermal::{Engine, Instant};
+
+use super::fit::write_aside;
+use crate::terminal::{Failure, Terminal};
+
+/// How long a run that is killed may have learned in vain.
+const KEEP_EVERY: Duration = Duration::from_secs(60);
+
+/// What a run knows, in a file from one run to the next.
+pub struct Kept {
+    path: Option<PathBuf>,
+    written: Clock,
+    /// The last instant that the run before had seen.
+    seen: Option<Instant>,
+}
+
+impl Kept {
+    /// Lets an engine go on from a file, if it is there; without a file nothing is kept.
+    ///
+    /// # Errors
+    /// When the file is not one of the same graph and fit, or cannot be written.
+    pub fn begin(
+        terminal: &Terminal,
+        path: Option<&Path>,
+        engine: &mut Engine,
+    ) -> Result<Self, Failure> {
+        let mut kept = Self {
+            path: path.map(Path::to_owned),
+            written: Clock::now(),
+            seen: None,
+        };
+        let Some(path) = path else { return Ok(kept) };
+        match std::fs::read(path) {
+            Ok(bytes) => {
+                engine.restore(&bytes).map_err(|error| {
+                    Failure::Request(format!(
+                        "cannot go on from {}: {error}; name another file to begin cold and keep this one",
+                        path.display()
+                    ))
+                })?;
+                engine.count_afresh();
+                kept.seen = engine.last();
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                terminal.note(format_args!(
+                    "{}: not there yet, the run begins cold",
+                    path.display()
+                ));
+            }
+            Err(error) => {
+                let cannot = format!("cannot read {}: {error}", path.display());
+                return Err(Failure::Outside(cannot));
+            }
+        }
+        // Better now than after the first minute.
+        kept.write(engine)?;
+        Ok(kept)
+    }
+
+    /// What the run before has not seen of a source.
+    pub fn rest<'a>(&self, terminal: &Terminal, source: &'a mut dyn Source) -> Rest<'a> {
+        Rest {
+            terminal: *terminal,
+            source,
+            seen: self.seen,
+            told: false,
+        }
+    }
+
+    /// Keeps what is known now and then.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn after_tick(&mut self, engine: &Engine) -> Result<(), SinkError> {
+        if self.path.is_none() || self.written.elapsed() < KEEP_EVERY {
+            return Ok(());
+        }
+        self.write(engine).map_err(|failure| match failure {
+            Failure::Outside(text) => text.into(),
+            _ => "the state cannot be written".into(),
+        })
+    }
+
+    /// Keeps what is known.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&mut self, engine: &Engine) -> Result<(), Failure> {
+        let Some(path) = &self.path else {
+            return Ok(());
+        };
+        self.written = Clock::now();
+        write_aside(path, engine.snapshot())
+    }
+}
+
+/// The rows of a source that the run before had not seen.
+pub struct Rest<'a> {
+    terminal: Terminal,
+    source: &'a mut dyn Source,
+    seen: Option<Instant>,
+    told: bool,
+}
+
+impl Rest<'_> {
+    fn pass_over(&mut self, samples: &Samples) {
+        if !self.told {
+            self.told = true;
+            self.terminal.note(format_args!(
+                "the row of {} was seen by the run before: it and all like it are passed over",
+                samples.time_text
+            ));
+        }
+    }
+}
+
+impl Source for Rest<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        loop {
+            let event = self.source.next(samples)?;
+            match (event, self.seen) {
+                (Some(Event::Row(time)), Some(seen)) if time <= seen => self.pass_over(samples),
+                _ => {
+                    self.seen = None;
+                    return Ok(event);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_is_kept_once_a_minute_and_not_at_every_tick() {
+        let name = format!("athermal-kept-{}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        let graph = folder.join("graph.toml");
+        let text = "schema = 1\nname = \"none\"\nsignals.room = { unit = \"Cel\", channels = [\"air\"] }\n\
+                    time.column = \"time_s\"\noutputs.room = \"room\"\n";
+        std::fs::write(&graph, text).unwrap();
+        let mut engine = athermal::Model::load(&graph).unwrap().engine().unwrap();
+        let terminal = Terminal::new(&crate::terminal::Options {
+            format: "table".into(),
+            quiet: true,
+        });
+        let path = folder.join("state");
+        let mut kept = Kept::begin(&terminal, Some(&path), &mut engine).unwrap();
+        let begun = std::fs::read(&path).unwrap();
+        engine.step(Instant::from_ns(1), &[20.0]).unwrap();
+        kept.after_tick(&engine).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), begun);
+        kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
+        kept.after_tick(&engine).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), engine.snapshot());
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,162 @@
+//! A run that goes on where the one before ended, as a user restarts it. Decides nothing about what a node keeps.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::path::PathBuf;
+
+use workbench::{Scratch, athermal, athermal_fed, athermal_on, simulated};
+
+/// Two axes of a machine, each by a model that goes on learning.
+const GRAPH: &str = r#"
+schema = 1
+name = "learning"
+[sets]
+axis = ["X", "Y"]
+[time]
+column = "time_s"
+[signals.temperature]
+unit = "Cel"
+channels = ["t1", "t2"]
+column = "{channel}_degC"
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = "axis"
+column = "{channel}_nm"
+max_age = "3min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+unit = "nm/min"
+[nodes.gradients]
+type = "slope"
+inputs.signal = "temperature"
+windows = ["5min", "15min"]
+unit = "mK/min"
+[nodes.model]
+type = "rls"
+each = "axis"
+inputs.features = "gradients"
+inputs.truth = "drift.{axis}"
+ahead = "5min"
+forgetting = { type = "constant", factor = 0.999 }
+learn = true
+[nodes.vote]
+type = "auto_weighted"
+each = "axis"
+inputs.voters = ["model.{axis}"]
+inputs.truth = "drift.{axis}"
+memory = "15min"
+[outputs]
+predicted = "vote"
+"#;
+
+/// A folder with half a day of a machine, a model that was fitted on half of another, and what a run in one piece gives.
+fn desk(test: &str) -> (Scratch, PathBuf, PathBuf, String) {
+    let scratch = Scratch::new(&format!("kept-runs-{test}"));
+    let graph = scratch.file("graph.toml", GRAPH);
+    let history = simulated(&scratch, "history.csv", "linear-axis", 0.5, 1);
+    let data = simulated(&scratch, "data.csv", "linear-axis", 0.5, 2);
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &history, &[&"-o", &model]).ended(0);
+    let whole = athermal(&[&"run", &model, &"-i", &data]).ended(0).out;
+    (scratch, model, data, whole)
+}
+
+#[test]
+fn a_run_that_is_restarted_gives_what_one_in_one_piece_does_and_needs_its_state_for_that() {
+    let (scratch, model, data, whole) = desk("restarted");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let half = lines[..2000].join("\n");
+    let state = scratch.path("state");
+
+    let before = athermal_fed(
+        &[&"run", &model, &"-i", &"-", &"--state", &state],
+        half.as_bytes(),
+    );
+    before.tells(&["not there yet, the run begins cold"]);
+    let before = before.ended(0).out;
+    let after = athermal(&[&"run", &model, &"-i", &data, &"--state", &state]);
+    after.tells(&["was seen by the run before"]);
+    let after = after.ended(0).out;
+    let rows = |text: &str| text.split_once('\n').unwrap().1.to_owned();
+    assert_eq!(before.clone() + &rows(&after), whole);
+
+    // A source that gives only what is new is as good.
+    let new = [&lines[..1], &lines[2000..]].concat().join("\n");
+    let cold = athermal_fed(&[&"run", &model, &"-i", &"-"], new.as_bytes());
+    assert_ne!(before + &rows(&cold.ended(0).out), whole);
+    let again = scratch.path("again");
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 6] =
+        [&"run", &model, &"-i", &"-", &"--state", &again];
+    let before = athermal_fed(&arguments, half.as_bytes()).ended(0).out;
+    let after = athermal_fed(&arguments, new.as_bytes()).ended(0);
+    assert!(!after.told.contains("seen"), "{}", after.told);
+    assert_eq!(before + &rows(&after.out), whole);
+}
+
+#[test]
+fn what_was_rejected_in_a_run_is_not_told_again_by_the_next() {
+    let (scratch, model, data, _) = desk("rejected");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let mut lines: Vec<_> = text.lines().take(40).map(str::to_owned).collect();
+    let column = lines[0].split(',').position(|name| name == "t1_degC");
+    let mut cells: Vec<_> = lines[5].split(',').collect();
+    cells[column.unwrap()] = "1e400";
+    lines[5] = cells.join(",");
+    let state = scratch.path("state");
+    let run = |lines: &[String]| {
+        let arguments: [&dyn AsRef<std::ffi::OsStr>; 7] = [
+            &"run",
+            &model,
+            &"-i",
+            &"-",
+            &"--lenient",
+            &"--state",
+            &state,
+        ];
+        athermal_fed(&arguments, lines.join("\n").as_bytes())
+            .ended(0)
+            .told
+    };
+    let first = run(&lines[..20]);
+    assert!(first.contains("1 sample is infinite"), "{first}");
+    let second = run(&[&lines[..1], &lines[20..]].concat());
+    assert!(!second.contains("sample"), "{second}");
+}
+
+#[test]
+fn a_state_of_another_fit_is_refused_and_stays_as_it_is() {
+    let (scratch, model, data, _) = desk("other-fit");
+    let state = scratch.path("state");
+    athermal(&[&"run", &model, &"-i", &data, &"--state", &state]).ended(0);
+    let kept = std::fs::read(&state).unwrap();
+    let other = scratch.path("other.json");
+    let graph = scratch.path("graph.toml");
+    athermal_on("fit", &graph, &data, &[&"-o", &other]).ended(0);
+    let run = athermal(&[&"run", &other, &"-i", &data, &"--state", &state]).ended(2);
+    run.tells(&[
+        "cannot go on from",
+        "belongs to revision",
+        "name another file",
+    ]);
+    assert_eq!(run.out, "");
+    assert_eq!(std::fs::read(&state).unwrap(), kept);
+
+    let half = scratch.file("half", &kept[..kept.len() / 2]);
+    let run = athermal(&[&"run", &model, &"-i", &data, &"--state", &half]).ended(2);
+    run.tells(&["damaged"]);
+}
+
+#[test]
+fn a_state_that_cannot_be_written_is_told_before_the_first_row() {
+    let (scratch, model, data, _) = desk("unwritable");
+    let state = scratch.path("nowhere/state");
+    let run = athermal(&[&"run", &model, &"-i", &data, &"--state", &state]).ended(3);
+    run.tells(&["cannot write", "nowhere"]);
+    assert_eq!(run.out, "");
+}
