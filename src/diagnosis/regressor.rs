@@ -4,12 +4,12 @@
 use athermal_core::compile::PlannedRole;
 use athermal_core::engine::Engine;
 use athermal_core::fit::FitError;
-use athermal_core::model::Model;
+use athermal_core::model::{Model, number_or_none};
 use athermal_core::node::Predictor;
 use athermal_core::recording::{Event, Recording};
 use athermal_core::score::trace;
 use athermal_numerics::{Collinearity, GramBlocks};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// The regressors that a fitted estimator uses, over the rows of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -20,7 +20,9 @@ pub struct Design {
     pub unit: String,
     /// Instants of its truth at which all its regressors had a value.
     pub rows: u64,
-    /// The condition number of the standardised regressors; NaN (null in JSON) without rows.
+    /// The condition number of the standardised regressors; NaN (null in JSON) without rows, infinite (`"inf"`) where they are
+    /// collinear.
+    #[serde(serialize_with = "or_null")]
     pub condition: f64,
     /// Each regressor.
     pub regressors: Vec<RegressorFacts>,
@@ -33,8 +35,14 @@ pub struct RegressorFacts {
     pub name: String,
     /// How much the prediction moves when it moves by one standard deviation and the others stay at their means.
     pub effect: f64,
-    /// Its variance inflation factor; NaN (null in JSON) where it is constant.
+    /// Its variance inflation factor; NaN (null in JSON) where it is constant, infinite (`"inf"`) where the others tell the same.
+    #[serde(serialize_with = "or_null")]
     pub inflation: f64,
+}
+
+fn or_null<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    let known = Some(*value).filter(|value| !value.is_nan());
+    number_or_none::serialize(&known, serializer)
 }
 
 /// An estimator whose rows are collected.

@@ -141,3 +141,38 @@ fn why_there_is_nothing_is_said_and_nothing_is_told_as_no_number() {
     assert_eq!(residuals[0]["level"], 0.01);
     assert!(residuals[0]["white"].is_boolean());
 }
+
+#[test]
+fn what_is_infinite_is_told_as_such_in_the_table_and_as_json() {
+    let scratch = Scratch::new("diagnose-collinear");
+    let text = r#"schema = 1
+name = "twice"
+time.column = "time_s"
+signals.room = { unit = "Cel", channels = ["a", "b"], max_age = "1min" }
+signals.position = { unit = "nm", channels = ["x"], max_age = "1min" }
+nodes.drift = { type = "slope", inputs.signal = "position", windows = ["1min"], unit = "nm/min" }
+nodes.room_slopes = { type = "slope", inputs.signal = "room", windows = ["1min"], unit = "mK/min" }
+nodes.model = { type = "linear", inputs.features = "room_slopes", inputs.truth = "drift.x", ahead = "0s" }
+outputs.predicted = "model"
+"#;
+    let graph = scratch.file("twice.toml", text);
+    let rows = (0..300).map(|row| {
+        let room = 20.0 + f64::from(row % 37) / 10.0;
+        format!("{},{room},{room},{}\n", 10 * row, row % 11)
+    });
+    let rows: String = rows.collect();
+    let log = scratch.file("log.csv", format!("time_s,a,b,x\n{rows}"));
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let table = athermal_on("diagnose", &model, &log, &[&"--no-fit"]).ended(0);
+    assert!(table.out.contains("inf  inf"), "{}", table.out);
+    let of = athermal_on(
+        "diagnose",
+        &model,
+        &log,
+        &[&"--no-fit", &"--format", &"json"],
+    );
+    let design = &of.ended(0).json()["diagnosis"]["designs"][0];
+    assert_eq!(design["condition"], "inf", "{design}");
+    assert_eq!(design["regressors"][0]["inflation"], "inf", "{design}");
+}
