@@ -9,6 +9,7 @@ use serde_json::value::RawValue;
 
 use crate::cell::Cells;
 use crate::columns;
+use crate::format::begins_json_array;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
 use crate::{FileError, Layout, Place};
@@ -39,6 +40,11 @@ impl JsonRows {
     pub fn new(mut lines: Lines, layout: &Layout) -> Result<Self, FileError> {
         if !lines.advance_to_content()? {
             return Err(FileError::Empty { file: lines.file });
+        }
+        if begins_json_array(lines.text()) {
+            return Err(FileError::JsonArray {
+                place: lines.place(),
+            });
         }
         lines.hold();
         let mut keys = vec![Key::new(&layout.time.column, false)];
@@ -398,6 +404,31 @@ mod tests {
         assert!(
             error(text).starts_with(
                 "standard input:2: column `t`: expected a decimal number, found nothing"
+    #[test]
+    fn an_array_is_an_error_that_asks_for_one_object_a_line() {
+        let object = "{\"t\":0,\"a\":1,\"b\":2}";
+        let long = format!("[{}{object}]", format!("{object},").repeat(50_000));
+        let arrays = [
+            format!("[{object},{object}]"),
+            format!("[{object}]\n"),
+            format!("[\n  {object},\n  {object}\n]\n"),
+            "[[0,1,2]]".to_owned(),
+            long,
+        ];
+        for text in arrays {
+            for lenient in [false, true] {
+                let told = read_with(&text, lenient).err().unwrap().to_string();
+                assert!(
+                    told.starts_with("standard input:1: a JSON array begins here, where one object a line is expected"),
+                    "{told}"
+                );
+            }
+        }
+        let layout = Layout::new("[s]", TimeForm::SECONDS, ["a"]);
+        let header = &b"[s],a\n0,1\n"[..];
+        assert!(Reader::from_read("f", header, layout, Options::default()).is_ok());
+    }
+
             )
         );
         assert_eq!(
