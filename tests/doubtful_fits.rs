@@ -189,6 +189,41 @@ fn a_truth_without_a_value_is_not_blamed_on_the_features() {
 }
 
 #[test]
+fn sensors_without_a_value_are_named_and_the_truth_is_not_blamed() {
+    let without = |channel: usize| {
+        let rows = explained(50);
+        let mut lines = rows.lines();
+        let mut text = format!("{}\n", lines.next().unwrap());
+        for line in lines {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            cells[1] = "";
+            cells[channel] = "";
+            let _ = writeln!(text, "{}", cells.join(","));
+        }
+        text
+    };
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let both = fit("silent", &node, &without(2), &[]).ended(1);
+    both.tells(&["m could not be fitted: `in.u` and `in.v` have no value in the data"]);
+    assert!(
+        !both.told.contains("out.y") && !both.out.contains("too early"),
+        "{}{}",
+        both.told,
+        both.out
+    );
+    // One of two is left out, and the fit goes on without it; a sum of both has no value without it.
+    fit("silent", &node, &without(1), &[]).ended(0);
+    let sum = "type = \"linear\"\ninputs.features = \"both\"\n\
+               [nodes.both]\ntype = \"sum\"\ninputs.signal = [\"in.u\", \"in.v\"]";
+    let of_sum = fit("silent", sum, &without(1), &[]).ended(1);
+    of_sum.tells(&["`both.sum` never has a value, since `in.u` has none in the data"]);
+    // Where the truth has none either, that is why.
+    fit("silent", &node, &without(3), &[])
+        .ended(1)
+        .tells(&["`out.y` has no value in the data"]);
+}
+
+#[test]
 fn gradients_on_collinear_features_are_not_said_to_be_solved_by_singular_values() {
     let mut text = String::from("s,u,v,y\n");
     for row in 0..100 {

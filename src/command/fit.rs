@@ -8,7 +8,7 @@ use athermal::core::compile::{PlannedChannel, Wanted};
 use athermal::core::diagnostic::Sources;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
-use athermal::core::node::{OrderTable, SelectionStep};
+use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
@@ -298,8 +298,12 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         counted(fit.rows, "row")
     );
     let dropped = [
+    let without_run = match &fit.outcome {
+        Outcome::Failed(TrainingError::NeverRan { .. }) => "not predicted",
+        _ => "too early to be predicted",
+    };
         (fit.dropped.outside_limits, "outside the limits"),
-        (fit.dropped.without_run, "too early to be predicted"),
+        (fit.dropped.without_run, without_run),
         (fit.dropped.incomplete, "incomplete"),
     ];
     let dropped: Vec<_> = dropped

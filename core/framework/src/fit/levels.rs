@@ -192,7 +192,7 @@ impl<'a> Fitting<'a> {
         self.pass(&mut second, parts, Some(&mut makings))?;
         let ended = collector.trainees.iter().zip(makings);
         Ok(ended
-            .map(|(trainee, making)| end(self.plan, trainee, making, true))
+            .map(|(trainee, making)| end(self.plan, &collector, trainee, making, true))
             .collect())
     }
 

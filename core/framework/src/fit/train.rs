@@ -145,7 +145,13 @@ impl Truths {
 }
 
 /// Ends the fit of one estimator.
-pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool) -> Made {
+pub(super) fn end(
+    plan: &Plan,
+    collector: &Collector,
+    trainee: &Trainee,
+    making: Making,
+    streamed: bool,
+) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
     let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
@@ -158,11 +164,14 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
                 regressors[candidate].name.clone(),
                 trainee.validity.share(candidate),
             )
-        })
+        };
+        let truths = dropped.without_run > 0;
+        let never_ran = truths.then(|| collector.waited_for(plan, trainee));
+        Err(never_ran.flatten().unwrap_or_else(no_truth))
         .collect();
     let truths = making.truths;
     let trained = if trainee.validity.knows_nothing() {
-        Err(TrainingError::NoTruth {
+        let no_truth = || TrainingError::NoTruth {
             truth: truth.name.clone(),
             outside_limits: dropped.outside_limits,
             too_early: dropped.without_run,
@@ -225,7 +234,7 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
             // The whole memory, or how folds are cut would depend on the number of threads.
             let mut making = begin(plan, trainee, options.memory);
             collector.replay(index, &mut making);
-            made.push((index, end(plan, trainee, making, false)));
+            made.push((index, end(plan, collector, trainee, making, false)));
         }
     };
     let mut made = if threads == 1 {
