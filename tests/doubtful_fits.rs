@@ -224,6 +224,42 @@ fn sensors_without_a_value_are_named_and_the_truth_is_not_blamed() {
 }
 
 #[test]
+fn a_truth_that_never_changes_is_told() {
+    const NOTE: &str = "the truth never changes in these rows";
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let constant = fit(
+        "constant",
+        &node,
+        &data(50, |_, _, _| 5.0),
+        &["--format", "json"],
+    )
+    .ended(0);
+    let constant = constant.json();
+    let fitted = &constant["estimators"][0];
+    assert_eq!(fitted["figures"]["constant_truth"], 5.0);
+    let notes = fitted["notes"].as_array().unwrap();
+    assert!(
+        notes
+            .iter()
+            .any(|note| note.as_str().unwrap().starts_with(NOTE)),
+        "{notes:?}"
+    );
+    let once = data(50, |row, _, _| if row == 49 { 5.1 } else { 5.0 });
+    let once = fit("constant", &node, &once, &[]).ended(0);
+    assert!(!once.out.contains(NOTE), "{}", once.out);
+}
+
+#[test]
+fn as_many_rows_as_coefficients_are_told() {
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let told = "3 rows for 3 coefficients, so the error on these rows says nothing of others";
+    let three = fit("exact", &node, &explained(3), &[]).ended(0);
+    assert!(three.out.contains(told), "{}", three.out);
+    let four = fit("exact", &node, &explained(4), &[]).ended(0);
+    assert!(!four.out.contains("says nothing of others"), "{}", four.out);
+}
+
+#[test]
 fn gradients_on_collinear_features_are_not_said_to_be_solved_by_singular_values() {
     let mut text = String::from("s,u,v,y\n");
     for row in 0..100 {
