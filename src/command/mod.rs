@@ -17,6 +17,7 @@ mod nodes;
 mod numbers;
 mod parameters;
 mod report;
+mod rejected;
 mod run;
 mod schema;
 mod show;

@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
+use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::document::TimeBase;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair};
 use athermal::core::recording::Event;
-use athermal::files::{Flush, Layout, Options, Reader, WithRevision, Writer, layout};
+use athermal::files::{FileError, Flush, Layout, Options, Reader, WithRevision, Writer, layout};
 use athermal::{Engine, Model};
 use clap::Args;
 
 use super::data;
 use super::evaluate::check_fitted;
+use super::rejected::Ranged;
 use super::swap;
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
@@ -79,6 +81,7 @@ impl Run {
             ..Options::default()
         };
         let mut reader = self.open(terminal, layout(&plan), options)?;
+        let mut ranged = Ranged::new(terminal, &mut reader, self.ranged(&plan));
         let TimeBase::Column { column, .. } = &plan.time;
         let columns: Vec<String> = plan
             .outputs
@@ -86,7 +89,7 @@ impl Run {
             .map(|output| output.name.clone())
             .collect();
         let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
-        live::run(&mut engine, &mut reader, &mut writer)?;
+        live::run(&mut engine, &mut ranged, &mut writer)?;
         self.tell(terminal, &engine, &reader);
         Ok(Answer::Fine)
     }
@@ -99,8 +102,9 @@ impl Run {
             lenient: self.lenient,
             ..Options::default()
         };
-        let layout = layout(&swap::reading(&model, &swaps, &feed));
-        let mut reader = self.open(terminal, layout, options)?;
+        let read = swap::reading(&model, &swaps, &feed);
+        let mut reader = self.open(terminal, layout(&read), options)?;
+        let mut ranged = Ranged::new(terminal, &mut reader, self.ranged(&read));
         let live = LiveOptions {
             channels: feed,
             ..LiveOptions::default()
@@ -127,7 +131,7 @@ impl Run {
         let mut writer = WithRevision(writer);
         let mut samples = Samples::default();
         let mut places = (String::new(), Vec::new());
-        while let Some(event) = reader.next(&mut samples).map_err(outside)? {
+        while let Some(event) = ranged.next(&mut samples).map_err(outside)? {
             let Event::Row(time) = event else {
                 stepper.segment();
                 continue;
@@ -190,18 +194,30 @@ impl Run {
         options: Options,
     ) -> Result<Reader, Failure> {
         let mut reader = Reader::open(&self.input, layout, options)?;
-        if self.input.as_os_str() == "-" {
-            // Beside a machine the input does not end, and nor would the wait for what is told then.
+        if !self.ends() {
             let terminal = *terminal;
-            reader.tell_first(move |first| {
-                terminal.warning(format_args!("{first}; others like it are counted"));
+            reader.tell_first(move |first| match first {
+                FileError::MissingColumns { .. } => {
+                    terminal.warning(format_args!("{first} (missing until a line has it)"));
+                }
+                _ => terminal.warning(format_args!("{first}; others like it are counted")),
             });
         }
         Ok(reader)
     }
 
+    /// The channels of which a sample that does not count is told at once.
+    fn ranged<'a>(&self, read: &'a Plan) -> &'a [SourceChannel] {
+        if self.ends() { &[] } else { &read.sources }
+    }
+
+    /// Whether the input is known to end: beside a machine it does not, and nor would the wait for what is told then.
+    fn ends(&self) -> bool {
+        self.input.as_os_str() != "-"
+    }
+
     fn flush(&self) -> Flush {
-        if self.input.as_os_str() == "-" {
+        if !self.ends() {
             Flush::EachRow
         } else {
             Flush::Buffered

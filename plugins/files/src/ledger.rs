@@ -98,6 +98,13 @@ impl Ledger {
         Ok(())
     }
 
+    /// Something that is an error at the end only, where the data ever end: whoever asked is told of it now.
+    pub fn tell_early(&mut self, error: impl FnOnce() -> FileError) {
+        if let Some(tell) = &mut self.tell {
+            tell(&error());
+        }
+    }
+
     /// A row that cannot be used.
     #[cold]
     pub fn refuse_row(&mut self, error: impl FnOnce() -> FileError) -> Result<(), FileError> {
