@@ -354,3 +354,15 @@ fn values_whose_squares_overflow_are_told_with_their_name() {
         told.tells(&["values of `in.u` are as large as 1e200", "a `range`"]);
     }
 }
+
+#[test]
+fn the_scale_of_outliers_is_told_in_any_unit() {
+    let node = format!("type = \"huber\"\n{FEATURES}");
+    let small = data(60, |row, u, v| {
+        1e-9 * (3.0 * u - 2.0 * v + 0.1 * noise(row, 3))
+    });
+    let small = fit("huber", &node, &small, &[]).ended(0);
+    let (_, scale) = small.out.split_once("the scale of the others is ").unwrap();
+    let scale: f64 = scale.split_once(' ').unwrap().0.parse().unwrap();
+    assert!(scale > 1e-12 && scale < 1e-9, "{}", small.out);
+}
