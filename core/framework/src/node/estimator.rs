@@ -114,6 +114,12 @@ pub trait Estimator: Debug + Send + Sync {
         Learns::Never { help: None }
     }
 
+    /// Whether a fit keeps the range of its regressors ([`Predictor::trained_range`]), outside which nothing is learned; without
+    /// it, a `margin` about that range is a mistake.
+    fn keeps_range(&self) -> bool {
+        true
+    }
+
     /// Whether its predictions come with their standard deviation, in the port `deviation`.
     fn deviates(&self) -> bool {
         false

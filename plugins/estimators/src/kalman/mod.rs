@@ -129,6 +129,10 @@ impl Estimator for Kalman {
     fn deviates(&self) -> bool {
         true
     }
+    fn keeps_range(&self) -> bool {
+        false
+    }
+
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(KalmanTrainer::new(setup, self.clone()))
