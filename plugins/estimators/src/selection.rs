@@ -51,7 +51,8 @@ pub struct CrossValidated {
     /// `{ type = "blocked", count = 5, gap_rows = 4, embargo_rows = 8 }` or `{ type = "expanding", count = 5 }`.
     #[serde(default = "Folds::three")]
     pub folds: Folds,
-    /// The smallest gain that is worth another regressor, or the largest loss at which one is taken out.
+    /// The smallest gain that is worth another regressor or sensor, or the largest loss at which one is taken out. Sensors that
+    /// come together must gain so much each, and that much more than fewer of them.
     #[serde(default = "thousandth")]
     pub tolerance: f64,
     /// The most regressors or sensors to end with; without it there is no limit.
