@@ -356,6 +356,43 @@ fn values_whose_squares_overflow_are_told_with_their_name() {
 }
 
 #[test]
+fn what_rows_that_do_not_fit_in_memory_change_is_told() {
+    let linear = "solver = { type = \"ridge\", alpha = { by = \"cross_validation\", folds = 3 } }";
+    let generalised =
+        "solver = { type = \"ridge\", alpha = { by = \"generalised_cross_validation\" } }";
+    let with = |kind: &str, more: &str| format!("type = \"{kind}\"\n{FEATURES}\n{more}");
+    let lags = "lags = [\"1 sample\"]";
+    let folds = "so folds end at multiples of 256 rows";
+    let scales = "centred and scaled by the first 1 of 1,";
+    let rows = explained(1500);
+    for (node, told, times) in [
+        (with("linear", linear), folds, 1),
+        (
+            with(
+                "linear",
+                &format!("{linear}\nselection = {{ method = \"forward\" }}"),
+            ),
+            folds,
+            1,
+        ),
+        (with("linear", generalised), folds, 0),
+        (with("linear", ""), folds, 0),
+        (with("polynomial", ""), scales, 1),
+        (with("narx", lags), scales, 1),
+    ] {
+        let streamed = fit("streamed", &node, &rows, &["--memory", "0"]).ended(0);
+        assert_eq!(
+            streamed.out.matches(told).count(),
+            times,
+            "{}",
+            streamed.out
+        );
+        let kept = fit("streamed", &node, &rows, &[]).ended(0);
+        assert!(!kept.out.contains("did not fit in memory"), "{}", kept.out);
+    }
+}
+
+#[test]
 fn the_scale_of_outliers_is_told_in_any_unit() {
     let node = format!("type = \"huber\"\n{FEATURES}");
     let small = data(60, |row, u, v| {

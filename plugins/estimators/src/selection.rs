@@ -9,7 +9,7 @@ use athermal_numerics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::folds::Folds;
+use crate::folds::{Folds, tell_moved};
 
 /// How regressors are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -184,13 +184,7 @@ impl Selection {
         let (candidates, names) = how.by.candidates(regressors);
         let splits = blocks.splits(&how.folds.cut())?;
         let selected = search.over(&splits, scales, &candidates)?;
-        if !blocks.exact_folds() {
-            let rows = blocks.block_rows();
-            report.figure("folds_end_at_multiples_of", rows);
-            report.notes.push(format!(
-                "the rows did not fit in memory, so folds end at multiples of {rows} rows"
-            ));
-        }
+        tell_moved(blocks, report);
         let name = |candidate: usize| {
             let units = candidates.units_of(candidate).iter();
             let names: Vec<&str> = units.map(|&unit| names[unit].as_str()).collect();
