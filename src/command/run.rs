@@ -37,7 +37,7 @@ pub struct Run {
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
-    /// Let nothing learn while it runs
+    /// Let no estimator learn while it runs; votes still go by recent errors
     #[arg(long)]
     frozen: bool,
     #[command(flatten)]
