@@ -45,7 +45,8 @@ fn put(
     fs::rename(&aside, path)
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
 

@@ -10,8 +10,7 @@ use crate::terminal::Terminal;
 
 /// Rows as they are read. Where they may never end, the first sample of each channel that does not count is told at once.
 pub struct Ranged<'a> {
-    /// What is read.
-    pub reader: &'a mut Reader,
+    reader: &'a mut Reader,
     terminal: Terminal,
     /// The channels of which none has been told yet, with their places in a row.
     untold: Vec<(usize, SourceChannel)>,
