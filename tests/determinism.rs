@@ -166,26 +166,87 @@ fn row_by_row_through_a_pipe_gives_the_same_bytes() {
     );
 }
 
-#[test]
-fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
-    let text = std::fs::read_to_string(&fitted().test).unwrap();
+/// What a run tells of these rows while the pipe that they come through is still open: so many lines.
+fn told_at_once(rows: &[String], lines: usize) -> String {
     let mut run = from_a_pipe();
     run.stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = run.spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let mut told = BufReader::new(child.stderr.take().unwrap());
-    for line in text.lines().take(3).chain(text.lines().skip(1).take(1)) {
-        writeln!(input, "{line}").unwrap();
+    for row in rows {
+        writeln!(input, "{row}").unwrap();
     }
     input.flush().unwrap();
     let mut first = String::new();
-    told.read_line(&mut first).unwrap();
+    for _ in 0..lines {
+        told.read_line(&mut first).unwrap();
+    }
+    drop(input);
+    child.wait().unwrap();
+    first
+}
+
+/// The header and the first rows of the test data.
+fn first_rows(count: usize) -> Vec<String> {
+    let text = std::fs::read_to_string(&fitted().test).unwrap();
+    text.lines().take(1 + count).map(str::to_owned).collect()
+}
+
+#[test]
+fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
+    let mut rows = first_rows(2);
+    rows.push(rows[1].clone());
     assert_eq!(
-        first,
+        told_at_once(&rows, 1),
         "warning: standard input:4: the time `0` is not after `10`; the row was left out; others like it are counted\n"
     );
-    drop(input);
-    assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn the_first_sample_out_of_range_of_each_channel_of_a_pipe_is_told_before_the_pipe_ends() {
+    let mut rows = first_rows(4);
+    let at = |name: &str| {
+        rows[0]
+            .split(',')
+            .position(|column| column == name)
+            .unwrap()
+    };
+    let (room, chuck, z) = (at("room_degC"), at("chuck_degC"), at("Z1_nm"));
+    for (row, column, value) in [
+        (1, room, "200.5"),
+        (2, room, "-300"),
+        (3, chuck, "-21"),
+        (4, z, "inf"),
+    ] {
+        let mut cells: Vec<&str> = rows[row].split(',').collect();
+        cells[column] = value;
+        rows[row] = cells.join(",");
+    }
+    assert_eq!(
+        told_at_once(&rows, 3),
+        "warning: temperature.room at 0.0: 200.5 is above the highest of its range, 200.0, taken as missing; others like it are counted\n\
+         warning: temperature.chuck at 20.0: -21.00 is below the lowest of its range, -20.00, taken as missing; others like it are counted\n\
+         warning: position.Z1 at 30.0: an infinite sample, taken as missing; others like it are counted\n"
+    );
+}
+
+#[test]
+fn a_misspelt_key_of_a_pipe_is_told_before_the_pipe_ends() {
+    let names = first_rows(0).remove(0).replace("room_degC", "rom_degC");
+    let rows = [0, 10].map(|time| {
+        let cells = names
+            .split(',')
+            .skip(1)
+            .map(|name| format!(", \"{name}\": 20.0"));
+        format!("{{\"time_s\": {time}{}}}", cells.collect::<String>())
+    });
+    let told = told_at_once(&rows, 1);
+    assert!(
+        told.starts_with(
+            "warning: standard input:1: there is no column `room_degC`; found `time_s`, "
+        ) && told.ends_with("did you mean `rom_degC`? (missing until a line has it)\n"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -189,6 +189,77 @@ fn a_truth_without_a_value_is_not_blamed_on_the_features() {
 }
 
 #[test]
+fn sensors_without_a_value_are_named_and_the_truth_is_not_blamed() {
+    let without = |channel: usize| {
+        let rows = explained(50);
+        let mut lines = rows.lines();
+        let mut text = format!("{}\n", lines.next().unwrap());
+        for line in lines {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            cells[1] = "";
+            cells[channel] = "";
+            let _ = writeln!(text, "{}", cells.join(","));
+        }
+        text
+    };
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let both = fit("silent", &node, &without(2), &[]).ended(1);
+    both.tells(&["m could not be fitted: `in.u` and `in.v` have no value in the data"]);
+    assert!(
+        !both.told.contains("out.y") && !both.out.contains("too early"),
+        "{}{}",
+        both.told,
+        both.out
+    );
+    // One of two is left out, and the fit goes on without it; a sum of both has no value without it.
+    fit("silent", &node, &without(1), &[]).ended(0);
+    let sum = "type = \"linear\"\ninputs.features = \"both\"\n\
+               [nodes.both]\ntype = \"sum\"\ninputs.signal = [\"in.u\", \"in.v\"]";
+    let of_sum = fit("silent", sum, &without(1), &[]).ended(1);
+    of_sum.tells(&["`both.sum` never has a value, since `in.u` has none in the data"]);
+    // Where the truth has none either, that is why.
+    fit("silent", &node, &without(3), &[])
+        .ended(1)
+        .tells(&["`out.y` has no value in the data"]);
+}
+
+#[test]
+fn a_truth_that_never_changes_is_told() {
+    const NOTE: &str = "the truth never changes in these rows";
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let constant = fit(
+        "constant",
+        &node,
+        &data(50, |_, _, _| 5.0),
+        &["--format", "json"],
+    )
+    .ended(0);
+    let constant = constant.json();
+    let fitted = &constant["estimators"][0];
+    assert_eq!(fitted["figures"]["constant_truth"], 5.0);
+    let notes = fitted["notes"].as_array().unwrap();
+    assert!(
+        notes
+            .iter()
+            .any(|note| note.as_str().unwrap().starts_with(NOTE)),
+        "{notes:?}"
+    );
+    let once = data(50, |row, _, _| if row == 49 { 5.1 } else { 5.0 });
+    let once = fit("constant", &node, &once, &[]).ended(0);
+    assert!(!once.out.contains(NOTE), "{}", once.out);
+}
+
+#[test]
+fn as_many_rows_as_coefficients_are_told() {
+    let node = format!("type = \"linear\"\n{FEATURES}");
+    let told = "3 rows for 3 coefficients, so the error on these rows says nothing of others";
+    let three = fit("exact", &node, &explained(3), &[]).ended(0);
+    assert!(three.out.contains(told), "{}", three.out);
+    let four = fit("exact", &node, &explained(4), &[]).ended(0);
+    assert!(!four.out.contains("says nothing of others"), "{}", four.out);
+}
+
+#[test]
 fn gradients_on_collinear_features_are_not_said_to_be_solved_by_singular_values() {
     let mut text = String::from("s,u,v,y\n");
     for row in 0..100 {
@@ -282,4 +353,53 @@ fn values_whose_squares_overflow_are_told_with_their_name() {
         let told = fit("overflow", &format!("{node}\n{FEATURES}"), &text, &[]).ended(1);
         told.tells(&["values of `in.u` are as large as 1e200", "a `range`"]);
     }
+}
+
+#[test]
+fn what_rows_that_do_not_fit_in_memory_change_is_told() {
+    let linear = "solver = { type = \"ridge\", alpha = { by = \"cross_validation\", folds = 3 } }";
+    let generalised =
+        "solver = { type = \"ridge\", alpha = { by = \"generalised_cross_validation\" } }";
+    let with = |kind: &str, more: &str| format!("type = \"{kind}\"\n{FEATURES}\n{more}");
+    let lags = "lags = [\"1 sample\"]";
+    let folds = "so folds end at multiples of 256 rows";
+    let scales = "centred and scaled by the first 1 of 1,";
+    let rows = explained(1500);
+    for (node, told, times) in [
+        (with("linear", linear), folds, 1),
+        (
+            with(
+                "linear",
+                &format!("{linear}\nselection = {{ method = \"forward\" }}"),
+            ),
+            folds,
+            1,
+        ),
+        (with("linear", generalised), folds, 0),
+        (with("linear", ""), folds, 0),
+        (with("polynomial", ""), scales, 1),
+        (with("narx", lags), scales, 1),
+    ] {
+        let streamed = fit("streamed", &node, &rows, &["--memory", "0"]).ended(0);
+        assert_eq!(
+            streamed.out.matches(told).count(),
+            times,
+            "{}",
+            streamed.out
+        );
+        let kept = fit("streamed", &node, &rows, &[]).ended(0);
+        assert!(!kept.out.contains("did not fit in memory"), "{}", kept.out);
+    }
+}
+
+#[test]
+fn the_scale_of_outliers_is_told_in_any_unit() {
+    let node = format!("type = \"huber\"\n{FEATURES}");
+    let small = data(60, |row, u, v| {
+        1e-9 * (3.0 * u - 2.0 * v + 0.1 * noise(row, 3))
+    });
+    let small = fit("huber", &node, &small, &[]).ended(0);
+    let (_, scale) = small.out.split_once("the scale of the others is ").unwrap();
+    let scale: f64 = scale.split_once(' ').unwrap().0.parse().unwrap();
+    assert!(scale > 1e-12 && scale < 1e-9, "{}", small.out);
 }

@@ -4,52 +4,24 @@
 
 mod workbench;
 
-use std::process::{Command, Output};
-
-use workbench::Scratch;
-
-fn athermal(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_athermal"))
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
+use workbench::{Scratch, athermal, graph};
 
 #[test]
 fn a_forecast_and_a_virtual_sensor_differ_in_their_horizons() {
-    let output = athermal(&[
-        "diff",
-        "graphs/die-tester.toml",
-        "graphs/die-tester-sensor.toml",
-    ]);
-    assert_eq!(output.status.code(), Some(1));
-    insta::assert_snapshot!(text(&output.stdout));
+    let told = athermal(&[&"diff", &graph("die-tester"), &graph("die-tester-sensor")]).ended(1);
+    insta::assert_snapshot!(told.out);
 }
 
 #[test]
 fn a_graph_does_not_differ_from_itself() {
-    let output = athermal(&["diff", "graphs/z-probe.toml", "graphs/z-probe.toml"]);
-    assert_eq!(
-        (output.status.code(), text(&output.stdout)),
-        (Some(0), String::new())
-    );
+    let told = athermal(&[&"diff", &graph("z-probe"), &graph("z-probe")]).ended(0);
+    assert_eq!(told.out, "");
 }
 
 #[test]
 fn differences_are_told_to_programs_too() {
-    let output = athermal(&[
-        "diff",
-        "--format",
-        "json",
-        "graphs/die-tester.toml",
-        "graphs/die-tester-sensor.toml",
-    ]);
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let (one, other) = (graph("die-tester"), graph("die-tester-sensor"));
+    let told = athermal(&[&"diff", &"--format", &"json", &one, &other]).json();
     assert_eq!(told["same"], false);
     let thermal = told["nodes"]
         .as_array()
@@ -66,27 +38,19 @@ fn differences_are_told_to_programs_too() {
 
 #[test]
 fn a_code_is_explained_with_a_wrong_and_a_right_graph() {
-    let output = athermal(&["explain", "a052"]);
-    assert_eq!(output.status.code(), Some(0));
-    insta::assert_snapshot!(text(&output.stdout));
-    let unknown = athermal(&["explain", "A000"]);
-    assert_eq!(unknown.status.code(), Some(2));
+    let told = athermal(&[&"explain", &"a052"]).ended(0);
+    insta::assert_snapshot!(told.out);
+    athermal(&[&"explain", &"A000"]).ended(2);
 }
 
 #[test]
 fn a_warning_is_a_no_only_where_that_is_asked_for() {
-    let file = std::env::temp_dir().join(format!("athermal-unused-{}.toml", std::process::id()));
-    let page = athermal(&["explain", "--format", "json", "A060"]);
-    let page: serde_json::Value = serde_json::from_slice(&page.stdout).unwrap();
-    std::fs::write(&file, page["wrong"].as_str().unwrap()).unwrap();
-    let path = file.to_str().unwrap();
-    assert_eq!(athermal(&["check", path]).status.code(), Some(0));
-    assert_eq!(
-        athermal(&["check", "--strict", path]).status.code(),
-        Some(1)
-    );
-    let json = athermal(&["check", "--format", "json", path]);
-    let told: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    let page = athermal(&[&"explain", &"--format", &"json", &"A060"]).json();
+    let scratch = Scratch::new("unused");
+    let file = scratch.file("graph.toml", page["wrong"].as_str().unwrap());
+    athermal(&[&"check", &file]).ended(0);
+    athermal(&[&"check", &"--strict", &file]).ended(1);
+    let told = athermal(&[&"check", &"--format", &"json", &file]).json();
     let first = &told["diagnostics"][0];
     assert_eq!(
         (
@@ -97,7 +61,6 @@ fn a_warning_is_a_no_only_where_that_is_asked_for() {
         ),
         (&"A060".into(), &"warning".into(), &4.into(), &10.into())
     );
-    std::fs::remove_file(file).unwrap();
 }
 
 #[test]
@@ -136,9 +99,9 @@ out = "plain"
     let models = [(full, "fitted.json", 0), (empty, "unfitted.json", 1)];
     let [fitted, unfitted] = models.map(|(data, model, status)| {
         let model = scratch.path(model);
-        workbench::athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(status);
+        athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(status);
         model
     });
-    let told = workbench::athermal(&[&"diff", &fitted, &unfitted]).ended(1);
+    let told = athermal(&[&"diff", &fitted, &unfitted]).ended(1);
     assert_eq!(told.out, "fitted parameters\n  ~ plain\n");
 }

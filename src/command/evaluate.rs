@@ -53,7 +53,8 @@ pub struct Evaluate {
     /// Score each prediction on all instants of its own
     #[arg(long)]
     each_on_its_own: bool,
-    /// Let nothing learn on the way; otherwise, what learns does so after each truth has been predicted
+    /// Let no estimator learn on the way; otherwise, what learns does so after each truth has been predicted. Votes go by recent
+    /// errors in either case
     #[arg(long)]
     frozen: bool,
     /// From which past truths predictions are made; only what reads or follows past truths differs

@@ -8,11 +8,12 @@ use athermal::core::compile::{PlannedChannel, Wanted};
 use athermal::core::diagnostic::Sources;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
-use athermal::core::node::{OrderTable, SelectionStep};
+use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
 
+use super::aside::write_aside;
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use super::numbers;
@@ -297,9 +298,13 @@ fn describe(fit: &EstimatorFit, candidates: bool) -> String {
         fit.truth,
         counted(fit.rows, "row")
     );
+    let without_run = match &fit.outcome {
+        Outcome::Failed(TrainingError::NeverRan { .. }) => "not predicted",
+        _ => "too early to be predicted",
+    };
     let dropped = [
         (fit.dropped.outside_limits, "outside the limits"),
-        (fit.dropped.without_run, "too early to be predicted"),
+        (fit.dropped.without_run, without_run),
         (fit.dropped.incomplete, "incomplete"),
     ];
     let dropped: Vec<_> = dropped
@@ -406,40 +411,4 @@ fn created() -> Option<String> {
     jiff::Timestamp::from_second(seconds)
         .ok()
         .map(|time| time.to_string())
-}
-
-/// Writes a file aside and renames it, so that a reader never sees half of it and a failure leaves the old one. What is there and
-/// is no file, such as `/dev/null` or a pipe, is written to instead: it would be no more.
-pub fn write_aside(path: &std::path::Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
-    let failed = |error| Failure::Outside(format!("cannot write {}: {error}", path.display()));
-    if std::fs::metadata(path).is_ok_and(|of| !of.is_file() && !of.is_dir()) {
-        return std::fs::write(path, content).map_err(failed);
-    }
-    let mut aside = path.as_os_str().to_owned();
-    aside.push(".part");
-    let aside = PathBuf::from(aside);
-    std::fs::write(&aside, content)
-        .and_then(|()| std::fs::rename(&aside, path))
-        .map_err(failed)
-}
-
-#[cfg(all(test, unix))]
-mod tests {
-    use super::write_aside;
-
-    #[test]
-    fn what_is_no_file_is_written_to_and_stays_what_it_is() {
-        let name = format!("athermal-pipe-{}", std::process::id());
-        let pipe = std::env::temp_dir().join(name);
-        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
-        assert!(made.unwrap().success());
-        let reader = std::thread::spawn({
-            let pipe = pipe.clone();
-            move || std::fs::read_to_string(pipe).unwrap()
-        });
-        write_aside(&pipe, "a model").unwrap();
-        assert_eq!(reader.join().unwrap(), "a model");
-        assert!(!std::fs::metadata(&pipe).unwrap().is_file());
-        std::fs::remove_file(&pipe).unwrap();
-    }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::fit::write_aside;
+use super::aside::write_aside;
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};

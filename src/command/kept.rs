@@ -7,7 +7,7 @@ use athermal::core::live::{Samples, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::{Engine, Instant};
 
-use super::fit::write_aside;
+use super::aside::write_aside;
 use crate::terminal::{Failure, Terminal};
 
 /// How long a run that is killed may have learned in vain.

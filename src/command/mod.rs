@@ -1,5 +1,6 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
+mod aside;
 mod build;
 mod check;
 mod compare;
@@ -17,6 +18,7 @@ mod new;
 mod nodes;
 mod numbers;
 mod parameters;
+mod rejected;
 mod report;
 mod run;
 mod schema;

@@ -113,7 +113,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             tell(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
                  truths that miss by more than so many times the recent error (both in units of `deviation` where the kind tells it), \
-                 nor so many widths outside the range of the fit",
+                 nor so many widths outside the range of the fit, without `margin` where it keeps none, as of `kalman`",
             );
         }
     }

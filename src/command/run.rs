@@ -2,16 +2,18 @@
 
 use std::path::PathBuf;
 
+use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::document::TimeBase;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair};
 use athermal::core::recording::Event;
-use athermal::files::{Flush, Layout, Options, Reader, WithRevision, Writer, layout};
+use athermal::files::{FileError, Flush, Layout, Options, Reader, WithRevision, Writer, layout};
 use athermal::{Engine, Model};
 use clap::Args;
 
 use super::data;
 use super::evaluate::check_fitted;
 use super::kept::Kept;
+use super::rejected::Ranged;
 use super::swap;
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
@@ -36,7 +38,7 @@ pub struct Run {
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
-    /// Let nothing learn while it runs
+    /// Let no estimator learn while it runs; votes still go by recent errors
     #[arg(long)]
     frozen: bool,
     /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: when the input ends, and at least once a
@@ -93,8 +95,9 @@ impl Run {
             .collect();
         let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
         let mut rest = kept.rest(terminal, &mut reader);
+        let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan));
         let mut keep = |engine: &Engine| kept.after_tick(engine);
-        live::run_keeping(&mut engine, &mut rest, &mut writer, &mut keep)?;
+        live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
         kept.write(&engine)?;
         self.tell(terminal, &engine, &reader);
         Ok(Answer::Fine)
@@ -108,8 +111,9 @@ impl Run {
             lenient: self.lenient,
             ..Options::default()
         };
-        let layout = layout(&swap::reading(&model, &swaps, &feed));
-        let mut reader = self.open(terminal, layout, options)?;
+        let read = swap::reading(&model, &swaps, &feed);
+        let mut reader = self.open(terminal, layout(&read), options)?;
+        let mut ranged = Ranged::new(terminal, &mut reader, self.ranged(&read));
         let live = LiveOptions {
             channels: feed,
             ..LiveOptions::default()
@@ -136,7 +140,7 @@ impl Run {
         let mut writer = WithRevision(writer);
         let mut samples = Samples::default();
         let mut places = (String::new(), Vec::new());
-        while let Some(event) = reader.next(&mut samples).map_err(outside)? {
+        while let Some(event) = ranged.next(&mut samples).map_err(outside)? {
             let Event::Row(time) = event else {
                 stepper.segment();
                 continue;
@@ -199,18 +203,30 @@ impl Run {
         options: Options,
     ) -> Result<Reader, Failure> {
         let mut reader = Reader::open(&self.input, layout, options)?;
-        if self.input.as_os_str() == "-" {
-            // Beside a machine the input does not end, and nor would the wait for what is told then.
+        if !self.ends() {
             let terminal = *terminal;
-            reader.tell_first(move |first| {
-                terminal.warning(format_args!("{first}; others like it are counted"));
+            reader.tell_first(move |first| match first {
+                FileError::MissingColumns { .. } => {
+                    terminal.warning(format_args!("{first} (missing until a line has it)"));
+                }
+                _ => terminal.warning(format_args!("{first}; others like it are counted")),
             });
         }
         Ok(reader)
     }
 
+    /// The channels of which a sample that does not count is told at once.
+    fn ranged<'a>(&self, read: &'a Plan) -> &'a [SourceChannel] {
+        if self.ends() { &[] } else { &read.sources }
+    }
+
+    /// Whether the input is known to end: beside a machine it does not, and nor would the wait for what is told then.
+    fn ends(&self) -> bool {
+        self.input.as_os_str() != "-"
+    }
+
     fn flush(&self) -> Flush {
-        if self.input.as_os_str() == "-" {
+        if !self.ends() {
             Flush::EachRow
         } else {
             Flush::Buffered

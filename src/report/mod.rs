@@ -23,6 +23,7 @@ pub use verdict::Verdict;
 pub use worth::{Settling, StepLoss, Worth};
 
 use athermal_core::compile::Wanted;
+use athermal_core::diagnostic::digits;
 use athermal_core::model::{Card, Model};
 use athermal_core::recording::Recording;
 use athermal_core::score::{Lack, Score, ScoreOptions, Scores, score};
@@ -88,15 +89,17 @@ pub fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-/// A figure to three significant digits or more; a dash for none.
+/// A figure to about three significant digits, however small or large its unit makes it; a dash for none.
 fn figure(value: Option<f64>) -> String {
     match value {
         Some(value) if value.is_nan() => "–".to_owned(),
         None => "–".to_owned(),
+        Some(value) if value.abs() >= 1e6 => digits(value, 3),
         Some(value) if value.abs() >= 100.0 => format!("{value:.0}"),
         Some(value) if value.abs() >= 10.0 => format!("{value:.1}"),
         Some(value) if value.abs() >= 0.1 || value == 0.0 => format!("{value:.2}"),
-        Some(value) => format!("{value:.3}"),
+        Some(value) if value.abs() >= 0.01 => format!("{value:.3}"),
+        Some(value) => digits(value, 3),
     }
 }
 
@@ -155,3 +158,19 @@ pub const WANTED: Wanted = Wanted {
     standard_errors: true,
     intervals: false,
 };
+
+#[cfg(test)]
+mod tests {
+    use super::figure;
+
+    #[test]
+    fn a_figure_keeps_its_digits_in_any_unit() {
+        let told = [0.0, 107.3, 21.46, 2.534, 0.0683, -4.2e-8, 1.234e-3, 3.5e9]
+            .map(|value| figure(Some(value)));
+        let expected = [
+            "0.00", "107", "21.5", "2.53", "0.068", "-4.20e-8", "0.00123", "3.50e9",
+        ];
+        assert_eq!(told, expected);
+        assert_eq!([None, Some(f64::NAN)].map(figure), ["–", "–"]);
+    }
+}

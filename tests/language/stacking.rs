@@ -208,3 +208,83 @@ fn a_stack_of_stacks_of_stacks_trusts_the_one_that_knows_most() {
     assert!((second / first - 1.0).abs() < 0.05, "{first}, {second}");
     assert!((third / first - 1.0).abs() < 0.05, "{first}, {third}");
 }
+
+/// What a stack finds over a voter that goes on learning, frozen by what is given.
+fn stacked_over(learning: &str) -> (f64, Vec<f64>) {
+    let graph = format!(
+        "{SAMPLES}
+[nodes.level]
+type = \"linear\"
+inputs.features = \"temperature.chuck\"
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+[nodes.higher]
+type = \"stack\"
+inputs.voters = [\"level\"]
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+[nodes.never]
+type = \"scale\"
+inputs.signal = \"level\"
+factor = 0.0
+[nodes.never_higher]
+type = \"scale\"
+inputs.signal = \"higher\"
+factor = 0.0
+[nodes.learns]
+type = \"rls\"
+inputs.features = \"temperature.room\"
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+forgetting = {{ type = \"constant\", factor = 0.9 }}
+{learning}
+[nodes.stays]
+type = \"linear\"
+inputs.features = \"temperature.room\"
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+[nodes.stack]
+type = \"stack\"
+inputs.voters = [\"learns\", \"stays\"]
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
+[outputs]
+out = \"stack\"
+level = \"never\"
+higher = \"never_higher\"
+"
+    );
+    let mut table = Table::default();
+    for row in 0..600_u32 {
+        let t = f64::from(row);
+        let (room, chuck) = ((0.7 * t).sin(), (0.3 * t).cos());
+        // What a kelvin does changes as time goes on.
+        let values = [room, chuck, (0.01 * t).sin() * room + 0.1 * chuck];
+        table.push(Instant::from_ns(i64::from(row) * 10_000_000_000), &values);
+    }
+    let plan = plan(&graph);
+    let (_, report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    let of_stack = report.estimators.iter().find(|fit| fit.node == "stack");
+    let Outcome::Fitted(report) = &of_stack.unwrap().outcome else {
+        panic!("{report:?}")
+    };
+    let Figure::Named(weights) = &report.figures["weights"] else {
+        panic!("{report:?}");
+    };
+    let weights = ["learns.Z", "stays.Z"].map(|name| weights[name].0);
+    (report.in_sample_rmse.unwrap(), weights.to_vec())
+}
+
+#[test]
+fn what_freezes_a_voter_is_fitted_with_it_in_folds() {
+    const LEARNS: &str = "learn = { outliers = inf, margin = inf }";
+    let free = stacked_over(LEARNS);
+    let frozen = stacked_over("learn = false");
+    // A voter that learns follows what changes, and one that is frozen throughout does not.
+    assert!(free.0 < 0.5 * frozen.0, "{free:?} {frozen:?}");
+    // What freezes it is never anything but 0, where it is fitted: the same as if nothing did.
+    for gate in ["never", "never_higher"] {
+        let gated = stacked_over(&format!("{LEARNS}\ninputs.freeze = \"{gate}\""));
+        assert_eq!(gated, free, "{gate}");
+    }
+}

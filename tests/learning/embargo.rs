@@ -1,6 +1,6 @@
 //! What a learner is told, and when.
 
-use crate::workbench::{Bench, problems};
+use crate::workbench::{Bench, compiled, problems};
 
 /// A position every 30 s whose slope over `window` is predicted, and a temperature every 10 s that is the time in seconds.
 fn graph(about: &str, window: &str, ahead: &str) -> String {
@@ -124,6 +124,32 @@ fn an_estimator_that_cannot_learn_says_what_can() {
         "solver = { type = \"sgd\" }\nlearn = { outlier = 3.0 }\n",
     ));
     assert!(told.contains("did you mean \"outliers\"?"), "{told}");
+}
+
+#[test]
+fn a_margin_about_no_range_is_a_mistake() {
+    let of = |kind: &str, limits: &str| {
+        let text = graph("arrival", "5min", "0s");
+        let lines = text
+            .lines()
+            .filter(|line| !line.starts_with("about") && !line.starts_with("learn ="));
+        let text = lines.collect::<Vec<_>>().join("\n");
+        let node = format!("type = \"{kind}\"\nlearn = {{ {limits} }}\n");
+        let text = text.replace("type = \"test_told\"", &node);
+        compiled(&text).err().unwrap_or_default()
+    };
+    for kind in ["kalman", "armax"] {
+        for margin in ["0.0", "0.5"] {
+            let told = of(kind, &format!("margin = {margin}, outliers = 4.0"));
+            assert!(
+                told.contains("its fit keeps no range of the regressors")
+                    && told.contains(&format!("{{ margin = {margin},")),
+                "{kind}: {told}"
+            );
+        }
+        assert_eq!(of(kind, "outliers = 4.0"), "", "{kind}");
+    }
+    assert_eq!(of("rls", "margin = 0.5"), "");
 }
 
 #[test]

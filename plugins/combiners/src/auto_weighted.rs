@@ -13,8 +13,8 @@ use crate::share::{raise, shrink};
 
 /// Auto-weighted voting: each voter counts by its recent root mean square error.
 ///
-/// `ŷ = Σ w_i ŷ_i` with `w_i ∝ RMSE_i^(−power)`, normalised, over the truths that arrived within `memory`. Only truths
-/// whose window does not overlap the predicted one count. A voter without errors in memory takes the mean weight of the
+/// `ŷ = Σ w_i ŷ_i` with `w_i ∝ RMSE_i^(−power)`, normalised, over the truths that the embargo let through within `memory`:
+/// only those count whose window does not overlap the predicted one. A voter without errors in memory takes the mean weight of the
 /// others; if no voter has any, all weights are equal. A voter without a prediction drops out and the rest are
 /// renormalised, so that the vote goes on when a sensor dies. The port `weights` shows them.
 ///
@@ -31,8 +31,8 @@ use crate::share::{raise, shrink};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AutoWeighted {
-    /// How long an error is remembered, counted from the arrival of its truth: `"15min"`, `{ truths = 12 }`, or ever less by
-    /// `{ half_life = "15min" }`.
+    /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
+    /// ever less by `{ half_life = "15min" }`.
     pub memory: Memory,
     /// How strongly errors count: 0 not at all, 2 as inverse variances do; at most 16.
     #[serde(default = "two")]

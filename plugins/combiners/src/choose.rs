@@ -17,8 +17,8 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Best {
-    /// How long an error is remembered, counted from the arrival of its truth: `"15min"`, `{ truths = 12 }`, or ever less by
-    /// `{ half_life = "15min" }`.
+    /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
+    /// ever less by `{ half_life = "15min" }`.
     pub memory: Memory,
 }
 

@@ -31,8 +31,8 @@ pub struct Conformal {
     #[serde(default = "nine_tenths")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub coverage: f64,
-    /// How long an error is remembered, counted from the arrival of its truth: a duration, such as "2d", and no number of
-    /// truths. One in which a few hundred truths come makes a steady interval.
+    /// How long an error is remembered, counted from when the embargo lets its truth through: a duration, such as "2d", and no
+    /// number of truths. One in which a few hundred truths come makes a steady interval.
     pub memory: Duration,
     /// How much a miss widens the next intervals, 0 (not at all) to 1; small is steady, large adapts fast.
     #[serde(default = "one_in_two_hundred")]

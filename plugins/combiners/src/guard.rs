@@ -19,8 +19,8 @@ use crate::memory::Memory;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Guard {
-    /// How long an error is remembered, counted from the arrival of its truth: `"15min"`, `{ truths = 12 }`, or ever less by
-    /// `{ half_life = "15min" }`.
+    /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
+    /// ever less by `{ half_life = "15min" }`.
     pub memory: Memory,
     /// How many truths must be in memory before a prediction is held back; 1 or more. With a `half_life` they count for less
     /// with age: one so short that fewer are ever left holds nothing back.

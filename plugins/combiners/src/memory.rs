@@ -5,9 +5,9 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// How long an error is remembered, counted from the arrival of its truth.
+/// How long an error is remembered, counted from when the embargo lets its truth through.
 ///
-/// `"15min"` forgets what arrived earlier at once, `{ truths = 12 }` what arrived before the last twelve, and
+/// `"15min"` forgets at once what was let through earlier, `{ truths = 12 }` what came before the last twelve, and
 /// `{ half_life = "15min" }` counts an error half after that time, a quarter after twice that, and not at all after ten times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]

@@ -20,7 +20,8 @@ use crate::choose::all_on;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StateGate {
-    /// How long another state must have lasted before its voter speaks; no time by default.
+    /// How long another state must have lasted before its voter speaks; no time by default. A state that is not known is taken
+    /// at once, and so is the first one that is known after it.
     #[serde(default)]
     pub dwell: Duration,
 }

@@ -20,6 +20,8 @@ use crate::solver::Solver;
 /// candidates like the features. The answer changes with time alone, so the node runs at every tick.
 ///
 /// The port `deviation` is the standard deviation of the truth about the prediction, as `linear` gives it.
+/// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
+/// newest truth, in the numbers of `rls`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arx {

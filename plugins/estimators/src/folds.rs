@@ -1,6 +1,7 @@
 //! Decides how a user says in which folds rows are cut for cross-validation.
 
-use athermal_core::node::{Forms, Mistake};
+use athermal_core::node::{Forms, Mistake, TrainingReport};
+use athermal_numerics::GramBlocks;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -40,6 +41,19 @@ pub enum Cut {
         #[serde(default)]
         gap_rows: u64,
     },
+}
+
+/// Tells, once, where the folds of a cross-validation end elsewhere than they would had the rows been kept.
+pub(crate) fn tell_moved(blocks: &GramBlocks, report: &mut TrainingReport) {
+    const FIGURE: &str = "folds_end_at_multiples_of";
+    if blocks.exact_folds() || report.figures.contains_key(FIGURE) {
+        return;
+    }
+    let rows = blocks.block_rows();
+    report.figure(FIGURE, rows);
+    report.notes.push(format!(
+        "the rows did not fit in memory, so folds end at multiples of {rows} rows"
+    ));
 }
 
 impl<'de> Deserialize<'de> for Folds {

@@ -1,5 +1,6 @@
 //! The estimator that outliers cannot pull.
 
+use athermal_core::diagnostic::digits;
 use athermal_core::node::{
     Estimator, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
@@ -115,8 +116,10 @@ impl Trainer for RobustTrainer {
         report.figure("scale", fit.scale);
         report.figure("converged", fit.converged);
         report.notes.push(format!(
-            "{} of {count} rows count as outliers; the scale of the others is {:.4} {}",
-            fit.outliers, fit.scale, self.unit
+            "{} of {count} rows count as outliers; the scale of the others is {} {}",
+            fit.outliers,
+            digits(fit.scale, 4),
+            self.unit
         ));
         if !fit.converged {
             report

@@ -23,6 +23,9 @@ use crate::solver::Solver;
 /// solver `sgd`): `s √(1 + 1/n + (x − x̄)ᵀ (XᵀX + αI)⁻¹ (x − x̄))` on standardised features, `s²` the residual variance
 /// (Draper and Smith 1998, section 3.1; for ridge, the posterior of Hastie, Tibshirani and Friedman 2009, section 3.4.1).
 /// It takes the data for more of the same: `conformal` measures how often an interval holds.
+///
+/// With the solver `sgd` and `learn = true` it goes on learning while it runs; the port `learning` then tells what became of the
+/// newest truth, in the numbers of `rls`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {

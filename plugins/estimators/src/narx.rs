@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::lags::{lag_mistakes, now};
 use crate::regression::told;
-use crate::scaling::{scale_mistakes, term_mistake};
+use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 
 /// More terms would take the memory of many rows.
 const MOST_TERMS: usize = 500;
@@ -175,6 +175,8 @@ struct NarxTrainer {
 }
 
 struct Expanding {
+    /// How many rows centres and scales were found from.
+    found_from: usize,
     centres: Vec<f64>,
     scales: Vec<f64>,
     mean: f64,
@@ -217,6 +219,7 @@ impl NarxTrainer {
         let truths = waiting.chunks_exact(width + 1).map(|row| row[width]);
         let mean = truths.sum::<f64>() / (waiting.len() / (width + 1)).max(1) as f64;
         let mut expanding = Expanding {
+            found_from: waiting.len() / (width + 1),
             centres: standard.means,
             scales: standard.scales,
             mean,
@@ -340,8 +343,10 @@ impl Trainer for NarxTrainer {
             coefficients: found.coefficients.clone(),
             mean: expanding.mean,
         };
+        let (found_from, rows) = (expanding.found_from, expanding.gram.count());
         let mut report = self.report(&found);
         report.in_sample_rmse = Some(mean_square.sqrt());
+        tell_first_rows(found_from, rows as usize, &mut report);
         Ok(Trained {
             predictor: Box::new(predictor),
             report,

@@ -8,7 +8,7 @@ use athermal_numerics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::folds::Folds;
+use crate::folds::{Folds, tell_moved};
 
 /// The penalty of ridge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -98,8 +98,8 @@ struct Chosen {
 }
 
 impl Settled {
-    /// What there is to tell goes into the report.
-    pub(crate) fn tell(&self, report: &mut TrainingReport) {
+    /// What there is to tell goes into the report; the rows are those of the choice.
+    pub(crate) fn tell(&self, blocks: &GramBlocks, report: &mut TrainingReport) {
         let Some(Chosen {
             by,
             tried,
@@ -115,7 +115,10 @@ impl Settled {
         report.figure("smallest_penalty", smallest);
         report.figure("largest_penalty", largest);
         let how = match by {
-            Choice::CrossValidation { .. } => "cross-validation",
+            Choice::CrossValidation { .. } => {
+                tell_moved(blocks, report);
+                "cross-validation"
+            }
             Choice::GeneralisedCrossValidation { .. } => "generalised cross-validation",
         };
         let told = r2.map_or_else(String::new, |r2| {

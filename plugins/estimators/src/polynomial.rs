@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::elastic_net::{FEATURES_AND_TRUTH, present_features};
 use crate::regression::LinearTrainer;
-use crate::scaling::{scale_mistakes, term_mistake};
+use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::selection::Selection;
 use crate::solver::Solver;
 
@@ -139,6 +139,9 @@ struct PolynomialTrainer {
 }
 
 struct Expanding {
+    /// How many rows centres and scales were found from.
+    found_from: usize,
+    rows: usize,
     centres: Vec<f64>,
     scales: Vec<f64>,
     trainer: LinearTrainer,
@@ -148,6 +151,7 @@ struct Expanding {
 
 impl Expanding {
     fn row(&mut self, terms: &[Term], features: &[f64], truth: f64) {
+        self.rows += 1;
         self.z.clear();
         let scaled = features.iter().zip(&self.centres).zip(&self.scales);
         self.z
@@ -177,6 +181,8 @@ impl PolynomialTrainer {
         };
         let standard = self.running.standardization();
         let mut expanding = Expanding {
+            found_from: self.waiting.len() / (features.len() + 1),
+            rows: 0,
             centres: standard.means,
             scales: standard.scales,
             trainer: LinearTrainer::new(&setup, self.solver, Some(self.selection)),
@@ -224,6 +230,7 @@ impl Trainer for PolynomialTrainer {
         };
         let mut report = TrainingReport::default();
         let linear = expanding.trainer.solve(&mut report)?;
+        tell_first_rows(expanding.found_from, expanding.rows, &mut report);
         let features = &self.setup.regressors;
         let mut predictor = PolynomialPredictor {
             regressors: Vec::new(),

@@ -90,7 +90,7 @@ impl LinearTrainer {
         let settled = penalty
             .settle(&self.blocks, &columns, scales)
             .map_err(told)?;
-        settled.tell(report);
+        settled.tell(&self.blocks, report);
         Ok((columns, settled.alpha))
     }
 

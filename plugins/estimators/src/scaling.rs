@@ -1,7 +1,8 @@
 //! Decides how a fitted model brings regressors to a common scale, and what makes no scale.
 
+use athermal_core::diagnostic::count;
 use athermal_core::model::{number, numbers};
-use athermal_core::node::Mistake;
+use athermal_core::node::{Mistake, TrainingReport};
 use serde::{Deserialize, Serialize};
 
 /// What each regressor varies about and how far, as a model file has it.
@@ -73,6 +74,18 @@ pub(crate) fn term_mistake(
     let place = places.find(|&place| place >= width)?;
     let message = format!("`terms` names regressor {place} and there are {width}, from 0 on");
     Some(Mistake::at("terms", message))
+}
+
+/// Tells where regressors are centred and scaled by fewer rows than the fit has: what came after did not fit in memory.
+pub(crate) fn tell_first_rows(found_from: usize, rows: usize, report: &mut TrainingReport) {
+    if found_from < rows {
+        report.figure("scaled_by_first_rows", found_from);
+        report.notes.push(format!(
+            "the rows did not fit in memory, so features are centred and scaled by the first {} of {} rows",
+            count(found_from),
+            count(rows)
+        ));
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use athermal_numerics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::folds::Folds;
+use crate::folds::{Folds, tell_moved};
 
 /// How regressors are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,7 +51,8 @@ pub struct CrossValidated {
     /// `{ type = "blocked", count = 5, gap_rows = 4, embargo_rows = 8 }` or `{ type = "expanding", count = 5 }`.
     #[serde(default = "Folds::three")]
     pub folds: Folds,
-    /// The smallest gain that is worth another regressor, or the largest loss at which one is taken out.
+    /// The smallest gain that is worth another regressor or sensor, or the largest loss at which one is taken out. Sensors that
+    /// come together must gain so much each, and that much more than fewer of them.
     #[serde(default = "thousandth")]
     pub tolerance: f64,
     /// The most regressors or sensors to end with; without it there is no limit.
@@ -183,13 +184,7 @@ impl Selection {
         let (candidates, names) = how.by.candidates(regressors);
         let splits = blocks.splits(&how.folds.cut())?;
         let selected = search.over(&splits, scales, &candidates)?;
-        if !blocks.exact_folds() {
-            let rows = blocks.block_rows();
-            report.figure("folds_end_at_multiples_of", rows);
-            report.notes.push(format!(
-                "the rows did not fit in memory, so folds end at multiples of {rows} rows"
-            ));
-        }
+        tell_moved(blocks, report);
         let name = |candidate: usize| {
             let units = candidates.units_of(candidate).iter();
             let names: Vec<&str> = units.map(|&unit| names[unit].as_str()).collect();

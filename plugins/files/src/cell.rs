@@ -48,6 +48,12 @@ fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
     fast_float2::parse(cell).ok()
 }
 
+/// The decimal mark of a number; none in one that has none.
+pub(crate) fn decimal_mark(number: &[u8]) -> Option<u8> {
+    let mut marks = number.iter().filter(|b| matches!(b, b',' | b'.'));
+    marks.next().copied()
+}
+
 /// Where the only comma stands, if there is one and no point.
 pub(crate) fn single_comma(cell: &[u8]) -> Option<usize> {
     let mut marks = cell

@@ -297,6 +297,37 @@ mod tests {
     }
 
     #[test]
+    fn a_file_has_one_decimal_mark() {
+        let mixed = "t;a;b\n0;1,5;2\n1;1;1.234\n2;7;2,5\n";
+        assert_eq!(
+            error(mixed),
+            "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark, or read leniently to leave out those with another"
+        );
+        let (rows, reader) = read_with(mixed, lenient());
+        assert_eq!(rows, "0 [1.5, 2.0]; 1 [1.0, NaN]; 2 [7.0, 2.5]");
+        assert_eq!(reader.report().bad_cells.count, 1);
+        let times = "t;a;b\n0.5;1.5;2\n1,5;1;1\n2.5;7;3\n";
+        assert!(error(times).starts_with("f.csv:3: column `t`: expected a number with the decimal mark `.`, as in line 2, found `1,5`"));
+        let (rows, reader) = read_with(times, lenient());
+        assert_eq!(rows, "0.5 [1.5, 2.0]; 2.5 [7.0, 3.0]");
+        assert_eq!(reader.report().refused_rows.count, 1);
+        assert_eq!(
+            read("t;a;b\n0.5;1.5;2\n1;1;2.5\n"),
+            "0.5 [1.5, 2.0]; 1 [1.0, 2.5]"
+        );
+    }
+
+    #[test]
+    fn the_seconds_of_a_date_may_have_another_mark_than_numbers() {
+        let layout = Layout::new("t", TimeForm::Rfc3339, ["a"]);
+        let text = &b"t;a\n2013-07-04T00:00:00.5Z;1,5\n"[..];
+        let mut reader = Reader::from_read("f", text, layout, Options::default()).unwrap();
+        let mut row = Row::default();
+        assert!(reader.next_into(&mut row).unwrap());
+        assert_eq!(row.values, [1.5]);
+    }
+
+    #[test]
     fn marks_of_other_programs_do_no_harm() {
         assert_eq!(read("\u{feff}t,a,b\r\n0,1,2.5\r\n1,3,\r\n"), TWO_ROWS);
         assert_eq!(

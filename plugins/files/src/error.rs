@@ -107,6 +107,19 @@ pub enum FileError {
         /// The text of the cell.
         found: String,
     },
+    /// A number with another decimal mark than the numbers before it.
+    MixedMarks {
+        /// The row.
+        place: Place,
+        /// The name of the column.
+        column: String,
+        /// The text of the cell.
+        found: String,
+        /// The mark that the numbers before it have: `,` or `.`.
+        mark: char,
+        /// The line of the first of them.
+        since: u64,
+    },
     /// A time cell that is not in the stated form, or beyond 64 bits of nanoseconds.
     BadTime {
         /// The row.
@@ -142,6 +155,11 @@ pub enum FileError {
         place: Place,
         /// What the parser said.
         reason: String,
+    },
+    /// A JSON array where objects are expected, one a line.
+    JsonArray {
+        /// The line with which it begins.
+        place: Place,
     },
     /// A row to be written has not as many values as there are columns.
     ValueCount {
@@ -217,6 +235,16 @@ impl fmt::Display for FileError {
                 f,
                 "{place}: column `{column}`: expected a number, found `{found}`; leave the cell empty where there is no value, or read leniently to take it as absent"
             ),
+            Self::MixedMarks {
+                place,
+                column,
+                found,
+                mark,
+                since,
+            } => write!(
+                f,
+                "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; write all numbers of a file with one mark, or read leniently to leave out those with another"
+            ),
             Self::BadTime {
                 place,
                 column,
@@ -252,6 +280,10 @@ impl fmt::Display for FileError {
             Self::BadObject { place, reason } => write!(
                 f,
                 "{place}: expected one JSON object on the line: {reason}; write one object per line, or read leniently to leave the line out"
+            ),
+            Self::JsonArray { place } => write!(
+                f,
+                "{place}: a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
             ),
             Self::ValueCount {
                 file,

@@ -26,9 +26,16 @@ impl Format {
     pub(crate) fn from_first_line(line: &[u8]) -> Self {
         match line.trim_ascii_start().first() {
             Some(b'{') => Self::JsonLines,
+            _ if begins_json_array(line) => Self::JsonLines,
             _ => Self::Csv,
         }
     }
+}
+
+/// Whether a first line is that of a JSON array of objects, over as many lines as it may be; `[s],room` is a header of CSV.
+pub(crate) fn begins_json_array(line: &[u8]) -> bool {
+    let rest = line.trim_ascii_start().strip_prefix(b"[");
+    rest.is_some_and(|rest| matches!(rest.trim_ascii_start().first(), None | Some(b'{' | b'[')))
 }
 
 #[cfg(test)]

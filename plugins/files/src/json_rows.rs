@@ -9,6 +9,7 @@ use serde_json::value::RawValue;
 
 use crate::cell::Cells;
 use crate::columns;
+use crate::format::begins_json_array;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
 use crate::{FileError, Layout, Place};
@@ -39,6 +40,11 @@ impl JsonRows {
     pub fn new(mut lines: Lines, layout: &Layout) -> Result<Self, FileError> {
         if !lines.advance_to_content()? {
             return Err(FileError::Empty { file: lines.file });
+        }
+        if begins_json_array(lines.text()) {
+            return Err(FileError::JsonArray {
+                place: lines.place(),
+            });
         }
         lines.hold();
         let mut keys = vec![Key::new(&layout.time.column, false)];
@@ -78,8 +84,8 @@ impl JsonRows {
         Ok(())
     }
 
-    /// Keys that no object has are most likely misspelt, which a stream only shows at its end.
-    fn check_all_seen(&self) -> Result<(), FileError> {
+    /// The error for keys that no object has had, if there are such.
+    fn never_seen(&self) -> Option<FileError> {
         let never = self
             .keys
             .iter()
@@ -87,9 +93,9 @@ impl JsonRows {
         let mut never = never.map(|key| key.name.as_str()).peekable();
         match &self.found {
             Some(found) if never.peek().is_some() => {
-                Err(columns::missing(self.lines.place(), never, found))
+                Some(columns::missing(self.lines.place(), never, found))
             }
-            _ => Ok(()),
+            _ => None,
         }
     }
 }
@@ -108,8 +114,15 @@ impl Key {
 impl Cells for JsonRows {
     fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
         while self.lines.advance_to_content()? {
+            let is_first = self.found.is_none();
             match self.read_object() {
-                Ok(()) if self.keys[0].ever_seen => return Ok(true),
+                Ok(()) if self.keys[0].ever_seen => {
+                    // Most likely misspelt, though a later object may have them.
+                    if is_first && let Some(error) = self.never_seen() {
+                        ledger.tell_early(|| error);
+                    }
+                    return Ok(true);
+                }
                 // The time must stand in every object; what else this one lacks may stand in the next.
                 Ok(()) => {
                     let found = self.found.as_deref().unwrap_or_default();
@@ -126,8 +139,7 @@ impl Cells for JsonRows {
                 })?,
             }
         }
-        self.check_all_seen()?;
-        Ok(false)
+        self.never_seen().map_or(Ok(false), Err)
     }
 
     fn time(&self) -> &[u8] {
@@ -393,6 +405,31 @@ mod tests {
     }
 
     #[test]
+    fn an_array_is_an_error_that_asks_for_one_object_a_line() {
+        let object = "{\"t\":0,\"a\":1,\"b\":2}";
+        let long = format!("[{}{object}]", format!("{object},").repeat(50_000));
+        let arrays = [
+            format!("[{object},{object}]"),
+            format!("[{object}]\n"),
+            format!("[\n  {object},\n  {object}\n]\n"),
+            "[[0,1,2]]".to_owned(),
+            long,
+        ];
+        for text in arrays {
+            for lenient in [false, true] {
+                let told = read_with(&text, lenient).err().unwrap().to_string();
+                assert!(
+                    told.starts_with("standard input:1: a JSON array begins here, where one object a line is expected"),
+                    "{told}"
+                );
+            }
+        }
+        let layout = Layout::new("[s]", TimeForm::SECONDS, ["a"]);
+        let header = &b"[s],a\n0,1\n"[..];
+        assert!(Reader::from_read("f", header, layout, Options::default()).is_ok());
+    }
+
+    #[test]
     fn a_line_without_time_is_an_error_or_left_out() {
         let text = "{\"t\":0,\"a\":1,\"b\":2}\n{\"a\":1}\n";
         assert!(
@@ -420,6 +457,24 @@ mod tests {
             error("{\"t\":0,\"aa\":1,\"bb\":1}\n{\"t\":1}\n"),
             "standard input:2: there are no columns `a`, `b`; found `t`, `aa`, `bb`; did you mean `aa` for `a`, `bb` for `b`?"
         );
+    }
+
+    #[test]
+    fn keys_that_the_first_object_lacks_are_told_at_once_where_that_is_asked_for() {
+        use std::sync::{Arc, Mutex};
+        let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
+        let text = &b"{\"t\":0,\"a\":1,\"bb\":1}\n{\"t\":1}\n{\"t\":2,\"b\":1}\n"[..];
+        let mut reader = Reader::from_read("pipe", text, layout, Options::default()).unwrap();
+        let told = Arc::new(Mutex::new(Vec::new()));
+        reader.tell_first({
+            let told = Arc::clone(&told);
+            move |first| told.lock().unwrap().push(first.to_string())
+        });
+        let expected = ["pipe:1: there is no column `b`; found `t`, `a`, `bb`; did you mean `bb`?"];
+        let mut row = Row::default();
+        while reader.next_into(&mut row).unwrap() {
+            assert_eq!(*told.lock().unwrap(), expected);
+        }
     }
 
     #[test]

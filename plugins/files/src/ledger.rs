@@ -1,5 +1,6 @@
 //! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
 
+use crate::cell::decimal_mark;
 use crate::{FileError, Place, TimeForm};
 
 /// What a reader met on its way; complete once the reader has come to the end.
@@ -45,6 +46,8 @@ pub(crate) struct Ledger {
     pub tell: Option<Tell>,
     lenient: bool,
     last_ns: Option<i64>,
+    /// The decimal mark of the first number that has one, with its line.
+    mark: Option<(u8, u64)>,
 }
 
 impl Ledger {
@@ -54,6 +57,7 @@ impl Ledger {
             tell: None,
             lenient,
             last_ns: None,
+            mark: None,
         }
     }
 
@@ -77,6 +81,13 @@ impl Ledger {
         }
     }
 
+    /// The decimal mark that numbers have, and since which line, where this one has another: a file has one.
+    pub fn other_mark(&mut self, number: &[u8], line: impl FnOnce() -> u64) -> Option<(u8, u64)> {
+        let mark = decimal_mark(number)?;
+        let first = *self.mark.get_or_insert_with(|| (mark, line()));
+        (first.0 != mark).then_some(first)
+    }
+
     /// A cell that cannot be read.
     #[cold]
     pub fn bad_cell(&mut self, error: impl FnOnce() -> FileError) -> Result<(), FileError> {
@@ -85,6 +96,13 @@ impl Ledger {
         }
         self.report.bad_cells.add(error, &mut self.tell);
         Ok(())
+    }
+
+    /// Something that is an error at the end only, where the data ever end: whoever asked is told of it now.
+    pub fn tell_early(&mut self, error: impl FnOnce() -> FileError) {
+        if let Some(tell) = &mut self.tell {
+            tell(&error());
+        }
     }
 
     /// A row that cannot be used.

@@ -6,6 +6,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::format::begins_json_array;
 use crate::{FileError, Format, Place};
 
 /// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
@@ -74,6 +75,11 @@ impl Lines {
             self.line.drain(..BYTE_ORDER_MARK.len());
         }
         if self.line.len() > LONGEST_ROW {
+            if begins_json_array(&self.line) {
+                return Err(FileError::JsonArray {
+                    place: self.place(),
+                });
+            }
             return Err(FileError::TooLong {
                 place: self.place(),
                 limit: LONGEST_ROW,

@@ -9,7 +9,7 @@ use crate::error::excerpt;
 use crate::json_rows::JsonRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
-use crate::{FileError, Format, Layout, Report};
+use crate::{FileError, Format, Layout, Place, Report, TimeForm};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -163,6 +163,12 @@ fn read_time<C: Cells>(
             found: excerpt(cell),
             expected: time.form.expected(),
         })?;
+    } else if rows.decimal_comma()
+        && time.form != TimeForm::Rfc3339
+        && let Some(mark) = ledger.other_mark(cell, || rows.place().line)
+    {
+        ledger.refuse_row(|| mixed(rows.place(), &time.column, cell, mark))?;
+        return Ok(None);
     }
     Ok(time_ns)
 }
@@ -177,6 +183,13 @@ fn read_values<C: Cells>(
     for (index, channel) in layout.channels.iter().enumerate() {
         let cell = rows.channel(index);
         let value = match cell::value(cell, rows.decimal_comma()) {
+            Some(_)
+                if rows.decimal_comma()
+                    && let Some(mark) = ledger.other_mark(cell, || rows.place().line) =>
+            {
+                ledger.bad_cell(|| mixed(rows.place(), &channel.column, cell, mark))?;
+                f64::NAN
+            }
             Some(value) => value,
             None => {
                 ledger.bad_cell(|| FileError::BadCell {
@@ -192,13 +205,23 @@ fn read_values<C: Cells>(
     Ok(())
 }
 
+/// What is wrong with a number that has another decimal mark than those since that line.
+fn mixed(place: Place, column: &str, cell: &[u8], (mark, since): (u8, u64)) -> FileError {
+    FileError::MixedMarks {
+        place,
+        column: column.to_owned(),
+        found: excerpt(cell::trim(cell)),
+        mark: char::from(mark),
+        since,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::io;
     use std::sync::Arc;
 
     use super::*;
-    use crate::TimeForm;
 
     fn layout(form: TimeForm) -> Layout {
         Layout::new("t", form, ["a"])

@@ -10,6 +10,7 @@ use std::process::Command;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::aside::copy_aside;
 use crate::checkout::{Checkout, VERSION};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use cargo::Cargo;
@@ -217,13 +218,9 @@ fn one_core(resolved: &Value, wishes: &[Wish]) -> Result<(), Failure> {
 
 /// Puts the binary where it was asked for, all at once.
 fn place(built: &Path, output: &Path) -> Result<(), Failure> {
-    let mut aside = output.as_os_str().to_owned();
-    aside.push(".new");
-    let aside = PathBuf::from(aside);
     let folder = output.parent().map_or(Ok(()), std::fs::create_dir_all);
     folder
-        .and_then(|()| std::fs::copy(built, &aside))
-        .and_then(|_| std::fs::rename(&aside, output))
+        .and_then(|()| copy_aside(built, output))
         .map_err(|error| {
             Failure::Outside(format!(
                 "cannot put {} at {}: {error}",

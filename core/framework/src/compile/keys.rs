@@ -55,16 +55,17 @@ pub(crate) struct LearnLimits {
     /// kind that tells how unsure it is are in units of its `deviation`, so that after a gap it may be off by more.
     #[schemars(extend("exclusiveMinimum" = 1.0))]
     pub(crate) outliers: f64,
-    /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width.
-    #[schemars(range(min = 0.0))]
-    pub(crate) margin: f64,
+    /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width; 0 where it is not
+    /// given. Not for kinds that follow a state, such as `kalman`, which is followed whatever the regressors are.
+    #[schemars(with = "f64", range(min = 0.0))]
+    pub(crate) margin: Option<f64>,
 }
 
 impl Default for LearnLimits {
     fn default() -> Self {
         Self {
             outliers: 6.0,
-            margin: 0.0,
+            margin: None,
         }
     }
 }
@@ -79,7 +80,8 @@ impl<'de> Deserialize<'de> for Learn {
 }
 
 impl LearnLimits {
-    pub(super) fn mistakes(self) -> Vec<Mistake> {
+    /// What cannot be meant of a kind; `ranged` where its fit keeps the range of its regressors.
+    pub(super) fn mistakes(self, ranged: bool) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         let Self { outliers, margin } = self;
         if outliers.is_nan() || outliers <= 1.0 {
@@ -87,10 +89,19 @@ impl LearnLimits {
             let mistake = Mistake::at("learn.outliers", message);
             mistakes.push(mistake.help("4 to 10 keeps spikes out; inf lets everything in"));
         }
-        if margin.is_nan() || margin < 0.0 {
+        if let Some(margin) = margin
+            && (margin.is_nan() || margin < 0.0)
+        {
             let message = format!("`margin` is {margin} and must be 0 or more");
             let mistake = Mistake::at("learn.margin", message);
             mistakes.push(mistake.help("0 is the range of the fit itself, inf any"));
+        }
+        if margin.is_some() && !ranged {
+            let message =
+                "its fit keeps no range of the regressors, so that `margin` would do nothing";
+            let mistake = Mistake::at("learn.margin", message);
+            mistakes
+                .push(mistake.help("leave `margin` out: its state is followed wherever they are"));
         }
         mistakes
     }

@@ -41,7 +41,7 @@ impl Resolver<'_> {
             }
             return Some(None);
         };
-        let mistakes = limits.mistakes();
+        let mistakes = limits.mistakes(estimator.keeps_range());
         let sound = mistakes.is_empty();
         self.mistakes(instance, mistakes);
         let port = InputPort::freeze();
@@ -53,7 +53,7 @@ impl Resolver<'_> {
         };
         sound.then_some(Some(PlannedLearning {
             outliers: limits.outliers,
-            margin: limits.margin,
+            margin: limits.margin.unwrap_or(0.0),
             freeze,
         }))
     }

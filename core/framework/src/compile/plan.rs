@@ -46,6 +46,15 @@ pub struct SourceChannel {
     pub range: (f64, f64),
 }
 
+impl SourceChannel {
+    /// Whether a sample, in the signal's unit, counts: it is finite and within the range. NaN, which is no sample, does not.
+    #[must_use]
+    pub fn admits(&self, sample: f64) -> bool {
+        let (lowest, highest) = self.range;
+        sample.is_finite() && sample >= lowest && sample <= highest
+    }
+}
+
 /// A slot.
 #[derive(Debug, Clone)]
 pub struct PlannedChannel {

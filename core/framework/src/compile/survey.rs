@@ -35,8 +35,13 @@ impl Resolver<'_> {
         self.known_inputs(&declared);
         let ports = self.wired(&declared);
         if let Some(keys) = &parts.estimator {
+            let spec = parts.spec.as_ref().and_then(|spec| spec.as_whole());
+            let ranged = spec.is_none_or(|spec| match spec.role() {
+                Role::Estimator(estimator) => estimator.keeps_range(),
+                _ => true,
+            });
             let mistakes = agreed(keys.readings().map(|keys| match &keys.learn {
-                Some(Learn::Within(limits)) => limits.mistakes(),
+                Some(Learn::Within(limits)) => limits.mistakes(ranged),
                 _ => Vec::new(),
             }));
             self.own_mistakes(&declared, mistakes, keys.left_out());

@@ -3,6 +3,7 @@
 mod codes;
 mod collector;
 mod counted;
+mod digits;
 mod gaps;
 mod names;
 mod nearest;
@@ -12,6 +13,7 @@ mod render;
 pub use codes::{CODES, Code, explain};
 pub use collector::{Diagnostic, Diagnostics, Problem, Severity};
 pub use counted::{count, counted};
+pub use digits::digits;
 pub use names::Names;
 pub use nearest::nearest;
 pub use place::{Place, SourceId, Sources};

@@ -375,8 +375,7 @@ impl Engine {
             if sample.is_nan() {
                 continue;
             }
-            let (lowest, highest) = source.range;
-            if sample.is_finite() && sample >= lowest && sample <= highest {
+            if source.admits(sample) {
                 self.slots.set(slot, sample, time);
             } else {
                 self.rejected[slot] += 1;

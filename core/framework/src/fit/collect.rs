@@ -7,6 +7,7 @@ use super::candidates::Validity;
 use super::report::Dropped;
 use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
 use crate::engine::{Engine, Pairing};
+use crate::node::TrainingError;
 use crate::recording::Event;
 use crate::time::Instant;
 
@@ -72,6 +73,8 @@ struct Tap {
     width: usize,
     kept: Vec<f64>,
     last_kept: Option<u64>,
+    /// Whether there was any run.
+    ran: bool,
 }
 
 /// The examples of one estimator.
@@ -101,6 +104,8 @@ pub(super) struct Collector {
     /// Set once rows no longer fit: from then on they are only counted.
     pub(super) overflowed: bool,
     tick: u64,
+    /// The measured channels that have had no value yet: the slots.
+    silent: Vec<usize>,
 }
 
 /// Takes the examples of one estimator, in order.
@@ -137,6 +142,7 @@ impl Collector {
                         width,
                         kept: Vec::new(),
                         last_kept: None,
+                        ran: false,
                     });
                     taps.len() - 1
                 })
@@ -161,6 +167,7 @@ impl Collector {
             bytes: 0,
             overflowed: false,
             tick: 0,
+            silent: measured(plan),
         }
     }
 
@@ -182,10 +189,12 @@ impl Collector {
             self.segment();
             return;
         };
+        self.silent.retain(|&slot| engine.value(slot).is_nan());
         for tap in &mut self.taps {
             let fresh = |&gather: &usize| engine.gathered(gather).1;
             if tap.triggers.is_empty() || tap.triggers.iter().any(fresh) {
                 tap.pairing.run(now, [engine.gathered(tap.gather).0]);
+                tap.ran = true;
             }
         }
         let tick = self.tick;
@@ -216,6 +225,33 @@ impl Collector {
                 self.keep(index, now, truth);
             }
         }
+    }
+
+    /// The regressors that an estimator waits for, and the measured channels behind them without a value, where it never ran.
+    pub(super) fn waited_for(&self, plan: &Plan, trainee: &Trainee) -> Option<TrainingError> {
+        if trainee.taps.iter().any(|&tap| self.taps[tap].ran) {
+            return None;
+        }
+        let Rows {
+            regressors,
+            triggers,
+            ..
+        } = plan.nodes[trainee.node].rows()?;
+        let waits = triggers
+            .iter()
+            .map(|&gather| plan.gathers[gather].entries.len());
+        let waits = &regressors[..waits.sum()];
+        let mut silent: Vec<String> = Vec::new();
+        for sensor in waits.iter().flat_map(|regressor| &regressor.sensors) {
+            let is_silent = |&slot: &usize| plan.channels[slot].name == *sensor;
+            if self.silent.iter().any(is_silent) && !silent.contains(sensor) {
+                silent.push(sensor.clone());
+            }
+        }
+        Some(TrainingError::NeverRan {
+            regressors: waits.iter().map(|waited| waited.name.clone()).collect(),
+            silent,
+        })
     }
 
     /// The examples kept of one estimator, in order.
@@ -288,6 +324,15 @@ impl Collector {
             trainee.segment_pending = true;
         }
     }
+}
+
+/// The slots of the measured channels as they are read now.
+fn measured(plan: &Plan) -> Vec<usize> {
+    let channels = plan.channels.iter().enumerate();
+    channels
+        .filter(|(_, channel)| channel.node.is_none() && channel.history.is_none())
+        .map(|(slot, _)| slot)
+        .collect()
 }
 
 #[cfg(test)]

@@ -192,7 +192,7 @@ impl<'a> Fitting<'a> {
         self.pass(&mut second, parts, Some(&mut makings))?;
         let ended = collector.trainees.iter().zip(makings);
         Ok(ended
-            .map(|(trainee, making)| end(self.plan, trainee, making, true))
+            .map(|(trainee, making)| end(self.plan, &collector, trainee, making, true))
             .collect())
     }
 
@@ -242,10 +242,9 @@ fn levels(plan: &Plan) -> Vec<Level> {
     // Of each slot the first level that may read it, and whether a fitted estimator is behind it.
     let mut of_slot = vec![(0_usize, false); plan.channels.len()];
     for (index, node) in plan.nodes.iter().enumerate() {
-        let gathers = node.role.inputs();
-        let entries = gathers.flat_map(|gather| &plan.gathers[gather].entries);
+        let entries = |gather: usize| plan.gathers[gather].entries.iter();
         let mut after = (0, false);
-        for entry in entries {
+        for entry in node.role.inputs().flat_map(entries) {
             let (level, predicted) = of_slot[entry.slot];
             after = (after.0.max(level), after.1 | predicted);
         }
@@ -258,6 +257,10 @@ fn levels(plan: &Plan) -> Vec<Level> {
             levels[level].of_predictions |= predicted;
             let predicts = matches!(node.role, PlannedRole::Estimator { .. });
             after = (level + 1, predicted | predicts);
+        }
+        // What freezes it is not among its rows, but whoever learns from what it gives needs that fitted too.
+        for entry in node.role.gathers().flat_map(entries) {
+            after.0 = after.0.max(of_slot[entry.slot].0);
         }
         of_slot[node.slots.clone()].fill(after);
     }

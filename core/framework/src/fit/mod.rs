@@ -3,6 +3,7 @@
 
 mod candidates;
 mod collect;
+mod doubt;
 mod drive;
 mod levels;
 mod report;

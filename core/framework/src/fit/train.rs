@@ -4,11 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::FitOptions;
 use super::collect::{Collector, Sink, Trainee};
+use super::doubt::Truths;
 use super::report::{EstimatorFit, Outcome};
 use crate::compile::{Plan, PlannedRole};
-use crate::node::{
-    Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
-};
+use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
 use crate::time::Instant;
 
 /// A fit in the making: the complete rows of the candidates that were kept go to the trainer.
@@ -98,54 +97,17 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
 
 /// Fewer complete rows say nothing about how a truth hangs together with anything.
 const LEAST_ROWS: u64 = 2;
-/// A fit whose error is larger than that of the mean by this factor is no better than none.
-const WORSE_THAN_MEAN: f64 = 1.1;
 /// Squares of larger values overflow when some of them are summed.
 const LARGEST: f64 = 1e150;
-/// The share of a mean that rounding may make up.
-const ROUNDING: f64 = 1e-9;
-
-/// The truths of the complete rows.
-#[derive(Debug, Clone, Copy, Default)]
-struct Truths {
-    rows: u64,
-    mean: f64,
-    /// The sum of the squares about the mean.
-    squares: f64,
-}
-
-impl Truths {
-    /// One more (Welford 1962).
-    fn count(&mut self, truth: f64) {
-        self.rows += 1;
-        let off = truth - self.mean;
-        self.mean += off / self.rows as f64;
-        self.squares += off * (truth - self.mean);
-    }
-
-    /// Tells of a fit that is clearly worse on its rows than their mean.
-    fn doubt(self, report: &mut TrainingReport) {
-        let Some(rmse) = report.in_sample_rmse else {
-            return;
-        };
-        let of_mean = (self.squares / self.rows as f64).sqrt();
-        let clearly = rmse > WORSE_THAN_MEAN * of_mean + ROUNDING * self.mean.abs();
-        if clearly {
-            let times = rmse / of_mean;
-            report.figure("rmse_over_that_of_mean", times);
-            let times = match times {
-                few if few < 1e4 => format!("{few:.1}"),
-                many => format!("{many:.0e}"),
-            };
-            report.notes.push(format!(
-                "the error on the rows of the fit is {times} times that of predicting their mean, so this fit is of no use"
-            ));
-        }
-    }
-}
 
 /// Ends the fit of one estimator.
-pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool) -> Made {
+pub(super) fn end(
+    plan: &Plan,
+    collector: &Collector,
+    trainee: &Trainee,
+    making: Making,
+    streamed: bool,
+) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
     let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
@@ -162,11 +124,14 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
         .collect();
     let truths = making.truths;
     let trained = if trainee.validity.knows_nothing() {
-        Err(TrainingError::NoTruth {
+        let no_truth = || TrainingError::NoTruth {
             truth: truth.name.clone(),
             outside_limits: dropped.outside_limits,
             too_early: dropped.without_run,
-        })
+        };
+        let truths = dropped.without_run > 0;
+        let never_ran = truths.then(|| collector.waited_for(plan, trainee));
+        Err(never_ran.flatten().unwrap_or_else(no_truth))
     } else if truths.rows < LEAST_ROWS {
         Err(TrainingError::TooFewRows {
             rows: truths.rows as usize,
@@ -190,7 +155,7 @@ pub(super) fn end(plan: &Plan, trainee: &Trainee, making: Making, streamed: bool
             predictor,
             mut report,
         }) => {
-            truths.doubt(&mut report);
+            truths.doubt(predictor.as_ref(), &mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
         Err(error) => (Outcome::Failed(error), None),
@@ -225,7 +190,7 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
             // The whole memory, or how folds are cut would depend on the number of threads.
             let mut making = begin(plan, trainee, options.memory);
             collector.replay(index, &mut making);
-            made.push((index, end(plan, trainee, making, false)));
+            made.push((index, end(plan, collector, trainee, making, false)));
         }
     };
     let mut made = if threads == 1 {

@@ -6,8 +6,9 @@ use std::fmt::Debug;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Coefficients, Figure, Figures, InputPort, Learner, Learns, Mistake, TrainedRange};
-use crate::diagnostic::{count, counted};
+use super::{
+    Coefficients, Figure, Figures, InputPort, Learner, Learns, Mistake, TrainedRange, TrainingError,
+};
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -113,6 +114,12 @@ pub trait Estimator: Debug + Send + Sync {
         Learns::Never { help: None }
     }
 
+    /// Whether a fit keeps the range of its regressors ([`Predictor::trained_range`]), outside which nothing is learned; without
+    /// it, a `margin` about that range is a mistake.
+    fn keeps_range(&self) -> bool {
+        true
+    }
+
     /// Whether its predictions come with their standard deviation, in the port `deviation`.
     fn deviates(&self) -> bool {
         false
@@ -202,76 +209,6 @@ pub trait Trainer: Send {
     /// # Errors
     /// When the rows do not allow one.
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError>;
-}
-
-/// Why a fit gave nothing.
-#[derive(Debug, Clone, PartialEq)]
-pub enum TrainingError {
-    /// Fewer rows than are needed.
-    TooFewRows {
-        /// Rows that there were.
-        rows: usize,
-        /// Rows that are needed.
-        needed: usize,
-    },
-    /// There is no truth to learn from.
-    NoTruth {
-        /// What is to be predicted.
-        truth: String,
-        /// How many values of it are outside the limits of `train.abs_truth`.
-        outside_limits: u64,
-        /// How many came before the estimator had run at the right time.
-        too_early: u64,
-    },
-    /// Squares of values overflow.
-    TooLarge {
-        /// Of what they are.
-        name: String,
-        /// The largest, in size.
-        largest: f64,
-    },
-    /// The numbers allow no solution.
-    Unsolvable {
-        /// What is wrong with them, in words.
-        reason: String,
-    },
-}
-
-impl std::fmt::Display for TrainingError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::TooFewRows { rows, needed } => {
-                let rows = counted(*rows, "complete row");
-                write!(f, "{rows}, and at least {} are needed", count(needed))
-            }
-            Self::NoTruth {
-                truth,
-                outside_limits,
-                too_early,
-            } => match (outside_limits, too_early) {
-                (0, 0) => write!(f, "`{truth}` has no value in the data"),
-                (outside, 0) => write!(
-                    f,
-                    "`{truth}` has no value within the limits of `train.abs_truth`, and {outside} outside"
-                ),
-                (0, early) => write!(
-                    f,
-                    "`{truth}` has no value after it could first be predicted, and {early} before"
-                ),
-                (outside, early) => write!(
-                    f,
-                    "of `{truth}` {outside} values are outside the limits of `train.abs_truth`, and {early} came \
-                     before it could first be predicted; there is no other"
-                ),
-            },
-            Self::TooLarge { name, largest } => write!(
-                f,
-                "values of `{name}` are as large as {largest:.0e}, of which no squares can be summed; a `range` on its signal \
-                 takes such values as missing"
-            ),
-            Self::Unsolvable { reason } => write!(f, "{reason}"),
-        }
-    }
 }
 
 /// What a fit gave.

@@ -21,6 +21,7 @@ mod port;
 mod reach;
 mod registry;
 mod state;
+mod training_error;
 
 pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
 pub use combiner::{Combine, Combiner, Evidence, Votes};
@@ -28,8 +29,7 @@ pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
     CandidateScore, Estimator, OrderFigure, OrderTable, Predictor, Regressor, Regressors,
-    SelectionStep, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup, TriedOrder,
-    TruthLags,
+    SelectionStep, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use figure::{Figure, Figures};
@@ -41,3 +41,4 @@ pub use reach::Reach;
 pub use registry::read;
 pub use registry::{Kind, NodeSpec, ReadSpec, Role, RoleName, first_paragraph, kind, kinds};
 pub use state::{Restored, State};
+pub use training_error::TrainingError;

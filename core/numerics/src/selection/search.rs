@@ -14,7 +14,8 @@ pub struct Search {
     pub direction: Direction,
     /// The ridge penalty on the sum of squares in the scaled columns; 0 for ordinary least squares.
     pub alpha: f64,
-    /// Stop before a step that adds less, or whose removal loses more; without it go on to the end.
+    /// Stop before a step that adds less for each of its units, or whose removal loses more; without it go on to the end. It is
+    /// the price of a unit too: several that come together are taken before one alone where that is worth it.
     pub tolerance: Option<f64>,
     /// End with at most so many units; without it, any number.
     pub most: Option<usize>,
@@ -149,8 +150,7 @@ impl State<'_> {
     fn add(&mut self) -> bool {
         let most = self.how.most.unwrap_or(usize::MAX);
         let adding = (0..self.candidates.count()).filter(|&candidate| {
-            let new = self.candidates.units_of(candidate);
-            let new = new.iter().filter(|&&unit| !self.units[unit]).count();
+            let new = self.new_units(candidate);
             new > 0 && self.size() + new <= most
         });
         let moves: Vec<usize> = adding.collect();
@@ -158,13 +158,30 @@ impl State<'_> {
             return false;
         };
         // Positive so that a gain of NaN stops too.
-        let gains_enough = |tolerance: f64| step.mean - self.reached >= tolerance;
+        let worth = step.mean - self.price(step.candidate, step.change);
+        let gains_enough = |tolerance: f64| worth - self.reached >= tolerance;
         if !self.how.tolerance.is_none_or(gains_enough) {
             self.selection.refused = Some(step);
             return false;
         }
         self.take(step);
         true
+    }
+
+    /// How many units a candidate brings that are not there yet.
+    fn new_units(&self, candidate: usize) -> usize {
+        let units = self.candidates.units_of(candidate).iter();
+        units.filter(|&&unit| !self.units[unit]).count()
+    }
+
+    /// What a candidate must gain beyond what one unit must.
+    fn price(&self, candidate: usize, change: Change) -> f64 {
+        match (change, self.how.tolerance) {
+            (Change::Added, Some(tolerance)) => {
+                tolerance.max(0.0) * self.new_units(candidate).saturating_sub(1) as f64
+            }
+            _ => 0.0,
+        }
     }
 
     /// Takes out the unit that is missed least, if that is worth it.
@@ -261,6 +278,7 @@ impl State<'_> {
         let score = self.how.score;
         let mut candidates = Vec::with_capacity(moves.len());
         let mut best: Option<(CandidateScore, Cow<'_, [usize]>)> = None;
+        let mut highest = f64::NEG_INFINITY;
         for &candidate in moves {
             let columns = self.changed(candidate, change);
             let tells = change == Change::Removed
@@ -275,7 +293,9 @@ impl State<'_> {
                 f64::NAN
             };
             let tried = CandidateScore { candidate, mean };
-            if mean.is_finite() && best.as_ref().is_none_or(|(b, _)| mean > b.mean) {
+            let worth = mean - self.price(candidate, change);
+            if worth.is_finite() && worth > highest {
+                highest = worth;
                 best = Some((tried, columns));
             }
             candidates.push(tried);

@@ -226,6 +226,34 @@ fn sensors_are_taken_in_the_order_of_the_own_oracle() {
     assert_eq!(back.steps.len(), 3);
 }
 
+#[test]
+fn two_sensors_are_not_taken_for_what_one_alone_gives_but_for_less_than_the_tolerance() {
+    // The last column is made from both sensors, and says a little of the target.
+    let sensors = Candidates::of_units(vec![vec![0], vec![1], vec![0, 1]]);
+    let chosen = |share: f64, tolerance: f64| {
+        let mut blocks = GramBlocks::with_row_memory(3, 1 << 20);
+        for i in 0..600 {
+            let (a, b, both) = (sine(i, 0.37), sine(i, 0.71), sine(i, 1.13));
+            blocks.push(&[a, b, both], a + share * both + 0.1 * sine(i, 1.7));
+        }
+        let how = Search {
+            tolerance: Some(tolerance),
+            ..Search::forward()
+        };
+        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
+        how.over(&splits, &[1.0; 3], &sensors).unwrap()
+    };
+    // Of the variance of the target the share explains about its square.
+    let little = chosen(0.05, 0.01);
+    assert_eq!(little.columns, [0]);
+    let refused = little.refused.unwrap();
+    assert!(refused.mean - little.steps[0].mean < 0.01);
+    assert_eq!(chosen(0.05, 1e-4).columns, [0, 1, 2]);
+    assert_eq!(chosen(0.5, 0.01).columns, [0, 1, 2]);
+    // Together they gain less than the tolerance for each.
+    assert_eq!(chosen(0.5, 0.6).columns, [0]);
+}
+
 /// The sum of the squared errors of a fit over the rows of a Gram matrix.
 fn squared_errors(gram: &crate::Gram, fit: &crate::LinearFit) -> f64 {
     let mut at = vec![0.0; gram.width() + 1];

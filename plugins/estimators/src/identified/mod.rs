@@ -34,6 +34,10 @@ macro_rules! identified {
                 athermal_core::node::Learns::UnlessTold
             }
 
+            fn keeps_range(&self) -> bool {
+                false
+            }
+
             fn deviates(&self) -> bool {
                 true
             }

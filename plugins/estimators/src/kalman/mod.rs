@@ -22,17 +22,20 @@ use fit::KalmanTrainer;
 /// `y = ȳ + μ + Σ b_j x_j + ε` with the mean truth `ȳ` of the fit; the level `μ` wanders and returns to 0 at a rate of its own
 /// (an autoregressive component, which with a rate of 0 is the random walk of the local level), or has a slope that is a
 /// random walk (local linear trend). Both are in continuous time, so that truths may come at any instants and be missing
-/// (Harvey 1989, sections 2.3, 9.1 and 9.2; Durbin and Koopman 2012, chapters 2 to 4). The fit finds the coefficients, which
-/// stay, and unless `noises` gives them the variances and the rate that make its rows most likely. Running, the filter takes
-/// each truth that the embargo lets through and predicts `ahead` of now from the newest one; with `learn = false` it stays
-/// where the fit ended, which is regression on the features. Without features it is a forecast from the past of the truth
+/// (Harvey 1989, sections 2.3, 9.1 and 9.2; Durbin and Koopman 2012, chapters 2 to 4). The fit finds the coefficients,
+/// and unless `noises` gives them the variances and the rate that make its rows most likely. Running, the filter takes each
+/// truth that the embargo lets through and predicts `ahead` of now from the newest one. The coefficients are states that do
+/// not wander: each truth moves them too, by as much as they are still uncertain, which is less from truth to truth. With
+/// `learn = false` it stays where the fit ended, which is regression on the features. Without features it is a forecast from the past of the truth
 /// alone.
 ///
 /// Truths whose windows overlap share their noise, which the model would take for a level that moves; so a truth that comes
 /// sooner than `every` after the one before counts for its share of that time, its variance being multiplied by the inverse.
 /// The coefficients are so those of all rows; the variances are found from rows `every` apart. In a new segment level and
 /// trend start from what the fit knew of them at large. The port `deviation` is the standard deviation of the truth about its
-/// prediction; it grows while no truth comes. The answer changes with time alone, so the node runs at every tick.
+/// prediction; it grows while no truth comes. The port `learning` tells what became of the newest truth, in the numbers of
+/// `rls`, and what is not learned from is not followed either. The answer changes with time alone, so the node runs at every
+/// tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kalman {
@@ -124,6 +127,10 @@ impl Estimator for Kalman {
 
     fn learns(&self) -> Learns {
         Learns::UnlessTold
+    }
+
+    fn keeps_range(&self) -> bool {
+        false
     }
 
     fn deviates(&self) -> bool {

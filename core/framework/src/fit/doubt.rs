@@ -1,0 +1,82 @@
+//! Decides which fits are doubted for the rows that they stand on; not which rows those are.
+
+use crate::diagnostic::counted;
+use crate::node::{Predictor, TrainingReport};
+
+/// A fit whose error is larger than that of the mean by this factor is no better than none.
+const WORSE_THAN_MEAN: f64 = 1.1;
+/// The share of a mean that rounding may make up.
+const ROUNDING: f64 = 1e-9;
+
+/// The truths of the complete rows.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Truths {
+    pub(super) rows: u64,
+    first: f64,
+    /// Whether another one differs from the first.
+    changes: bool,
+    mean: f64,
+    /// The sum of the squares about the mean.
+    squares: f64,
+}
+
+impl Truths {
+    /// One more (Welford 1962).
+    pub(super) fn count(&mut self, truth: f64) {
+        if self.rows == 0 {
+            self.first = truth;
+        }
+        self.changes |= truth != self.first;
+        self.rows += 1;
+        let off = truth - self.mean;
+        self.mean += off / self.rows as f64;
+        self.squares += off * (truth - self.mean);
+    }
+
+    /// Tells of a fit that says little, for all that its error may be small.
+    pub(super) fn doubt(self, predictor: &dyn Predictor, report: &mut TrainingReport) {
+        if !self.changes {
+            report.figure("constant_truth", self.first);
+            report.notes.push(
+                "the truth never changes in these rows, so nothing is learned of what moves it"
+                    .to_owned(),
+            );
+        }
+        self.doubt_few_rows(predictor, report);
+        self.doubt_large_error(report);
+    }
+
+    /// Tells of a fit with so many coefficients that it can meet its rows whatever they are.
+    fn doubt_few_rows(self, predictor: &dyn Predictor, report: &mut TrainingReport) {
+        let terms = predictor.coefficients().map_or(Vec::new(), |all| all.terms);
+        let fitted = terms.iter().filter(|term| term.value != 0.0).count();
+        if self.changes && fitted as u64 >= self.rows {
+            report.figure("fitted_coefficients", fitted);
+            report.notes.push(format!(
+                "{} for {}, so the error on these rows says nothing of others: a fit needs more rows",
+                counted(self.rows, "row"),
+                counted(fitted as u64, "coefficient"),
+            ));
+        }
+    }
+
+    /// Tells of a fit that is clearly worse on its rows than their mean.
+    fn doubt_large_error(self, report: &mut TrainingReport) {
+        let Some(rmse) = report.in_sample_rmse else {
+            return;
+        };
+        let of_mean = (self.squares / self.rows as f64).sqrt();
+        let clearly = rmse > WORSE_THAN_MEAN * of_mean + ROUNDING * self.mean.abs();
+        if clearly {
+            let times = rmse / of_mean;
+            report.figure("rmse_over_that_of_mean", times);
+            let times = match times {
+                few if few < 1e4 => format!("{few:.1}"),
+                many => format!("{many:.0e}"),
+            };
+            report.notes.push(format!(
+                "the error on the rows of the fit is {times} times that of predicting their mean, so this fit is of no use"
+            ));
+        }
+    }
+}

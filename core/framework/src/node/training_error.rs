@@ -1,0 +1,143 @@
+//! Decides in which words a fit that gave nothing is told; whether it gave nothing is decided by who fits.
+
+use crate::diagnostic::{count, counted};
+
+/// Why a fit gave nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TrainingError {
+    /// Fewer rows than are needed.
+    TooFewRows {
+        /// Rows that there were.
+        rows: usize,
+        /// Rows that are needed.
+        needed: usize,
+    },
+    /// There is no truth to learn from.
+    NoTruth {
+        /// What is to be predicted.
+        truth: String,
+        /// How many values of it are outside the limits of `train.abs_truth`.
+        outside_limits: u64,
+        /// How many came before the estimator had run at the right time.
+        too_early: u64,
+    },
+    /// The estimator never ran: nothing that it waits for ever had a value.
+    NeverRan {
+        /// The regressors that it waits for.
+        regressors: Vec<String>,
+        /// The measured channels behind them that have no value in the data either.
+        silent: Vec<String>,
+    },
+    /// Squares of values overflow.
+    TooLarge {
+        /// Of what they are.
+        name: String,
+        /// The largest, in size.
+        largest: f64,
+    },
+    /// The numbers allow no solution.
+    Unsolvable {
+        /// What is wrong with them, in words.
+        reason: String,
+    },
+}
+
+impl std::fmt::Display for TrainingError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::TooFewRows { rows, needed } => {
+                let rows = counted(*rows, "complete row");
+                write!(f, "{rows}, and at least {} are needed", count(needed))
+            }
+            Self::NoTruth {
+                truth,
+                outside_limits,
+                too_early,
+            } => match (outside_limits, too_early) {
+                (0, 0) => write!(f, "`{truth}` has no value in the data"),
+                (outside, 0) => write!(
+                    f,
+                    "`{truth}` has no value within the limits of `train.abs_truth`, and {outside} outside"
+                ),
+                (0, early) => write!(
+                    f,
+                    "`{truth}` has no value after it could first be predicted, and {early} before"
+                ),
+                (outside, early) => write!(
+                    f,
+                    "of `{truth}` {outside} values are outside the limits of `train.abs_truth`, and {early} came \
+                     before it could first be predicted; there is no other"
+                ),
+            },
+            Self::NeverRan { regressors, silent } => {
+                let (never, none) = (names(regressors), names(silent));
+                let have = |of: &[String]| if of.len() == 1 { "has" } else { "have" };
+                match silent.as_slice() {
+                    [] => write!(f, "{never} never {} a value", have(regressors)),
+                    _ if silent == regressors => {
+                        write!(f, "{none} {} no value in the data", have(silent))
+                    }
+                    _ => write!(
+                        f,
+                        "{never} never {} a value, since {none} {} none in the data",
+                        have(regressors),
+                        have(silent)
+                    ),
+                }
+            }
+            Self::TooLarge { name, largest } => write!(
+                f,
+                "values of `{name}` are as large as {largest:.0e}, of which no squares can be summed; a `range` on its signal \
+                 takes such values as missing"
+            ),
+            Self::Unsolvable { reason } => write!(f, "{reason}"),
+        }
+    }
+}
+
+/// At most so many names are told.
+const MOST: usize = 6;
+
+fn names(of: &[String]) -> String {
+    let shown: Vec<String> = of
+        .iter()
+        .take(MOST)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    match (shown.as_slice(), of.len().saturating_sub(MOST)) {
+        ([most @ .., last], 0) if !most.is_empty() => format!("{} and {last}", most.join(", ")),
+        (_, 0) => shown.concat(),
+        (_, more) => format!("{} and {more} more", shown.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TrainingError;
+
+    fn told(regressors: &[&str], silent: &[&str]) -> String {
+        let named = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        let (regressors, silent) = (named(regressors), named(silent));
+        TrainingError::NeverRan { regressors, silent }.to_string()
+    }
+
+    #[test]
+    fn what_never_had_a_value_is_named_with_the_sensors_behind_it() {
+        assert_eq!(told(&["a"], &["a"]), "`a` has no value in the data");
+        assert_eq!(
+            told(&["a", "b"], &["a", "b"]),
+            "`a` and `b` have no value in the data"
+        );
+        assert_eq!(told(&["sum"], &[]), "`sum` never has a value");
+        assert_eq!(
+            told(&["p", "q", "r"], &["a"]),
+            "`p`, `q` and `r` never have a value, since `a` has none in the data"
+        );
+        let many: Vec<String> = (1..=8).map(|nth| format!("s{nth}")).collect();
+        let many: Vec<&str> = many.iter().map(String::as_str).collect();
+        assert_eq!(
+            told(&many, &[]),
+            "`s1`, `s2`, `s3`, `s4`, `s5`, `s6` and 2 more never have a value"
+        );
+    }
+}

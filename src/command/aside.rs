@@ -1,0 +1,90 @@
+//! Decides how a whole file comes to be at a path: aside first, then by its name; not what is in it.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crate::terminal::Failure;
+
+/// Writes a file aside and renames it, so that a reader never sees half of it and a failure, be it of power, leaves the old one.
+/// What is there and is no file, such as `/dev/null` or a pipe, is written to instead: it would be no more.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_aside(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    let content = content.as_ref();
+    let failed = |error| Failure::Outside(format!("cannot write {}: {error}", path.display()));
+    let synced = |to: &Path| {
+        let mut file = fs::File::create(to)?;
+        file.write_all(content)?;
+        file.sync_all()
+    };
+    put(path, "part", synced, |to| fs::write(to, content)).map_err(failed)
+}
+
+/// The same with a copy of another file, which keeps its rights.
+///
+/// # Errors
+/// When it cannot be read or written.
+pub fn copy_aside(from: &Path, path: &Path) -> io::Result<()> {
+    let copied = |to: &Path| fs::copy(from, to).map(|_| ());
+    let written = |to: &Path| fs::write(to, fs::read(from)?);
+    put(path, "new", copied, written)
+}
+
+/// Makes a file beside a path and gives it that name; or writes to what is there, where that is no file.
+fn put(
+    path: &Path,
+    ending: &str,
+    make: impl FnOnce(&Path) -> io::Result<()>,
+    write_to: impl FnOnce(&Path) -> io::Result<()>,
+) -> io::Result<()> {
+    if fs::metadata(path).is_ok_and(|of| !of.is_file() && !of.is_dir()) {
+        return write_to(path);
+    }
+    let mut aside = path.as_os_str().to_owned();
+    aside.push(".");
+    aside.push(ending);
+    let aside = PathBuf::from(aside);
+    make(&aside)?;
+    fs::rename(&aside, path)
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+
+    /// What a pipe is given, which stays one.
+    fn through_a_pipe(name: &str, write: impl FnOnce(&Path)) -> String {
+        let name = format!("athermal-{name}-{}", std::process::id());
+        let pipe = std::env::temp_dir().join(name);
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || fs::read_to_string(pipe).unwrap()
+        });
+        write(&pipe);
+        let read = reader.join().unwrap();
+        assert!(!fs::metadata(&pipe).unwrap().is_file());
+        fs::remove_file(&pipe).unwrap();
+        read
+    }
+
+    #[test]
+    fn what_is_no_file_is_written_to_and_stays_what_it_is() {
+        let read = through_a_pipe("written", |pipe| write_aside(pipe, "a model").unwrap());
+        assert_eq!(read, "a model");
+        let program = std::env::temp_dir().join(format!("athermal-built-{}", std::process::id()));
+        fs::write(&program, "a program").unwrap();
+        let read = through_a_pipe("copied", |pipe| copy_aside(&program, pipe).unwrap());
+        assert_eq!(read, "a program");
+        let placed = program.with_extension("placed");
+        copy_aside(&program, &placed).unwrap();
+        assert_eq!(fs::read_to_string(&placed).unwrap(), "a program");
+        for file in [program, placed] {
+            fs::remove_file(file).unwrap();
+        }
+    }
+}
