@@ -213,6 +213,11 @@ fn a_stack_of_stacks_of_stacks_trusts_the_one_that_knows_most() {
 fn stacked_over(learning: &str) -> (f64, Vec<f64>) {
     let graph = format!(
         "{SAMPLES}
+[nodes.alone]
+type = \"linear\"
+inputs.features = \"temperature.chuck\"
+inputs.truth = \"position.Z\"
+ahead = \"0s\"
 [nodes.level]
 type = \"linear\"
 inputs.features = \"temperature.chuck\"
@@ -225,7 +230,7 @@ inputs.truth = \"position.Z\"
 ahead = \"0s\"
 [nodes.never]
 type = \"scale\"
-inputs.signal = \"level\"
+inputs.signal = \"alone\"
 factor = 0.0
 [nodes.never_higher]
 type = \"scale\"
