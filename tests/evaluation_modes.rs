@@ -529,3 +529,60 @@ fn arx_runs_free_on_a_wall_and_on_a_plate_and_output_error_no_worse() {
         );
     }
 }
+
+/// A slow filter of an input that jumps, with noise that is soon forgotten.
+const SLOW: &str = r#"
+schema = 1
+name = "slow"
+[time]
+column = "time_s"
+[signals.input]
+unit = "V"
+channels = ["a"]
+column = "{channel}"
+max_age = "10s"
+[signals.output]
+unit = "V"
+channels = ["y"]
+column = "{channel}"
+max_age = "10s"
+[nodes.jenkins]
+type = "bj"
+inputs = { features = "input.a", truth = "output.y" }
+ahead = "0s"
+nb = 1
+nf = 1
+nk = 0
+nc = 0
+nd = 1
+penalty = 0.0
+[outputs]
+jenkins = "jenkins"
+"#;
+
+#[test]
+fn a_run_that_begins_amid_a_jump_of_the_input_is_as_good_as_one_from_long_before() {
+    let scratch = Scratch::new("evaluation-modes-amid");
+    let draws: Vec<[f64; 2]> = series(6000);
+    let (mut input, mut filtered, mut noise) = (1.0, 0.0, 0.0);
+    let mut lines = Vec::new();
+    for (nth, [jump, draw]) in draws.into_iter().enumerate() {
+        if jump.abs() < 0.05 {
+            input = -input;
+        }
+        filtered = 0.99 * filtered + input;
+        noise = 0.5 * noise + draw;
+        lines.push(format!("{},{input},{}\n", 10 * nth, filtered + noise));
+    }
+    let table = |lines: &[String]| format!("time_s,a,y\n{}", lines.concat());
+    let graph = scratch.file("slow.toml", SLOW);
+    let train = scratch.file("train.csv", table(&lines[..3000]));
+    let model = fitted(&scratch, "model.json", &graph, &train);
+    let from_there = |from: usize| {
+        let data = scratch.file("test.csv", table(&lines[from..from + 300]));
+        figure(&scores(&model, &data, &[]), "jenkins", "rmse")
+    };
+    let errors: Vec<f64> = (0..8).map(|nth| from_there(3000 + 340 * nth)).collect();
+    // What is drawn has a standard deviation of 0.58.
+    assert!(errors.iter().all(|error| *error < 1.2), "{errors:?}");
+}

@@ -6,6 +6,30 @@ use std::path::{Path, PathBuf};
 
 use crate::terminal::Failure;
 
+/// Refuses an output that is one of the files that are read: what stands in it would be lost.
+///
+/// # Errors
+/// When it is.
+pub fn check_apart<'a>(
+    option: &str,
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    let Ok(known) = fs::canonicalize(output) else {
+        // What is not there yet, or is standard output, is read by nobody.
+        return Ok(());
+    };
+    let is_same = |input: &&Path| fs::canonicalize(input).is_ok_and(|input| input == known);
+    match inputs.into_iter().find(is_same) {
+        Some(input) if known.is_file() => Err(Failure::Request(format!(
+            "{option} {}: this is the file that is read as {}, and what stands in it would be lost; name another file",
+            output.display(),
+            input.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Writes a file aside and renames it, so that a reader never sees half of it and a failure, be it of power, leaves the old one.
 /// What is there and is no file, such as `/dev/null` or a pipe, is written to instead: it would be no more.
 ///

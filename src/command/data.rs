@@ -32,6 +32,11 @@ impl Data {
         }
     }
 
+    /// The paths of the files.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(PathBuf::as_path)
+    }
+
     /// Other files, read in the same way.
     #[must_use]
     pub fn others(&self, files: Vec<PathBuf>) -> Self {

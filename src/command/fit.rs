@@ -13,7 +13,7 @@ use athermal::files::Dataset;
 use clap::Args;
 use serde_json::json;
 
-use super::aside::write_aside;
+use super::aside::{check_apart, write_aside};
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
 use super::numbers;
@@ -68,6 +68,13 @@ impl Fit {
     /// # Errors
     /// When the graph has mistakes, the data cannot be read, or the model cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        // A model may take the place of one whose graph is fitted anew.
+        let is_model = self
+            .graph
+            .extension()
+            .is_some_and(|ending| ending == "json");
+        let graph = (!is_model).then_some(&*self.graph);
+        check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         let mut sources = Sources::new();
         let mut model = Model::load_from(&self.graph, Wanted::default(), &mut sources)?;
         self.doubt_tests(&model, sources, terminal);

@@ -8,6 +8,7 @@ use athermal::core::score::Lack;
 use athermal::report::{WANTED, gather, page, plots, text};
 use clap::Args;
 
+use super::aside::check_apart;
 use super::data::{self, Data};
 use super::evaluate::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
@@ -44,6 +45,10 @@ impl Report {
     /// # Errors
     /// When the model or the data cannot be used, or a file cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        if let Some(output) = &self.output {
+            let read = self.data.paths().chain([&*self.model]);
+            check_apart("--output", output, read)?;
+        }
         let model = load_fitted(&self.model, WANTED)?;
         let dataset = self.data.dataset();
         let names = dataset

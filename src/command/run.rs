@@ -10,6 +10,7 @@ use athermal::files::{FileError, Flush, Layout, Options, Reader, WithRevision, W
 use athermal::{Engine, Model};
 use clap::Args;
 
+use super::aside::check_apart;
 use super::data;
 use super::evaluate::check_fitted;
 use super::kept::Kept;
@@ -72,6 +73,12 @@ impl Run {
     /// When the model or the input cannot be used, or the output not written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         data::check_ending(&self.output)?;
+        let read = [&*self.model, &*self.input];
+        check_apart("--output", &self.output, read)?;
+        if let Some(state) = &self.state {
+            let others = read.into_iter().chain([&*self.output]);
+            check_apart("--state", state, others)?;
+        }
         let model = Model::load(&self.model)?;
         self.tell_unread(terminal, &model);
         check_fitted(&model, &self.model)?;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::workbench::athermal;
+use super::workbench::{Scratch, athermal};
 use super::{csv, desk, rows};
 
 #[test]
@@ -33,4 +33,32 @@ fn an_ending_that_names_no_format_is_refused_before_anything_is_written() {
     run(&without).ended(0);
     let text = std::fs::read_to_string(without).unwrap();
     assert!(text.contains(','), "{text}");
+}
+
+#[test]
+fn an_output_that_is_one_of_the_inputs_is_refused_and_all_stays_as_it_is() {
+    let scratch = Scratch::new("command-line-same-file");
+    let graph = scratch.file("graph.toml", crate::PLAIN);
+    let log = scratch.file("log.csv", "time_s,room,Z\n0,20,1\n10,20.1,2\n");
+    let link = scratch.path("link.csv");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(&log, &link).unwrap();
+    #[cfg(not(unix))]
+    std::fs::hard_link(&log, &link).unwrap();
+    let before = [&graph, &log].map(|path| std::fs::read(path).unwrap());
+    let run: [&dyn AsRef<std::ffi::OsStr>; 3] = [&"run", &graph, &"-i"];
+    let with = |first: &[&dyn AsRef<std::ffi::OsStr>], more: &[&dyn AsRef<std::ffi::OsStr>]| {
+        let refused = athermal(&[first, more].concat()).ended(2);
+        refused.tells(&["would be lost", "name another file"]);
+        assert_eq!(refused.out, "");
+    };
+    with(&run, &[&log, &"-o", &log]);
+    with(&run, &[&log, &"-o", &link]);
+    with(&run, &[&log, &"--state", &log]);
+    with(&[&"fit", &graph], &[&"--data", &log, &"-o", &log]);
+    with(&[&"fit", &graph], &[&"--data", &log, &"-o", &graph]);
+    with(&[&"report", &graph], &[&"--data", &log, &"-o", &log]);
+    with(&[&"report", &graph], &[&"--data", &log, &"-o", &graph]);
+    let after = [&graph, &log].map(|path| std::fs::read(path).unwrap());
+    assert_eq!(before, after);
 }

@@ -75,7 +75,7 @@ pub use least_squares::{
 pub use non_negative::non_negative_least_squares;
 pub use penalty::{cross_validated_penalties, generalised_cross_validation, logarithmic_grid};
 pub use prediction_error::{
-    Fading, InformationCriteria, InputOrders, Orders, Polynomials, PredictionError,
+    Beginning, Fading, InformationCriteria, InputOrders, Orders, Polynomials, PredictionError,
     PredictionErrorFit, Samples, Stepper, Transfer,
 };
 pub use prediction_variance::PredictionVariance;

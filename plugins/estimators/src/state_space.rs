@@ -327,6 +327,7 @@ impl Identify for StateSpace {
         let coefficients = equation.a.len() + of_inputs + equation.c.len() + 1;
         let left = rows.saturating_sub(coefficients).max(1);
         Ok(Found {
+            beginnings: Vec::new(),
             residual_sum_of_squares: squares * scale * scale,
             rows,
             variance: squares * scale * scale / left as f64,

@@ -3,6 +3,7 @@
 //!
 //! All kinds are cases of one model (Ljung 1999, eq. 4.33): `A(q) (y − μ) = Σ B_i(q)/F_i(q) u_i + C(q)/(D(q) (1 − q⁻¹)^d) e`.
 
+mod anywhere;
 mod brought;
 mod criteria;
 mod initial;
@@ -18,6 +19,7 @@ mod stepper;
 #[cfg(test)]
 mod tests;
 
+pub use anywhere::Beginning;
 pub use criteria::InformationCriteria;
 pub use polynomials::{InputOrders, Orders, Polynomials, Transfer};
 pub use roots::Fading;

@@ -15,7 +15,7 @@ use super::{Orders, Polynomials, Samples};
 pub(super) struct Segment<'a> {
     model: &'a Polynomials,
     values: Vec<f64>,
-    inputs: Vec<Vec<f64>>,
+    pub(super) inputs: Vec<Vec<f64>>,
     counted: &'a Counted,
 }
 
@@ -117,7 +117,8 @@ impl<'a> Segment<'a> {
         }
     }
 
-    fn brought(&self, start: &[f64], derive: bool) -> Vec<Brought> {
+    /// What each input brings about, from such a start; with what it takes to derive it where that is asked for.
+    pub(super) fn brought(&self, start: &[f64], derive: bool) -> Vec<Brought> {
         let mut rest = start;
         let transfers = self.model.inputs.iter().zip(&self.inputs);
         let brought = transfers.map(|(transfer, input)| {
@@ -142,32 +143,6 @@ impl<'a> Segment<'a> {
         };
         (begin..self.values.len()).map(of).collect()
     }
-}
-
-/// The mean square of how far from rest the filter of each value of a start is, over all samples but the first of each segment.
-pub(super) fn off_rest(model: &Polynomials, samples: &Samples, starts: &[Start]) -> Vec<f64> {
-    let mut sums = vec![0.0; model.inputs.len()];
-    let mut count = 0;
-    let counted = Counted::from(0);
-    for (segment, start) in samples.segments().zip(starts) {
-        let segment = Segment::new(model, samples, segment, &counted);
-        count += segment.values.len().saturating_sub(1);
-        let brought = segment.brought(&start.values, false);
-        for (nth, sum) in sums.iter_mut().enumerate() {
-            let rest = model.inputs[nth].gain();
-            let before = brought[nth]
-                .whole
-                .iter()
-                .zip(segment.inputs[nth].iter().skip(1));
-            *sum += before
-                .map(|(whole, input)| (whole - rest * input).powi(2))
-                .sum::<f64>();
-        }
-    }
-    let of_each = model.inputs.iter().zip(&sums);
-    of_each
-        .flat_map(|(transfer, sum)| vec![sum / count.max(1) as f64; transfer.f.len()])
-        .collect()
 }
 
 /// What a model leaves, wherever its filters begin.

@@ -3,9 +3,10 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
+use super::anywhere::{Beginning, beginnings, off_rest};
 use super::initial;
 use super::precision::held;
-use super::residuals::{Counted, Left, Segment, counted_from, off_rest};
+use super::residuals::{Counted, Left, Segment, counted_from};
 use super::{Orders, Polynomials, Samples};
 use crate::checks::{check_parameter, check_penalty};
 use crate::{GramBlocks, NumericsError};
@@ -64,7 +65,9 @@ pub struct PredictionErrorFit {
     pub first: usize,
     /// How many values that filters gave before the segments were found beside the coefficients, as far as samples tell them.
     pub starts: usize,
-    /// What the square of each of them counted as much as.
+    /// Where the filter of each input begins in a run; nothing where they are taken to be at rest.
+    pub beginnings: Vec<Beginning>,
+    /// What the square of each of those values counted as much as.
     pub(super) start_counts: Vec<f64>,
     /// Steps of the search, with those that went before to find what starts count.
     pub steps: usize,
@@ -140,6 +143,7 @@ impl PredictionError {
         let Judged { model, left, .. } = self.polished(found, samples, &counted, radius);
         Ok(PredictionErrorFit {
             residual_sum_of_squares: left.squares,
+            beginnings: beginnings(&model, samples, &left.starts),
             model,
             rows,
             first,

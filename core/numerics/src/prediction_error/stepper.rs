@@ -119,11 +119,23 @@ impl Stepper {
 
     /// Forgets what was: the inputs have always been like this.
     pub fn rest(&mut self, input: impl Fn(usize) -> f64) {
-        let level = self.model.at_rest(&input) - self.model.level;
-        for (nth, (past, transfer)) in self.inputs.iter_mut().zip(&self.model.inputs).enumerate() {
+        self.begin(&input, |nth, of| of.gain() * input(nth));
+    }
+
+    /// Forgets what was: the inputs have always been like this, but their filters gave what `before` says.
+    pub fn begin(
+        &mut self,
+        input: impl Fn(usize) -> f64,
+        before: impl Fn(usize, &Transfer) -> f64,
+    ) {
+        let mut brought = 0.0;
+        for (nth, (past, of)) in self.inputs.iter_mut().zip(&self.model.inputs).enumerate() {
+            let filtered = before(nth, of);
             past.values.fill(input(nth));
-            past.filtered.fill(transfer.gain() * input(nth));
+            past.filtered.fill(filtered);
+            brought += filtered;
         }
+        let level = brought / (1.0 + self.model.a.iter().sum::<f64>());
         self.past.fill(level);
         self.noise.fill(0.0);
         self.doubt_innovations();
@@ -135,29 +147,32 @@ impl Stepper {
         self.doubt.begin();
     }
 
-    /// Where it is has been measured: of what the inputs do not explain of it their filters have this share, and the noise the
-    /// rest, as if it had always been there.
-    pub fn settle_between(&mut self, value: f64, filters: f64) {
+    /// Where it is has been measured: of what the inputs do not explain of it each of their filters has such a share, and the noise
+    /// the rest, as if it had always been there.
+    pub fn settle_among(&mut self, value: f64, share: impl Fn(usize) -> f64) {
         let value = value - self.model.level;
-        let brought: f64 = self
+        let brought = |(past, of): (&PastInput, &Transfer)| match past.filtered.first() {
+            Some(&filtered) => filtered,
+            None => of.gain() * past.values.first().copied().unwrap_or(0.0),
+        };
+        let mut explained: f64 = self
             .inputs
             .iter()
             .zip(&self.model.inputs)
-            .map(|(past, of)| match past.filtered.first() {
-                Some(&filtered) => filtered,
-                None => of.gain() * past.values.first().copied().unwrap_or(0.0),
-            })
+            .map(brought)
             .sum();
-        let filtered = |of: &&Transfer| !of.f.is_empty();
-        let count = self.model.inputs.iter().filter(filtered).count();
-        // Which of the filters is off, nobody knows.
-        let off = filters * (value - brought) / count.max(1) as f64;
-        for past in &mut self.inputs {
-            let before = past.filtered.iter_mut();
-            before.for_each(|filtered| *filtered += off);
+        let off = value - explained;
+        for (nth, past) in self.inputs.iter_mut().enumerate() {
+            if past.filtered.is_empty() {
+                continue;
+            }
+            let own = share(nth) * off;
+            past.filtered
+                .iter_mut()
+                .for_each(|filtered| *filtered += own);
+            explained += own;
         }
         self.past.fill(value);
-        let explained = brought + off * count as f64;
         let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - explained;
         self.noise.fill(noise);
         self.doubt_innovations();

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use athermal_core::model::numbers;
 use athermal_core::node::{Coefficients, Learner, Mistake, Predictor, Restored, State};
 use athermal_core::time::{Duration, Instant};
-use athermal_numerics::{Polynomials, Stepper};
+use athermal_numerics::{Beginning, Polynomials, Stepper};
 use serde::{Deserialize, Serialize};
 
 use crate::order::LARGEST;
@@ -40,6 +40,9 @@ pub(super) struct Identified {
     /// The standard deviation of a prediction one step after the newest truth, two steps and so on.
     #[serde(with = "numbers")]
     pub(super) deviations: Vec<f64>,
+    /// Where the filter of each input begins in a run, on scaled inputs, in the unit of the truth; nothing where at rest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) beginnings: Vec<Beginning>,
 }
 
 #[typetag::serde(name = "identified")]
@@ -53,6 +56,12 @@ impl Predictor for Identified {
         let mut mistakes = self.scaling.mistakes(width);
         let inputs = &self.model.inputs;
         mistakes.extend(Mistake::of_lengths(width, &[("inputs", inputs.len())]));
+        if !self.beginnings.is_empty() {
+            let mut lengths = vec![("beginnings", self.beginnings.len())];
+            let times = self.beginnings.iter();
+            lengths.extend(times.map(|of| ("beginnings.times", of.times.len())));
+            mistakes.extend(Mistake::of_lengths(width, &lengths));
+        }
         let delays = inputs
             .iter()
             .map(|input| ("delay", input.delay, 0..=LARGEST));
@@ -129,8 +138,9 @@ athermal_core::state!(Before, "identified/2");
 struct Following {
     known: Known,
     deviations: Vec<f64>,
-    /// The share of the filters of the inputs in what the first truth is off by.
-    of_filters: f64,
+    /// Where the filters of the inputs begin, and the share of each in what the first truth is off by.
+    beginnings: Vec<Beginning>,
+    shares: Vec<f64>,
     /// For predictions, which leave no trace.
     scratch: RefCell<Stepper>,
     /// To work out in how unsure they are.
@@ -140,6 +150,7 @@ struct Following {
 impl Following {
     fn new(of: &Identified) -> Self {
         let stepper = Stepper::new(of.model.clone());
+        let beginnings = beginnings(of);
         let followed = Followed {
             stepper: stepper.clone(),
             at: Instant::MIN,
@@ -156,34 +167,57 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
-            of_filters: of_filters(of),
+            shares: shares(of, &beginnings),
+            beginnings,
             room: RefCell::new(vec![0.0; stepper.remembers()]),
             scratch: RefCell::new(stepper),
         }
     }
 }
 
-/// The share of the filters of the inputs in what the first truth is off by: that of the variance which inputs as in the fit,
-/// staying as they are for long, give them beside that of the noise. Noise that is integrated has all, since it may be anywhere.
-fn of_filters(of: &Identified) -> f64 {
-    let model = &of.model;
-    if !model.follows() {
-        return 1.0;
+/// Where the filters of the inputs begin; at rest, each is taken to be as far off as all inputs as in the fit, staying as they are
+/// for long, bring them on average.
+fn beginnings(of: &Identified) -> Vec<Beginning> {
+    if !of.beginnings.is_empty() {
+        return of.beginnings.clone();
     }
-    let filters = model.inputs.iter().filter(|input| !input.f.is_empty());
-    let filters: f64 = filters.map(|input| input.gain().powi(2)).sum();
-    let noise = of.deviations.last().map_or(f64::NAN, |of| of.powi(2));
-    let share = filters / (filters + noise);
-    if model.differences == 0 && share.is_finite() {
-        share
-    } else {
-        0.0
-    }
+    let inputs = &of.model.inputs;
+    let filters = || inputs.iter().filter(|input| !input.f.is_empty());
+    let squares: f64 = filters().map(|input| input.gain().powi(2)).sum();
+    let each = squares / filters().count().max(1) as f64;
+    let at_rest = inputs.iter().enumerate().map(|(nth, input)| {
+        let mut times = vec![0.0; inputs.len()];
+        times[nth] = input.gain();
+        let shared = if input.f.is_empty() { 0.0 } else { each };
+        Beginning { times, shared }
+    });
+    at_rest.collect()
+}
+
+/// The share of the filter of each input in what the first truth is off by: what its error has in common with that of the sum of
+/// all, beside the variance of the noise. Noise that is integrated has all, since it may be anywhere; where there is no model of
+/// noise, filters have all.
+fn shares(of: &Identified, beginnings: &[Beginning]) -> Vec<f64> {
+    let shared = beginnings.iter().map(|beginning| beginning.shared);
+    let noise = match of.deviations.last() {
+        Some(deviation) if of.model.follows() => deviation.powi(2),
+        _ => 0.0,
+    };
+    let all = shared.clone().sum::<f64>() + noise;
+    let share = |shared: f64| {
+        let share = shared / all;
+        if of.model.differences == 0 && share.is_finite() {
+            share
+        } else {
+            0.0
+        }
+    };
+    shared.map(share).collect()
 }
 
 impl Known {
-    /// Begins at rest, a step before what the first run predicts.
-    fn begin(&mut self, row: &[f64], of: Instant) {
+    /// Begins a step before what the first run predicts, with filters as far as its inputs tell of them.
+    fn begin(&mut self, row: &[f64], of: Instant, beginnings: &[Beginning]) {
         let Self {
             scaling,
             series,
@@ -192,7 +226,12 @@ impl Known {
         } = self;
         let count = series.len() as i64;
         for (nth, followed) in series.iter_mut().enumerate() {
-            followed.stepper.rest(scaling.of(row));
+            let input = scaling.of(row);
+            let before = |nth: usize, _: &_| {
+                let times = beginnings[nth].times.iter().enumerate();
+                times.map(|(of, times)| times * input(of)).sum()
+            };
+            followed.stepper.begin(&input, before);
             followed.at = of - *step + part(*step, nth as i64, count);
             followed.told = 0;
         }
@@ -285,7 +324,7 @@ impl Learner for Following {
             known.end();
         }
         if !known.begun {
-            known.begin(regressors, of);
+            known.begin(regressors, of, &self.beginnings);
         }
         // A truth that has not been told by now never will be.
         for nth in 0..known.series.len() {
@@ -352,7 +391,7 @@ impl Learner for Following {
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
         if !self.known.begun {
-            self.known.begin(regressors, at);
+            self.known.begin(regressors, at, &self.beginnings);
         }
         let oldest = self
             .known
@@ -377,7 +416,7 @@ impl Learner for Following {
         }
         stepper.step(known.scaling.of(regressors), Some(truth));
         if is_first {
-            stepper.settle_between(truth, self.of_filters);
+            stepper.settle_among(truth, |nth| self.shares[nth]);
         }
         let followed = &mut known.series[nth];
         std::mem::swap(stepper, &mut followed.stepper);

@@ -3,8 +3,8 @@
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    InformationCriteria, NumericsError, Orders, Polynomials, PredictionError, PredictionErrorFit,
-    Samples, Standardization, Standardizer,
+    Beginning, InformationCriteria, NumericsError, Orders, Polynomials, PredictionError,
+    PredictionErrorFit, Samples, Standardization, Standardizer,
 };
 
 use super::follow::{Identified, MOST_SERIES};
@@ -53,6 +53,8 @@ pub(crate) struct Found {
     pub(crate) rows: usize,
     /// The variance of an innovation.
     pub(crate) variance: f64,
+    /// Where the filter of each input begins in a run; nothing where there is none.
+    pub(crate) beginnings: Vec<Beginning>,
 }
 
 /// Keeps all rows, which are gone through again and again.
@@ -194,6 +196,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 .map(|sum| (variance * sum).sqrt())
                 .collect(),
             model: found.model,
+            beginnings: found.beginnings,
             errors: found.errors,
             step: pace.step,
             series: pace.series,
@@ -230,6 +233,13 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
+        for beginning in &mut fit.beginnings {
+            beginning
+                .times
+                .iter_mut()
+                .for_each(|times| *times *= spread);
+            beginning.shared *= spread * spread;
+        }
         tell_pieces(samples, &fit.model, report);
         report.figure("converged", fit.converged);
         report.figure("steps_of_search", fit.steps);
@@ -243,6 +253,7 @@ impl Identify for Asked {
             residual_sum_of_squares: fit.residual_sum_of_squares,
             rows: fit.rows,
             variance: fit.variance(),
+            beginnings: fit.beginnings,
             model: fit.model,
             errors,
         })

@@ -6,6 +6,7 @@ use athermal_numerics::Transfer;
 /// A model that sums its input up, nearly.
 fn identified(step: Duration) -> Identified {
     Identified {
+        beginnings: Vec::new(),
         regressors: vec!["input".to_owned()],
         scaling: Scaling {
             means: vec![0.0],
@@ -69,6 +70,30 @@ fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noi
     assert!((second(&model) - 1.0).abs() < 1e-12);
     model.model.differences = 0;
     assert!((second(&model) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn a_run_begins_where_inputs_tell_that_filters_are_and_not_where_they_would_be_after_long() {
+    let step = Duration::from_ns(1_000_000_000);
+    let mut model = identified(step);
+    model.model.a = Vec::new();
+    model.model.inputs[0].f = vec![-0.99];
+    let first = |model: &Identified| {
+        let mut learner = Following::new(model);
+        let now = Instant::from_ns(0);
+        learner.run(&[2.0], now, now - step);
+        learner.predict(&[2.0], now)
+    };
+    // A model of before says nothing of that: its gain is 10.
+    assert!((first(&model) - 20.0).abs() < 1e-9);
+    model.beginnings = vec![Beginning {
+        times: vec![0.3],
+        shared: 1.0,
+    }];
+    assert_eq!(model.mistakes(), []);
+    assert!((first(&model) - (0.1 + 0.99 * 0.3) * 2.0).abs() < 1e-9);
+    model.beginnings.push(model.beginnings[0].clone());
+    assert_eq!(model.mistakes().len(), 1);
 }
 
 /// What it predicts of a truth of 0 around a pause of so many steps.
