@@ -29,9 +29,11 @@ impl Diagnose {
         let name = &feature.feature;
         let users: Vec<&str> = tables.users_of(main, name).collect();
         let why = format!("What {} leaves goes with {name}, ", main.prediction);
-        let (why, look) = if users.iter().any(|user| is_of(&main.prediction, user)) {
+        let own = users.iter().find(|user| is_of(&main.prediction, user));
+        let (why, look) = if let Some(own) = own {
             let model = quoted(&self.model.display().to_string());
-            let node = quoted(&main.prediction);
+            // Without `each` a node is called by its own name, and its prediction by that of its axis too.
+            let node = quoted(own);
             let words = [
                 &program(),
                 "show",
