@@ -153,7 +153,7 @@ pub fn gather(
     })
 }
 
-/// What a model must be loaded with so that a report can tell the noise of the truth.
+/// What a model must be loaded with so that a report can tell the standard error of the truth.
 pub const WANTED: Wanted = Wanted {
     standard_errors: true,
     intervals: false,

@@ -22,7 +22,7 @@ pub struct Verdict {
     pub no_model: Option<f64>,
     /// Whether the drift was measured at any instant.
     pub measured: bool,
-    /// The noise of the measured drift.
+    /// The standard error of the measured drift, in which scatter and curvature within its windows both count.
     pub noise: Option<f64>,
     /// Drift over all that is corrected, without the correction.
     pub without_correction: Option<f64>,
@@ -104,7 +104,7 @@ impl Verdict {
         if let Some(noise) = self.noise {
             let _ = write!(
                 text,
-                " (the measurement's own noise is {})",
+                " (the standard error of what was measured is {})",
                 figure(Some(noise))
             );
         }
@@ -152,7 +152,7 @@ mod tests {
         assert!(verdict.is_good());
         assert_eq!(
             verdict.sentence(),
-            "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the measurement's own noise is 3.85); \
+            "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the standard error of what was measured is 3.85); \
              corrected, 15.0 of 60.0 remain, 75 % less."
         );
         verdict.with_correction = Some(61.0);

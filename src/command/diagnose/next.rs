@@ -64,7 +64,7 @@ impl Diagnose {
         wanted.then(|| format!("More days may still make it better; with another log:\n{fit}"))
     }
 
-    /// Where what is left is noise, only a truth with less of it can be told better.
+    /// Where what is left is white, a truth over another window may be told better.
     fn wider_windows(&self, tables: &Tables) -> Option<String> {
         let of = self.of.iter().map(|name| quoted(name));
         let of = of.flat_map(|name| ["--of".to_owned(), name]);
@@ -72,9 +72,8 @@ impl Diagnose {
         let more: Vec<&str> = more.iter().map(String::as_str).collect();
         let look = self.command("diagnose", &more);
         let wanted = !self.window && tables.all_white();
-        wanted.then(|| {
-            format!("What is left is white; how much noise other windows would have:\n{look}")
-        })
+        wanted
+            .then(|| format!("What is left is white; signal to noise over other windows:\n{look}"))
     }
 }
 

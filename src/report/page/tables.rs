@@ -47,7 +47,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
         "RMSE",
         "no model",
         "persistence",
-        "noise of truth",
+        "standard error of truth",
         "R²",
         "bias",
         "largest",
