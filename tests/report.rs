@@ -401,3 +401,19 @@ fn a_graph_without_a_prediction_is_told_so() {
     told.tells(&["no prediction of a measured truth"]);
     assert!(std::fs::read_to_string(page).unwrap().contains("air.room"));
 }
+
+#[test]
+fn the_verdict_tells_the_errors_of_the_table() {
+    let scratch = Scratch::new("the_verdict_tells_the_errors_of_the_table");
+    let model = fitted(&scratch, "linear-axis", "linear-axis");
+    let days = simulated(&scratch, "days.csv", "linear-axis", 0.5, 2);
+    let facts = report(&model, &days, &[&"--format", &"json"]).json();
+    for verdict in facts["verdicts"].as_array().unwrap() {
+        let (axis, node) = (verdict["axis"].as_str().unwrap(), &verdict["node"]);
+        let scores = facts["scores"].as_array().unwrap().iter();
+        let mut of_axis = scores.filter(|of| of["truth"] == format!("drift.{axis}"));
+        let score = of_axis.find(|of| of["node"] == *node).unwrap();
+        assert_eq!(verdict["error"], score["rmse"], "{axis}");
+        assert_eq!(verdict["no_model"], score["baseline_zero"], "{axis}");
+    }
+}

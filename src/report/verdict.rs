@@ -16,7 +16,7 @@ pub struct Verdict {
     pub node: String,
     /// The unit.
     pub unit: String,
-    /// Error of the prediction; none where it gave nothing.
+    /// Error of the prediction, on the instants on which it is scored; none where it gave nothing.
     pub error: Option<f64>,
     /// The drift itself on the same instants: the error of no model.
     pub no_model: Option<f64>,
@@ -44,6 +44,10 @@ impl Verdict {
         let score = scores
             .iter()
             .find(|score| score.node == *node && is_channel(&score.truth, &axis.name));
+        // Where all predictions of the truth are valid, as the table of scores has it; where they never are at once, on its own.
+        let scored = score.and_then(|score| Some((score.rmse?, score.baseline_zero?)));
+        let own = || rms(both().map(|(_, e)| *e)).zip(rms(both().map(|(y, _)| *y)));
+        let figures = scored.or_else(own);
         let corrected = worth.and_then(|worth| {
             let i = worth.axes.iter().position(|name| *name == axis.name)?;
             let pairs = worth.drift_without[i]
@@ -57,8 +61,8 @@ impl Verdict {
             axis: axis.name.clone(),
             node: node.clone(),
             unit: axis.unit.clone(),
-            error: rms(both().map(|(_, e)| *e)),
-            no_model: rms(both().map(|(y, _)| *y)),
+            error: figures.map(|of| of.0),
+            no_model: figures.map(|of| of.1),
             measured: axis.truth.value.iter().any(|y| !y.is_nan()),
             noise: score.and_then(|score| score.truth_noise),
             without_correction: corrected.map(|both| both.0),
