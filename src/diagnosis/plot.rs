@@ -84,7 +84,7 @@ impl Picture {
         });
         Chart {
             title: self.title.clone(),
-            x_label: &self.x_label,
+            x_label: self.x_label.clone(),
             y_label: self.y_label.clone(),
             y_range: self.y_range,
             limits: self.limits.clone(),

@@ -5,6 +5,7 @@
 
 mod course;
 mod errors;
+mod hours;
 mod page;
 mod published;
 mod sensors;
@@ -15,6 +16,7 @@ mod worth;
 
 pub use course::{Axis, Course, Voter, Weight};
 pub use errors::Errors;
+use hours::Hours;
 pub use page::{page, plots};
 pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
