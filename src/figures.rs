@@ -8,7 +8,7 @@ pub use athermal::core::diagnostic::{count, counted, digits};
 /// How wide tables may be, in characters.
 const WIDTH: usize = 80;
 
-/// A number to about four significant digits, without an exponent where that is readable.
+/// A number to three or four significant digits, without an exponent where that is readable.
 #[must_use]
 pub fn number(value: f64) -> String {
     let size = value.abs();
@@ -23,7 +23,7 @@ pub fn number(value: f64) -> String {
     } else if size >= 0.9995 {
         format!("{value:.2}")
     } else {
-        format!("{value:.3}")
+        digits(value, 3)
     }
 }
 
@@ -265,7 +265,10 @@ mod tests {
     #[test]
     fn numbers_keep_the_digits_that_matter() {
         assert_eq!(number(31.7149), "31.71");
-        assert_eq!(number(0.041_23), "0.041");
+        assert_eq!(
+            [0.412_3, -0.041_23, 0.009_5].map(number),
+            ["0.412", "-0.0412", "0.00950"]
+        );
         assert_eq!(number(1234.6), "1235");
         let rounded_up = [999.96, 99.996, 0.9996].map(number);
         assert_eq!(rounded_up, ["1000", "100.0", "1.00"]);

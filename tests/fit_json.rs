@@ -269,3 +269,33 @@ fn figures_are_what_the_model_computes_with() {
         "{values:?}"
     );
 }
+
+#[test]
+fn a_filter_that_follows_some_of_the_rows_says_what_it_found_on_how_many() {
+    let scratch = Scratch::new("fit-some-rows");
+    let node = "[nodes.noises]\ntype = \"kalman\"\n";
+    let signals = SIGNALS.replace("\"mix\"", "\"noises\"");
+    let graph = format!("{signals}{node}{FEATURES}inputs.truth = \"y.y\"\nahead = \"0s\"\n");
+    let (graph, data) = (
+        scratch.file("graph.toml", graph),
+        scratch.file("rows.csv", rows()),
+    );
+    let model = scratch.path("model.json");
+    let fit = |more: &[&dyn AsRef<std::ffi::OsStr>]| {
+        let all: [&dyn AsRef<std::ffi::OsStr>; 6] =
+            [&"fit", &graph, &"--data", &data, &"-o", &model];
+        let fit = athermal(&[&all, more].concat()).ended(0);
+        fit.out.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let some = fit(&[&"--memory", &"0"]);
+    // 400 rows are halved until at most 16 are left.
+    for part in [
+        "400 rows",
+        "variances and coefficients were found on 13 rows, one in 32 of all",
+        "condition number and what is said of regressors are of these alone",
+        "a larger `--memory`",
+    ] {
+        assert!(some.contains(part), "`{part}` is not in: {some}");
+    }
+    assert!(!fit(&[]).contains("were found on"));
+}

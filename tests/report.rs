@@ -401,3 +401,63 @@ fn a_graph_without_a_prediction_is_told_so() {
     told.tells(&["no prediction of a measured truth"]);
     assert!(std::fs::read_to_string(page).unwrap().contains("air.room"));
 }
+
+#[test]
+fn the_verdict_tells_the_errors_of_the_table() {
+    let scratch = Scratch::new("the_verdict_tells_the_errors_of_the_table");
+    let model = fitted(&scratch, "linear-axis", "linear-axis");
+    let days = simulated(&scratch, "days.csv", "linear-axis", 0.5, 2);
+    let facts = report(&model, &days, &[&"--format", &"json"]).json();
+    for verdict in facts["verdicts"].as_array().unwrap() {
+        let (axis, node) = (verdict["axis"].as_str().unwrap(), &verdict["node"]);
+        let scores = facts["scores"].as_array().unwrap().iter();
+        let mut of_axis = scores.filter(|of| of["truth"] == format!("drift.{axis}"));
+        let score = of_axis.find(|of| of["node"] == *node).unwrap();
+        assert_eq!(verdict["error"], score["rmse"], "{axis}");
+        assert_eq!(verdict["no_model"], score["baseline_zero"], "{axis}");
+    }
+}
+
+#[test]
+fn dates_are_shown_as_hours_since_the_first_and_nothing_is_shaded_without_limits() {
+    let scratch = Scratch::new("dates_are_shown_as_hours");
+    let text = "schema = 1\nname = \"dated\"\n[time]\ncolumn = \"time\"\nunit = \"rfc3339\"\n\
+                [signals.position]\nunit = \"nm\"\nchannels = [\"z\"]\nmax_age = \"1min\"\n\
+                [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"5min\"]\nunit = \"nm/min\"\n\
+                [nodes.predicted]\ntype = \"persistence\"\ninputs.truth = \"drift.z\"\nahead = \"5min\"\n\
+                [outputs]\npredicted = \"predicted\"\n";
+    let graph = scratch.file("dated.toml", text);
+    let rows = (0..480).map(|minute| {
+        let position = 4000.0 * (f64::from(minute) / 60.0).sin();
+        format!(
+            "2026-03-15T{:02}:{:02}:00Z,{position}\n",
+            8 + minute / 60,
+            minute % 60
+        )
+    });
+    let data = scratch.file("log.csv", format!("time,z\n{}", rows.collect::<String>()));
+    let (page, plots) = (scratch.path("page.html"), scratch.path("plots"));
+    report(&graph, &data, &[&"-o", &page, &"--plots", &plots]);
+    let page = std::fs::read_to_string(page).unwrap();
+    let plot = std::fs::read_to_string(plots.join("drift-z.svg")).unwrap();
+    for shown in [&page, &plot] {
+        assert!(shown.contains("hours since 2026-03-15T08:00:00Z"));
+        // 492680 hours have passed since 1970.
+        assert!(
+            !shown.contains(">4926") && shown.contains(">4</text>"),
+            "{plot}"
+        );
+        assert!(!shown.contains("class=\"s1\"") && !shown.contains("class=\"s2\""));
+    }
+    assert!(!page.contains("Shaded"), "no limits are given");
+    let from: f64 = (page
+        .split("data-x0=\"")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap())
+    .parse()
+    .unwrap();
+    assert!((0.0..3600.0).contains(&from), "{from}");
+}

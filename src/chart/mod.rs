@@ -74,7 +74,7 @@ pub struct Chart<'a> {
     /// What it shows, for those who cannot see it.
     pub title: String,
     /// What x is.
-    pub x_label: &'a str,
+    pub x_label: String,
     /// What y is, with its unit.
     pub y_label: String,
     /// Its width in user units, in which letters are 13 high.
@@ -91,13 +91,15 @@ pub struct Chart<'a> {
     pub y_range: Option<(f64, f64)>,
     /// Whether x is in seconds and shown in hours, and can be zoomed.
     pub time: bool,
+    /// The x that is shown as 0.
+    pub zero: f64,
 }
 
 impl Default for Chart<'_> {
     fn default() -> Self {
         Self {
             title: String::new(),
-            x_label: "",
+            x_label: String::new(),
             y_label: String::new(),
             width: 900.0,
             height: 220.0,
@@ -106,6 +108,7 @@ impl Default for Chart<'_> {
             limits: Vec::new(),
             y_range: None,
             time: false,
+            zero: 0.0,
         }
     }
 }
@@ -158,7 +161,7 @@ struct Scene {
     height: f64,
     /// The frame: x, y, width, height.
     frame: (f64, f64, f64, f64),
-    /// The ends of x in seconds where it can be zoomed.
+    /// The ends of x in seconds, from what is shown as 0, where it can be zoomed.
     zoom: Option<(f64, f64)>,
     behind: Vec<Shape>,
     /// What stands in the frame, in units from its corner.
@@ -227,7 +230,7 @@ impl Chart<'_> {
             width: self.width,
             height: whole,
             frame: (LEFT, top, width, height),
-            zoom: self.time.then_some((x0, x1)),
+            zoom: self.time.then_some((x0 - self.zero, x1 - self.zero)),
             behind: Vec::new(),
             inside: Vec::new(),
             ticks: Vec::new(),
@@ -266,21 +269,18 @@ impl Chart<'_> {
             layer.draw(&mut scene.inside, &px, &py, py(0.0));
         }
         let scale = if self.time { 3600.0 } else { 1.0 };
-        let marks = ticks(x0 / scale, x1 / scale, 8);
+        let marks = ticks((x0 - self.zero) / scale, (x1 - self.zero) / scale, 8);
         let step = step_of(&marks);
         let foot = whole - BOTTOM + 15.0;
         for x in marks {
-            let at = LEFT + px(x * scale);
+            let at = LEFT + px(self.zero + x * scale);
             scene
                 .ticks
                 .push(text(at, foot, Anchor::Middle, label(x, step)));
         }
-        scene.around.push(text(
-            right,
-            whole - 4.0,
-            Anchor::End,
-            self.x_label.to_owned(),
-        ));
+        scene
+            .around
+            .push(text(right, whole - 4.0, Anchor::End, self.x_label.clone()));
         Some(scene)
     }
 

@@ -187,7 +187,7 @@ fn describe(scores: &Scores) -> String {
         node("from past drift (motion)", "motion"),
         node("from both (both)", "both"),
         node("vote of the three", "vote"),
-        baseline("noise of the truth itself", |score| score.truth_noise),
+        baseline("standard error of the truth", |score| score.truth_noise),
     ];
     let header: Vec<&str> = std::iter::once("")
         .chain(axes.iter().map(|axis| axis.name))
@@ -202,8 +202,8 @@ fn describe(scores: &Scores) -> String {
 
 /// Two sentences on what the figures mean.
 fn meaning(axes: &[Axis]) -> String {
-    let noise = axes.iter().filter_map(|axis| axis.vote.truth_noise);
-    let noise = noise.reduce(f64::min);
+    let errors = axes.iter().filter_map(|axis| axis.vote.truth_noise);
+    let error = errors.reduce(f64::min);
     let gains = || axes.iter().filter_map(|axis| Some((axis, axis.gain()?)));
     let by_gain = |a: &(&Axis, f64), b: &(&Axis, f64)| a.1.total_cmp(&b.1);
     let (Some((_, least)), Some((best, most))) = (gains().min_by(by_gain), gains().max_by(by_gain))
@@ -218,14 +218,14 @@ fn meaning(axes: &[Axis]) -> String {
         "The vote foresees the drift of the next five minutes with {:.0} to {:.0} % less error\n\
          than no model: on {}, {:.0} nm in five minutes are left of {:.0} nm.\n\
          What is left comes mostly from what cannot be known five minutes before, such\n\
-         as the next step of the chuck; no model can score below about {} nm/min here,\n\
-         the noise of the truth itself, since positions are measured to 12 nm.\n",
+         as the next step of the chuck; and the drift itself is known to {} nm/min at\n\
+         best, its standard error, since positions are measured to 12 nm.\n",
         100.0 * least,
         100.0 * most,
         best.name,
         5.0 * with,
         5.0 * without,
-        or_dash(noise),
+        or_dash(error),
     )
 }
 

@@ -21,7 +21,11 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 ///
 /// Each prediction is compared with the truth measured later, beside no model (predicting zero), persistence (the last
 /// truth that shares nothing with the predicted one; K steps ahead that of K steps before, in a free run none), and the
-/// noise of the truth itself. All predictions of a truth are scored on the instants at which all of them are valid.
+/// standard error of the truth itself. All predictions of a truth are scored on the instants at which all of them are valid.
+///
+/// The standard error of a truth that is a slope is that of its line, from the residuals about it (root mean square over
+/// the instants). Scatter of the samples and curvature of the drift within the window both count there, so that it may be
+/// more than the noise of the measurement, and a prediction may come below it.
 ///
 /// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
 /// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is the share of the truth's spread that is told,
@@ -266,7 +270,7 @@ fn describe(scores: &Scores, mode: Mode) -> String {
         );
         let _ = writeln!(
             text,
-            "  no model {}, persistence {}, noise of the truth {}",
+            "  no model {}, persistence {}, standard error of the truth {}",
             or_dash(first.baseline_zero),
             or_dash(first.baseline_persistence),
             or_dash(first.truth_noise)

@@ -14,8 +14,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal, print};
 /// Write a starter graph for a log of yours
 ///
 /// Looks at the names and values of a CSV or JSON lines file, guesses what is a temperature, what drifts and in which
-/// units, measures rates and gaps, and sets the drift against its noise to choose the windows. Every guess is told, and
-/// stands in the graph as a comment. The graph checks, fits and evaluates as it is.
+/// units, measures rates and gaps, and sets the drift against its standard error to choose the windows. Every guess is
+/// told, and stands in the graph as a comment. The graph checks, fits and evaluates as it is.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal init log.csv

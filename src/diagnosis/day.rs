@@ -41,8 +41,10 @@ pub struct Days {
 /// A day that was left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOut {
-    /// Its number, from 1, among those that have a truth.
+    /// Its number, from 1, by the time since the first instant: days without a truth have a number too, and are left out here.
     pub day: usize,
+    /// Its first instant in s.
+    pub from_s: f64,
     /// How well it was predicted.
     pub scores: Vec<DayScore>,
 }
@@ -77,6 +79,8 @@ pub struct DayScore {
 struct Calendar {
     /// Segment and first instant of each day.
     begins: Vec<(u32, Instant)>,
+    /// The number of each, from 1.
+    numbers: Vec<usize>,
 }
 
 impl DayScore {
@@ -110,7 +114,8 @@ impl Calendar {
         }
         begins.sort_unstable();
         begins.dedup();
-        Self { begins }
+        let numbers = numbers(&begins, &observation.segments, day);
+        Self { begins, numbers }
     }
 
     fn count(&self) -> usize {
@@ -121,6 +126,40 @@ impl Calendar {
         let after = self.begins.partition_point(|begin| *begin <= (segment, at));
         after.saturating_sub(1)
     }
+}
+
+/// The numbers of days, from 1, by the time that has gone by since the first instant. A segment begins another day than the one
+/// before it, and one whose clock starts again the next.
+fn numbers(
+    begins: &[(u32, Instant)],
+    segments: &[Option<(Instant, Instant)>],
+    day: Duration,
+) -> Vec<usize> {
+    let elapsed = |from: Instant, at: Instant| ((at - from).secs() / day.secs()).round() as usize;
+    // The first instant of the clock, and how many days were before it; the end of the last segment, and its last day.
+    let (mut clock, mut last) = ((Instant::from_ns(0), 0), None::<(Instant, usize)>);
+    let mut before = Vec::new();
+    for &segment in segments {
+        let Some((from, to)) = segment else {
+            before.push(0);
+            continue;
+        };
+        let days = match last {
+            Some((end, number)) if from > end => number.max(clock.1 + elapsed(clock.0, from)),
+            _ => {
+                clock = (from, last.map_or(0, |last| last.1));
+                clock.1
+            }
+        };
+        last = Some((to, days + days_in(from, to, day) as usize));
+        before.push(days);
+    }
+    let number = |&(segment, at): &(u32, Instant)| {
+        let nth = segment as usize;
+        let from = segments.get(nth).copied().flatten().map_or(at, |of| of.0);
+        before.get(nth).copied().unwrap_or(0) + elapsed(from, at) + 1
+    };
+    begins.iter().map(number).collect()
 }
 
 /// Into how many days a segment falls.
@@ -169,7 +208,8 @@ pub fn days(
     }
     let (plan, of) = (&*model.plan, &observation.trace);
     let left_out = each.iter().enumerate().map(|(out, errors)| LeftOut {
-        day: out + 1,
+        day: calendar.numbers[out],
+        from_s: (calendar.begins[out].1 - Instant::from_ns(0)).secs(),
         scores: scores(plan, of, errors, errors),
     });
     let left_out = left_out.collect();
@@ -403,5 +443,19 @@ mod tests {
         assert_eq!(calendar.day_of(0, at(20)), 0);
         assert_eq!(calendar.day_of(0, at(26)), 1);
         assert_eq!(calendar.day_of(0, at(230)), 2);
+        assert_eq!(calendar.numbers, [1, 2, 10]);
+    }
+
+    #[test]
+    fn days_are_numbered_by_the_time_since_the_first_instant() {
+        let of = |segments: &[(i64, i64)]| {
+            let truths: Vec<_> = (0..).zip(segments.iter().map(|of| of.0)).collect();
+            let segments = segments.iter().map(|&(from, to)| Some((at(from), at(to))));
+            calendar(segments.collect(), &truths).numbers
+        };
+        // The file of the third day is missing; of each day there are eight hours; a clock starts again.
+        assert_eq!(of(&[(0, 24), (24, 48), (72, 96)]), [1, 2, 4]);
+        assert_eq!(of(&[(0, 8), (24, 32), (72, 80)]), [1, 2, 4]);
+        assert_eq!(of(&[(0, 48), (0, 24), (48, 72)]), [1, 3, 5]);
     }
 }

@@ -84,7 +84,7 @@ impl Picture {
         });
         Chart {
             title: self.title.clone(),
-            x_label: &self.x_label,
+            x_label: self.x_label.clone(),
             y_label: self.y_label.clone(),
             y_range: self.y_range,
             limits: self.limits.clone(),
@@ -197,7 +197,7 @@ fn windows(windows: &[&Windows]) -> Picture {
     Picture {
         title: "Signal to noise of the drift against its window".to_owned(),
         x_label: format!("window in {}{own}", unit.name),
-        y_label: "signal to noise".to_owned(),
+        y_label: "signal to noise (standard error of the slope)".to_owned(),
         points: lines.collect(),
         ..Picture::default()
     }

@@ -1,4 +1,4 @@
-//! Decides how high a drift stands above its noise, against the window that it is taken over (Mandelli, Dankwart and Napoli,
+//! Decides how high a drift stands above its standard error, against the window that it is taken over (Mandelli, Dankwart and Napoli,
 //! Fig. 2); which window to choose is decided elsewhere.
 //!
 //! A wider window has less noise in its slope (as `T^−3/2` for evenly spaced samples) but smooths the drift away. The spread of the

@@ -19,10 +19,6 @@ use super::sensors::{SensorFacts, ask_for_reasons, sensors};
 use super::track::{Track, parameters, places};
 use super::{ReportError, Series};
 
-/// Limits of the states of stability where no `stability` node gives them, in nm/min (Mandelli, Dankwart and Napoli, section 3.4).
-const STABLE: f64 = 30.0;
-const TRANSIENT: f64 = 80.0;
-
 /// What happened over time.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Course {
@@ -57,7 +53,8 @@ pub struct Axis {
     pub ahead_s: f64,
     /// The weights of a vote's voters at each truth; empty where nothing is weighed.
     pub weights: Vec<Weight>,
-    /// Below this absolute truth the axis is stable, and from the second on transient; none where the truth is no drift.
+    /// Below this absolute truth the axis is stable, and from the second on transient, as a `stability` node says; none without one,
+    /// since what is stable depends on the machine.
     pub states: Option<(f64, f64)>,
 }
 
@@ -251,12 +248,9 @@ impl Axis {
     }
 }
 
-/// The limits of the states of stability in the unit of a drift.
+/// The limits of the states of stability in the unit of a drift; none where it is no drift, or nobody gives them.
 fn states(plan: &Plan, unit: &Unit) -> Option<(f64, f64)> {
     let in_unit = |quantity: &Quantity| quantity.in_unit(unit);
-    if let Some(node) = parameters::<Stability>(plan, "stability") {
-        return in_unit(&node.stable_below).zip(in_unit(&node.transient_above));
-    }
-    let factor = Unit::parse("nm/min").ok()?.factor_to(unit)?;
-    Some((STABLE * factor, TRANSIENT * factor))
+    let node = parameters::<Stability>(plan, "stability")?;
+    in_unit(&node.stable_below).zip(in_unit(&node.transient_above))
 }

@@ -5,6 +5,7 @@
 
 mod course;
 mod errors;
+mod hours;
 mod page;
 mod published;
 mod sensors;
@@ -15,6 +16,7 @@ mod worth;
 
 pub use course::{Axis, Course, Voter, Weight};
 pub use errors::Errors;
+use hours::Hours;
 pub use page::{page, plots};
 pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
@@ -153,7 +155,7 @@ pub fn gather(
     })
 }
 
-/// What a model must be loaded with so that a report can tell the noise of the truth.
+/// What a model must be loaded with so that a report can tell the standard error of the truth.
 pub const WANTED: Wanted = Wanted {
     standard_errors: true,
     intervals: false,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Facts, Published, Worth, figure, spelled};
+use super::{Facts, Hours, Published, Worth, figure, spelled};
 
 /// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
 #[must_use]
@@ -18,7 +18,7 @@ pub fn text(facts: &Facts) -> String {
         published(&mut text, table);
     }
     if let Some(worth) = &facts.worth {
-        loss(&mut text, worth);
+        loss(&mut text, worth, &Hours::of(&facts.course));
     }
     let sensors = facts.course.sensors.iter();
     let odd: Vec<_> = sensors
@@ -61,7 +61,7 @@ fn published(text: &mut String, table: &Published) {
     }
 }
 
-fn loss(text: &mut String, worth: &Worth) {
+fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
     let Some(headline) = worth.headline() else {
         return;
     };
@@ -69,6 +69,9 @@ fn loss(text: &mut String, worth: &Worth) {
     text.push_str(&filled(&headline, ""));
     if worth.settling.is_empty() {
         return;
+    }
+    if hours.from_s != 0.0 {
+        let _ = writeln!(text, "\nChanges of the set point, in {}:", hours.label);
     }
     let unit = spelled(worth.set_point_unit.as_deref().unwrap_or_default());
     let _ = writeln!(
@@ -90,7 +93,7 @@ fn loss(text: &mut String, worth: &Worth) {
         let _ = writeln!(
             text,
             "{:>6.1}{:>9.1}{:>9.1}{:>15}{:>9}{:>17}{:>9}",
-            s.at_s / 3600.0,
+            hours.at(s.at_s),
             s.from,
             s.to,
             minutes(s.without_min),

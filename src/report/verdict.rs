@@ -16,13 +16,13 @@ pub struct Verdict {
     pub node: String,
     /// The unit.
     pub unit: String,
-    /// Error of the prediction; none where it gave nothing.
+    /// Error of the prediction, on the instants on which it is scored; none where it gave nothing.
     pub error: Option<f64>,
     /// The drift itself on the same instants: the error of no model.
     pub no_model: Option<f64>,
     /// Whether the drift was measured at any instant.
     pub measured: bool,
-    /// The noise of the measured drift.
+    /// The standard error of the measured drift, in which scatter and curvature within its windows both count.
     pub noise: Option<f64>,
     /// Drift over all that is corrected, without the correction.
     pub without_correction: Option<f64>,
@@ -44,6 +44,10 @@ impl Verdict {
         let score = scores
             .iter()
             .find(|score| score.node == *node && is_channel(&score.truth, &axis.name));
+        // Where all predictions of the truth are valid, as the table of scores has it; where they never are at once, on its own.
+        let scored = score.and_then(|score| Some((score.rmse?, score.baseline_zero?)));
+        let own = || rms(both().map(|(_, e)| *e)).zip(rms(both().map(|(y, _)| *y)));
+        let figures = scored.or_else(own);
         let corrected = worth.and_then(|worth| {
             let i = worth.axes.iter().position(|name| *name == axis.name)?;
             let pairs = worth.drift_without[i]
@@ -57,8 +61,8 @@ impl Verdict {
             axis: axis.name.clone(),
             node: node.clone(),
             unit: axis.unit.clone(),
-            error: rms(both().map(|(_, e)| *e)),
-            no_model: rms(both().map(|(y, _)| *y)),
+            error: figures.map(|of| of.0),
+            no_model: figures.map(|of| of.1),
             measured: axis.truth.value.iter().any(|y| !y.is_nan()),
             noise: score.and_then(|score| score.truth_noise),
             without_correction: corrected.map(|both| both.0),
@@ -104,7 +108,7 @@ impl Verdict {
         if let Some(noise) = self.noise {
             let _ = write!(
                 text,
-                " (the measurement's own noise is {})",
+                " (the standard error of what was measured is {})",
                 figure(Some(noise))
             );
         }
@@ -152,7 +156,7 @@ mod tests {
         assert!(verdict.is_good());
         assert_eq!(
             verdict.sentence(),
-            "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the measurement's own noise is 3.85); \
+            "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the standard error of what was measured is 3.85); \
              corrected, 15.0 of 60.0 remain, 75 % less."
         );
         verdict.with_correction = Some(61.0);

@@ -201,7 +201,7 @@ impl Writer<'_> {
         let width = self.clock.length(self.choice.drift_s);
         let _ = writeln!(
             text,
-            "\n# Drift window: signal to noise of the slope of {}, by width:",
+            "\n# Drift window: signal to noise (its standard error) of the slope of {}, by width:",
             self.axes().join(", ")
         );
         let shown = self

@@ -9,7 +9,8 @@ use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
 
-/// Signal to noise of a drift that is enough: a fifth of its variance is then noise, `1 / (1 + 2²)`.
+/// Signal to noise of a drift that is enough, noise being its standard error, in which scatter and curvature both count: a fifth
+/// of its variance is then noise, `1 / (1 + 2²)`.
 pub(super) const ENOUGH: f64 = 2.0;
 /// Samples in the shortest window of a temperature.
 const FEWEST_OF_FEATURE: f64 = 3.0;
@@ -31,7 +32,7 @@ pub struct Choice {
     pub spread: Vec<f64>,
     /// The 99th percentile of the absolute drift per s, for each drifting channel.
     pub extreme: Vec<f64>,
-    /// Whether the drift rises above its noise.
+    /// Whether the drift rises above its standard error.
     pub enough: bool,
 }
 
@@ -136,10 +137,12 @@ impl Choice {
             .collect();
         let why = if self.enough {
             format!(
-                "the narrowest at which it stands {ENOUGH} times above its noise on half of them"
+                "the narrowest at which it stands {ENOUGH} times above its standard error on half of them"
             )
         } else {
-            format!("where it stands highest above its noise; {ENOUGH} times would be better")
+            format!(
+                "where it stands highest above its standard error; {ENOUGH} times would be better"
+            )
         };
         let mut remarks = vec![format!(
             "drift window: {width}, {why} ({})",
@@ -147,7 +150,7 @@ impl Choice {
         )];
         if !self.enough {
             remarks.push(
-                "the drift hardly rises above the noise of its measurement: expect little of any model"
+                "the drift hardly rises above its standard error: expect little of any model"
                     .to_owned(),
             );
         }

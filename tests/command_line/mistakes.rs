@@ -555,3 +555,28 @@ slopes = ["one", "two"]
     let told = told.replace(&graph.display().to_string(), "wrong.toml");
     assert_eq!(told, ONCE);
 }
+
+#[test]
+fn a_number_that_is_too_large_is_no_other_mistake_of_its_node() {
+    let text = r#"schema = 1
+[signals.temperature]
+unit = "Cel"
+channels = ["a", "b"]
+max_age = "1min"
+[nodes.gradients]
+type = "slope"
+inputs.signal = "temperature"
+windows = { dynamic_range = "8min", shortest = "4min", steps = 99999999999999999999, harmonics = 4 }
+[nodes.sum]
+type = "sum"
+inputs.signal = "gradients"
+weights = [1e999, 1]
+[outputs]
+predicted = "sum"
+"#;
+    let expected = [
+        (9, "the number 99999999999999999999 is too large"),
+        (13, "the number 1e999 is too large"),
+    ];
+    assert_told("too-large", text, &expected);
+}

@@ -3,8 +3,8 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use super::NOISE;
-use super::workbench::{Scratch, athermal_on, graph, simulated};
+use super::workbench::{Scratch, athermal, athermal_on, graph, simulated};
+use super::{NOISE, TWO_SENSORS, wandering};
 
 #[test]
 fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
@@ -175,4 +175,37 @@ outputs.predicted = "model"
     let design = &of.ended(0).json()["diagnosis"]["designs"][0];
     assert_eq!(design["condition"], "inf", "{design}");
     assert_eq!(design["regressors"][0]["inflation"], "inf", "{design}");
+}
+
+#[test]
+fn the_coefficients_it_points_to_are_there_for_a_node_without_each_too() {
+    let scratch = Scratch::new("diagnose-without-each");
+    let graph = scratch.file("graph.toml", TWO_SENSORS);
+    // The position answers a temperature ten minutes late, so that what is left goes with a feature that is used.
+    let table = wandering(6000, |course, row| {
+        1000.0 * course[row.saturating_sub(60)][0]
+    });
+    let rows = table.events().iter().enumerate().map(|(row, (_, values))| {
+        let [a, b, z] = values[..] else {
+            panic!("{values:?}")
+        };
+        format!("{},{a},{b},{z}\n", 10 * row)
+    });
+    let rows: String = rows.collect();
+    let log = scratch.file("log.csv", format!("time_s,a,b,z\n{rows}"));
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let told = athermal_on("diagnose", &model, &log, &[&"--no-fit"]).ended(0);
+    told.tells(&["What thermal.z leaves goes with", "coefficients:"]);
+    let asked = told.told.lines().find(|line| line.contains("--node"));
+    let asked = asked.unwrap().rsplit(' ').next().unwrap();
+    let show = [
+        &"show" as &dyn AsRef<OsStr>,
+        &model,
+        &"--format",
+        &"coefficients",
+        &"--node",
+        &asked,
+    ];
+    athermal(&show).ended(0);
 }

@@ -16,7 +16,7 @@ use crate::past::{LookingBack, max_age, max_age_mistake};
 /// With every new value at `t` it takes the last value at or before `t − over` away; without `over`, the value before. That
 /// one must not have been older than `max_age` at that instant. A difference of two samples has the noise of both, and that of a `slope`
 /// over the same time is smaller; over one sample it is the differencing of Box and Jenkins (1976). Differences of temperatures
-/// are in kelvin.
+/// in Cel or K are in K, of those in \[degF\] in \[degR\].
 ///
 /// Two differences share a sample where one ends as the other begins, so that a value summarises `over` and `max_age`: where it
 /// is a truth, the embargo goes by that.

@@ -43,7 +43,8 @@ pub struct Diagnose {
     /// Show these predictions, by node, channel or axis, each with all its regressors; else what the graph puts out
     #[arg(long, num_args = 1.., value_name = "NAME")]
     of: Vec<String>,
-    /// Set the signal to noise of each drift against the window that it is taken over
+    /// Set the signal to noise of each drift against the window that it is taken over, noise being the standard error of its
+    /// slopes, in which scatter and curvature within the window both count
     #[arg(long)]
     window: bool,
     /// How long a day is, of which each is left out once

@@ -29,9 +29,11 @@ impl Diagnose {
         let name = &feature.feature;
         let users: Vec<&str> = tables.users_of(main, name).collect();
         let why = format!("What {} leaves goes with {name}, ", main.prediction);
-        let (why, look) = if users.iter().any(|user| is_of(&main.prediction, user)) {
+        let own = users.iter().find(|user| is_of(&main.prediction, user));
+        let (why, look) = if let Some(own) = own {
             let model = quoted(&self.model.display().to_string());
-            let node = quoted(&main.prediction);
+            // Without `each` a node is called by its own name, and its prediction by that of its axis too.
+            let node = quoted(own);
             let words = [
                 &program(),
                 "show",
@@ -62,7 +64,7 @@ impl Diagnose {
         wanted.then(|| format!("More days may still make it better; with another log:\n{fit}"))
     }
 
-    /// Where what is left is noise, only a truth with less of it can be told better.
+    /// Where what is left is white, a truth over another window may be told better.
     fn wider_windows(&self, tables: &Tables) -> Option<String> {
         let of = self.of.iter().map(|name| quoted(name));
         let of = of.flat_map(|name| ["--of".to_owned(), name]);
@@ -70,9 +72,8 @@ impl Diagnose {
         let more: Vec<&str> = more.iter().map(String::as_str).collect();
         let look = self.command("diagnose", &more);
         let wanted = !self.window && tables.all_white();
-        wanted.then(|| {
-            format!("What is left is white; how much noise other windows would have:\n{look}")
-        })
+        wanted
+            .then(|| format!("What is left is white; signal to noise over other windows:\n{look}"))
     }
 }
 

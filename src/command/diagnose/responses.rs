@@ -100,9 +100,9 @@ impl<'a> Node<'a> {
             rows.push(("all together".to_owned(), together.collect()));
         }
         format!(
-            "{}: how far a step of 1 {} moves what it predicts in the end, in {}\n{}",
+            "{}: how far a step of {} moves what it predicts in the end, in {}\n{}",
             self.name,
-            first.sensor_unit,
+            one(&first.sensor_unit),
             in_the_end(self.unit()),
             matrix("sensor", &self.columns, &rows)
         )
@@ -115,9 +115,9 @@ impl<'a> Node<'a> {
         };
         let rows = self.rows(sensors, |of| or_no_end(of.gain));
         format!(
-            "{}: how far a step of 1 {} moves what it predicts for good, in {}\n{}",
+            "{}: how far a step of {} moves what it predicts for good, in {}\n{}",
             self.name,
-            first.sensor_unit,
+            one(&first.sensor_unit),
             self.unit(),
             matrix("sensor", &self.columns, &rows)
         )
@@ -165,6 +165,14 @@ fn or_no_end(value: Option<f64>) -> String {
     value.map_or("no end".to_owned(), number)
 }
 
+/// One of a unit; of a number without a unit, which is in units of 1, the number alone.
+fn one(unit: &str) -> String {
+    match unit {
+        "1" => unit.to_owned(),
+        unit => format!("1 {unit}"),
+    }
+}
+
 /// The unit of a sum over minutes: that of a position, where the truth is its drift per minute.
 fn in_the_end(unit: &str) -> String {
     unit.strip_suffix("/min")
@@ -204,6 +212,22 @@ mod tests {
     fn a_drift_per_minute_ends_as_a_length() {
         assert_eq!(in_the_end("nm/min"), "nm");
         assert_eq!(in_the_end("W/m2"), "W/m2·min");
+    }
+
+    #[test]
+    fn a_step_of_a_number_without_a_unit_is_one() {
+        let share = Response {
+            sensor_unit: "1".to_owned(),
+            gain: Some(3.0),
+            ..answer("open", None, 60.0)
+        };
+        for (of, step) in [
+            (share, "a step of 1 moves"),
+            (answer("a", Some(2.0), 60.0), "a step of 1 K moves"),
+        ] {
+            let told = text(&[&instance("X", "nm/min", vec![of])]);
+            assert!(told.contains(step), "{told}");
+        }
     }
 
     #[test]

@@ -106,7 +106,7 @@ impl<'a> Tables<'a> {
         designs.any(|of| is_of(&main.prediction, &of.node))
     }
 
-    /// Whether all that is left of any truth may be noise.
+    /// Whether all that is left of any truth is white.
     pub(super) fn all_white(&self) -> bool {
         let all = self.diagnosis.residuals.iter();
         let mut shown = all.filter(|of| self.shows(&of.prediction)).peekable();
@@ -321,7 +321,8 @@ impl<'a> Tables<'a> {
         });
         let rows: Vec<_> = rows.collect();
         format!(
-            "signal to noise of the drift against its window, * as the graph has it\n{}",
+            "signal to noise of the drift against its window, * as the graph has it; noise\n\
+             is the standard error of its slopes, in which scatter and curvature both count\n{}",
             matrix("window", &columns, &rows)
         )
     }

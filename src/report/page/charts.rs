@@ -1,6 +1,6 @@
 //! Decides which pictures there are of an axis and of a correction; how one is drawn is decided by [`crate::chart`].
 
-use super::super::{Axis, Errors, Facts, Worth};
+use super::super::{Axis, Errors, Facts, Hours, Worth};
 use crate::chart::{Chart, LINES, Layer, Mark};
 
 /// Stretches that are quasi-stable or transient, run together where they follow each other.
@@ -25,13 +25,14 @@ fn bands(axis: &Axis) -> Vec<(f64, f64, &'static str)> {
     bands
 }
 
-fn over_time(axis: &Axis, title: &str) -> Chart<'static> {
+fn over_time(axis: &Axis, title: &str, hours: &Hours) -> Chart<'static> {
     Chart {
         title: format!("{title} of {}", axis.name),
-        x_label: "hours",
+        x_label: hours.label.clone(),
         y_label: format!("{} in {}", axis.name, axis.unit),
         height: 220.0,
         time: true,
+        zero: hours.from_s,
         ..Chart::default()
     }
 }
@@ -60,12 +61,12 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
             },
         ],
         bands: bands(axis),
-        ..over_time(axis, "Drift")
+        ..over_time(axis, "Drift", &Hours::of(&facts.course))
     }
 }
 
 /// What each voter says.
-pub(super) fn votes(axis: &Axis) -> Chart<'_> {
+pub(super) fn votes<'a>(axis: &'a Axis, hours: &Hours) -> Chart<'a> {
     let voters = axis.voters.iter().zip(LINES.iter().cycle());
     Chart {
         layers: voters
@@ -73,12 +74,12 @@ pub(super) fn votes(axis: &Axis) -> Chart<'_> {
                 Layer::line(&axis.truth.time_s, &voter.value, class, voter.node.as_str())
             })
             .collect(),
-        ..over_time(axis, "Predictions")
+        ..over_time(axis, "Predictions", hours)
     }
 }
 
 /// How much each voter counts; none where nothing is weighed.
-pub(super) fn weights(axis: &Axis) -> Option<Chart<'_>> {
+pub(super) fn weights<'a>(axis: &'a Axis, hours: &Hours) -> Option<Chart<'a>> {
     let first = axis.weights.first()?;
     let colour = |name: &str| {
         let nth = axis.voters.iter().position(|voter| voter.node == name);
@@ -100,13 +101,13 @@ pub(super) fn weights(axis: &Axis) -> Option<Chart<'_>> {
             })
             .collect(),
         y_range: Some((0.0, 1.0)),
-        ..over_time(axis, "Weights")
+        ..over_time(axis, "Weights", hours)
     })
 }
 
 fn small<'a>(
     title: String,
-    x_label: &'a str,
+    x_label: &str,
     y_label: String,
     x: &'a [f64],
     y: &'a [f64],
@@ -114,7 +115,7 @@ fn small<'a>(
 ) -> Chart<'a> {
     Chart {
         title,
-        x_label,
+        x_label: x_label.to_owned(),
         y_label,
         width: 460.0,
         height: 250.0,
@@ -165,11 +166,11 @@ pub(super) fn errors<'a>(axis: &'a Axis, errors: &'a Errors) -> [(&'static str, 
 }
 
 /// Optical loss without and with the correction; none without losses.
-pub(super) fn loss(worth: &Worth) -> Option<Chart<'_>> {
+pub(super) fn loss<'a>(worth: &'a Worth, hours: &Hours) -> Option<Chart<'a>> {
     let (without, with) = (&worth.loss_without, &worth.loss_with);
     (!with.value.is_empty()).then(|| Chart {
         title: "Optical loss over five minutes".into(),
-        x_label: "hours",
+        x_label: hours.label.clone(),
         y_label: "loss in dB".into(),
         height: 260.0,
         layers: vec![
@@ -179,6 +180,7 @@ pub(super) fn loss(worth: &Worth) -> Option<Chart<'_>> {
         limits: vec![worth.loss_limit],
         y_range: Some((0.0, 10.0 * worth.loss_limit)),
         time: true,
+        zero: hours.from_s,
         ..Chart::default()
     })
 }

@@ -7,7 +7,7 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use super::{Facts, Worth, figure};
+use super::{Facts, Hours, Worth, figure};
 use crate::chart::{COLOURS, Chart, Plot, STYLE, escaped};
 
 /// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
@@ -21,7 +21,7 @@ pub fn page(facts: &Facts) -> String {
     );
     verdicts(&mut html, facts);
     if let Some(worth) = &facts.worth {
-        worth_section(&mut html, worth);
+        worth_section(&mut html, worth, &Hours::of(&facts.course));
     }
     html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
     html.push_str(&tables::scores(&facts.scores));
@@ -65,9 +65,9 @@ fn verdicts(html: &mut String, facts: &Facts) {
     html.push_str("</ul>");
 }
 
-fn worth_section(html: &mut String, worth: &Worth) {
+fn worth_section(html: &mut String, worth: &Worth, hours: &Hours) {
     html.push_str("<h2>What the correction is worth</h2>");
-    if let Some(chart) = charts::loss(worth) {
+    if let Some(chart) = charts::loss(worth, hours) {
         let worst = |losses: &[f64]| figure(Some(losses.iter().copied().fold(0.0, f64::max)));
         let _ = write!(
             html,
@@ -80,8 +80,12 @@ fn worth_section(html: &mut String, worth: &Worth) {
     }
     if !worth.settling.is_empty() {
         html.push_str("<h3>Settle time and largest loss per change of the set point</h3>");
-        html.push_str(&tables::settling(worth));
-        html.push_str("<p class=\"muted\">From the change to the start of the first ten minutes that are stable throughout.</p>");
+        html.push_str(&tables::settling(worth, hours));
+        let _ = write!(
+            html,
+            "<p class=\"muted\">From the change, in {}, to the start of the first ten minutes that are stable throughout.</p>",
+            hours.label
+        );
     }
     if !worth.steps.is_empty() {
         html.push_str("<h3>Largest loss per temperature step</h3>");
@@ -133,10 +137,11 @@ fn votes(html: &mut String, facts: &Facts) {
         "<h2>Votes, features and errors</h2><p class=\"muted\">At a positive lag the drift follows the feature, so that the feature can tell of it. \
          Responses are the estimator's to one sensor alone: a step of one unit, and one unit for one minute, whose spikes are cut off.</p>",
     );
+    let hours = Hours::of(&facts.course);
     for (axis, errors) in facts.course.axes.iter().zip(&facts.errors) {
         let _ = write!(html, "<details><summary>{}</summary>", escaped(&axis.name));
-        wide(html, &charts::votes(axis));
-        if let Some(chart) = charts::weights(axis) {
+        wide(html, &charts::votes(axis, &hours));
+        if let Some(chart) = charts::weights(axis, &hours) {
             wide(html, &chart);
         }
         html.push_str("<div class=\"pair\">");
@@ -215,6 +220,7 @@ fn card(html: &mut String, facts: &Facts) {
 /// Every picture of the page as files of its own; those with nothing to draw are left out.
 #[must_use]
 pub fn plots(facts: &Facts) -> Vec<Plot> {
+    let hours = Hours::of(&facts.course);
     let mut plots = Vec::new();
     let mut add = |name: String, chart: &Chart<'_>| plots.extend(Plot::of(name, chart));
     for (axis, spread) in facts.course.axes.iter().zip(&facts.errors) {
@@ -223,8 +229,8 @@ pub fn plots(facts: &Facts) -> Vec<Plot> {
             format!("drift-{name}"),
             &charts::drift(axis, &errors, facts),
         );
-        add(format!("votes-{name}"), &charts::votes(axis));
-        if let Some(chart) = charts::weights(axis) {
+        add(format!("votes-{name}"), &charts::votes(axis, &hours));
+        if let Some(chart) = charts::weights(axis, &hours) {
             add(format!("weights-{name}"), &chart);
         }
         for curves in curves::of(axis, facts) {
@@ -234,7 +240,11 @@ pub fn plots(facts: &Facts) -> Vec<Plot> {
             add(format!("{kind}-{name}"), &chart);
         }
     }
-    if let Some(chart) = facts.worth.as_ref().and_then(charts::loss) {
+    if let Some(chart) = facts
+        .worth
+        .as_ref()
+        .and_then(|worth| charts::loss(worth, &hours))
+    {
         add("loss".to_owned(), &chart);
     }
     plots

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal_core::model::EstimatorCard;
 use athermal_core::score::Score;
 
-use super::super::{Published, SensorFacts, Worth, figure, spelled};
+use super::super::{Hours, Published, SensorFacts, Worth, figure, spelled};
 use crate::chart::escaped;
 
 fn table(header: &[&str], rows: &str) -> String {
@@ -47,7 +47,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
         "RMSE",
         "no model",
         "persistence",
-        "noise of truth",
+        "standard error of truth",
         "R²",
         "bias",
         "largest",
@@ -86,7 +86,7 @@ pub(super) fn published(tables: &[Published]) -> String {
     html
 }
 
-pub(super) fn settling(worth: &Worth) -> String {
+pub(super) fn settling(worth: &Worth, hours: &Hours) -> String {
     let unit = escaped(spelled(worth.set_point_unit.as_deref().unwrap_or_default()));
     let mut rows = String::new();
     for s in &worth.settling {
@@ -95,7 +95,7 @@ pub(super) fn settling(worth: &Worth) -> String {
         let _ = write!(
             rows,
             "<tr><td>{:.1} h</td><td>{:.1} {unit}</td><td>{:.1} {unit}</td><td>{}</td><td>{}</td><td>{} dB</td><td>{} dB</td></tr>",
-            s.at_s / 3600.0,
+            hours.at(s.at_s),
             s.from,
             s.to,
             minutes(s.without_min),

@@ -27,9 +27,7 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
     }
     let (root, errors) = DeTable::parse_recoverable(text);
     if errors.is_empty() {
-        let table = table(source, root.into_inner(), diagnostics);
-        let lost = Vec::new();
-        return Some(Parsed { table, lost });
+        return Some(Reader::new(source, diagnostics).parsed(root.into_inner(), Vec::new()));
     }
     let mut left = salvage(text);
     let told = left.as_mut().map(|left| std::mem::take(&mut left.errors));
@@ -45,9 +43,7 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
     }
     let left = left?;
     let (root, _) = DeTable::parse_recoverable(&left.text);
-    let table = table(source, root.into_inner(), diagnostics);
-    let lost = left.lost;
-    Some(Parsed { table, lost })
+    Some(Reader::new(source, diagnostics).parsed(root.into_inner(), left.lost))
 }
 
 fn at(source: SourceId, span: &std::ops::Range<usize>) -> Place {
@@ -55,70 +51,100 @@ fn at(source: SourceId, span: &std::ops::Range<usize>) -> Place {
     Place::new(source, byte(span.start), byte(span.end))
 }
 
-fn table(source: SourceId, table: DeTable<'_>, diagnostics: &mut Diagnostics) -> Table {
-    table
-        .into_iter()
-        .map(|(key, spanned)| {
-            let key_place = at(source, &key.span());
-            let mut value = value(source, spanned, diagnostics);
+/// Sections of which it does no harm to leave a key out: of the named things in them something may be missing.
+const NAMED: [&str; 3] = ["sets", "signals", "nodes"];
+
+/// What the parser gives, on its way into a tree.
+struct Reader<'a> {
+    source: SourceId,
+    diagnostics: &'a mut Diagnostics,
+    /// The keys down to what is read.
+    way: Vec<String>,
+    lost: Vec<Lost>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(source: SourceId, diagnostics: &'a mut Diagnostics) -> Self {
+        Self {
+            source,
+            diagnostics,
+            way: Vec::new(),
+            lost: Vec::new(),
+        }
+    }
+
+    fn parsed(mut self, root: DeTable<'_>, mut lost: Vec<Lost>) -> Parsed {
+        let table = self.table(root);
+        lost.append(&mut self.lost);
+        Parsed { table, lost }
+    }
+
+    fn table(&mut self, table: DeTable<'_>) -> Table {
+        let mut entries = Vec::with_capacity(table.len());
+        for (key, spanned) in table {
+            let key_place = at(self.source, &key.span());
+            let key = key.into_inner().into_owned();
+            self.way.push(key.clone());
+            let value = self.value(spanned);
+            self.way.pop();
+            let Some(mut value) = value else { continue };
             // A dotted key or an implied header has no text of its own.
             if value.place.start == value.place.end {
                 value.place = key_place;
             }
-            (
-                key.into_inner().into_owned(),
-                Entry {
-                    key: key_place,
-                    value,
-                },
-            )
-        })
-        .collect()
-}
+            let entry = Entry {
+                key: key_place,
+                value,
+            };
+            entries.push((key, entry));
+        }
+        entries.into_iter().collect()
+    }
 
-fn value(source: SourceId, spanned: Spanned<DeValue<'_>>, diagnostics: &mut Diagnostics) -> Value {
-    let place = at(source, &spanned.span());
-    let data = match spanned.into_inner() {
-        DeValue::String(text) => Data::Text(text.into_owned()),
-        DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
-            Ok(number) => Data::Integer(number),
-            Err(_) => {
-                diagnostics.report(
-                    place,
-                    DocumentProblem::NumberTooLarge {
-                        number: number.to_string(),
-                    },
-                );
-                Data::Integer(0)
+    /// A number that nothing can hold is told. Whoever reads it would take what stands for it for what was meant, so it is left out
+    /// where that can be known; none then.
+    fn too_large(&mut self, place: Place, number: String, instead: Data) -> Option<Data> {
+        let problem = DocumentProblem::NumberTooLarge { number };
+        self.diagnostics.report(place, problem);
+        let first = self.way.first().map_or("", String::as_str);
+        if self.way.len() < 3 || !NAMED.contains(&first) {
+            return Some(instead);
+        }
+        self.lost.push(Lost {
+            way: Some(self.way.clone()),
+            around: Vec::new(),
+        });
+        None
+    }
+
+    fn value(&mut self, spanned: Spanned<DeValue<'_>>) -> Option<Value> {
+        let place = at(self.source, &spanned.span());
+        let data = match spanned.into_inner() {
+            DeValue::String(text) => Data::Text(text.into_owned()),
+            DeValue::Integer(number) => {
+                match i64::from_str_radix(number.as_str(), number.radix()) {
+                    Ok(number) => Data::Integer(number),
+                    Err(_) => self.too_large(place, number.to_string(), Data::Integer(0))?,
+                }
             }
-        },
-        DeValue::Float(number) => match number.as_str().parse::<f64>() {
-            Ok(read) if read.is_infinite() && !number.as_str().contains("inf") => {
-                diagnostics.report(
-                    place,
-                    DocumentProblem::NumberTooLarge {
-                        number: number.to_string(),
-                    },
-                );
-                Data::Float(0.0)
-            }
-            Ok(read) => Data::Float(read),
-            Err(_) => {
+            DeValue::Float(number) => match number.as_str().parse::<f64>() {
+                Ok(read) if read.is_infinite() && !number.as_str().contains("inf") => {
+                    self.too_large(place, number.to_string(), Data::Float(0.0))?
+                }
+                Ok(read) => Data::Float(read),
                 // After a syntax error the parser leaves what it could not read; that error is reported already.
-                Data::Float(0.0)
+                Err(_) => Data::Float(0.0),
+            },
+            DeValue::Boolean(truth) => Data::Bool(truth),
+            DeValue::Datetime(time) => Data::Time(time.to_string()),
+            DeValue::Array(values) => {
+                let values = values.into_iter();
+                Data::List(values.filter_map(|element| self.value(element)).collect())
             }
-        },
-        DeValue::Boolean(truth) => Data::Bool(truth),
-        DeValue::Datetime(time) => Data::Time(time.to_string()),
-        DeValue::Array(values) => Data::List(
-            values
-                .into_iter()
-                .map(|element| value(source, element, diagnostics))
-                .collect(),
-        ),
-        DeValue::Table(entries) => Data::Table(table(source, entries, diagnostics)),
-    };
-    Value::new(place, data)
+            DeValue::Table(entries) => Data::Table(self.table(entries)),
+        };
+        Some(Value::new(place, data))
+    }
 }
 
 /// The first key with more parts than may be nested.

@@ -67,7 +67,8 @@ pub struct Score {
     /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so
     /// many steps back, on the same instants; none in a free run, which would repeat the first truth of each segment.
     pub baseline_persistence: Option<f64>,
-    /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines.
+    /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines: both the
+    /// scatter of the samples and the curvature of what they follow count, and a prediction may come below it.
     pub truth_noise: Option<f64>,
     /// Whether it is scored on instants of its own.
     pub own_instants: bool,

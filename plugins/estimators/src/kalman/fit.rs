@@ -148,6 +148,7 @@ impl KalmanTrainer {
                 "the rows do not determine all coefficients; with a `penalty` above 0 they need not",
             ));
         }
+        self.tell_thinned(report);
         tell_rows(&self.names, &scaled, truths.iter().copied(), report);
         self.tell(followed.model, report);
         let mut filter = followed.filter;
@@ -211,15 +212,28 @@ impl KalmanTrainer {
                 );
             }
         }
-        if self.stride > 1 {
-            report.figure("rows_apart", self.stride);
-            report.figure("rows_followed", self.kept.len());
-            report.notes.push(format!(
-                "one row in {} was followed, {} in all",
-                self.stride,
-                self.kept.len()
-            ));
+    }
+
+    /// All that is told of the fit is told of the rows that it goes through.
+    fn tell_thinned(&self, report: &mut TrainingReport) {
+        if self.stride == 1 {
+            return;
         }
+        report.figure("rows_apart", self.stride);
+        report.figure("rows_followed", self.kept.len());
+        let found = match &self.parameters.noises {
+            Some(_) => "coefficients",
+            None => "variances and coefficients",
+        };
+        let more = match self.most {
+            MOST_ROWS => "",
+            _ => "; a larger `--memory` lets it follow more",
+        };
+        report.notes.push(format!(
+            "{found} were found on {} rows, one in {} of all; RMSE, condition number and what is said of regressors are of these alone{more}",
+            self.kept.len(),
+            self.stride
+        ));
     }
 }
 

@@ -33,7 +33,8 @@ use crate::windows::{half, over, three, window_mistakes};
 pub struct Slope {
     /// The lengths of the windows, such as `["150s", "5min"]`, or a dynamic range of them.
     pub windows: Windows,
-    /// The unit of the slopes; without it, that of the input per minute. Of a temperature it is in kelvin: `mK/min`.
+    /// The unit of the slopes, such as `mK/min` of a temperature; without it, that of differences of the input per minute: of Cel
+    /// and K it is K/min, of \[degF\] \[degR\]/min.
     #[serde(default)]
     pub unit: Option<Unit>,
     /// The fewest samples in a window, 2 or more.
