@@ -14,6 +14,7 @@ mod mistakes;
 mod mistakes_in_tests;
 mod next;
 mod numbers;
+mod truths;
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -193,21 +194,6 @@ fn a_graph_that_needs_fitting_is_no_model() {
     athermal(&[&"run", &plain, &"--input", &data]).ended(0);
     athermal(&[&"evaluate", &plain, &"--data", &data]).ended(0);
     athermal(&[&"run", &model, &"--input", &data]).ended(0);
-}
-
-#[test]
-fn the_error_of_a_truth_is_told_as_what_it_is() {
-    let (_scratch, plain, data, _) = desk("truth-error");
-    let told = athermal(&[&"evaluate", &plain, &"--data", &data]).ended(0);
-    assert!(told.out.contains("standard error of the truth") && !told.out.contains("noise"));
-    for (command, part) in [
-        ("evaluate", "curvature"),
-        ("diagnose", "standard error of its"),
-    ] {
-        let help = athermal(&[&command, &"--help"]).ended(0).out;
-        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(help.contains(part), "{help}");
-    }
 }
 
 #[test]
