@@ -203,6 +203,12 @@ fn the_days_of_a_spreadsheet_are_days() {
     let graph = folder.graph("days.csv");
     assert!(graph.contains("3,000 rows over 25"), "{graph}");
     assert!(graph.contains("unit = \"d\""), "{graph}");
+    let mixed = text.replace("46083,", "46083.").replace("46084,", "46084.");
+    let (fine, told) = folder.init("mixed.csv", &mixed);
+    assert!(!fine);
+    let reason =
+        "but since line 2 the decimal mark is `.`; write all numbers of a file with one mark";
+    assert!(told.contains(reason), "{told}");
 }
 
 #[test]
@@ -228,12 +234,12 @@ fn a_sensor_with_a_cell_that_cannot_be_read_is_kept() {
     for row in [7, 2000] {
         let name = format!("{row}.csv");
         let logged = log_of(&grinding(3000, 30.0), |number, on| match number == row {
-            true => "#REF".to_owned(),
+            true => "#\0EF".to_owned(),
             false => digit(on),
         });
         let told = folder.started(&name, &logged);
         let reason = format!(
-            "1 cell of 3000 cannot be read `#REF` in line {}: mend",
+            "1 cell of 3000 cannot be read `#\u{fffd}EF` in line {}: mend",
             row + 2
         );
         assert!(told.contains("grinding: input"), "{told}");

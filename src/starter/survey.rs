@@ -28,8 +28,38 @@ pub struct Series {
     pub values: Vec<f64>,
     /// How many cells are neither numbers nor empty.
     pub unreadable: u64,
-    /// The first of them: its text, and its line.
-    pub first_unreadable: Option<(String, u64)>,
+    /// The first of them, for people.
+    pub first_unreadable: Option<Unreadable>,
+}
+
+/// A cell that cannot be read.
+#[derive(Debug)]
+pub struct Unreadable {
+    /// Its text and its line.
+    told: String,
+    /// For a number with another decimal mark than those before it, their mark and the line of the first.
+    mark: Option<(char, u64)>,
+}
+
+impl Unreadable {
+    fn of(error: &FileError) -> Option<Self> {
+        let (found, line, mark) = match error {
+            FileError::BadCell { found, place, .. } => (found, place.line, None),
+            FileError::MixedMarks {
+                found,
+                place,
+                mark,
+                since,
+                ..
+            } => (found, place.line, Some((*mark, *since))),
+            _ => return None,
+        };
+        let found = found.replace(char::is_control, "\u{fffd}");
+        Some(Self {
+            told: format!("`{found}` in line {line}"),
+            mark,
+        })
+    }
 }
 
 /// A series of fewer values says nothing.
@@ -113,13 +143,7 @@ impl Survey {
         }
         for (series, bad) in series.iter_mut().zip(&reader.report().bad_cells_of) {
             series.unreadable = bad.count;
-            series.first_unreadable = match &bad.first {
-                Some(
-                    FileError::BadCell { place, found, .. }
-                    | FileError::MixedMarks { place, found, .. },
-                ) => Some((found.clone(), place.line)),
-                _ => None,
-            };
+            series.first_unreadable = bad.first.as_ref().and_then(Unreadable::of);
         }
         let duration_s = first.map_or(0.0, |first| (last - first) as f64 / 1e9);
         if rows < 2 || duration_s <= 0.0 {
@@ -143,13 +167,22 @@ impl Survey {
             let example = series
                 .first_unreadable
                 .as_ref()
-                .map(|(text, line)| format!("`{text}` in line {line}"))
-                .unwrap_or_default();
+                .map_or("", |first| first.told.as_str());
+            let mark = series
+                .first_unreadable
+                .as_ref()
+                .and_then(|first| first.mark);
             if series.unreadable * TEXT_ONE_IN >= cells.max(1) {
                 let all = if values == 0 { "" } else { "in part " };
-                column.leave_out(format!(
-                    "it is {all}text, such as {example}; write numbers, 1 and 0 or true and false for a flag"
-                ));
+                column.leave_out(match mark {
+                    Some((mark, since)) => format!(
+                        "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write \
+                         all numbers of a file with one mark"
+                    ),
+                    None => format!(
+                        "it is {all}text, such as {example}; write numbers, 1 and 0 or true and false for a flag"
+                    ),
+                });
             } else if values < FEWEST_VALUES {
                 let plural = if values == 1 { "" } else { "s" };
                 column.leave_out(format!(
