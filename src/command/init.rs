@@ -73,7 +73,7 @@ impl Init {
         }
         write_aside(&self.output, &starter.text)?;
         if people {
-            terminal.note(self.next());
+            terminal.note(self.next(starter.lenient));
         } else {
             println!(
                 "{:#}",
@@ -83,11 +83,22 @@ impl Init {
         Ok(Answer::Fine)
     }
 
-    fn next(&self) -> String {
+    fn next(&self, lenient: bool) -> String {
         let program = program();
         let [graph, data] =
             [&self.output, &self.data].map(|path| quoted(&path.display().to_string()));
-        let fit = command(&[&program, "fit", &graph, "--data", &data, "-o model.json"]);
+        let lenient = if lenient { "--lenient" } else { "" };
+        let fit: [&str; 7] = [
+            &program,
+            "fit",
+            &graph,
+            "--data",
+            &data,
+            lenient,
+            "-o model.json",
+        ];
+        let fit: Vec<&str> = fit.into_iter().filter(|part| !part.is_empty()).collect();
+        let fit = command(&fit);
         let evaluate = command(&[&program, "evaluate model.json --data OTHER.csv"]);
         format!(
             "wrote {graph}; look it over, then fit it, and test it on another log:\n{fit}\n{evaluate}"

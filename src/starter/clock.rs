@@ -144,11 +144,17 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
             let bytes = cell.as_bytes();
             bytes.len() >= 10 && bytes[..4].iter().all(u8::is_ascii_digit) && bytes[4] == b'-'
         });
+        let why = if cells.iter().all(|cell| has_zone(cell)) {
+            "dates and times as in RFC 3339"
+        } else {
+            "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when the \
+             clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00"
+        };
         return dated.then(|| Clock {
             column,
             form: TimeForm::Rfc3339,
             declared: Some("unit = \"rfc3339\""),
-            why: "dates and times as in RFC 3339".to_owned(),
+            why: why.to_owned(),
         });
     };
     // A clock that steps back once is still a clock.
@@ -183,6 +189,20 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
             why: "a sample number; how long a sample takes the log does not say".to_owned(),
         });
     }
+    if counts_days(&numbers) {
+        return Some(Clock {
+            column,
+            form: TimeForm::Numbers {
+                ns_per_unit: 86_400_000_000_000,
+            },
+            declared: declared("d"),
+            why: format!(
+                "numbers from {} on that rise by parts of one, taken for days as a spreadsheet counts them; if they are \
+                 another unit, its name must say so: time_s, time_ms, time_min, time_h",
+                numbers[0].floor()
+            ),
+        });
+    }
     // Seconds since 1970 have ten digits before the point until 2286, milliseconds thirteen.
     let (name, ns_per_unit) = if numbers[0] >= 1e11 {
         ("ms", 1_000_000)
@@ -195,6 +215,25 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         declared: declared(name),
         why: format!("numbers, taken for {name} since its name does not say"),
     })
+}
+
+/// Whether a date and time says how far it is from UTC.
+fn has_zone(cell: &str) -> bool {
+    // A sign in the date itself is none of an offset.
+    let mut behind_date = cell.bytes().skip(10);
+    behind_date.any(|byte| matches!(byte, b'Z' | b'z' | b'+' | b'-'))
+}
+
+/// Whether numbers look like the days of a spreadsheet, of which 40,000 is in 2009 and 60,000 in 2064, at a rate of more
+/// than two a day.
+fn counts_days(numbers: &[f64]) -> bool {
+    let mut steps: Vec<f64> = numbers.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let usual = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+    let days = numbers
+        .iter()
+        .all(|number| (40_000.0..60_000.0).contains(number));
+    days && usual < 0.5
 }
 
 fn declared(unit: &str) -> Option<&'static str> {
@@ -248,9 +287,49 @@ mod tests {
                     ns_per_unit: 1_000_000,
                 },
             ),
+            (
+                "when;a\n46083,00000000;5\n46083,00034722;5\n46083,00069444;5\n",
+                "when",
+                TimeForm::Numbers {
+                    ns_per_unit: 86_400_000_000_000,
+                },
+            ),
+            (
+                "time_s,a\n46083.00,5\n46083.01,5\n46083.02,5\n",
+                "time_s",
+                TimeForm::SECONDS,
+            ),
+            (
+                "time,a\n46083,5\n46084,5\n46085,5\n",
+                "time",
+                TimeForm::SECONDS,
+            ),
         ] {
             let clock = found(text).unwrap();
             assert_eq!((clock.column.as_str(), clock.form), (column, form));
+        }
+    }
+
+    #[test]
+    fn what_was_assumed_of_a_time_is_told() {
+        let days = found("time,a\n46083.000,5\n46083.001,5\n").unwrap();
+        let told = days.remark();
+        assert!(told.contains("numbers from 46083 on"), "{told}");
+        assert!(
+            told.contains("taken for days") && told.contains("time_s"),
+            "{told}"
+        );
+        for (second, zoned) in [
+            ("2026-03-02 00:00:30", false),
+            ("2026-03-02T00:00:30Z", true),
+            ("2026-03-02T00:00:30-01:00", true),
+        ] {
+            let text = format!("time,a\n2026-03-02T00:00:00Z,1\n{second},2\n");
+            let text = std::io::Cursor::new(text);
+            let described = Description::of_read("log", text, None, 10).unwrap();
+            let told = find(&described, None).unwrap().remark();
+            assert_eq!(told.contains("without a zone"), !zoned, "{told}");
+            assert_eq!(told.contains("taken for UTC"), !zoned, "{told}");
         }
     }
 

@@ -30,8 +30,12 @@ pub struct Column {
     pub kind: Kind,
     /// Why it was taken so.
     why: String,
+    /// What else the user should know of it.
+    warning: Option<String>,
     unit_known: bool,
     guess: Guess,
+    /// What its name alone says.
+    named: Guess,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,10 +108,19 @@ impl Column {
             Kind::Unused => return Some(format!("{}: left out, {}", self.name, self.why)),
         };
         let unit = if self.unit_known { "" } else { " (a guess)" };
+        let warning = self.warning.iter().map(|warning| format!("; {warning}"));
         Some(format!(
-            "{}: {what}, in {}{unit}; {}",
-            self.name, self.unit, self.why
+            "{}: {what}, in {}{unit}; {}{}",
+            self.name,
+            self.unit,
+            self.why,
+            warning.collect::<String>()
         ))
+    }
+
+    /// Tells the user something of it.
+    pub fn warn(&mut self, what: String) {
+        self.warning = Some(what);
     }
 
     /// Whether its unit is stated by its name.
@@ -127,20 +140,10 @@ impl Column {
 /// The columns of a log other than its time, with a first guess of what each is.
 #[must_use]
 pub fn columns(described: &Description, time: &str) -> Vec<Column> {
-    let columns = described.columns.iter().enumerate();
+    let columns = described.columns.iter();
     columns
-        .filter(|(_, name)| *name != time)
-        .map(|(index, name)| {
-            let mut column = guess(name);
-            let cells = described.rows.iter().filter_map(|row| row.get(index));
-            let mut cells = cells
-                .map(|cell| cell.trim())
-                .filter(|cell| !cell.is_empty());
-            if cells.any(|cell| cell.replace(',', ".").parse::<f64>().is_err()) {
-                column.leave_out("it is text");
-            }
-            column
-        })
+        .filter(|name| *name != time)
+        .map(|name| guess(name))
         .collect()
 }
 
@@ -194,8 +197,10 @@ fn guess(name: &str) -> Column {
         unit: unit.map_or(fallback, |(_, unit)| unit).to_owned(),
         kind: Kind::Unused,
         why: why.to_owned(),
+        warning: None,
         unit_known: unit.is_some(),
         guess,
+        named: guess,
     }
 }
 
@@ -258,6 +263,30 @@ pub fn assign(columns: &mut [Column], told: &Told) -> Result<(), String> {
         of_kind.map(|column| column.name.as_str()).collect()
     };
     let causes = [names(Kind::Temperature), names(Kind::Drive)].concat();
+    let left_out = |named: &[Guess]| -> Option<String> {
+        let lost = columns
+            .iter()
+            .filter(|column| column.kind == Kind::Unused && named.contains(&column.named));
+        let lost: Vec<String> = lost.filter_map(Column::remark).collect();
+        (!lost.is_empty()).then(|| lost.join("; "))
+    };
+    let lost = match (names(Kind::Drifting).is_empty(), causes.is_empty()) {
+        (false, false) => None,
+        (true, false) => {
+            left_out(&[Guess::Position]).map(|lost| ("nothing is left that drifts", lost))
+        }
+        (false, true) => left_out(&[Guess::Temperature, Guess::Drive])
+            .map(|lost| ("nothing is left that could explain a drift", lost)),
+        (true, true) => left_out(&[Guess::Temperature, Guess::Position]).map(|lost| {
+            (
+                "neither what drifts nor what could explain it is left",
+                lost,
+            )
+        }),
+    };
+    if let Some((what, lost)) = lost {
+        return Err(format!("{what}: {lost}"));
+    }
     match (names(Kind::Drifting).is_empty(), causes.is_empty()) {
         (false, false) => Ok(()),
         (true, false) => Err(format!(

@@ -30,6 +30,8 @@ pub struct Starter {
     pub text: String,
     /// What was found and guessed, a line each.
     pub remarks: Vec<String>,
+    /// Whether the log has cells that only a lenient reader passes over.
+    pub lenient: bool,
 }
 
 /// Why there is no starter graph for a log.
@@ -66,5 +68,6 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     Ok(Starter {
         text: text::graph(path, &clock, &columns, &survey, &choice),
         remarks,
+        lenient: survey.needs_lenience(&columns),
     })
 }

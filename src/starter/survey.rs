@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use athermal::files::{ChannelColumn, Layout, Options, Reader, Row, TimeColumn};
+use athermal::files::{ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn};
 
 use super::NoStarter;
 use super::clock::Clock;
-use super::column::Column;
+use super::column::{Column, Kind};
 
 /// The values of a log, column by column.
 #[derive(Debug)]
@@ -26,7 +26,46 @@ pub struct Series {
     pub time_s: Vec<f64>,
     /// What.
     pub values: Vec<f64>,
+    /// How many cells are neither numbers nor empty.
+    pub unreadable: u64,
+    /// The first of them, for people.
+    pub first_unreadable: Option<Unreadable>,
 }
+
+/// A cell that cannot be read.
+#[derive(Debug)]
+pub struct Unreadable {
+    /// Its text and its line.
+    told: String,
+    /// For a number with another decimal mark than those before it, their mark and the line of the first.
+    mark: Option<(char, u64)>,
+}
+
+impl Unreadable {
+    fn of(error: &FileError) -> Option<Self> {
+        let (found, line, mark) = match error {
+            FileError::BadCell { found, place, .. } => (found, place.line, None),
+            FileError::MixedMarks {
+                found,
+                place,
+                mark,
+                since,
+                ..
+            } => (found, place.line, Some((*mark, *since))),
+            _ => return None,
+        };
+        let found = found.replace(char::is_control, "\u{fffd}");
+        Some(Self {
+            told: format!("`{found}` in line {line}"),
+            mark,
+        })
+    }
+}
+
+/// A series of fewer values says nothing.
+const FEWEST_VALUES: usize = 10;
+/// A column with one unreadable cell among so many is text, one with fewer a sensor with mistakes in its log.
+const TEXT_ONE_IN: u64 = 10;
 
 impl Series {
     /// The mean time between two values in s, interruptions not counted.
@@ -102,6 +141,10 @@ impl Survey {
                 }
             }
         }
+        for (series, bad) in series.iter_mut().zip(&reader.report().bad_cells_of) {
+            series.unreadable = bad.count;
+            series.first_unreadable = bad.first.as_ref().and_then(Unreadable::of);
+        }
         let duration_s = first.map_or(0.0, |first| (last - first) as f64 / 1e9);
         if rows < 2 || duration_s <= 0.0 {
             return Err(NoStarter::Unfit(
@@ -115,15 +158,54 @@ impl Survey {
         })
     }
 
-    /// Leaves out the columns that say nothing.
+    /// Leaves out the columns that say nothing, and tells of cells that cannot be read in those that stay.
     pub fn judge(&self, columns: &mut [Column]) {
         for (series, column) in self.series.iter().zip(columns) {
             let (low, high) = series.extremes();
-            if series.values.len() < 10 {
-                column.leave_out(format!("it has {} values", series.values.len()));
+            let values = series.values.len();
+            let cells = values as u64 + series.unreadable;
+            let example = series
+                .first_unreadable
+                .as_ref()
+                .map_or("", |first| first.told.as_str());
+            let mark = series
+                .first_unreadable
+                .as_ref()
+                .and_then(|first| first.mark);
+            if series.unreadable * TEXT_ONE_IN >= cells.max(1) {
+                let all = if values == 0 { "" } else { "in part " };
+                column.leave_out(match mark {
+                    Some((mark, since)) => format!(
+                        "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write \
+                         all numbers of a file with one mark"
+                    ),
+                    None => format!(
+                        "it is {all}text, such as {example}; write numbers, 1 and 0 or true and false for a flag"
+                    ),
+                });
+            } else if values < FEWEST_VALUES {
+                let plural = if values == 1 { "" } else { "s" };
+                column.leave_out(format!(
+                    "it has {values} value{plural}, and at least {FEWEST_VALUES} are needed"
+                ));
             } else if low == high {
                 column.leave_out(format!("it is {low} throughout"));
+            } else if series.unreadable > 0 {
+                let (many, the_first) = match series.unreadable {
+                    1 => ("1 cell".to_owned(), ""),
+                    more => (format!("{more} cells"), ", the first"),
+                };
+                column.warn(format!(
+                    "{many} of {cells} cannot be read{the_first} {example}: mend the log, or read it with --lenient"
+                ));
             }
         }
+    }
+
+    /// Whether a column that is used has cells that only a lenient reader passes over.
+    #[must_use]
+    pub fn needs_lenience(&self, columns: &[Column]) -> bool {
+        let mut pairs = self.series.iter().zip(columns);
+        pairs.any(|(series, column)| column.kind != Kind::Unused && series.unreadable > 0)
     }
 }

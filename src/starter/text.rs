@@ -86,6 +86,27 @@ impl Writer<'_> {
         self.axes().len() > 1
     }
 
+    /// Whether the values of a signal are too far apart for slopes over the drift window.
+    fn is_rare(&self, group: &Group) -> bool {
+        let mut columns = group.columns.iter();
+        columns.any(|index| self.choice.rare.contains(index))
+    }
+
+    /// What may explain the drift by how it changes.
+    fn sloping(&self) -> impl Iterator<Item = &Group> {
+        let causes = self.temperatures.iter().chain(&self.drives);
+        causes.filter(|group| !self.is_rare(group))
+    }
+
+    /// What may explain the drift by the value that it has.
+    fn standing(&self) -> impl Iterator<Item = &Group> {
+        // What a heater does follows from how strong it is and how warm it has become, not only from how they change.
+        let all = !self.drives.is_empty() && self.temperatures.is_empty();
+        let drives = self.drives.iter();
+        let drives = drives.filter(move |group| all || self.is_rare(group));
+        drives.chain(self.drifting.iter().filter(move |_| all))
+    }
+
     fn sets(&self, text: &mut String) {
         if self.many() {
             let axes: Vec<String> = self.axes().iter().map(|axis| toml_string(axis)).collect();
@@ -169,7 +190,11 @@ impl Writer<'_> {
                 "{}",
                 beside(
                     &format!("max_age = \"{}\"", self.clock.length(self.max_age(group))),
-                    "how long a value counts: a few intervals"
+                    if self.is_rare(group) {
+                        "how long a value counts: its values are rare, so as long as the longest gap"
+                    } else {
+                        "how long a value counts: a few intervals"
+                    }
                 )
             );
             let _ = writeln!(
@@ -184,14 +209,20 @@ impl Writer<'_> {
         }
     }
 
-    /// Long enough for the usual gaps between values: three times what nine in ten do not exceed.
+    /// Long enough for the usual gaps between values: three times what nine in ten do not exceed; of rare values, which may
+    /// be written only when they change, for all gaps.
     fn max_age(&self, group: &Group) -> f64 {
         let members = group
             .columns
             .iter()
             .map(|&index| &self.survey.series[index]);
-        let gaps = members.filter_map(|series| series.gap(0.9));
-        let age = 3.0 * gaps.fold(0.0, f64::max);
+        let (share, times) = if self.is_rare(group) {
+            (1.0, 1.0)
+        } else {
+            (0.9, 3.0)
+        };
+        let gaps = members.filter_map(|series| series.gap(share));
+        let age = times * gaps.fold(0.0, f64::max);
         // To whole seconds, or where that is too coarse to whole milliseconds.
         let step = if age > 2.0 { 1.0 } else { 1e-3 };
         step * (age / step).ceil()
@@ -223,6 +254,9 @@ impl Writer<'_> {
                 told.join("  ")
             );
         }
+        if let Some(bound) = &self.choice.bound {
+            let _ = writeln!(text, "# ({})", bound.told(self.clock));
+        }
         let _ = writeln!(
             text,
             "{}\n\
@@ -234,8 +268,7 @@ impl Writer<'_> {
             names(&self.drifting),
             toml_string(&self.drift_unit()),
         );
-        let causes: Vec<&Group> = self.temperatures.iter().chain(&self.drives).collect();
-        for (number, group) in causes.iter().enumerate() {
+        for (number, group) in self.sloping().enumerate() {
             let why = if number == 0 {
                 "short windows see the fast part of the drift, long ones the slow"
             } else {
@@ -299,14 +332,9 @@ impl Writer<'_> {
         } else {
             ("", *self.axes().first().unwrap_or(&"*"))
         };
-        let causes = self.temperatures.iter().chain(&self.drives);
-        let mut features: Vec<String> =
-            causes.map(|group| toml_string(&gradients(group))).collect();
-        if !self.drives.is_empty() && self.temperatures.is_empty() {
-            // What a heater does follows from how strong it is and how warm it has become, not only from how they change.
-            let levels = self.drives.iter().chain(&self.drifting);
-            features.extend(levels.map(|group| toml_string(&group.signal)));
-        }
+        let changes = self.sloping().map(|group| toml_string(&gradients(group)));
+        let levels = self.standing().map(|group| toml_string(&group.signal));
+        let features: Vec<String> = changes.chain(levels).collect();
         let features = list(&features);
         let lags = format!(
             "[\"{}\", \"{width}\", \"{}\"]",

@@ -1,7 +1,10 @@
 //! Decides over which windows drift and temperatures are looked at: long enough to rise above the noise, short enough to follow.
 //!
 //! Of the widths of [`athermal::diagnosis::window`] the narrowest is chosen at which the drift stands [`ENOUGH`] times above its
-//! noise on half of the channels, or where none does, the one at which it stands highest.
+//! noise on half of the channels, or where none does, the one at which it stands highest. The rates of what drifts and of the
+//! temperatures bound the search; an input that is logged too rarely for slopes over that window is not one that bounds it.
+
+use std::collections::BTreeSet;
 
 use athermal::diagnosis::window::{Drift, FEWEST_SAMPLES, WINDOWS_IN_RECORDING, nice_widths};
 
@@ -34,6 +37,31 @@ pub struct Choice {
     pub extreme: Vec<f64>,
     /// Whether the drift rises above its standard error.
     pub enough: bool,
+    /// Inputs with values too far apart for slopes over the drift window, by number: their last value stands for them.
+    pub rare: BTreeSet<usize>,
+    /// The temperature whose rate kept narrower windows than the chosen one from being tried.
+    pub bound: Option<Bound>,
+}
+
+/// A temperature that bounds how narrow a drift window may be.
+#[derive(Debug)]
+pub struct Bound {
+    /// Its column.
+    pub column: String,
+    /// The time between two of its values in s, which nine of ten do not exceed.
+    pub gap_s: f64,
+}
+
+impl Bound {
+    /// Why narrower windows were not tried, for people.
+    #[must_use]
+    pub fn told(&self, clock: &Clock) -> String {
+        format!(
+            "narrower ones were not tried: {} has a value every {}, and its slope takes {FEWEST_OF_FEATURE}",
+            self.column,
+            clock.about(self.gap_s)
+        )
+    }
 }
 
 /// Roots of tan x = x over π: the windows whose spectrum shares zeros with that of a drift, per drift window.
@@ -53,15 +81,15 @@ impl Choice {
                 .collect()
         };
         let drifting = of_kind(|kind| kind == Kind::Drifting);
-        let causes = of_kind(|kind| matches!(kind, Kind::Temperature | Kind::Drive));
+        let temperatures = of_kind(|kind| kind == Kind::Temperature);
         let slowest = |series: &[&Series], share| {
             let gaps = series.iter().filter_map(|series| series.gap(share));
             gaps.fold(0.0, f64::max)
         };
         let intervals = drifting.iter().filter_map(|series| series.interval_s());
-        let narrowest = (FEWEST_SAMPLES * intervals.fold(0.0, f64::max))
-            .max(FEWEST_OF_FEATURE * slowest(&drifting, 0.9))
-            .max(FEWEST_OF_FEATURE * slowest(&causes, 0.9));
+        let of_drifting = (FEWEST_SAMPLES * intervals.fold(0.0, f64::max))
+            .max(FEWEST_OF_FEATURE * slowest(&drifting, 0.9));
+        let narrowest = of_drifting.max(FEWEST_OF_FEATURE * slowest(&temperatures, 0.9));
         let widest = survey.duration_s / WINDOWS_IN_RECORDING;
         let widths: Vec<f64> = nice_widths()
             .filter(|width| (narrowest..=widest).contains(width))
@@ -97,10 +125,28 @@ impl Choice {
             candidates.iter().max_by(by_ratio)
         };
         let drift_s = chosen.or_else(best).map_or(narrowest, |(width, _)| *width);
-        let shortest_s = (drift_s / 2.0)
-            .max(FEWEST_OF_FEATURE * slowest(&causes, 0.9))
-            .min(drift_s)
-            .ceil();
+        let pairs = || survey.series.iter().zip(columns).enumerate();
+        let needs = |series: &Series| FEWEST_OF_FEATURE * series.gap(0.9).unwrap_or(0.0);
+        let rare: BTreeSet<usize> = pairs()
+            .filter(|(_, (series, column))| column.kind == Kind::Drive && needs(series) > drift_s)
+            .map(|(index, _)| index)
+            .collect();
+        let causes: Vec<&Series> = pairs()
+            .filter(|(_, (_, column))| matches!(column.kind, Kind::Temperature | Kind::Drive))
+            .filter(|(index, _)| !rare.contains(index))
+            .map(|(_, (series, _))| series)
+            .collect();
+        let shortest_s = shortest(drift_s, FEWEST_OF_FEATURE * slowest(&causes, 0.9));
+        let untried = nice_widths().any(|width| (of_drifting..drift_s).contains(&width));
+        let slowest_temperature = pairs()
+            .filter(|(_, (_, column))| column.kind == Kind::Temperature)
+            .max_by(|(_, (a, _)), (_, (b, _))| needs(a).total_cmp(&needs(b)));
+        let bound = slowest_temperature
+            .filter(|_| enough && untried && widths.first() == Some(&drift_s))
+            .map(|(_, (series, column))| Bound {
+                column: column.name.clone(),
+                gap_s: series.gap(0.9).unwrap_or(0.0),
+            });
         let fitting = HARMONICS
             .iter()
             .filter(|harmonic| *harmonic * drift_s <= SHARE_OF_LOG * survey.duration_s);
@@ -117,6 +163,8 @@ impl Choice {
             extreme: drifts.iter().map(Drift::extreme).collect(),
             candidates,
             enough,
+            rare,
+            bound,
         })
     }
 
@@ -148,6 +196,13 @@ impl Choice {
             "drift window: {width}, {why} ({})",
             told.join(", ")
         )];
+        remarks.extend(self.bound.iter().map(|bound| bound.told(clock)));
+        for &index in &self.rare {
+            remarks.push(format!(
+                "{}: its values are too far apart for slopes over {width}, so its last value is taken as it stands",
+                columns[index].name
+            ));
+        }
         if !self.enough {
             remarks.push(
                 "the drift hardly rises above its standard error: expect little of any model"
@@ -155,5 +210,29 @@ impl Choice {
             );
         }
         remarks
+    }
+}
+
+/// The shortest window of what explains a drift over `drift_s`, at least what its rate needs: to whole seconds, or where
+/// the drift window is shorter than one, to whole milliseconds.
+fn shortest(drift_s: f64, needed_s: f64) -> f64 {
+    let step = if drift_s < 1.0 { 1e-3 } else { 1.0 };
+    let at_least = (drift_s / 2.0).max(needed_s);
+    (step * (at_least / step).ceil()).min(drift_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shortest_window_of_a_feature_is_never_above_that_of_the_drift() {
+        for width in nice_widths() {
+            for needed_s in [0.0, 0.0015, 0.3 * width, width] {
+                let shortest_s = shortest(width, needed_s);
+                assert!(shortest_s <= width, "{shortest_s} of {width}");
+                assert!(shortest_s >= 0.499 * width, "{shortest_s} of {width}");
+            }
+        }
     }
 }

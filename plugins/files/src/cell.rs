@@ -19,7 +19,8 @@ pub(crate) trait Cells {
     fn place(&self) -> Place;
 }
 
-/// The value of a cell, `NaN` for "no value" (empty, `NaN`, `null` in any case); `None` when it is neither.
+/// The value of a cell, `NaN` for "no value" (empty, `NaN`, `null` in any case), 1 for `true` and 0 for `false` (in any case);
+/// `None` when it is neither.
 ///
 /// Infinities stay: what they mean is the engine's to say.
 #[inline]
@@ -37,6 +38,12 @@ pub(crate) fn value(cell: &[u8], decimal_comma: bool) -> Option<f64> {
 fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
     if cell.is_empty() || cell.eq_ignore_ascii_case(b"null") {
         return Some(f64::NAN);
+    }
+    if cell.eq_ignore_ascii_case(b"true") {
+        return Some(1.0);
+    }
+    if cell.eq_ignore_ascii_case(b"false") {
+        return Some(0.0);
     }
     if decimal_comma && let Some(comma) = single_comma(cell) {
         let mut point = [0; COMMA_CELL];
@@ -125,8 +132,20 @@ mod tests {
     }
 
     #[test]
+    fn a_flag_is_one_or_zero() {
+        for text in ["true", "True", " TRUE ", "\"true\""] {
+            assert_eq!(value(text.as_bytes(), false), Some(1.0), "{text:?}");
+        }
+        for text in ["false", "False", " FALSE ", "\"false\""] {
+            assert_eq!(value(text.as_bytes(), true), Some(0.0), "{text:?}");
+        }
+    }
+
+    #[test]
     fn other_text_is_neither_number_nor_absence() {
-        for text in ["NA", "-", "off", "1,5", "1 2", "0x10", "21.5C"] {
+        for text in [
+            "NA", "-", "off", "yes", "no", "truer", "1,5", "1 2", "0x10", "21.5C",
+        ] {
             assert_eq!(value(text.as_bytes(), false), None, "{text:?}");
         }
     }

@@ -211,7 +211,7 @@ impl Cells for CsvRows {
     }
 
     fn decimal_comma(&self) -> bool {
-        self.delimiter == b';'
+        self.delimiter != b','
     }
 
     fn place(&self) -> Place {
@@ -291,9 +291,14 @@ mod tests {
     }
 
     #[test]
-    fn a_decimal_comma_is_read_where_a_semicolon_separates() {
-        assert_eq!(read("t;a;b\n0,5;1,5;-2,25e1\n"), "0.5 [1.5, -22.5]");
-        assert!(error("t\ta\tb\n0\t1,5\t2\n").contains("`1,5`"));
+    fn a_decimal_comma_is_read_where_something_else_than_a_comma_separates() {
+        for delimiter in [";", "\t", "|"] {
+            let text = "t;a;b\n0,5;1,5;-2,25e1\n".replace(';', delimiter);
+            assert_eq!(read(&text), "0.5 [1.5, -22.5]", "{delimiter:?}");
+            let mixed = "t;a;b\n0;1,5;2\n1;1.5;2\n".replace(';', delimiter);
+            assert!(error(&mixed).contains("with the decimal mark `,`"));
+        }
+        assert!(error("t,a,b\n0,\"1,5\",2\n").contains("`1,5`"));
     }
 
     #[test]

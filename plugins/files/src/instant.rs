@@ -23,19 +23,6 @@ impl TimeForm {
         }
     }
 
-    /// An instant as a cell gives it.
-    pub(crate) fn text(self, time_ns: i64) -> String {
-        match self {
-            Self::Numbers { ns_per_unit: unit } | Self::Samples { step_ns: unit } => {
-                // All nanoseconds of an epoch are more than a number of 64 bits can tell.
-                let (whole, rest) = (time_ns / unit, time_ns % unit);
-                (whole as f64 + rest as f64 / unit as f64).to_string()
-            }
-            Self::Rfc3339 => Timestamp::from_nanosecond(time_ns.into())
-                .map_or_else(|_| format!("{time_ns} ns"), |time| time.to_string()),
-        }
-    }
-
     /// What a cell should look like, for a message.
     pub(crate) fn expected(self) -> &'static str {
         match self {
@@ -65,31 +52,6 @@ mod tests {
 
     /// 2013-07-04T00:00:00Z: 15,890 days after 1970-01-01.
     const DAY: i64 = 15_890 * 86_400 * 1_000_000_000;
-
-    #[test]
-    fn an_instant_is_shown_as_it_stands_in_the_file() {
-        let cases = [
-            (TimeForm::SECONDS, "3041100"),
-            (TimeForm::SECONDS, "-0.5"),
-            (
-                TimeForm::Numbers {
-                    ns_per_unit: 1_000_000,
-                },
-                "1700000000250",
-            ),
-            (
-                TimeForm::Samples {
-                    step_ns: 80_000_000,
-                },
-                "7",
-            ),
-            (TimeForm::Rfc3339, "2013-07-04T00:00:00Z"),
-        ];
-        for (form, text) in cases {
-            let time_ns = form.read(text.as_bytes()).unwrap();
-            assert_eq!(form.text(time_ns), text);
-        }
-    }
 
     #[test]
     fn text_without_a_zone_is_utc() {

@@ -372,8 +372,16 @@ mod tests {
     }
 
     #[test]
+    fn a_flag_is_one_or_zero() {
+        assert_eq!(
+            read("{\"t\":0,\"a\":true,\"b\":\"False\"}\n"),
+            "0 [1.0, 0.0]"
+        );
+    }
+
+    #[test]
     fn a_value_that_is_no_number_is_an_error_with_line_and_key() {
-        for value in ["true", "[1]", "{}", "\"off\""] {
+        for value in ["[1]", "{}", "\"off\""] {
             let text = format!("{{\"t\":0,\"a\":1,\"b\":2}}\n{{\"t\":1,\"a\":{value}}}\n");
             let found = value.trim_matches('"');
             assert!(

@@ -1,7 +1,8 @@
 //! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
 
 use crate::cell::decimal_mark;
-use crate::{FileError, Place, TimeForm};
+use crate::error::excerpt;
+use crate::{FileError, Place};
 
 /// What a reader met on its way; complete once the reader has come to the end.
 #[derive(Debug, Clone, Default)]
@@ -12,6 +13,8 @@ pub struct Report {
     pub refused_time: Count,
     /// Cells taken as absent because they could not be read; only when reading leniently.
     pub bad_cells: Count,
+    /// The same for each channel of the layout; empty where there was none.
+    pub bad_cells_of: Vec<Count>,
     /// Rows left out because of their time cell, number of cells or syntax; only when reading leniently.
     pub refused_rows: Count,
     /// The last line, when it was cut off in the middle and left out.
@@ -46,6 +49,8 @@ pub(crate) struct Ledger {
     pub tell: Option<Tell>,
     lenient: bool,
     last_ns: Option<i64>,
+    /// The time cell of the row at that instant.
+    last_time: Vec<u8>,
     /// The decimal mark of the first number that has one, with its line.
     mark: Option<(u8, u64)>,
 }
@@ -57,24 +62,27 @@ impl Ledger {
             tell: None,
             lenient,
             last_ns: None,
+            last_time: Vec::new(),
             mark: None,
         }
     }
 
-    /// Whether the row at this instant can be used: strictly after the one before.
-    pub fn accepts(&mut self, time_ns: i64, form: TimeForm, place: impl FnOnce() -> Place) -> bool {
+    /// Whether the row at this instant, which its time cell gives, can be used: strictly after the one before.
+    pub fn accepts(&mut self, time_ns: i64, cell: &[u8], place: impl FnOnce() -> Place) -> bool {
         match self.last_ns {
             Some(previous_ns) if time_ns <= previous_ns => {
                 let error = || FileError::TimeNotAfter {
                     place: place(),
-                    time: form.text(time_ns),
-                    previous: form.text(previous_ns),
+                    time: excerpt(cell),
+                    previous: excerpt(&self.last_time),
                 };
                 self.report.refused_time.add(error, &mut self.tell);
                 false
             }
             _ => {
                 self.last_ns = Some(time_ns);
+                self.last_time.clear();
+                self.last_time.extend_from_slice(cell);
                 self.report.rows += 1;
                 true
             }
@@ -88,13 +96,21 @@ impl Ledger {
         (first.0 != mark).then_some(first)
     }
 
-    /// A cell that cannot be read.
+    /// A cell of a channel of the layout that cannot be read.
     #[cold]
-    pub fn bad_cell(&mut self, error: impl FnOnce() -> FileError) -> Result<(), FileError> {
+    pub fn bad_cell(
+        &mut self,
+        channel: usize,
+        error: impl Fn() -> FileError,
+    ) -> Result<(), FileError> {
         if !self.lenient {
             return Err(error());
         }
-        self.report.bad_cells.add(error, &mut self.tell);
+        let report = &mut self.report;
+        let channels = report.bad_cells_of.len().max(channel + 1);
+        report.bad_cells_of.resize_with(channels, Count::default);
+        report.bad_cells_of[channel].add(&error, &mut None);
+        report.bad_cells.add(error, &mut self.tell);
         Ok(())
     }
 

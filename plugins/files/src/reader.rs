@@ -124,7 +124,7 @@ fn next<C: Cells>(
 ) -> Result<bool, FileError> {
     while rows.advance(ledger)? {
         if let Some(time_ns) = read_time(rows, layout, ledger, &mut row.time_text)?
-            && ledger.accepts(time_ns, layout.time.form, || rows.place())
+            && ledger.accepts(time_ns, cell::trim(rows.time()), || rows.place())
         {
             row.time_ns = time_ns;
             read_values(rows, layout, ledger, &mut row.values)?;
@@ -187,12 +187,12 @@ fn read_values<C: Cells>(
                 if rows.decimal_comma()
                     && let Some(mark) = ledger.other_mark(cell, || rows.place().line) =>
             {
-                ledger.bad_cell(|| mixed(rows.place(), &channel.column, cell, mark))?;
+                ledger.bad_cell(index, || mixed(rows.place(), &channel.column, cell, mark))?;
                 f64::NAN
             }
             Some(value) => value,
             None => {
-                ledger.bad_cell(|| FileError::BadCell {
+                ledger.bad_cell(index, || FileError::BadCell {
                     place: rows.place(),
                     column: channel.column.clone(),
                     found: excerpt(cell::trim(cell)),
@@ -259,6 +259,29 @@ mod tests {
         assert_eq!(
             refused.first.as_ref().unwrap().to_string(),
             "f.csv:4: the time `10` is not after `10`; the row was left out"
+        );
+    }
+
+    #[test]
+    fn a_time_that_steps_back_is_told_as_the_file_has_it() {
+        let told = |text: &'static str, form| {
+            let mut reader =
+                Reader::from_read("f.csv", text.as_bytes(), layout(form), Options::default())
+                    .unwrap();
+            assert_eq!(rows(&mut reader).len(), 1);
+            let refused = &reader.report().refused_time;
+            refused.first.as_ref().unwrap().to_string()
+        };
+        assert_eq!(
+            told(
+                "t,a\n2026-03-02T08:30:00+01:00,1\n2026-03-02T07:29:30+01:00,1\n",
+                TimeForm::Rfc3339
+            ),
+            "f.csv:3: the time `2026-03-02T07:29:30+01:00` is not after `2026-03-02T08:30:00+01:00`; the row was left out"
+        );
+        assert_eq!(
+            told("t;a\n1,50;1\n 1,25 ;1\n", TimeForm::SECONDS),
+            "f.csv:3: the time `1,25` is not after `1,50`; the row was left out"
         );
     }
 
@@ -344,6 +367,9 @@ mod tests {
         assert!(
             matches!(&bad.first, Some(FileError::BadCell { place, found, .. }) if place.line == 3 && found == "NA")
         );
+        let of_channel = &reader.report().bad_cells_of[0];
+        assert_eq!(of_channel.count, 2);
+        assert!(of_channel.first.is_some());
     }
 
     /// Gives one line per call, and knows how many it gave.

@@ -1,0 +1,293 @@
+//! Starter graphs of logs as machines write them: fast, sparse, with flags, with mistakes.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_athermal");
+
+/// A fresh folder that is gone at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path =
+            std::env::temp_dir().join(format!("athermal-starter-{}-{name}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(PROGRAM);
+        command.args(arguments).current_dir(&self.0);
+        command.output().unwrap()
+    }
+
+    /// What `init` says of a log, its lines joined.
+    fn init(&self, name: &str, log: &str) -> (bool, String) {
+        let graph = format!("{name}.toml");
+        std::fs::write(self.0.join(name), log).unwrap();
+        let output = self.run(&["init", name, "-o", &graph]);
+        let told = String::from_utf8(output.stderr).unwrap();
+        let words: Vec<&str> = told.split_whitespace().collect();
+        (output.status.success(), words.join(" "))
+    }
+
+    /// What `init` says of a log whose graph it writes; the graph checks.
+    fn started(&self, name: &str, log: &str) -> String {
+        let (fine, told) = self.init(name, log);
+        assert!(fine, "{name}: {told}");
+        let checked = self.run(&["check", &format!("{name}.toml")]);
+        let said = String::from_utf8(checked.stderr).unwrap();
+        assert!(checked.status.success(), "{name}: {said}");
+        told
+    }
+
+    fn graph(&self, name: &str) -> String {
+        std::fs::read_to_string(self.0.join(format!("{name}.toml"))).unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Numbers between -1 and 1 that look random, the same ones every time.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005);
+        self.0 = self.0.wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+/// A sample of a machine that grinds now and then: instant in s, temperature in °C, whether it grinds, position in µm.
+type Sample = (f64, f64, bool, f64);
+
+/// A machine that grinds for 25 minutes of every 70, and warms by it with 40 minutes.
+fn grinding(samples: usize, interval_s: f64) -> Vec<Sample> {
+    let mut noise = Noise(1);
+    let mut warm = 0.0;
+    let sample = |number: usize| {
+        let time_s = number as f64 * interval_s;
+        let grinds = time_s % 4200.0 >= 2700.0;
+        warm += interval_s / 2400.0 * (f64::from(u8::from(grinds)) - warm);
+        let degc = 20.0 + 4.0 * warm + 0.01 * noise.next();
+        (time_s, degc, grinds, 12.0 * warm + 0.05 * noise.next())
+    };
+    (0..samples).map(sample).collect()
+}
+
+/// A log of it with flags as they are written by `flag`.
+fn log_of(samples: &[Sample], mut flag: impl FnMut(usize, bool) -> String) -> String {
+    let mut text = "time_s,plate_degC,grinding,Z_um\n".to_owned();
+    for (number, (time_s, degc, grinds, z)) in samples.iter().enumerate() {
+        let grinds = flag(number, *grinds);
+        let _ = writeln!(text, "{time_s},{degc:.4},{grinds},{z:.4}");
+    }
+    text
+}
+
+fn digit(on: bool) -> String {
+    u8::from(on).to_string()
+}
+
+#[test]
+fn a_flag_that_is_logged_on_change_does_not_widen_the_drift_window() {
+    let folder = Folder::new("on-change");
+    let samples = grinding(5000, 30.0);
+    let window = |told: &str| {
+        let (_, rest) = told.split_once("drift window: ").unwrap();
+        rest.split_once(" (").unwrap().0.to_owned()
+    };
+    let always = folder.started("always.csv", &log_of(&samples, |_, on| digit(on)));
+    let mut last = None;
+    let on_change = log_of(&samples, |_, on| match last.replace(on) == Some(on) {
+        true => String::new(),
+        false => digit(on),
+    });
+    let told = folder.started("change.csv", &on_change);
+    assert_eq!(window(&told), window(&always), "{told}");
+    assert!(
+        told.contains("grinding: its values are too far apart"),
+        "{told}"
+    );
+    let graph = folder.graph("change.csv");
+    assert!(
+        graph.contains("inputs.features = [\"gradients\", \"input\"]"),
+        "{graph}"
+    );
+    let fitted = folder.run(&[
+        "fit",
+        "change.csv.toml",
+        "--data",
+        "change.csv",
+        "-o",
+        "m.json",
+    ]);
+    let said = String::from_utf8(fitted.stderr).unwrap();
+    assert!(fitted.status.success(), "{said}");
+    let scored = folder.run(&[
+        "evaluate",
+        "m.json",
+        "--data",
+        "change.csv",
+        "--format",
+        "json",
+    ]);
+    let facts: serde_json::Value = serde_json::from_slice(&scored.stdout).unwrap();
+    let scores = facts["scores"].as_array().unwrap();
+    let thermal = scores.iter().find(|score| score["node"] == "thermal");
+    let thermal = thermal.unwrap();
+    let figure = |name: &str| thermal[name].as_f64().unwrap();
+    assert!(figure("rmse") < 0.5 * figure("baseline_zero"), "{thermal}");
+}
+
+#[test]
+fn a_temperature_that_bounds_the_drift_window_is_named() {
+    let folder = Folder::new("bound");
+    let samples = grinding(5000, 30.0);
+    let mut text = "time_s,plate_degC,Z_um\n".to_owned();
+    for (number, (time_s, degc, _, z)) in samples.iter().enumerate() {
+        let degc = match number % 60 {
+            0 => format!("{degc:.4}"),
+            _ => String::new(),
+        };
+        let _ = writeln!(text, "{time_s},{degc},{z:.4}");
+    }
+    let told = folder.started("slow.csv", &text);
+    let reason = "narrower ones were not tried: plate_degC has a value every 30 min";
+    assert!(told.contains(reason), "{told}");
+    assert!(folder.graph("slow.csv").contains(reason));
+}
+
+#[test]
+fn a_starter_graph_of_a_fast_log_checks() {
+    let folder = Folder::new("fast");
+    for period_ms in [0.1, 0.5, 2.0, 10.0, 50.0, 100.0] {
+        let mut noise = Noise(1);
+        let mut text = "time_ms,a_degC,Z_nm\n".to_owned();
+        for number in 0..5000 {
+            let phase = f64::from(number) / 800.0;
+            let (degc, z) = (20.0 + phase.sin(), 500.0 * phase.cos());
+            let time_ms = f64::from(number) * period_ms;
+            let _ = writeln!(
+                text,
+                "{time_ms:.1},{:.4},{:.3}",
+                degc + 0.001 * noise.next(),
+                z + noise.next()
+            );
+        }
+        folder.started(&format!("{period_ms}.csv"), &text);
+    }
+}
+
+#[test]
+fn the_days_of_a_spreadsheet_are_days() {
+    let folder = Folder::new("days");
+    let mut text = "time;plate_degC;Z_um\n".to_owned();
+    for (time_s, degc, _, z) in grinding(3000, 30.0) {
+        let days = 46083.0 + time_s / 86_400.0;
+        let row = format!("{days:.8};{degc:.4};{z:.4}");
+        let _ = writeln!(text, "{}", row.replace('.', ","));
+    }
+    let told = folder.started("days.csv", &text);
+    assert!(told.contains("taken for days"), "{told}");
+    let graph = folder.graph("days.csv");
+    assert!(graph.contains("3,000 rows over 25"), "{graph}");
+    assert!(graph.contains("unit = \"d\""), "{graph}");
+    let mixed = text.replace("46083,", "46083.").replace("46084,", "46084.");
+    let (fine, told) = folder.init("mixed.csv", &mixed);
+    assert!(!fine);
+    let reason =
+        "but since line 2 the decimal mark is `.`; write all numbers of a file with one mark";
+    assert!(told.contains(reason), "{told}");
+}
+
+#[test]
+fn a_flag_in_words_is_read_where_it_is_true_or_false_and_else_told_as_text() {
+    let folder = Folder::new("flags");
+    let samples = grinding(3000, 30.0);
+    let logged = log_of(&samples, |_, on| {
+        if on { "TRUE" } else { "False" }.to_owned()
+    });
+    let told = folder.started("words.csv", &logged);
+    assert!(told.contains("grinding: input"), "{told}");
+    let logged = log_of(&samples, |_, on| if on { "yes" } else { "no" }.to_owned());
+    let told = folder.started("yes.csv", &logged);
+    assert!(
+        told.contains("grinding: left out, it is text, such as `no` in line 2; write numbers"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_sensor_with_a_cell_that_cannot_be_read_is_kept() {
+    let folder = Folder::new("corrupt");
+    for row in [7, 2000] {
+        let name = format!("{row}.csv");
+        let logged = log_of(&grinding(3000, 30.0), |number, on| match number == row {
+            true => "#\0EF".to_owned(),
+            false => digit(on),
+        });
+        let told = folder.started(&name, &logged);
+        let reason = format!(
+            "1 cell of 3000 cannot be read `#\u{fffd}EF` in line {}: mend",
+            row + 2
+        );
+        assert!(told.contains("grinding: input"), "{told}");
+        assert!(told.contains(&reason), "{told}");
+        let graph = format!("{name}.toml");
+        assert!(
+            told.contains(&format!(
+                "fit {graph} --data {name} --lenient -o model.json"
+            )) || told.contains("--lenient \\"),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+fn columns_of_too_few_values_or_of_text_are_named_where_nothing_is_left() {
+    let folder = Folder::new("short");
+    let mut text = "time_s,plate_degC,Z_um,Y_mm\n".to_owned();
+    for (number, (time_s, degc, _, z)) in grinding(60, 30.0).iter().enumerate() {
+        let z = match number % 10 {
+            0 => format!("{z:.4},0.{number}5"),
+            _ => ",".to_owned(),
+        };
+        let _ = writeln!(text, "{time_s},{degc:.4},{z}");
+    }
+    let (fine, told) = folder.init("short.csv", &text);
+    assert!(!fine);
+    assert!(
+        told.contains(
+            "nothing is left that drifts: Z_um: left out, it has 6 values, and at least 10 are needed; Y_mm: left out"
+        ),
+        "{told}"
+    );
+    let logged = log_of(&grinding(300, 30.0), |_, on| digit(on)).replace("20.", "warm ");
+    let (fine, told) = folder.init("text.csv", &logged.replace(",1,", ",0,"));
+    assert!(!fine);
+    assert!(
+        told.contains("nothing is left that could explain a drift: plate_degC: left out, it is"),
+        "{told}"
+    );
+}
+
+#[test]
+fn decimal_commas_are_read_between_tabs() {
+    let folder = Folder::new("tabs");
+    let logged = log_of(&grinding(3000, 30.0), |_, on| digit(on));
+    let logged = logged.replace(',', "\t").replace('.', ",");
+    let told = folder.started("tabs.tsv", &logged);
+    assert!(told.contains("plate_degC: temperature"), "{told}");
+    assert!(told.contains("Z_um: drifts"), "{told}");
+}
