@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 /// The weighted sum of its inputs: `Σ w_i x_i`, such as the mean of two sensors or what one has more than another.
 ///
 /// It exists while all inputs do; each is held up to its maximum age. Of temperatures in Cel or \[degF\] the weights must add up
-/// to 1, which gives a temperature, or to 0, which gives a difference, in K of Cel and in \[degR\] of \[degF\]; other sums hang on where the scale has its zero.
+/// to 1, which gives a temperature, or to 0, which gives a difference, in K of Cel and in \[degR\] of \[degF\]; other sums hang
+/// on where the scale has its zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sum {

@@ -2,7 +2,8 @@
 //!
 //! This package decides what bytes mean: delimiters, quoting, numbers, instants, what "no value" looks like, and what is
 //! done with a line that cannot be used. A flag may stand as `true` or `false`, in any case, and is 1 or 0; where something else
-//! than a comma separates cells (`;`, tab, `|`), a number may have a decimal comma. It does not decide what a channel is for, its unit, or when a value is too old.
+//! than a comma separates cells (`;`, tab, `|`), a number may have a decimal comma. It does not decide what a channel is for, its
+//! unit, or when a value is too old.
 //!
 //! ```
 //! use athermal_files::{Layout, Options, Reader, Row, TimeForm};
