@@ -198,7 +198,7 @@ fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
     rows.push(rows[1].clone());
     assert_eq!(
         told_at_once(&rows, 1),
-        "warning: standard input:4: the time `0` is not after `10`; the row was left out; others like it are counted\n"
+        "warning: standard input:4: the time `0.0` is not after `10.0`; the row was left out; others like it are counted\n"
     );
 }
 

@@ -1,33 +1,27 @@
 //! Decides how filters of inputs stand at samples anywhere, from which follows how they may stand where nothing of before is
 //! known; not what samples tell of where they began.
 
-use faer::Mat;
 use serde::{Deserialize, Serialize};
 
 use super::residuals::{Counted, Segment};
 use super::starts::Start;
 use super::{Polynomials, Samples, Transfer};
-use crate::state_space::pseudo_inverse_above;
 
-/// Of inputs that tell nearly the same, what is less than this share of them is not gone by.
-const DISTINCT: f64 = 1e-8;
-
-/// Filters are taken to be at rest where what they give together is then off by no more than this, in mean squares of what the best
-/// guess is off by: where they begin shortly after a rest, they are nearer to it than anywhere.
-const AT_REST: f64 = 4.0;
+/// Filters are taken to be at rest unless they are then on average more than three times as far off as the best guess, in mean
+/// squares: many runs begin shortly after a rest, nearer to it than samples anywhere.
+const AT_REST: f64 = 9.0;
 
 /// Where the filter of an input begins where only the inputs are known.
 ///
-/// What filters gave until then is guessed from the inputs by the best linear predictor, by least squares through 0 over samples
+/// What a filter gave until then is guessed from its input by the best linear predictor, by least squares through 0 over samples
 /// anywhere.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Beginning {
-    /// The guess, in times of each input.
-    pub times: Vec<f64>,
-    /// What its error has in common with that of the sum of all filters, as a mean of products: what that sum is off by is
-    /// shared like this.
-    pub shared: f64,
+    /// The guess, in times of the input.
+    pub times: f64,
+    /// The mean square of how far off the guess is.
+    pub square: f64,
 }
 
 /// The mean square of how far from rest the filter of each value of a start is, over all samples but the first of each segment.
@@ -52,55 +46,35 @@ pub(super) fn beginnings(
     samples: &Samples,
     starts: &[Start],
 ) -> Vec<Beginning> {
-    let width = model.inputs.len();
-    let has_past = |nth: usize| !model.inputs[nth].f.is_empty();
-    // Of inputs, of filters with inputs, and of filters with the sum of all.
-    let mut own = Mat::<f64>::zeros(width, width);
-    let mut across = own.clone();
-    let mut with_sum = vec![0.0; width];
-    let gains: Vec<f64> = model.inputs.iter().map(Transfer::gain).collect();
-    let mut off_rest = 0.0;
+    let mut sums = vec![[0.0; 3]; model.inputs.len()];
     let count = anywhere(model, samples, starts, |before, inputs| {
-        let filters = || (0..width).filter(|&nth| has_past(nth));
-        let sum: f64 = filters().map(|nth| before[nth]).sum();
-        let rest: f64 = filters().map(|nth| gains[nth] * inputs[nth]).sum();
-        off_rest += (sum - rest).powi(2);
-        for i in 0..width {
-            with_sum[i] += before[i] * sum;
-            for j in 0..width {
-                own[(i, j)] += inputs[i] * inputs[j];
-                across[(i, j)] += before[i] * inputs[j];
-            }
+        for ([of_input, both, own], (before, input)) in
+            sums.iter_mut().zip(before.iter().zip(inputs))
+        {
+            *of_input += input * input;
+            *both += before * input;
+            *own += before * before;
         }
     });
-    let inverse = pseudo_inverse_above(&own, &own, DISTINCT).ok();
-    let guess = inverse.map(|inverse| &across * inverse);
-    let beginning = |nth: usize| {
-        let mut at_rest = vec![0.0; width];
-        at_rest[nth] = gains[nth];
-        let known = Beginning {
-            times: at_rest,
-            shared: 0.0,
-        };
-        let Some(guess) = guess.as_ref().filter(|_| has_past(nth)) else {
-            return known;
-        };
-        let of_sum = |input: usize| -> f64 {
-            let filters = (0..width).filter(|&nth| has_past(nth));
-            filters.map(|filter| guess[(filter, input)]).sum()
-        };
-        let explained = (0..width).map(|input| across[(nth, input)] * of_sum(input));
-        let shared = (with_sum[nth] - explained.sum::<f64>()) / count.max(1) as f64;
-        let times: Vec<f64> = (0..width).map(|input| guess[(nth, input)]).collect();
-        if shared.is_finite() && times.iter().all(|times| times.is_finite()) {
-            Beginning { times, shared }
-        } else {
-            known
+    let (mut off, mut off_rest) = (0.0, 0.0);
+    let mut beginning = |(of, &[of_input, both, own]): (&Transfer, &[f64; 3])| {
+        let gain = of.gain();
+        let times = both / of_input;
+        if of.f.is_empty() || !times.is_finite() {
+            let square = 0.0;
+            return Beginning {
+                times: gain,
+                square,
+            };
         }
+        let square = (own - times * both).max(0.0) / count.max(1) as f64;
+        off += square;
+        off_rest += square + (gain - times).powi(2) * of_input / count.max(1) as f64;
+        Beginning { times, square }
     };
-    let all: Vec<Beginning> = (0..width).map(beginning).collect();
-    let off: f64 = all.iter().map(|of| of.shared).sum();
-    if off_rest / count.max(1) as f64 > AT_REST * off {
+    let all: Vec<Beginning> = model.inputs.iter().zip(&sums).map(&mut beginning).collect();
+    // Written so that NaN is at rest.
+    if off_rest.is_finite() && off_rest > AT_REST * off {
         all
     } else {
         Vec::new()
@@ -176,9 +150,8 @@ mod tests {
         let own = of_input * (1.0 + both) / ((1.0 - both) * (1.0 - pole * pole));
         let square = own - times * times * of_input;
         let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 0.05;
-        assert!(near(filtered.times[0], times), "{filtered:?}, {times}");
-        assert!(filtered.times[1].abs() < 0.05, "{filtered:?}");
-        assert!(near(filtered.shared, square), "{filtered:?}, {square}");
-        assert_eq!((&known.times[..], known.shared), (&[0.0, 3.0][..], 0.0));
+        assert!(near(filtered.times, times), "{filtered:?}, {times}");
+        assert!(near(filtered.square, square), "{filtered:?}, {square}");
+        assert_eq!((known.times, known.square), (3.0, 0.0));
     }
 }

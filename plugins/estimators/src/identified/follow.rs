@@ -57,10 +57,8 @@ impl Predictor for Identified {
         let inputs = &self.model.inputs;
         mistakes.extend(Mistake::of_lengths(width, &[("inputs", inputs.len())]));
         if !self.beginnings.is_empty() {
-            let mut lengths = vec![("beginnings", self.beginnings.len())];
-            let times = self.beginnings.iter();
-            lengths.extend(times.map(|of| ("beginnings.times", of.times.len())));
-            mistakes.extend(Mistake::of_lengths(width, &lengths));
+            let beginnings = [("beginnings", self.beginnings.len())];
+            mistakes.extend(Mistake::of_lengths(width, &beginnings));
         }
         let delays = inputs
             .iter()
@@ -185,34 +183,32 @@ fn beginnings(of: &Identified) -> Vec<Beginning> {
     let filters = || inputs.iter().filter(|input| !input.f.is_empty());
     let squares: f64 = filters().map(|input| input.gain().powi(2)).sum();
     let each = squares / filters().count().max(1) as f64;
-    let at_rest = inputs.iter().enumerate().map(|(nth, input)| {
-        let mut times = vec![0.0; inputs.len()];
-        times[nth] = input.gain();
-        let shared = if input.f.is_empty() { 0.0 } else { each };
-        Beginning { times, shared }
+    let at_rest = inputs.iter().map(|input| Beginning {
+        times: input.gain(),
+        square: if input.f.is_empty() { 0.0 } else { each },
     });
     at_rest.collect()
 }
 
-/// The share of the filter of each input in what the first truth is off by: what its error has in common with that of the sum of
-/// all, beside the variance of the noise. Noise that is integrated has all, since it may be anywhere; where there is no model of
+/// The share of the filter of each input in what the first truth is off by: that of the square of how far off it may begin, beside
+/// the others and the variance of the noise. Noise that is integrated has all, since it may be anywhere; where there is no model of
 /// noise, filters have all.
 fn shares(of: &Identified, beginnings: &[Beginning]) -> Vec<f64> {
-    let shared = beginnings.iter().map(|beginning| beginning.shared);
+    let squares = beginnings.iter().map(|beginning| beginning.square);
     let noise = match of.deviations.last() {
         Some(deviation) if of.model.follows() => deviation.powi(2),
         _ => 0.0,
     };
-    let all = shared.clone().sum::<f64>() + noise;
-    let share = |shared: f64| {
-        let share = shared / all;
+    let all = squares.clone().sum::<f64>() + noise;
+    let share = |square: f64| {
+        let share = square / all;
         if of.model.differences == 0 && share.is_finite() {
             share
         } else {
             0.0
         }
     };
-    shared.map(share).collect()
+    squares.map(share).collect()
 }
 
 impl Known {
@@ -227,10 +223,7 @@ impl Known {
         let count = series.len() as i64;
         for (nth, followed) in series.iter_mut().enumerate() {
             let input = scaling.of(row);
-            let before = |nth: usize, _: &_| {
-                let times = beginnings[nth].times.iter().enumerate();
-                times.map(|(of, times)| times * input(of)).sum()
-            };
+            let before = |nth: usize, _: &_| beginnings[nth].times * input(nth);
             followed.stepper.begin(&input, before);
             followed.at = of - *step + part(*step, nth as i64, count);
             followed.told = 0;

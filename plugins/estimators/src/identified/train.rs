@@ -234,11 +234,8 @@ impl Identify for Asked {
         }
         fit.residual_sum_of_squares *= spread * spread;
         for beginning in &mut fit.beginnings {
-            beginning
-                .times
-                .iter_mut()
-                .for_each(|times| *times *= spread);
-            beginning.shared *= spread * spread;
+            beginning.times *= spread;
+            beginning.square *= spread * spread;
         }
         tell_pieces(samples, &fit.model, report);
         report.figure("converged", fit.converged);

@@ -87,12 +87,12 @@ fn a_run_begins_where_inputs_tell_that_filters_are_and_not_where_they_would_be_a
     // A model of before says nothing of that: its gain is 10.
     assert!((first(&model) - 20.0).abs() < 1e-9);
     model.beginnings = vec![Beginning {
-        times: vec![0.3],
-        shared: 1.0,
+        times: 0.3,
+        square: 1.0,
     }];
     assert_eq!(model.mistakes(), []);
     assert!((first(&model) - (0.1 + 0.99 * 0.3) * 2.0).abs() < 1e-9);
-    model.beginnings.push(model.beginnings[0].clone());
+    model.beginnings.push(model.beginnings[0]);
     assert_eq!(model.mistakes().len(), 1);
 }
 
