@@ -245,12 +245,9 @@ fn a_sensor_with_a_cell_that_cannot_be_read_is_kept() {
         assert!(told.contains("grinding: input"), "{told}");
         assert!(told.contains(&reason), "{told}");
         let graph = format!("{name}.toml");
-        assert!(
-            told.contains(&format!(
-                "fit {graph} --data {name} --lenient -o model.json"
-            )) || told.contains("--lenient \\"),
-            "{told}"
-        );
+        // How a command is broken into lines depends on where the program is.
+        let next = format!("fit {graph} --data {name} --lenient -o model.json");
+        assert!(told.replace("\\ ", "").contains(&next), "{told}");
     }
 }
 
