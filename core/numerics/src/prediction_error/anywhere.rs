@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn what_a_filter_gave_before_is_guessed_from_its_input_as_their_covariance_says() {
-        let (persistence, pole) = (0.5, 0.9);
+        let (persistence, pole) = (0.5, 0.95);
         let inputs = InputOrders {
             nb: 1,
             nk: 0,
