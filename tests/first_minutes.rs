@@ -2,33 +2,18 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod workbench;
+
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use athermal::Model;
 use athermal::core::fit::{FitOptions, fit};
 use athermal::core::machine::{Setup, Simulated, machine, machines};
 use athermal::core::score::{ScoreOptions, score};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_athermal");
-
-/// A fresh folder that is gone at the end.
-struct Folder(PathBuf);
+use workbench::Folder;
 
 impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("athermal-{}-{name}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(PROGRAM);
-        command.args(arguments).current_dir(&self.0);
-        command.output().unwrap()
-    }
-
     /// Runs and expects success; gives standard output and standard error.
     fn fine(&self, arguments: &[&str]) -> (String, String) {
         let output = self.run(arguments);
@@ -45,12 +30,6 @@ impl Folder {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}\n{told}");
         assert_eq!(told.trim_end().lines().count(), 1, "{told}");
         told
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 

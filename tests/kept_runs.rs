@@ -160,3 +160,21 @@ fn a_state_that_cannot_be_written_is_told_before_the_first_row() {
     run.tells(&["cannot write", "nowhere"]);
     assert_eq!(run.out, "");
 }
+
+#[test]
+fn a_state_that_is_the_output_is_refused_be_it_there_or_not() {
+    let (scratch, model, data, _) = desk("output");
+    let both = scratch.path("both.csv");
+    let run = || {
+        athermal(&[
+            &"run", &model, &"-i", &data, &"-o", &both, &"--state", &both,
+        ])
+    };
+    run()
+        .ended(2)
+        .tells(&["--state", "the same file as", "name another file"]);
+    assert!(!both.exists());
+    std::fs::write(&both, "kept").unwrap();
+    run().ended(2);
+    assert_eq!(std::fs::read_to_string(&both).unwrap(), "kept");
+}

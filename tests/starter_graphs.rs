@@ -2,30 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod workbench;
+
 use std::fmt::Write as _;
-use std::path::PathBuf;
-use std::process::{Command, Output};
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_athermal");
-
-/// A fresh folder that is gone at the end.
-struct Folder(PathBuf);
+use workbench::Folder;
 
 impl Folder {
-    fn new(name: &str) -> Self {
-        let path =
-            std::env::temp_dir().join(format!("athermal-starter-{}-{name}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(PROGRAM);
-        command.args(arguments).current_dir(&self.0);
-        command.output().unwrap()
-    }
-
     /// What `init` says of a log, its lines joined.
     fn init(&self, name: &str, log: &str) -> (bool, String) {
         let graph = format!("{name}.toml");
@@ -48,12 +31,6 @@ impl Folder {
 
     fn graph(&self, name: &str) -> String {
         std::fs::read_to_string(self.0.join(format!("{name}.toml"))).unwrap()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 

@@ -6,27 +6,27 @@ use std::path::{Path, PathBuf};
 
 use crate::terminal::Failure;
 
-/// Refuses an output that is one of the files that are read: what stands in it would be lost.
+/// Refuses an output that is another file of the same command, such as one that is read: what stands in it would be lost.
 ///
 /// # Errors
 /// When it is.
 pub fn check_apart<'a>(
     option: &str,
     output: &Path,
-    inputs: impl IntoIterator<Item = &'a Path>,
+    others: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Failure> {
-    let Ok(known) = fs::canonicalize(output) else {
-        // What is not there yet, or is standard output, is read by nobody.
-        return Ok(());
-    };
-    let is_same = |input: &&Path| fs::canonicalize(input).is_ok_and(|input| input == known);
-    match inputs.into_iter().find(is_same) {
-        Some(input) if known.is_file() => Err(Failure::Request(format!(
-            "{option} {}: this is the file that is read as {}, and what stands in it would be lost; name another file",
+    // What is not there yet is known by its name alone; what is there and is no file loses nothing.
+    let known = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let is_file =
+        |path: &Path| fs::metadata(path).map_or(path.as_os_str() != "-", |of| of.is_file());
+    let is_same = |other: &&Path| is_file(output) && known(other) == known(output);
+    match others.into_iter().find(is_same) {
+        Some(other) => Err(Failure::Request(format!(
+            "{option} {}: this is the same file as {}, and what stands in it would be lost; name another file",
             output.display(),
-            input.display()
+            other.display()
         ))),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
@@ -36,14 +36,26 @@ pub fn check_apart<'a>(
 /// # Errors
 /// When it cannot be written.
 pub fn write_aside(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
-    let content = content.as_ref();
-    let failed = |error| Failure::Outside(format!("cannot write {}: {error}", path.display()));
+    let failed = |error| Failure::Outside(not_written(path, &error));
+    whole_aside(path, content.as_ref()).map_err(failed)
+}
+
+/// Why a file is not written.
+pub fn not_written(path: &Path, error: &io::Error) -> String {
+    format!("cannot write {}: {error}", path.display())
+}
+
+/// The same for who tells of an error otherwise.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn whole_aside(path: &Path, content: &[u8]) -> io::Result<()> {
     let synced = |to: &Path| {
         let mut file = fs::File::create(to)?;
         file.write_all(content)?;
         file.sync_all()
     };
-    put(path, "part", synced, |to| fs::write(to, content)).map_err(failed)
+    put(path, "part", synced, |to| fs::write(to, content))
 }
 
 /// The same with a copy of another file, which keeps its rights.

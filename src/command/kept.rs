@@ -7,8 +7,8 @@ use athermal::core::live::{Samples, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::{Engine, Instant};
 
-use super::aside::write_aside;
-use crate::terminal::{Failure, Terminal};
+use super::aside::{not_written, whole_aside};
+use crate::terminal::{Failure, Terminal, outside};
 
 /// How long a run that is killed may have learned in vain.
 const KEEP_EVERY: Duration = Duration::from_secs(60);
@@ -60,7 +60,7 @@ impl Kept {
             }
         }
         // Better now than after the first minute.
-        kept.write(engine)?;
+        kept.write(engine).map_err(outside)?;
         Ok(kept)
     }
 
@@ -82,22 +82,19 @@ impl Kept {
         if self.path.is_none() || self.written.elapsed() < KEEP_EVERY {
             return Ok(());
         }
-        self.write(engine).map_err(|failure| match failure {
-            Failure::Outside(text) => text.into(),
-            _ => "the state cannot be written".into(),
-        })
+        self.write(engine)
     }
 
     /// Keeps what is known.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write(&mut self, engine: &Engine) -> Result<(), Failure> {
+    pub fn write(&mut self, engine: &Engine) -> Result<(), SinkError> {
         let Some(path) = &self.path else {
             return Ok(());
         };
         self.written = Clock::now();
-        write_aside(path, engine.snapshot())
+        whole_aside(path, &engine.snapshot()).map_err(|error| not_written(path, &error).into())
     }
 }
 

@@ -105,7 +105,7 @@ impl Run {
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan));
         let mut keep = |engine: &Engine| kept.after_tick(engine);
         live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
-        kept.write(&engine)?;
+        kept.write(&engine).map_err(outside)?;
         self.tell(terminal, &engine, &reader);
         Ok(Answer::Fine)
     }

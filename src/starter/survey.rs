@@ -7,6 +7,7 @@ use athermal::files::{ChannelColumn, FileError, Layout, Options, Reader, Row, Ti
 use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
+use crate::figures::counted;
 
 /// The values of a log, column by column.
 #[derive(Debug)]
@@ -184,9 +185,9 @@ impl Survey {
                     ),
                 });
             } else if values < FEWEST_VALUES {
-                let plural = if values == 1 { "" } else { "s" };
                 column.leave_out(format!(
-                    "it has {values} value{plural}, and at least {FEWEST_VALUES} are needed"
+                    "it has {}, and at least {FEWEST_VALUES} are needed",
+                    counted(values as u64, "value")
                 ));
             } else if low == high {
                 column.leave_out(format!("it is {low} throughout"));

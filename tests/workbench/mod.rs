@@ -9,7 +9,7 @@ mod regression;
 mod simulated;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
-pub use program::{Finished, Scratch, athermal, athermal_fed, athermal_on};
+pub use program::{Finished, Folder, Scratch, athermal, athermal_fed, athermal_on};
 pub use regression::{coefficients, fitted, numbers, regression};
 pub use simulated::simulated;
 

@@ -346,7 +346,7 @@ impl Trainer for NarxTrainer {
         let (found_from, rows) = (expanding.found_from, expanding.gram.count());
         let mut report = self.report(&found);
         report.in_sample_rmse = Some(mean_square.sqrt());
-        tell_first_rows(found_from, rows as usize, &mut report);
+        tell_first_rows(found_from, rows, &mut report);
         Ok(Trained {
             predictor: Box::new(predictor),
             report,

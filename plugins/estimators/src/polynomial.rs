@@ -141,7 +141,6 @@ struct PolynomialTrainer {
 struct Expanding {
     /// How many rows centres and scales were found from.
     found_from: usize,
-    rows: usize,
     centres: Vec<f64>,
     scales: Vec<f64>,
     trainer: LinearTrainer,
@@ -151,7 +150,6 @@ struct Expanding {
 
 impl Expanding {
     fn row(&mut self, terms: &[Term], features: &[f64], truth: f64) {
-        self.rows += 1;
         self.z.clear();
         let scaled = features.iter().zip(&self.centres).zip(&self.scales);
         self.z
@@ -182,7 +180,6 @@ impl PolynomialTrainer {
         let standard = self.running.standardization();
         let mut expanding = Expanding {
             found_from: self.waiting.len() / (features.len() + 1),
-            rows: 0,
             centres: standard.means,
             scales: standard.scales,
             trainer: LinearTrainer::new(&setup, self.solver, Some(self.selection)),
@@ -230,7 +227,7 @@ impl Trainer for PolynomialTrainer {
         };
         let mut report = TrainingReport::default();
         let linear = expanding.trainer.solve(&mut report)?;
-        tell_first_rows(expanding.found_from, expanding.rows, &mut report);
+        tell_first_rows(expanding.found_from, expanding.trainer.rows(), &mut report);
         let features = &self.setup.regressors;
         let mut predictor = PolynomialPredictor {
             regressors: Vec::new(),

@@ -124,6 +124,11 @@ impl LinearTrainer {
         Some(self.range.as_ref()?.of(columns))
     }
 
+    /// How many rows it was given.
+    pub(crate) fn rows(&self) -> u64 {
+        self.blocks.count()
+    }
+
     /// The fitted model; what there is to tell goes into the report.
     pub(crate) fn solve(
         &self,

@@ -77,8 +77,8 @@ pub(crate) fn term_mistake(
 }
 
 /// Tells where regressors are centred and scaled by fewer rows than the fit has: what came after did not fit in memory.
-pub(crate) fn tell_first_rows(found_from: usize, rows: usize, report: &mut TrainingReport) {
-    if found_from < rows {
+pub(crate) fn tell_first_rows(found_from: usize, rows: u64, report: &mut TrainingReport) {
+    if (found_from as u64) < rows {
         report.figure("scaled_by_first_rows", found_from);
         report.notes.push(format!(
             "the rows did not fit in memory, so features are centred and scaled by the first {} of {} rows",

@@ -83,11 +83,11 @@ impl<'a> Reader<'a> {
         let mut entries = Vec::with_capacity(table.len());
         for (key, spanned) in table {
             let key_place = at(self.source, &key.span());
-            let key = key.into_inner().into_owned();
-            self.way.push(key.clone());
+            self.way.push(key.into_inner().into_owned());
             let value = self.value(spanned);
-            self.way.pop();
-            let Some(mut value) = value else { continue };
+            let (Some(key), Some(mut value)) = (self.way.pop(), value) else {
+                continue;
+            };
             // A dotted key or an implied header has no text of its own.
             if value.place.start == value.place.end {
                 value.place = key_place;

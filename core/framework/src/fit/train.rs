@@ -129,8 +129,8 @@ pub(super) fn end(
             outside_limits: dropped.outside_limits,
             too_early: dropped.without_run,
         };
-        let truths = dropped.without_run > 0;
-        let never_ran = truths.then(|| collector.waited_for(plan, trainee));
+        let came = dropped.without_run > 0;
+        let never_ran = came.then(|| collector.waited_for(plan, trainee));
         Err(never_ran.flatten().unwrap_or_else(no_truth))
     } else if truths.rows < LEAST_ROWS {
         Err(TrainingError::TooFewRows {

@@ -58,13 +58,11 @@ pub(super) fn beginnings(
     });
     let (mut off, mut off_rest) = (0.0, 0.0);
     let mut beginning = |(of, &[of_input, both, own]): (&Transfer, &[f64; 3])| {
-        let gain = of.gain();
-        let times = both / of_input;
+        let (gain, times) = (of.gain(), both / of_input);
         if of.f.is_empty() || !times.is_finite() {
-            let square = 0.0;
             return Beginning {
                 times: gain,
-                square,
+                square: 0.0,
             };
         }
         let square = (own - times * both).max(0.0) / count.max(1) as f64;

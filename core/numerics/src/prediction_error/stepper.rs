@@ -117,20 +117,11 @@ impl Stepper {
         &self.model
     }
 
-    /// Forgets what was: the inputs have always been like this.
-    pub fn rest(&mut self, input: impl Fn(usize) -> f64) {
-        self.begin(&input, |nth, of| of.gain() * input(nth));
-    }
-
-    /// Forgets what was: the inputs have always been like this, but their filters gave what `before` says.
-    pub fn begin(
-        &mut self,
-        input: impl Fn(usize) -> f64,
-        before: impl Fn(usize, &Transfer) -> f64,
-    ) {
+    /// Forgets what was: the inputs have always been like this, and their filters gave what `before` says.
+    pub fn begin(&mut self, input: impl Fn(usize) -> f64, before: impl Fn(usize) -> f64) {
         let mut brought = 0.0;
-        for (nth, (past, of)) in self.inputs.iter_mut().zip(&self.model.inputs).enumerate() {
-            let filtered = before(nth, of);
+        for (nth, past) in self.inputs.iter_mut().enumerate() {
+            let filtered = before(nth);
             past.values.fill(input(nth));
             past.filtered.fill(filtered);
             brought += filtered;
@@ -139,6 +130,13 @@ impl Stepper {
         self.past.fill(level);
         self.noise.fill(0.0);
         self.doubt_innovations();
+    }
+
+    /// The same at rest: the filters gave what such inputs lead to.
+    #[cfg(test)]
+    pub(super) fn rest(&mut self, input: impl Fn(usize) -> f64) {
+        let gains: Vec<f64> = self.model.inputs.iter().map(Transfer::gain).collect();
+        self.begin(&input, |nth| gains[nth] * input(nth));
     }
 
     /// What was not foreseen until now is not known, but for its variance.

@@ -223,7 +223,7 @@ impl Known {
         let count = series.len() as i64;
         for (nth, followed) in series.iter_mut().enumerate() {
             let input = scaling.of(row);
-            let before = |nth: usize, _: &_| beginnings[nth].times * input(nth);
+            let before = |nth: usize| beginnings[nth].times * input(nth);
             followed.stepper.begin(&input, before);
             followed.at = of - *step + part(*step, nth as i64, count);
             followed.told = 0;
