@@ -9,12 +9,22 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant as Clock};
 
-use die_tester::by_hand::ByHand;
-use die_tester::{Tick, model, ticks};
+use athermal::Model;
+use die_tester::by_hand::{Dense, Shipped};
+use die_tester::{Tick, dense, has_truth, model, ticks};
 
 fn main() {
     println!("{:<52}{:>14}{:>14}", "", "measured", "budget");
-    live();
+    let shipped = model();
+    let mut by_hand = Shipped::new(&shipped);
+    live("selected slopes", &shipped, ticks(9.0, 2), |tick| {
+        by_hand.step(tick)
+    });
+    let all = dense::model();
+    let mut by_hand = Dense::new(&all);
+    live("all of 64 slopes", &all, dense::ticks(9.0, 2), |tick| {
+        by_hand.step(tick)
+    });
     program();
 }
 
@@ -22,15 +32,13 @@ fn tell(work: &str, measured: &str, budget: &str) {
     println!("{work:<52}{measured:>14}{budget:>14}");
 }
 
-fn live() {
-    let model = model();
-    let mut warm = ticks(9.0, 2);
+fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: impl FnMut(&Tick) -> [f64; 6]) {
+    println!("models of {of}:");
     let measured = warm.split_off(17_280);
     let mut engine = model.engine().expect("the fit belongs to the graph");
-    let mut by_hand = ByHand::new(&model);
     for tick in &warm {
         engine.step(tick.0, &tick.1).expect("ticks are in order");
-        by_hand.step(tick);
+        by_hand(tick);
     }
     let start = Clock::now();
     let engine = times(&measured, |tick| {
@@ -39,7 +47,7 @@ fn live() {
     });
     let seconds = start.elapsed().as_secs_f64();
     let by_hand = times(&measured, |tick| {
-        std::hint::black_box(by_hand.step(tick));
+        std::hint::black_box(by_hand(tick));
     });
     for (name, truth, budgets) in [
         ("a tick that carries truth", true, ["3 µs", "15 µs", "1.5"]),
@@ -83,7 +91,7 @@ struct Quantiles {
 impl Quantiles {
     fn of(times: &[Duration], ticks: &[Tick], truth: bool) -> Self {
         let chosen = times.iter().zip(ticks);
-        let chosen = chosen.filter(|(_, tick)| tick.1[6].is_nan() != truth);
+        let chosen = chosen.filter(|(_, tick)| has_truth(tick) == truth);
         let mut sorted: Vec<_> = chosen.map(|(time, _)| *time).collect();
         sorted.sort_unstable();
         Self {

@@ -5,24 +5,28 @@ mod die_tester;
 use athermal::core::channel::{ABSENT, COLD};
 use athermal::{Engine, Instant, Model};
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
-use die_tester::by_hand::ByHand;
-use die_tester::{Tick, model, ticks};
+use die_tester::by_hand::{Dense, Shipped};
+use die_tester::{Tick, dense, has_truth, model, ticks};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 
 fn main() {
-    same_bits();
+    let mut by_hand = Shipped::new(&model());
+    same_bits(&model(), &ticks(2.0, 2), |tick| by_hand.step(tick));
+    let mut by_hand = Dense::new(&dense::model());
+    same_bits(&dense::model(), &dense::ticks(2.0, 2), |tick| {
+        by_hand.step(tick)
+    });
     divan::main();
 }
 
 /// A comparison with other results would be none.
-fn same_bits() {
-    let model = model();
-    let (mut engine, mut by_hand) = (engine(&model), ByHand::new(&model));
+fn same_bits(model: &Model, ticks: &[Tick], mut by_hand: impl FnMut(&Tick) -> [f64; 6]) {
+    let mut engine = engine(model);
     let mut predictions = 0;
-    for tick in ticks(2.0, 2) {
+    for tick in ticks {
         let engine = engine.step(tick.0, &tick.1).expect("ticks are in order");
-        let by_hand = by_hand.step(&tick);
+        let by_hand = by_hand(tick);
         let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
         assert!(
             engine.iter().zip(&by_hand).all(same),
@@ -42,10 +46,6 @@ fn warm_and_measured() -> (Vec<Tick>, Vec<Tick>) {
     let mut warm = ticks(2.5, 2);
     let measured = warm.split_off(17_280);
     (warm, measured)
-}
-
-fn has_truth(tick: &Tick) -> bool {
-    !tick.1[6].is_nan()
 }
 
 #[divan::bench(args = [true, false], sample_count = 20)]
@@ -79,7 +79,7 @@ fn live_ticks_by_hand(bencher: Bencher) {
     let model = model();
     let (warm, measured) = warm_and_measured();
     let with_inputs = || {
-        let mut by_hand = ByHand::new(&model);
+        let mut by_hand = Shipped::new(&model);
         for tick in &warm {
             by_hand.step(tick);
         }

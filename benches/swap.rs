@@ -6,17 +6,11 @@
 
 mod die_tester;
 
-use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
 use athermal::Model;
-use athermal::core::compile::{Wanted, compile};
-use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{Disk, declare, load_text};
-use athermal::core::fit::{FitOptions, fit};
 use athermal::core::live::{LiveOptions, pair};
-use die_tester::{Tick, table, ticks};
+use die_tester::{Tick, fitted, ticks};
 
 const SWAPS: usize = 200;
 /// Ticks from one swap to the next; no multiple of those from one position to the next.
@@ -25,7 +19,7 @@ const NEIGHBOURS: usize = 20;
 
 fn main() {
     let week = ticks(7.0, 1);
-    let text = std::fs::read_to_string(die_tester::graph()).expect("the shipped graph is there");
+    let text = die_tester::text();
     let other = text
         .replace(
             "inputs.signal = \"temperature\"",
@@ -37,7 +31,7 @@ fn main() {
         )
         .replace("\"both.{axis}\"]", "\"both.{axis}\", \"last.{axis}\"]")
         .replace("memory = \"15min\"", "memory = \"20min\"");
-    let models = [model(&text, &week), model(&other, &week)];
+    let models = [fitted(&text, &week), fitted(&other, &week)];
     assert!(models[1].plan.nodes.len() > models[0].plan.nodes.len());
     let data = ticks(9.0, 2);
 
@@ -85,28 +79,6 @@ fn tell(work: &str, measured: &str, budget: &str) {
 
 fn us(time: Duration) -> String {
     format!("{:.2} µs", time.as_secs_f64() * 1e6)
-}
-
-/// A graph from its text, fitted on a week.
-fn model(text: &str, week: &[Tick]) -> Model {
-    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/of-a-benchmark.toml");
-    let document = load_text(name, text, &Disk, &mut sources, &mut diagnostics);
-    let graph = document.and_then(|document| declare(document, &mut diagnostics));
-    let plan = graph
-        .as_ref()
-        .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
-    let (Some(graph), Some(plan)) = (graph, plan) else {
-        panic!("{}", diagnostics.render(&sources, false, 100));
-    };
-    let plan = Arc::new(plan);
-    let fitted = fit(&plan, &table(week), &FitOptions::default(), &mut |_| ());
-    Model {
-        graph,
-        fitted: fitted.expect("a table in memory can be read").0,
-        plan,
-        card: None,
-    }
 }
 
 /// What a tick cost.

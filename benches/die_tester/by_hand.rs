@@ -8,10 +8,9 @@ use athermal::core::channel::{ABSENT, COLD};
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use serde_json::Value;
 
-use super::Tick;
+use super::{AXES, Tick};
 
-const AXES: [&str; 6] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
-const FEATURES: usize = 42;
+const NAMES: [&str; AXES] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
 const MINUTE: i64 = 60_000_000_000;
 /// The lags of the drift, the horizon, the span of the drift and the memory of the vote.
 const LAGS: [i64; 3] = [0, 5 * MINUTE, 10 * MINUTE];
@@ -19,23 +18,23 @@ const AHEAD: i64 = 5 * MINUTE;
 const SPAN: i64 = 5 * MINUTE;
 const MEMORY: i64 = 15 * MINUTE;
 
-/// A sum of weighted regressors: features first, then the lags of the drift.
+/// A sum of weighted regressors: slopes first, then the lags of the drift.
 struct Linear {
     intercept: f64,
     terms: Vec<(f64, usize)>,
 }
 
 impl Linear {
-    fn read(fitted: &Value, node: &str, features: &[&str]) -> Self {
+    fn read(fitted: &Value, node: &str, slopes: &[&str]) -> Self {
         let fit = &fitted[node];
         let list = |key: &str| fit[key].as_array().expect("a linear fit lists its terms");
         let place = |name: &Value| {
             let name = name.as_str().expect("regressors have names");
-            match features.iter().position(|feature| *feature == name) {
+            match slopes.iter().position(|slope| *slope == name) {
                 Some(place) => place,
-                None if name.ends_with("lag 0s") => FEATURES,
-                None if name.ends_with("lag 5min") => FEATURES + 1,
-                None if name.ends_with("lag 10min") => FEATURES + 2,
+                None if name.ends_with("lag 0s") => slopes.len(),
+                None if name.ends_with("lag 5min") => slopes.len() + 1,
+                None if name.ends_with("lag 10min") => slopes.len() + 2,
                 None => panic!("`{name}` is no regressor of the die tester"),
             }
         };
@@ -58,16 +57,22 @@ impl Linear {
     }
 }
 
-type Votes = [[f64; 3]; 6];
+type Votes = [[f64; 3]; AXES];
 
-pub struct ByHand {
+/// The shipped graph.
+pub type Shipped = ByHand<6, 42, 45>;
+
+/// The one in which nothing is selected.
+pub type Dense = ByHand<8, 64, 67>;
+
+pub struct ByHand<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize> {
     gradients: RollingSlope,
     drift: RollingSlope,
-    models: [[Linear; 3]; 6],
-    slopes: [f64; FEATURES],
-    drifts: [f64; 6],
+    models: [[Linear; 3]; AXES],
+    slopes: [f64; SLOPES],
+    drifts: [f64; AXES],
     /// Drifts as they were measured, newest last, and for each lag the first that is too new for it.
-    past: VecDeque<(i64, [f64; 6])>,
+    past: VecDeque<(i64, [f64; AXES])>,
     next: [usize; 3],
     /// Votes by tick, newest last.
     runs: VecDeque<(i64, Votes)>,
@@ -77,7 +82,9 @@ pub struct ByHand {
     mean_squares: Votes,
 }
 
-impl ByHand {
+impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
+    ByHand<SENSORS, SLOPES, REGRESSORS>
+{
     pub fn new(model: &Model) -> Self {
         let text = model.to_text().expect("a model can be written");
         let json: Value = serde_json::from_str(&text).expect("a model is JSON");
@@ -86,7 +93,7 @@ impl ByHand {
             .filter(|channel| channel.name.starts_with("gradients."))
             .collect();
         let names: Vec<_> = gradients.iter().map(|channel| &*channel.name).collect();
-        let windows: Vec<_> = gradients[..7]
+        let windows: Vec<_> = gradients[..SLOPES / SENSORS]
             .iter()
             .map(|channel| channel.channel.span.as_ns())
             .collect();
@@ -100,32 +107,28 @@ impl ByHand {
             cold: COLD,
         };
         let read = |node: &str, axis: &str| {
-            Linear::read(
-                &json["fitted"],
-                &format!("{node}.{axis}"),
-                &names[..FEATURES],
-            )
+            Linear::read(&json["fitted"], &format!("{node}.{axis}"), &names[..SLOPES])
         };
         Self {
-            gradients: RollingSlope::new(&windows, 6, coverage, no_value, false),
-            drift: RollingSlope::new(&[SPAN], 6, coverage, no_value, false),
-            models: AXES.map(|axis| ["thermal", "motion", "both"].map(|node| read(node, axis))),
-            slopes: [f64::NAN; FEATURES],
-            drifts: [f64::NAN; 6],
+            gradients: RollingSlope::new(&windows, SENSORS, coverage, no_value, false),
+            drift: RollingSlope::new(&[SPAN], AXES, coverage, no_value, false),
+            models: NAMES.map(|axis| ["thermal", "motion", "both"].map(|node| read(node, axis))),
+            slopes: [f64::NAN; SLOPES],
+            drifts: [f64::NAN; AXES],
             past: VecDeque::with_capacity(128),
             next: [0; 3],
             runs: VecDeque::with_capacity(128),
             errors: VecDeque::with_capacity(128),
             arrived: false,
-            mean_squares: [[f64::NAN; 3]; 6],
+            mean_squares: [[f64::NAN; 3]; AXES],
         }
     }
 
     /// The predictions of the six axes.
-    pub fn step(&mut self, (time, samples): &Tick) -> [f64; 6] {
+    pub fn step(&mut self, (time, samples): &Tick) -> [f64; AXES] {
         let now = time.as_ns();
-        let (temperatures, positions) = samples.split_at(6);
-        let mut admitted = [f64::NAN; 6];
+        let (temperatures, positions) = samples.split_at(SENSORS);
+        let mut admitted = [f64::NAN; SENSORS];
         for (admitted, &temperature) in admitted.iter_mut().zip(temperatures) {
             if (-20.0..=200.0).contains(&temperature) {
                 *admitted = temperature;
@@ -141,15 +144,15 @@ impl ByHand {
             self.past.push_back((now, self.drifts));
         }
 
-        let mut regressors = [f64::NAN; FEATURES + 3];
+        let mut regressors = [f64::NAN; REGRESSORS];
         for (to, slope) in regressors.iter_mut().zip(&self.slopes) {
             *to = slope * 60_000.0;
         }
         let lagged = [0, 1, 2].map(|lag| self.lagged(now, lag));
-        let mut votes = [[f64::NAN; 3]; 6];
-        for axis in 0..6 {
+        let mut votes = [[f64::NAN; 3]; AXES];
+        for axis in 0..AXES {
             for lag in 0..3 {
-                regressors[FEATURES + lag] = lagged[lag].map_or(f64::NAN, |drifts| drifts[axis]);
+                regressors[SLOPES + lag] = lagged[lag].map_or(f64::NAN, |drifts| drifts[axis]);
             }
             votes[axis] = [0, 1, 2].map(|node| self.models[axis][node].predict(&regressors));
         }
@@ -163,7 +166,7 @@ impl ByHand {
     }
 
     /// The drifts that were held a lag ago, if they were not too old then.
-    fn lagged(&mut self, now: i64, lag: usize) -> Option<[f64; 6]> {
+    fn lagged(&mut self, now: i64, lag: usize) -> Option<[f64; AXES]> {
         let at = now - LAGS[lag];
         while self
             .past
@@ -214,7 +217,7 @@ impl ByHand {
         if !changed {
             return;
         }
-        for axis in 0..6 {
+        for axis in 0..AXES {
             for voter in 0..3 {
                 let known = self.errors.iter().map(|(_, errors)| errors[axis][voter]);
                 let known = known.filter(|error| !error.is_nan());

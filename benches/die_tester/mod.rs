@@ -3,19 +3,23 @@
 #![allow(dead_code, reason = "each benchmark uses a part of it")]
 
 pub mod by_hand;
+pub mod dense;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use athermal::core::compile::{Wanted, compile};
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::document::{Disk, declare, load_text};
 use athermal::core::fit::{FitOptions, fit};
 use athermal::core::machine::{Machine, Row, Setup, Simulation};
 use athermal::core::recording::Table;
 use athermal::{Instant, Model};
 
-pub const CHANNELS: usize = 12;
+/// One tick: temperatures, then six positions, NaN where there is none.
+pub type Tick = (Instant, Vec<f64>);
 
-/// One tick: six temperatures, then six positions, NaN where there is none.
-pub type Tick = (Instant, [f64; CHANNELS]);
+pub const AXES: usize = 6;
 
 pub fn graph() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/die-tester.toml")
@@ -37,11 +41,13 @@ pub fn ticks(days: f64, seed: u64) -> Vec<Tick> {
     let mut row = Row::empty(MACHINE.channels());
     let mut ticks = Vec::new();
     while simulation.next(&mut row) {
-        let mut values = [f64::NAN; CHANNELS];
-        values.copy_from_slice(&row.values);
-        ticks.push((Instant::from_ns(row.time_ns), values));
+        ticks.push((Instant::from_ns(row.time_ns), row.values.clone()));
     }
     ticks
+}
+
+pub fn has_truth((_, values): &Tick) -> bool {
+    !values[values.len() - AXES].is_nan()
 }
 
 pub fn table(ticks: &[Tick]) -> Table {
@@ -52,14 +58,35 @@ pub fn table(ticks: &[Tick]) -> Table {
     table
 }
 
+pub fn text() -> String {
+    std::fs::read_to_string(graph()).expect("the shipped graph is there")
+}
+
 /// The graph, fitted on a week.
 pub fn model() -> Model {
-    let mut model = Model::load(graph()).expect("the shipped graph has no mistakes");
-    let week = table(&ticks(7.0, 1));
-    let plan = Arc::clone(&model.plan);
-    let fitted = fit(&plan, &week, &FitOptions::default(), &mut |_| ());
-    model.fitted = fitted.expect("a table in memory can be read").0;
-    model
+    fitted(&text(), &ticks(7.0, 1))
+}
+
+/// A graph from its text, fitted on these ticks.
+pub fn fitted(text: &str, ticks: &[Tick]) -> Model {
+    let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+    let name = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/of-a-benchmark.toml");
+    let document = load_text(name, text, &Disk, &mut sources, &mut diagnostics);
+    let graph = document.and_then(|document| declare(document, &mut diagnostics));
+    let plan = graph
+        .as_ref()
+        .and_then(|graph| compile(graph, Wanted::default(), &mut diagnostics));
+    let (Some(graph), Some(plan)) = (graph, plan) else {
+        panic!("{}", diagnostics.render(&sources, false, 100));
+    };
+    let plan = Arc::new(plan);
+    let fitted = fit(&plan, &table(ticks), &FitOptions::default(), &mut |_| ());
+    Model {
+        graph,
+        fitted: fitted.expect("a table in memory can be read").0,
+        plan,
+        card: None,
+    }
 }
 
 /// Writes a simulated log as a table, and gives its size in bytes.

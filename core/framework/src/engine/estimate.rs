@@ -1,5 +1,6 @@
 //! Decides how a fitted estimator is run: which regressors it is given, and when it gives nothing.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::feedback::Feedback;
@@ -53,9 +54,21 @@ struct Part {
     gather: usize,
     /// Their places within it.
     places: Vec<usize>,
+    /// The same where they lie side by side.
+    side_by_side: Option<Range<usize>>,
 }
 
 impl Part {
+    fn new(gather: usize, places: Vec<usize>) -> Self {
+        let first = places.first().copied().unwrap_or(0);
+        let range = first..first + places.len();
+        Self {
+            gather,
+            side_by_side: range.clone().eq(places.iter().copied()).then_some(range),
+            places,
+        }
+    }
+
     /// What its regressors are.
     fn entries<'a>(&'a self, gathers: &'a [Gather]) -> impl Iterator<Item = Entry> + 'a {
         let entries = &gathers[self.gather].entries;
@@ -116,17 +129,12 @@ impl Estimate {
             .flat_map(|&gather| (0..widths[gather]).map(move |place| (gather, place)))
             .collect();
         let used = places_of(node, regressors, &*predictor)?;
-        let mut parts: Vec<Part> = Vec::new();
-        for &index in &used {
-            let (gather, place) = places[index];
-            match parts.last_mut() {
-                Some(part) if part.gather == gather => part.places.push(place),
-                _ => parts.push(Part {
-                    gather,
-                    places: vec![place],
-                }),
-            }
-        }
+        let used_of_gathers: Vec<_> = used.iter().map(|&index| places[index]).collect();
+        let same_gather = |one: &(usize, usize), other: &(usize, usize)| one.0 == other.0;
+        let parts = used_of_gathers
+            .chunk_by(same_gather)
+            .map(|part| Part::new(part[0].0, part.iter().map(|&(_, place)| place).collect()));
+        let parts = parts.collect();
         let learning = match learning {
             None => None,
             Some(planned) => {
@@ -248,8 +256,13 @@ impl Estimate {
             row = rest;
             let there = &from.values[..];
             if let Some(stamp) = from.together {
-                for (value, &place) in values.iter_mut().zip(&part.places) {
-                    *value = there[place];
+                match &part.side_by_side {
+                    Some(range) => values.copy_from_slice(&there[range.clone()]),
+                    None => {
+                        for (value, &place) in values.iter_mut().zip(&part.places) {
+                            *value = there[place];
+                        }
+                    }
                 }
                 oldest = oldest.min(stamp);
                 continue;
