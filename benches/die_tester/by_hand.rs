@@ -48,12 +48,18 @@ impl Linear {
         }
     }
 
-    /// NaN where a regressor is absent, since NaN travels through sums.
+    /// NaN where a regressor is absent, since NaN travels through sums. In strands, as the engine's models sum.
     fn predict(&self, regressors: &[f64]) -> f64 {
-        let terms = self.terms.iter();
-        terms.fold(self.intercept, |sum, &(b, place)| {
-            sum + b * regressors[place]
-        })
+        let of = |&(b, place): &(f64, usize)| b * regressors[place];
+        let (fours, rest) = self.terms.as_chunks::<4>();
+        let mut sums = [0.0; 4];
+        for four in fours {
+            for (sum, term) in sums.iter_mut().zip(four) {
+                *sum += of(term);
+            }
+        }
+        let rest: f64 = rest.iter().map(of).sum();
+        self.intercept + ((sums[0] + sums[1]) + (sums[2] + sums[3]) + rest)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::checks::{check_length, check_parameter};
 use crate::scratch::Scratch;
-use crate::{Gram, NumericsError};
+use crate::{Gram, NumericsError, dot};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};
@@ -320,20 +320,6 @@ pub fn covariance_of(
     } else {
         Err(NumericsError::NoConvergence)
     }
-}
-
-/// The product of two vectors, summed in four strands so that it does not wait for each addition.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a4, a_rest) = a.as_chunks::<4>();
-    let (b4, b_rest) = b.as_chunks::<4>();
-    let mut sums = [0.0; 4];
-    for (a, b) in a4.iter().zip(b4) {
-        for strand in 0..4 {
-            sums[strand] += a[strand] * b[strand];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 #[cfg(test)]

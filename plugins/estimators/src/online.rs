@@ -5,7 +5,7 @@ use athermal_core::node::{
     Coefficients, Learner, Mistake, Predictor, Restored, State, TrainedRange,
 };
 use athermal_core::time::Instant;
-use athermal_numerics::{Rls, Sgd, Standardization};
+use athermal_numerics::{Rls, Sgd, Standardization, dot};
 use serde::{Deserialize, Serialize};
 
 use crate::scaling::scale_mistakes;
@@ -319,6 +319,5 @@ impl Learner for OnlineLearner {
 
 /// `b₀ + Σ b_j x_j`.
 fn value(coefficients: &[f64], intercept: f64, regressors: &[f64]) -> f64 {
-    let terms = coefficients.iter().zip(regressors);
-    terms.fold(intercept, |sum, (b, x)| sum + b * x)
+    intercept + dot(coefficients, regressors)
 }

@@ -7,7 +7,7 @@ use athermal_core::node::{
 };
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
-    PredictionVariance, Sgd, SgdOptions, Standardization,
+    PredictionVariance, Sgd, SgdOptions, Standardization, dot,
 };
 use serde::{Deserialize, Serialize};
 
@@ -357,8 +357,7 @@ impl Predictor for LinearPredictor {
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
-        let terms = self.coefficients.iter().zip(regressors);
-        terms.fold(self.intercept, |sum, (b, x)| sum + b * x)
+        self.intercept + dot(&self.coefficients, regressors)
     }
 
     fn deviation(&self, regressors: &[f64]) -> f64 {
