@@ -76,26 +76,46 @@ fn floating_selection(bencher: Bencher, rows: usize) {
     select(bencher, rows, Direction::Floating);
 }
 
-#[divan::bench(args = [8_000, 80_000], sample_count = 10)]
-fn rows_into_blocks(bencher: Bencher, rows: usize) {
-    bencher.bench_local(|| blocks(rows));
+/// Rows one after the other, each with its truth.
+fn rows_in_memory(count: usize) -> Vec<f64> {
+    let mut rows = Vec::with_capacity(count * (CANDIDATES + 1));
+    each_row(count, |row, truth| {
+        rows.extend_from_slice(row);
+        rows.push(truth);
+    });
+    rows
+}
+
+fn push_all(mut blocks: GramBlocks, rows: &[f64]) -> GramBlocks {
+    for row in rows.chunks_exact(CANDIDATES + 1) {
+        blocks.push(&row[..CANDIDATES], row[CANDIDATES]);
+    }
+    blocks
+}
+
+/// All of a forward selection: rows in memory become Gram blocks, and these a choice.
+#[divan::bench(args = [8_000, 603_000], sample_count = 10)]
+fn forward_selection_from_rows(bencher: Bencher, rows: usize) {
+    let rows = rows_in_memory(rows);
+    bencher.bench_local(|| {
+        let blocks = push_all(GramBlocks::new(CANDIDATES), &rows);
+        let scales = Standardization::of(&blocks.total()).scales;
+        let search = Search {
+            alpha: 1.0,
+            tolerance: Some(1e-3),
+            ..Search::forward()
+        };
+        search.run(&blocks, &Folds::contiguous(3), &scales)
+    });
 }
 
 /// All of a least squares: rows in memory become Gram blocks, and these coefficients.
 #[divan::bench(sample_count = 10)]
 fn least_squares_from_rows(bencher: Bencher) {
-    const ROWS: usize = 603_458;
-    let mut rows = Vec::with_capacity(ROWS * (CANDIDATES + 1));
-    each_row(ROWS, |row, truth| {
-        rows.extend_from_slice(row);
-        rows.push(truth);
-    });
+    let rows = rows_in_memory(603_458);
     let columns: Vec<_> = (0..CANDIDATES).collect();
     bencher.bench_local(|| {
-        let mut blocks = GramBlocks::with_row_memory(CANDIDATES, 0);
-        for row in rows.chunks_exact(CANDIDATES + 1) {
-            blocks.push(&row[..CANDIDATES], row[CANDIDATES]);
-        }
+        let blocks = push_all(GramBlocks::with_row_memory(CANDIDATES, 0), &rows);
         let gram = blocks.total();
         let scales = Standardization::of(&gram).scales;
         LeastSquares::ordinary().solve(&gram, &columns, &scales, blocks.rows())
