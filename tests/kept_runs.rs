@@ -162,6 +162,17 @@ fn a_state_that_cannot_be_written_is_told_before_the_first_row() {
 }
 
 #[test]
+fn a_state_is_no_stream() {
+    let (_scratch, model, data, _) = desk("stream");
+    let run = athermal(&[&"run", &model, &"-i", &data, &"--state", &"-"]).ended(2);
+    run.tells(&[
+        "--state -: what a run knows is kept in a file",
+        "name a file",
+    ]);
+    assert_eq!(run.out, "");
+}
+
+#[test]
 fn a_state_that_is_the_output_is_refused_be_it_there_or_not() {
     let (scratch, model, data, _) = desk("output");
     let both = scratch.path("both.csv");

@@ -124,6 +124,18 @@ fn outputs_that_only_one_graph_has_are_empty_while_another_runs() {
 }
 
 #[test]
+fn a_graph_that_lacks_outputs_of_what_runs_is_told() {
+    let scratch = desk("lacking");
+    let other = GRAPH.replace("predicted = \"model\"", "still = \"model:still\"");
+    scratch.file("other.toml", other);
+    let finished = run(&scratch, &[&swap(&scratch, "1200", "other.toml")]).ended(0);
+    finished
+        .tells(&["other.toml has no output `predicted.Z`, whose column is empty while it runs"]);
+    let same = run(&scratch, &[&swap(&scratch, "1200", "still.toml")]).ended(0);
+    assert!(!same.told.contains("has no output"), "{}", same.told);
+}
+
+#[test]
 fn a_worse_graph_is_refused_with_figures_and_a_margin_lets_it_pass() {
     let scratch = desk("shadow");
     let at = swap(&scratch, "1100", "still.toml");

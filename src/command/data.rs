@@ -9,6 +9,7 @@ use clap::Args;
 
 use crate::figures::{count, counted};
 use crate::invocation::{program, quoted};
+use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal};
 
 /// Recorded data.
@@ -142,6 +143,16 @@ fn tell_repeated(terminal: &Terminal, files: impl Iterator<Item = impl AsRef<str
                 ));
             }
         }
+    }
+}
+
+/// Notes, once however many files there are, that times do not say how far they are from UTC.
+pub fn note_zone(terminal: &Terminal, reports: &[(String, Report)]) {
+    let mut places = reports
+        .iter()
+        .filter_map(|(_, report)| report.without_zone.as_ref());
+    if let Some(place) = places.next() {
+        terminal.note(format_args!("{place}: {WITHOUT_ZONE}"));
     }
 }
 

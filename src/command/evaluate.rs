@@ -150,6 +150,7 @@ impl Evaluate {
             scores.refused,
             &scores.rejected,
         );
+        data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);
         }

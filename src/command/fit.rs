@@ -180,6 +180,7 @@ pub fn fit_on(
     terminal: &Terminal,
 ) -> Result<FitReport, Failure> {
     let (dataset, report) = fit_without_card(model, data, options, terminal)?;
+    data::note_zone(terminal, &dataset.reports());
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),

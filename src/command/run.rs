@@ -76,6 +76,10 @@ impl Run {
         let read = [&*self.model, &*self.input];
         check_apart("--output", &self.output, read)?;
         if let Some(state) = &self.state {
+            if state.as_os_str() == "-" {
+                let told = "--state -: what a run knows is kept in a file, from one run to the next; name a file";
+                return Err(Failure::Request(told.to_owned()));
+            }
             let others = read.into_iter().chain([&*self.output]);
             check_apart("--state", state, others)?;
         }

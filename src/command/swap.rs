@@ -275,6 +275,7 @@ impl<'a> Course<'a> {
 
     fn stage(&mut self, control: &mut Control, model: Model, path: PathBuf) -> Result<(), Failure> {
         let staged = control.stage(&model, false).map_err(refused)?;
+        self.tell_lacking(&model, &path);
         self.terminal.note(report(&path, staged));
         self.staged = Some((model, path));
         match self.options.shadow {
@@ -282,6 +283,27 @@ impl<'a> Course<'a> {
                 .shadow(duration, self.options.margin)
                 .map_err(refused),
             None => self.commit(control),
+        }
+    }
+
+    /// Tells of outputs of what runs that a new graph does not have, as one for another machine would not.
+    fn tell_lacking(&self, new: &Model, path: &Path) {
+        let has = |name: &str| new.plan.outputs.iter().any(|output| output.name == name);
+        let running = self.running.plan.outputs.iter();
+        let lacking: Vec<_> = running
+            .filter(|output| !has(&output.name))
+            .map(|output| format!("`{}`", output.name))
+            .collect();
+        if !lacking.is_empty() {
+            let (what, are) = match lacking.len() {
+                1 => ("output", "whose column is empty"),
+                _ => ("outputs", "whose columns are empty"),
+            };
+            self.terminal.warning(format_args!(
+                "{} has no {what} {}, {are} while it runs",
+                path.display(),
+                lacking.join(", ")
+            ));
         }
     }
 

@@ -1,7 +1,7 @@
 //! Decides which column of a log gives the time, and in which form.
 
 use athermal::core::time::Duration;
-use athermal::files::{Description, TimeForm};
+use athermal::files::{Description, TimeForm, has_zone};
 
 use crate::figures::time;
 
@@ -123,6 +123,10 @@ pub fn words(name: &str) -> Vec<&str> {
         .collect()
 }
 
+/// What is told of times that do not say how far they are from UTC.
+pub const WITHOUT_ZONE: &str = "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when \
+     the clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00";
+
 fn clock(described: &Description, index: usize) -> Option<Clock> {
     let column = described.columns[index].clone();
     let cells: Vec<&str> = described
@@ -144,11 +148,10 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
             let bytes = cell.as_bytes();
             bytes.len() >= 10 && bytes[..4].iter().all(u8::is_ascii_digit) && bytes[4] == b'-'
         });
-        let why = if cells.iter().all(|cell| has_zone(cell)) {
+        let why = if cells.iter().all(|cell| has_zone(cell.as_bytes())) {
             "dates and times as in RFC 3339"
         } else {
-            "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when the \
-             clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00"
+            WITHOUT_ZONE
         };
         return dated.then(|| Clock {
             column,
@@ -215,13 +218,6 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         declared: declared(name),
         why: format!("numbers, taken for {name} since its name does not say"),
     })
-}
-
-/// Whether a date and time says how far it is from UTC.
-fn has_zone(cell: &str) -> bool {
-    // A sign in the date itself is none of an offset.
-    let mut behind_date = cell.bytes().skip(10);
-    behind_date.any(|byte| matches!(byte, b'Z' | b'z' | b'+' | b'-'))
 }
 
 /// Whether numbers look like the days of a spreadsheet, of which 40,000 is in 2009 and 60,000 in 2064, at a rate of more

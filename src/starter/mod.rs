@@ -7,6 +7,8 @@ mod survey;
 mod text;
 mod window;
 
+pub use clock::WITHOUT_ZONE;
+
 use std::path::Path;
 
 use athermal::files::{Description, FileError};

@@ -62,3 +62,39 @@ fn an_output_that_is_one_of_the_inputs_is_refused_and_all_stays_as_it_is() {
     let after = [&graph, &log].map(|path| std::fs::read(path).unwrap());
     assert_eq!(before, after);
 }
+
+#[test]
+fn times_without_a_zone_are_told_once_and_those_with_one_are_not() {
+    let scratch = desk("zone").0;
+    let graph = "schema = 1\nextends = \"fitted.toml\"\ntime = { column = \"time_s\", unit = \"rfc3339\" }\n";
+    let graph = scratch.file("dated.toml", graph);
+    let dated = |zone: &str| {
+        let row = |row: &String| {
+            let (seconds, rest) = row.split_once(',').unwrap();
+            let seconds: u32 = seconds.parse().unwrap();
+            let (minutes, seconds) = (seconds / 60, seconds % 60);
+            let (hours, minutes) = (minutes / 60, minutes % 60);
+            format!("2026-03-02T{hours:02}:{minutes:02}:{seconds:02}{zone},{rest}")
+        };
+        let half = |from| csv(&rows(from, 60).iter().map(row).collect::<Vec<_>>());
+        (
+            scratch.file("first.csv", half(0)),
+            scratch.file("second.csv", half(60)),
+        )
+    };
+    let model = scratch.path("dated.json");
+    for (zone, times) in [("", 1), ("Z", 0)] {
+        let (first, second) = dated(zone);
+        let fit = athermal(&[&"fit", &graph, &"-o", &model, &"--data", &first, &second]).ended(0);
+        let scores = athermal(&[&"evaluate", &model, &"--data", &first, &second]).ended(0);
+        for told in [fit.told, scores.told] {
+            let found = told.matches("without a zone, taken for UTC").count();
+            assert_eq!(found, times, "{told}");
+            assert_eq!(
+                told.contains("first.csv:2: dates and times"),
+                times == 1,
+                "{told}"
+            );
+        }
+    }
+}

@@ -128,3 +128,75 @@ also = \"drift\"
     assert!(told.contains(judged), "{told}");
     plan(&text("Z", "Z"));
 }
+
+/// A graph with two predictions of one drift, and this node that votes.
+fn voting(vote: &str) -> String {
+    format!(
+        "{SAMPLES}{SLOPES}
+[nodes.thermal]
+type = \"rls\"
+inputs.features = \"gradients\"
+inputs.truth = \"drift.Z\"
+ahead = \"5min\"
+[nodes.same]
+type = \"persistence\"
+inputs.truth = \"drift.Z\"
+ahead = \"5min\"
+[nodes.sure]
+type = \"conformal\"
+inputs.prediction = \"same\"
+inputs.truth = \"drift.Z\"
+memory = \"1d\"
+[nodes.first]
+type = \"mean\"
+inputs.voters = [\"thermal\", \"same\"]
+[nodes.half]
+type = \"scale\"
+inputs.signal = \"thermal\"
+factor = 0.5
+{vote}
+[outputs]
+out = \"vote\"
+first = \"first\"
+sure = \"sure\"
+half = \"half\"
+"
+    )
+}
+
+#[test]
+fn what_a_node_gives_beside_its_prediction_has_no_vote() {
+    let mean = "[nodes.vote]\ntype = \"mean\"\ninputs.voters = ";
+    let stack = "[nodes.vote]\ntype = \"stack\"\nahead = \"5min\"\ninputs.truth = \"drift.Z\"\ninputs.voters = ";
+    for (voter, instead) in [
+        ("thermal:deviation", "`thermal`"),
+        ("thermal:deviation.Z", "`thermal.Z`"),
+        ("sure:upper", "`sure`"),
+        ("first:weights.weight-same", "`first.Z`"),
+    ] {
+        for kind in [mean, stack] {
+            let told = problems(&voting(&format!("{kind}[\"same\", \"{voter}\"]")));
+            assert_eq!(told.matches("error[").count(), 1, "{told}");
+            assert!(told.contains("error[A067]"), "{told}");
+            assert!(
+                told.contains(&format!("let the prediction vote: {instead}")),
+                "{told}"
+            );
+        }
+    }
+    let alone = "[nodes.vote]\ntype = \"conformal\"\nmemory = \"1d\"\ninputs.truth = \"drift.Z\"\n";
+    let told = problems(&voting(&format!(
+        "{alone}inputs.prediction = \"first:weights.weight-same\""
+    )));
+    assert!(told.contains("A067"), "{told}");
+    for voter in [
+        "thermal",
+        "thermal:prediction",
+        "sure",
+        "first",
+        "half",
+        "drift.Z",
+    ] {
+        plan(&voting(&format!("{mean}[\"{voter}\"]")));
+    }
+}

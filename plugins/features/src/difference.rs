@@ -14,7 +14,8 @@ use crate::past::{LookingBack, max_age, max_age_mistake};
 /// The change of each channel over a time, or from one value to the next: `x(t) − x(t − over)`.
 ///
 /// With every new value at `t` it takes the last value at or before `t − over` away; without `over`, the value before. That
-/// one must not have been older than `max_age` at that instant. A difference of two samples has the noise of both, and that of a `slope`
+/// one must not have been older than `max_age` at that instant: by default than a held value of the channel may be, and without
+/// `over` than that and a sample of the signal, since a slow clock's value before is a whole period old. A difference of two samples has the noise of both, and that of a `slope`
 /// over the same time is smaller; over one sample it is the differencing of Box and Jenkins (1976). Differences of temperatures
 /// in Cel or K are in K, of those in \[degF\] in \[degR\].
 ///
@@ -26,7 +27,7 @@ pub struct Difference {
     /// Over which time; without it, from one value to the next.
     #[serde(default)]
     pub over: Option<Duration>,
-    /// How old the earlier value may have been; by default as old as a held value of the channel may be.
+    /// How old the earlier value may have been.
     #[serde(default)]
     pub max_age: Option<Duration>,
 }
@@ -37,6 +38,17 @@ const BEFORE: Duration = Duration::from_ns(1);
 impl Difference {
     fn back(&self) -> Duration {
         self.over.unwrap_or(BEFORE)
+    }
+
+    /// The channels that are looked back at, each with how long its values count there.
+    fn earlier(&self, channels: &[Channel]) -> Vec<Channel> {
+        let mut channels = channels.to_vec();
+        if self.over.is_none() {
+            for channel in &mut channels {
+                channel.span += channel.max_age.unwrap_or_default();
+            }
+        }
+        channels
     }
 
     fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
@@ -63,16 +75,17 @@ impl Feature for Difference {
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
-        let change = |channel: &Channel| Channel {
+        let earlier = self.earlier(from);
+        let change = |(channel, earlier): (&Channel, &Channel)| Channel {
             unit: channel.unit.difference(),
             span: channel.span
                 + self.over.unwrap_or_default()
-                + max_age(self.max_age, channel).unwrap_or_default(),
+                + max_age(self.max_age, earlier).unwrap_or_default(),
             ..channel.clone()
         };
         Ok(vec![OutputPort {
             name: "difference",
-            channels: from.iter().map(change).collect(),
+            channels: from.iter().zip(&earlier).map(change).collect(),
         }])
     }
 
@@ -85,9 +98,9 @@ impl Feature for Difference {
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
-        let channels = inputs.port("signal");
+        let channels = self.earlier(inputs.port("signal"));
         Box::new(Differencing {
-            past: LookingBack::new(vec![self.back()], self.max_age, channels),
+            past: LookingBack::new(vec![self.back()], self.max_age, &channels),
         })
     }
 }

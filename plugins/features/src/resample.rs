@@ -34,7 +34,7 @@ pub enum ResampleMethod {
     /// Their mean, which summarises the period.
     #[default]
     Mean,
-    /// The last one.
+    /// The last one. It counts for a period longer than the signal's `max_age`, since the next comes no sooner.
     Last,
 }
 
@@ -52,13 +52,15 @@ impl Feature for Resample {
         if let Some(mistake) = Mistake::unless_lasting("every", self.every) {
             return Err(vec![mistake]);
         }
-        let span = match self.method {
-            ResampleMethod::Mean => self.every,
-            ResampleMethod::Last => Duration::ZERO,
-        };
-        let regular = |channel: &Channel| Channel {
-            span: channel.span + span,
-            ..channel.clone()
+        let regular = |channel: &Channel| match self.method {
+            ResampleMethod::Mean => Channel {
+                span: channel.span + self.every,
+                ..channel.clone()
+            },
+            ResampleMethod::Last => Channel {
+                max_age: channel.max_age.map(|age| age + self.every),
+                ..channel.clone()
+            },
         };
         Ok(vec![OutputPort {
             name: "signal",

@@ -26,13 +26,17 @@ impl Bench {
     }
 
     fn in_unit(unit: &str, node: &str, ports: &[&str]) -> Self {
+        Self::reading("s", unit, node, ports)
+    }
+
+    fn reading(signal: &str, unit: &str, node: &str, ports: &[&str]) -> Self {
         let outputs: String = ports
             .iter()
             .map(|port| format!("{port} = \"n:{port}\"\n"))
             .collect();
         let text = format!(
             "schema = 1\n[signals.s]\nunit = \"{unit}\"\nchannels = [\"y\", \"z\"]\nmax_age = \"10s\"\n\
-             [nodes.n]\ninputs.signal = \"s\"\n{node}\n[outputs]\n{outputs}"
+             [nodes.n]\ninputs.signal = \"{signal}\"\n{node}\n[outputs]\n{outputs}"
         );
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
         let files = Memory::new();
@@ -364,6 +368,35 @@ fn oracle_of_a_regular_clock() {
             before = now;
         }
         assert!(compared > 40, "{compared}");
+    }
+}
+
+#[test]
+fn a_value_of_a_slow_clock_differs_from_the_one_before() {
+    // No row is at the end of a minute, so that the value before is older than one by up to two rows.
+    let chain = |method: &str| {
+        format!(
+            "type = \"difference\"\n[nodes.c]\ntype = \"resample\"\nevery = \"1min\"\nmethod = \"{method}\"\n\
+             inputs.signal = \"s\"\n"
+        )
+    };
+    for method in ["mean", "last"] {
+        let mut bench = Bench::reading("c", "mm", &chain(method), &["difference"]);
+        let mut changes = 0;
+        for row in 0..150 {
+            let now = 3.0 + 4.3 * f64::from(row);
+            bench.tick(&[now, 2.0 * now, 0.0]);
+            let change = bench.output("difference.y");
+            if !change.is_nan() {
+                assert!(
+                    (change - 120.0).abs() < 2.0 * 4.3 + 1e-9,
+                    "{method}: {change}"
+                );
+                changes += 1;
+            }
+        }
+        // The ends of ten minutes are passed, and the first value has none before it.
+        assert_eq!(changes, 9, "{method}");
     }
 }
 

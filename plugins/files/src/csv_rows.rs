@@ -323,6 +323,14 @@ mod tests {
     }
 
     #[test]
+    fn times_may_have_another_mark_than_values() {
+        assert_eq!(
+            read("t;a;b\n0.5;1,5;2\n1.5;1;2,5\n"),
+            "0.5 [1.5, 2.0]; 1.5 [1.0, 2.5]"
+        );
+    }
+
+    #[test]
     fn the_seconds_of_a_date_may_have_another_mark_than_numbers() {
         let layout = Layout::new("t", TimeForm::Rfc3339, ["a"]);
         let text = &b"t;a\n2013-07-04T00:00:00.5Z;1,5\n"[..];

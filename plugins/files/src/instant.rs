@@ -33,13 +33,16 @@ impl TimeForm {
     }
 }
 
+/// Whether a date and time says how far it is from UTC.
+#[must_use]
+pub fn has_zone(text: &[u8]) -> bool {
+    let mut behind_date = text.iter().skip(DATE_LENGTH);
+    behind_date.any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'))
+}
+
 fn timestamp(text: &[u8]) -> Option<Timestamp> {
     static PARSER: DateTimeParser = DateTimeParser::new();
-    let zoned = text
-        .iter()
-        .skip(DATE_LENGTH)
-        .any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'));
-    if zoned {
+    if has_zone(text) {
         return PARSER.parse_timestamp(text).ok();
     }
     let civil = PARSER.parse_datetime(text).ok()?;

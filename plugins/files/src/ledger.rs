@@ -17,6 +17,8 @@ pub struct Report {
     pub bad_cells_of: Vec<Count>,
     /// Rows left out because of their time cell, number of cells or syntax; only when reading leniently.
     pub refused_rows: Count,
+    /// The first time that is a date without a zone, and was taken for UTC.
+    pub without_zone: Option<Place>,
     /// The last line, when it was cut off in the middle and left out.
     pub truncated: Option<Place>,
 }
@@ -40,6 +42,15 @@ impl Count {
     }
 }
 
+/// A decimal mark, with the line since which numbers have it.
+type Mark = Option<(u8, u64)>;
+
+fn other_mark(known: &mut Mark, number: &[u8], line: impl FnOnce() -> u64) -> Mark {
+    let mark = decimal_mark(number)?;
+    let first = *known.get_or_insert_with(|| (mark, line()));
+    (first.0 != mark).then_some(first)
+}
+
 /// Who is told at once of what is met for the first time.
 pub(crate) type Tell = Box<dyn FnMut(&FileError) + Send>;
 
@@ -51,8 +62,10 @@ pub(crate) struct Ledger {
     last_ns: Option<i64>,
     /// The time cell of the row at that instant.
     last_time: Vec<u8>,
-    /// The decimal mark of the first number that has one, with its line.
-    mark: Option<(u8, u64)>,
+    /// The decimal mark of the first time that has one, with its line.
+    time_mark: Mark,
+    /// The same of values.
+    value_mark: Mark,
 }
 
 impl Ledger {
@@ -63,7 +76,8 @@ impl Ledger {
             lenient,
             last_ns: None,
             last_time: Vec::new(),
-            mark: None,
+            time_mark: None,
+            value_mark: None,
         }
     }
 
@@ -89,11 +103,15 @@ impl Ledger {
         }
     }
 
-    /// The decimal mark that numbers have, and since which line, where this one has another: a file has one.
-    pub fn other_mark(&mut self, number: &[u8], line: impl FnOnce() -> u64) -> Option<(u8, u64)> {
-        let mark = decimal_mark(number)?;
-        let first = *self.mark.get_or_insert_with(|| (mark, line()));
-        (first.0 != mark).then_some(first)
+    /// The decimal mark that times have, and since which line, where this one has another. That of values may be another
+    /// still: a logger writes its own clock with a point, whatever the spreadsheet beside it does.
+    pub fn other_time_mark(&mut self, time: &[u8], line: impl FnOnce() -> u64) -> Mark {
+        other_mark(&mut self.time_mark, time, line)
+    }
+
+    /// The same of values: all that a file has are written with one mark.
+    pub fn other_value_mark(&mut self, value: &[u8], line: impl FnOnce() -> u64) -> Mark {
+        other_mark(&mut self.value_mark, value, line)
     }
 
     /// A cell of a channel of the layout that cannot be read.

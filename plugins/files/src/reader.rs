@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::cell::{self, Cells};
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
+use crate::instant::has_zone;
 use crate::json_rows::JsonRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
@@ -163,9 +164,13 @@ fn read_time<C: Cells>(
             found: excerpt(cell),
             expected: time.form.expected(),
         })?;
+    } else if time.form == TimeForm::Rfc3339 {
+        let report = &mut ledger.report;
+        if report.without_zone.is_none() && !has_zone(text.as_bytes()) {
+            report.without_zone = Some(rows.place());
+        }
     } else if rows.decimal_comma()
-        && time.form != TimeForm::Rfc3339
-        && let Some(mark) = ledger.other_mark(cell, || rows.place().line)
+        && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
     {
         ledger.refuse_row(|| mixed(rows.place(), &time.column, cell, mark))?;
         return Ok(None);
@@ -185,7 +190,7 @@ fn read_values<C: Cells>(
         let value = match cell::value(cell, rows.decimal_comma()) {
             Some(_)
                 if rows.decimal_comma()
-                    && let Some(mark) = ledger.other_mark(cell, || rows.place().line) =>
+                    && let Some(mark) = ledger.other_value_mark(cell, || rows.place().line) =>
             {
                 ledger.bad_cell(index, || mixed(rows.place(), &channel.column, cell, mark))?;
                 f64::NAN

@@ -6,7 +6,9 @@ use super::instance::Instance;
 use super::plan::{Beside, PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
+use super::reference::Reference;
 use super::resolver::{Resolver, Suspect};
+use super::scope::Found;
 use crate::channel::Channel;
 use crate::node::{Combiner, OutputPort};
 use crate::time::Duration;
@@ -37,6 +39,9 @@ impl Resolver<'_> {
             self.wrong_count(instance, port.name, &[], "one channel or more");
             return None;
         };
+        if !self.are_predictions(instance, port.name) {
+            return None;
+        }
         let mut agree = sound & self.votes_agree(instance, port.name, &voters);
         let truth = truth?;
         let state = state?;
@@ -189,6 +194,43 @@ impl Resolver<'_> {
             ahead: Duration::ZERO,
             max_age: self.channels[slot].channel.default_max_age(),
         }
+    }
+
+    /// Whether no voter is what an estimator or combiner gives beside its prediction. What else there is may vote: a feature of
+    /// a prediction, such as its `scale`, is one for all that is known.
+    pub(super) fn are_predictions(&mut self, instance: &Instance<'_>, input: &str) -> bool {
+        let mut all = true;
+        for (text, place) in instance
+            .input(input)
+            .map_or(&[][..], |input| &input.references)
+        {
+            let Ok(Found::Slots(slots)) = self.scopes.look_up(text) else {
+                continue;
+            };
+            let mut told_of = slots.iter().map(|&slot| (slot, self.told_of(slot)));
+            let Some((slot, Some(prediction))) = told_of.find(|(_, of)| of.is_some()) else {
+                continue;
+            };
+            let reference = Reference::parse(text);
+            let problem = CompileProblem::NoPrediction {
+                channel: self.channels[slot].name.clone(),
+                prediction: match reference.channel {
+                    Some(_) => self.channels[prediction].name.clone(),
+                    None => reference.node.to_owned(),
+                },
+            };
+            self.diagnostics.report(*place, problem);
+            all = false;
+        }
+        all
+    }
+
+    /// The prediction beside which an estimator or combiner gives this slot.
+    fn told_of(&self, slot: usize) -> Option<usize> {
+        let node = &self.nodes[self.channels[slot].node?];
+        let (_, predictions) = node.ports.first()?;
+        let predicts = !matches!(node.role, PlannedRole::Feature { .. });
+        (predicts && !predictions.contains(&slot)).then_some(predictions.start)
     }
 
     /// Whether predictions may be put together.

@@ -77,9 +77,13 @@ impl Resolver<'_> {
         {
             let mut unit = Self::port_unit(&port);
             if port.name == "voters" {
-                whole &= self.votes_agree(instance, port.name, &features);
-                whole &= self.votes_fit(instance, port.name, &features, &link);
-                unit = Some(self.channels[truth].channel.unit.clone());
+                if self.are_predictions(instance, port.name) {
+                    whole &= self.votes_agree(instance, port.name, &features);
+                    whole &= self.votes_fit(instance, port.name, &features, &link);
+                    unit = Some(self.channels[truth].channel.unit.clone());
+                } else {
+                    whole = false;
+                }
             }
             for &lag in &wanted.feature_lags {
                 for &slot in &features {

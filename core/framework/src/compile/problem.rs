@@ -90,6 +90,8 @@ pub enum CompileProblem {
         second: String,
         second_truth: String,
     },
+    /// A vote that is not what its node predicts.
+    NoPrediction { channel: String, prediction: String },
     /// A loop without a delay.
     Cycle { path: Vec<String> },
     /// A regressor that contains part of the answer.
@@ -216,6 +218,7 @@ impl Problem for CompileProblem {
             Self::NoRows { .. } => "A064",
             Self::Doubt { .. } => "A065",
             Self::Truths { .. } => "A066",
+            Self::NoPrediction { .. } => "A067",
             Self::NeverLearns { .. } => "A110",
             Self::EndlessTruth { .. } => "A160",
         }
@@ -243,6 +246,7 @@ impl Problem for CompileProblem {
             | Self::Spans { .. }
             | Self::Horizons { .. }
             | Self::Truths { .. }
+            | Self::NoPrediction { .. }
             | Self::Cycle { .. }
             | Self::Leak { .. }
             | Self::NoMaxAge { .. }
@@ -326,6 +330,12 @@ impl Problem for CompileProblem {
                     format!("`{first}` predicts `{first_truth}` and `{second}` `{second_truth}`")
                 }
             }
+            Self::NoPrediction {
+                channel,
+                prediction,
+            } => {
+                format!("`{channel}` tells of the prediction `{prediction}` and is none")
+            }
             Self::Cycle { path } => {
                 format!("these nodes wait for each other: {}", path.join(" → "))
             }
@@ -397,6 +407,7 @@ impl Problem for CompileProblem {
             Self::Spans { .. } => "spans differ",
             Self::Horizons { .. } => "horizons differ",
             Self::Truths { .. } => "truths differ",
+            Self::NoPrediction { .. } => "not a prediction",
             Self::Cycle { .. } => "part of a loop",
             Self::Leak { .. } => "sees the future",
             Self::NoMaxAge { .. } => "held without a maximum age",
@@ -448,6 +459,9 @@ impl Problem for CompileProblem {
             Self::Horizons { .. } => "give both the same `ahead`".to_owned(),
             Self::Truths { .. } => {
                 "combine predictions of one axis; `each` makes a node for each of several".to_owned()
+            }
+            Self::NoPrediction { prediction, .. } => {
+                format!("let the prediction vote: `{prediction}`")
             }
             Self::Cycle { .. } => "let the feedback go through a `delay` node".to_owned(),
             Self::Leak {

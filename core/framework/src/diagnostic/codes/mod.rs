@@ -308,6 +308,11 @@ pub const CODES: &[Code] = &[
         "All voters of a combiner predict the same thing, and are judged by it. A prediction of one axis is none of another, however alike the two are."
     ),
     code!(
+        "A067",
+        "a vote that is no prediction",
+        "What an estimator or combiner gives first is its prediction. Its other ports, such as `deviation`, `lower` or `weights`, tell of that prediction; put together with predictions they would make a number of no meaning."
+    ),
+    code!(
         "A070",
         "nothing to run over",
         "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."
