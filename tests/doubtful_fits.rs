@@ -100,6 +100,29 @@ fn gradients_that_diverge_are_an_error_that_names_the_step_size() {
 }
 
 #[test]
+fn a_fit_that_is_left_with_no_regressor_says_so_and_why() {
+    let stays = |row: usize, u: f64| format!("{row},{u},5,{}\n", 3.0 * u + noise(row, 3));
+    let rows: String = (0..300).map(|row| stays(row, noise(row, 1))).collect();
+    let rows = format!("s,u,v,y\n{rows}");
+    let select = |features: &str| {
+        format!(
+            "type = \"linear\"\ninputs.features = \"{features}\"\nselection = {{ method = \"forward\" }}"
+        )
+    };
+    let none = fit("none-left", &select("in.v"), &rows, &[]).ended(0);
+    let some = fit("some-left", &select("in"), &rows, &[]).ended(0);
+    let long = "type = \"ar\"\nlags = [\"5000s\"]";
+    let no_past = fit("no-past", long, &rows, &[]).ended(0);
+    for (told, left) in [(&none.out, false), (&some.out, true), (&no_past.out, false)] {
+        let says_none = told.contains("no regressor is left to predict from");
+        assert_eq!(says_none, !left, "{told}");
+    }
+    for told in [&none.out, &some.out] {
+        assert!(told.contains("constant, so without effect: in.v"), "{told}");
+    }
+}
+
+#[test]
 fn a_fit_that_is_worse_than_the_mean_of_its_rows_is_doubted() {
     let node = format!(
         "type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"sgd\", eta0 = 1.2, power = 0.0, epochs = 1 }}"

@@ -104,7 +104,11 @@ impl LinearTrainer {
         let fit = solved.map_err(told)?;
         report.condition = Some(fit.condition);
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
-        self.note(&fit, report);
+        let of_all = self.selection.as_ref().and_then(|_| {
+            let all: Vec<usize> = (0..self.regressors.len()).collect();
+            squares.solve(&gram, &all, &standard.scales, None).ok()
+        });
+        self.note(&fit, of_all.as_ref().unwrap_or(&fit), report);
         let names = columns
             .iter()
             .map(|&column| self.regressors[column].name.clone())
@@ -233,8 +237,9 @@ impl LinearTrainer {
         Ok((model, online))
     }
 
-    fn note(&self, fit: &LinearFit, report: &mut TrainingReport) {
-        name_columns(fit, |column| &self.regressors[column].name, report);
+    /// Tells of the columns of all candidates, and of how those chosen were solved.
+    fn note(&self, fit: &LinearFit, of_all: &LinearFit, report: &mut TrainingReport) {
+        name_columns(of_all, |column| &self.regressors[column].name, report);
         match fit.method {
             Method::Cholesky => {}
             // The least squares only looked at the regressors; the coefficients are found in another way.

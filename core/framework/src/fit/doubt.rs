@@ -33,8 +33,19 @@ impl Truths {
         self.squares += off * (truth - self.mean);
     }
 
-    /// Tells of a fit that says little, for all that its error may be small.
-    pub(super) fn doubt(self, predictor: &dyn Predictor, report: &mut TrainingReport) {
+    /// Tells of a fit that says little, for all that its error may be small; `asked_for` is how many regressors its node has.
+    pub(super) fn doubt(
+        self,
+        predictor: &dyn Predictor,
+        asked_for: usize,
+        report: &mut TrainingReport,
+    ) {
+        if asked_for > 0 && predictor.uses().is_empty() {
+            report.figure("regressors_left", 0_usize);
+            report
+                .notes
+                .push("no regressor is left to predict from".to_owned());
+        }
         if !self.changes {
             report.figure("constant_truth", self.first);
             report.notes.push(

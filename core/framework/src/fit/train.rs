@@ -155,7 +155,7 @@ pub(super) fn end(
             predictor,
             mut report,
         }) => {
-            truths.doubt(predictor.as_ref(), &mut report);
+            truths.doubt(predictor.as_ref(), regressors.len(), &mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
         Err(error) => (Outcome::Failed(error), None),
