@@ -180,12 +180,22 @@ fn the_days_of_a_spreadsheet_are_days() {
     let graph = folder.graph("days.csv");
     assert!(graph.contains("3,000 rows over 25"), "{graph}");
     assert!(graph.contains("unit = \"d\""), "{graph}");
-    let mixed = text.replace("46083,", "46083.").replace("46084,", "46084.");
+    let days = ["46083", "46084"];
+    let (first, second) = text.split_at(text.len() / 3);
+    let points = days.iter().fold(second.replace(',', "."), |text, day| {
+        text.replace(&format!("{day}."), &format!("{day},"))
+    });
+    let mixed = first.to_owned() + &points;
     let (fine, told) = folder.init("mixed.csv", &mixed);
     assert!(!fine);
     let reason =
-        "but since line 2 the decimal mark is `.`; write all numbers of a file with one mark";
+        "but since line 2 the decimal mark is `,`; write all numbers of a file with one mark";
     assert!(told.contains(reason), "{told}");
+    // The clock may have a mark of its own.
+    let apart = days.iter().fold(text, |text, day| {
+        text.replace(&format!("{day},"), &format!("{day}."))
+    });
+    folder.started("apart.csv", &apart);
 }
 
 #[test]
