@@ -200,3 +200,24 @@ fn what_a_node_gives_beside_its_prediction_has_no_vote() {
         plan(&voting(&format!("{mean}[\"{voter}\"]")));
     }
 }
+
+#[test]
+fn regressors_and_votes_stand_once_and_factors_may_stand_twice() {
+    let mean = "[nodes.vote]\ntype = \"mean\"\ninputs.voters = ";
+    let told = problems(&voting(&format!(
+        "{mean}[\"same\", \"thermal\", \"same.Z\"]"
+    )));
+    assert_eq!(told.matches("error[").count(), 1, "{told}");
+    assert!(told.contains("error[A068]"), "{told}");
+    assert!(told.contains("`same.Z` stands twice in `voters`"), "{told}");
+    let of = |features: &str, node: &str| {
+        voting(&format!("{mean}[\"same\", \"thermal\"]{node}")).replace(
+            "inputs.features = \"gradients\"",
+            &format!("inputs.features = {features}"),
+        )
+    };
+    let told = problems(&of("[\"gradients\", \"gradients\"]", ""));
+    assert!(told.contains("A068"), "{told}");
+    let squared = "\n[nodes.squared]\ntype = \"product\"\nunit = \"nm2/min2\"\ninputs.signal = [\"drift\", \"drift\"]\n";
+    plan(&of("[\"gradients\", \"squared\"]", squared));
+}

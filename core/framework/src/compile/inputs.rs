@@ -12,6 +12,9 @@ use crate::node::{InputPort, Inputs, Read};
 use crate::time::Duration;
 use crate::unit::Unit;
 
+/// The inputs of which every channel counts once; a product may well have one twice.
+const COUNTS_ONCE: [&str; 2] = ["features", "voters"];
+
 impl Resolver<'_> {
     /// Looks up what an input refers to: slots in order, none for an optional input left out.
     pub(crate) fn slots(
@@ -30,11 +33,32 @@ impl Resolver<'_> {
         let mut whole = true;
         for (text, place) in &input.references {
             match self.look_up(text, *place) {
-                Some(found) => slots.extend(found),
+                Some(found) => {
+                    whole &= self.count_once(port.name, &slots, &found, *place);
+                    slots.extend(found);
+                }
                 None => whole = false,
             }
         }
         whole.then_some(slots)
+    }
+
+    /// Tells of a regressor or a vote that stands among those before it already.
+    fn count_once(
+        &mut self,
+        input: &'static str,
+        before: &[usize],
+        found: &[usize],
+        place: Place,
+    ) -> bool {
+        let counts = COUNTS_ONCE.contains(&input);
+        let twice = found.iter().find(|slot| counts && before.contains(slot));
+        if let Some(&slot) = twice {
+            let channel = self.channels[slot].name.clone();
+            self.diagnostics
+                .report(place, CompileProblem::Repeated { channel, input });
+        }
+        twice.is_none()
     }
 
     /// Tells that an input is missing, unless it is there under a name that is told to be none.

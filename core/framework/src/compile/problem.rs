@@ -92,6 +92,11 @@ pub enum CompileProblem {
     },
     /// A vote that is not what its node predicts.
     NoPrediction { channel: String, prediction: String },
+    /// A regressor or a vote that counts twice.
+    Repeated {
+        channel: String,
+        input: &'static str,
+    },
     /// A loop without a delay.
     Cycle { path: Vec<String> },
     /// A regressor that contains part of the answer.
@@ -219,6 +224,7 @@ impl Problem for CompileProblem {
             Self::Doubt { .. } => "A065",
             Self::Truths { .. } => "A066",
             Self::NoPrediction { .. } => "A067",
+            Self::Repeated { .. } => "A068",
             Self::NeverLearns { .. } => "A110",
             Self::EndlessTruth { .. } => "A160",
         }
@@ -247,6 +253,7 @@ impl Problem for CompileProblem {
             | Self::Horizons { .. }
             | Self::Truths { .. }
             | Self::NoPrediction { .. }
+            | Self::Repeated { .. }
             | Self::Cycle { .. }
             | Self::Leak { .. }
             | Self::NoMaxAge { .. }
@@ -336,6 +343,7 @@ impl Problem for CompileProblem {
             } => {
                 format!("`{channel}` tells of the prediction `{prediction}` and is none")
             }
+            Self::Repeated { channel, input } => format!("`{channel}` stands twice in `{input}`"),
             Self::Cycle { path } => {
                 format!("these nodes wait for each other: {}", path.join(" → "))
             }
@@ -408,6 +416,7 @@ impl Problem for CompileProblem {
             Self::Horizons { .. } => "horizons differ",
             Self::Truths { .. } => "truths differ",
             Self::NoPrediction { .. } => "not a prediction",
+            Self::Repeated { .. } => "for the second time",
             Self::Cycle { .. } => "part of a loop",
             Self::Leak { .. } => "sees the future",
             Self::NoMaxAge { .. } => "held without a maximum age",
@@ -460,6 +469,7 @@ impl Problem for CompileProblem {
             Self::Truths { .. } => {
                 "combine predictions of one axis; `each` makes a node for each of several".to_owned()
             }
+            Self::Repeated { .. } => "refer to each channel once".to_owned(),
             Self::NoPrediction { prediction, .. } => {
                 format!("let the prediction vote: `{prediction}`")
             }

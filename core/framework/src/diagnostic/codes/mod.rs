@@ -313,6 +313,11 @@ pub const CODES: &[Code] = &[
         "What an estimator or combiner gives first is its prediction. Its other ports, such as `deviation`, `lower` or `weights`, tell of that prediction; put together with predictions they would make a number of no meaning."
     ),
     code!(
+        "A068",
+        "a channel that counts twice",
+        "Each regressor and each vote counts once: the coefficients of two that are the same cannot be told apart, and a voter that stands twice would have twice the say."
+    ),
+    code!(
         "A070",
         "nothing to run over",
         "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."
