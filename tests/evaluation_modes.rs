@@ -432,15 +432,17 @@ fn steps_are_asked_for_and_refused_where_they_mean_nothing() {
     let data = scratch.file("data.csv", csv(&series(20)));
     let graph = scratch.file("graph.toml", GRAPH.replace("LEARN", ""));
     let model = fitted(&scratch, "model.json", &graph, &data);
-    let evaluate = |mode: &[&str]| {
+    let evaluate = |mode: &[&str], code: i32| {
         let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
             vec![&"evaluate", &model, &"--data", &data];
         arguments.extend(mode.iter().map(|part| part as &dyn AsRef<std::ffi::OsStr>));
-        athermal(&arguments).ended(2)
+        athermal(&arguments).ended(code)
     };
-    evaluate(&["--mode", "k-step"]).tells(&["--steps <K>"]);
-    evaluate(&["--mode", "free-run", "--steps", "3"]).tells(&["--mode k-step", "free-run"]);
-    evaluate(&["--mode", "k-step", "--steps", "0"]).tells(&["--steps"]);
+    evaluate(&["--mode", "k-step"], 2).tells(&["--steps <K>"]);
+    evaluate(&["--mode", "free-run", "--steps", "3"], 2).tells(&["--mode k-step", "free-run"]);
+    evaluate(&["--mode", "k-step", "--steps", "0"], 2).tells(&["--steps"]);
+    evaluate(&["--mode", "k-step", "--steps", "1000"], 0)
+        .tells(&["1000 steps ahead", "fewer `--steps`"]);
 }
 
 /// The rows of a file from one to another as a file of their own.

@@ -154,6 +154,14 @@ impl Evaluate {
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);
         }
+        let none = |of: &Score| of.valid.is_some() && of.n == 0;
+        if let Some(steps) = self.steps
+            && scores.scores.iter().any(none)
+        {
+            terminal.warning(format_args!(
+                "where no truth was predicted {steps} steps ahead, no stretch of the data may be that long: try fewer `--steps`"
+            ));
+        }
         if scores.scores.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to score",

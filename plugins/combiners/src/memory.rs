@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 /// How long an error is remembered, counted from when the embargo lets its truth through.
 ///
-/// `"15min"` forgets at once what was let through earlier, `{ truths = 12 }` what came before the last twelve, and
+/// `"15min"` forgets at once what was let through 15 minutes ago or earlier, `{ truths = 12 }` what came before the last twelve, and
 /// `{ half_life = "15min" }` counts an error half after that time, a quarter after twice that, and not at all after ten times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]

@@ -27,7 +27,8 @@ use crate::windows::{half, over, three, window_mistakes};
 /// steady ramp; `r2` its coefficient of determination, the share of the variance that it explains.
 ///
 /// A value exists once the window reaches back no further than the channel's first value, holds `min_samples` samples and
-/// these span `min_coverage` of it.
+/// these span `min_coverage` of it. Where times jitter, half a sample's period more than a whole number of periods keeps the oldest
+/// sample from falling now into the window and now out of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Slope {

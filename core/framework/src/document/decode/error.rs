@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::de::{self, Expected, Unexpected};
 
-use crate::diagnostic::{Diagnostics, Place, counted, nearest};
+use crate::diagnostic::{Diagnostics, Place, Problem, counted, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Value};
@@ -41,6 +41,29 @@ impl Mistake {
         }
     }
 
+    /// The choices that there are where the text at `way` is none of them.
+    pub(super) fn choices_at(&self, way: &[Step]) -> Option<&[String]> {
+        match &self.problem {
+            DocumentProblem::UnknownChoice { choices, .. } if self.path == way => Some(choices),
+            _ => None,
+        }
+    }
+
+    /// A missing key in this table, with what a text that is no choice there is told.
+    pub(super) fn moved(&mut self, path: Vec<Step>, place: Place, no_choice: Option<&Self>) {
+        (self.path, self.place) = (path, place);
+        if let (DocumentProblem::MissingKey { advice, .. }, Some(no_choice)) =
+            (&mut self.problem, no_choice)
+        {
+            *advice = no_choice.problem.help();
+        }
+    }
+
+    /// Whether the key at `way` is unknown.
+    pub(super) fn is_unknown(&self, way: &[Step]) -> bool {
+        matches!(self.problem, DocumentProblem::UnknownKey { .. }) && self.path == way
+    }
+
     /// The way to the key that an unknown one may be meant for.
     pub(super) fn meant(&self) -> Option<Vec<Step>> {
         let DocumentProblem::UnknownKey { key, known, .. } = &self.problem else {
@@ -64,8 +87,9 @@ impl Mistake {
     pub(super) fn advised(mut self, of: &dyn Fn(&str) -> Option<String>) -> Self {
         if self.path.is_empty()
             && let DocumentProblem::MissingKey { key, advice, .. } = &mut self.problem
+            && let Some(of_key) = of(key)
         {
-            *advice = of(key);
+            *advice = Some(of_key);
         }
         self
     }
@@ -246,7 +270,6 @@ fn search(
 
 impl fmt::Display for DecodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use crate::diagnostic::Problem;
         match &*self.0 {
             State::Unplaced(problem) | State::Placed(Mistake { problem, .. }) => {
                 f.write_str(&problem.message())

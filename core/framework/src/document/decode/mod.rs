@@ -51,7 +51,7 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
                 strange.push(mistake);
             }
         }
-        let mistake = match result {
+        let mut mistake = match result {
             Ok(value) => {
                 let meant = strange.iter().filter_map(Mistake::meant);
                 let touched = repair.as_ref().map_or(&[][..], Repair::touched);
@@ -63,6 +63,11 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
             Err(error) => error.into_mistake(value.place),
         };
         let repair = repair.get_or_insert_with(|| Repair::of(value));
+        let first = |tree: &Value| {
+            let error = attempt::<T>(tree).0.err()?;
+            Some(error.into_mistake(value.place))
+        };
+        repair.place_missing_key(&mut mistake, first);
         let is_misspelt = strange.iter().any(|given| given.is_meant_for(&mistake));
         if !repair.explains(&mistake) && !is_misspelt {
             mistake.clone().advised(advice).report(what, diagnostics);
@@ -80,10 +85,6 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
                             next.path == mistake.path && next.missing_key() == Some(key);
                         !at_key && !still_missing
                     }
-                };
-                let first = |tree: &Value| {
-                    let error = attempt::<T>(tree).0.err()?;
-                    Some(error.into_mistake(value.place))
                 };
                 repair.put_in(&mistake.path, key, stands_in)
                     || repair.choose(&mistake.path, key, word(value, &mistake.path, key), first)

@@ -1,8 +1,7 @@
 //! Taking what is wrong out of a copy of the tree so that the rest can be read; it reports nothing.
 
 use super::error::{Mistake, Step};
-use crate::diagnostic::nearest;
-use crate::document::problem::DocumentProblem;
+use crate::diagnostic::{Place, nearest};
 use crate::document::tree::{Data, Entry, Value};
 
 /// The index of what was taken out of a list; no list is that long.
@@ -46,6 +45,31 @@ impl Repair {
                 .touched
                 .iter()
                 .any(|path| path.starts_with(&mistake.path)),
+        }
+    }
+
+    /// Finds out what may stand under a missing key, and where a buffered enum lacks it, the table within that it is missing of.
+    /// `read` gives the first mistake of a tree.
+    pub(super) fn place_missing_key(
+        &mut self,
+        mistake: &mut Mistake,
+        read: impl Fn(&Value) -> Option<Mistake>,
+    ) {
+        let Some(key) = mistake.missing_key() else {
+            return;
+        };
+        let mut tables = Vec::new();
+        if let Some(table) = inside(&mut self.tree, &mistake.path) {
+            tables_without(table, key, &mut mistake.path.clone(), &mut tables);
+        }
+        for (path, place) in tables {
+            let first = self.read_with("", &path, key, &read);
+            let (first, way) = (first.as_ref(), way(&path, key));
+            if !first.is_some_and(|first| first == mistake || first.is_unknown(&way)) {
+                let no_choice = first.filter(|first| first.choices_at(&way).is_some());
+                mistake.moved(path, place, no_choice);
+                return;
+            }
         }
     }
 
@@ -155,22 +179,12 @@ impl Repair {
         read: impl Fn(&Value) -> Option<Mistake>,
     ) -> Vec<String> {
         let way = way(path, key);
-        let mut with = |choice: &str| {
-            let put = self.insert(path, key, Data::Text(choice.to_owned()));
-            let first = read(&self.tree);
-            if put {
-                self.remove(path, key);
-            }
-            first
-        };
+        let mut with = |choice: &str| self.read_with(choice, path, key, &read);
         // No choice is without a name.
-        let choices = match with("") {
-            Some(Mistake {
-                path,
-                problem: DocumentProblem::UnknownChoice { choices, .. },
-                ..
-            }) if path == way => choices,
-            _ => return Vec::new(),
+        let of_no_name = with("");
+        let choices = of_no_name.as_ref().and_then(|first| first.choices_at(&way));
+        let Some(choices) = choices else {
+            return Vec::new();
         };
         let tried: Vec<_> = choices.iter().map(|choice| with(choice)).collect();
         let is_beside = |first: &Mistake| {
@@ -179,14 +193,30 @@ impl Repair {
         };
         let same = tried.windows(2).all(|two| two[0] == two[1]);
         if same && tried.iter().flatten().all(is_beside) {
-            return choices;
+            return choices.to_vec();
         }
-        let tried = choices.into_iter().zip(tried);
+        let tried = choices.iter().cloned().zip(tried);
         let readable = tried.filter(|(_, first)| {
             let mut first = first.iter();
             first.all(|first| !first.path.starts_with(path))
         });
         readable.map(|(choice, _)| choice).collect()
+    }
+
+    /// The first mistake of the tree with a text under a missing key.
+    fn read_with(
+        &mut self,
+        text: &str,
+        path: &[Step],
+        key: &str,
+        read: impl Fn(&Value) -> Option<Mistake>,
+    ) -> Option<Mistake> {
+        let put = self.insert(path, key, Data::Text(text.to_owned()));
+        let first = read(&self.tree);
+        if put {
+            self.remove(path, key);
+        }
+        first
     }
 
     /// The tree with each of the other choices that would do.
@@ -223,6 +253,26 @@ impl Repair {
         {
             table.remove(key);
         }
+    }
+}
+
+/// The ways to a table and those within it that have no such key, and where they are.
+fn tables_without(
+    value: &Value,
+    key: &str,
+    path: &mut Vec<Step>,
+    tables: &mut Vec<(Vec<Step>, Place)>,
+) {
+    let Data::Table(table) = &value.data else {
+        return;
+    };
+    if !table.contains(key) {
+        tables.push((path.clone(), value.place));
+    }
+    for (name, entry) in table.iter() {
+        path.push(Step::Key(name.to_owned()));
+        tables_without(&entry.value, key, path, tables);
+        path.pop();
     }
 }
 

@@ -39,6 +39,14 @@ enum Method {
 enum Solver {
     Ridge { alpha: f64 },
     Sgd { rate: f64, every: Option<Duration> },
+    Searched { alpha: Searched },
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
+enum Searched {
+    Error { folds: u32 },
+    Score,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -452,8 +460,30 @@ error[A007]: "solver" of node "n" needs the key "type"
   |
 7 | solver = { alpha = 1 }
   |          ^^^^^^^^^^^^^ "type" is missing
+  |
+  = help: the choices are "ridge", "sgd", "searched"
 "#
     );
+}
+
+#[test]
+fn a_tagged_table_within_another_needs_its_own_tag() {
+    let report = mistakes("solver = { type = \"searched\", alpha = { folds = 3 } }");
+    assert_eq!(
+        report,
+        r#"
+error[A007]: "solver.alpha" of node "n" needs the key "by"
+ --> a.toml:7:39
+  |
+7 | solver = { type = "searched", alpha = { folds = 3 } }
+  |                                       ^^^^^^^^^^^^^ "by" is missing
+  |
+  = help: the choices are "error", "score"
+"#
+    );
+    let report = mistakes("solver = { type = \"searched\", alpha = { by = \"r2\" } }");
+    assert_eq!(report.matches("error[").count(), 1, "{report}");
+    assert!(report.contains("A009"), "{report}");
 }
 
 #[test]
@@ -490,6 +520,8 @@ error[A007]: "stages" of node "n" needs the key "method"
   |
 7 | stages = [{ folds = 1 }, { folds = "2", tolerance = 1, method = "forward" }, 5]
   |           ^^^^^^^^^^^^^ "method" is missing
+  |
+  = help: the choices are "forward", "backward"
 
 error[A008]: expected a whole number, 0 or more for "folds", found the text "2"
  --> a.toml:7:36
