@@ -100,6 +100,28 @@ fn a_run_that_is_restarted_gives_what_one_in_one_piece_does_and_needs_its_state_
 }
 
 #[test]
+fn a_watched_run_that_is_restarted_goes_on_too() {
+    let (scratch, model, data, _) = desk("watched");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let half = text.lines().take(2000).collect::<Vec<_>>().join("\n");
+    let state = scratch.path("state");
+    let watched = |rows: &str, state: Option<&PathBuf>| {
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"run", &model, &"-i", &"-", &"--watch"];
+        if let Some(state) = state {
+            arguments.extend([&"--state" as &dyn AsRef<std::ffi::OsStr>, state]);
+        }
+        athermal_fed(&arguments, rows.as_bytes()).ended(0).out
+    };
+    let before = watched(&half, Some(&state));
+    let after = watched(&text, Some(&state));
+    assert_eq!(
+        before + after.split_once('\n').unwrap().1,
+        watched(&text, None)
+    );
+}
+
+#[test]
 fn what_was_rejected_in_a_run_is_not_told_again_by_the_next() {
     let (scratch, model, data, _) = desk("rejected");
     let text = std::fs::read_to_string(&data).unwrap();

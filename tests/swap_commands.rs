@@ -218,10 +218,16 @@ struct Live {
 
 impl Live {
     fn new(graph: &Path) -> Self {
+        Self::going_on(graph, &[], 0)
+    }
+
+    /// One that begins at a time of its own.
+    fn going_on(graph: &Path, more: &[&str], time: u32) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
             .arg("run")
             .arg(graph)
             .args(["--input", "-", "--output", "-", "--watch"])
+            .args(more)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -233,7 +239,7 @@ impl Live {
             rows,
             out: BufReader::new(child.stdout.take().unwrap()),
             child,
-            time: 0,
+            time,
         };
         live.row();
         assert_eq!(live.line(), "time_s,predicted.Z,revision");
@@ -320,4 +326,29 @@ fn a_watched_graph_is_taken_over_when_any_of_its_files_changes() {
     ] {
         assert!(told.contains(part), "`{part}` is not in\n{told}");
     }
+}
+
+#[test]
+fn what_took_over_in_a_run_goes_on_in_the_next() {
+    let scratch = desk("kept");
+    let (graph, state) = (scratch.path("graph.toml"), scratch.path("state"));
+    let kept = ["--state", state.to_str().unwrap()];
+    let mut live = Live::going_on(&graph, &kept, 0);
+    let first = live.revision();
+    let slower = GRAPH.replace("windows = [\"30s\"]", "windows = [\"40s\"]");
+    scratch.file("graph.toml", slower);
+    let second = live.until_swapped(&first);
+    let time = live.time;
+    live.told();
+
+    // Forty seconds would have to pass before the first slope of a run that begins cold.
+    let mut live = Live::going_on(&graph, &kept, time);
+    live.row();
+    let line = live.line();
+    assert_eq!(line, format!("{},60.0,{second}", live.time));
+    live.told();
+
+    scratch.file("model.toml", module("still"));
+    let refused = run(&scratch, &["--watch", "--state", state.to_str().unwrap()]).ended(2);
+    refused.tells(&["cannot go on from", "belongs to revision"]);
 }

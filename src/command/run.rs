@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::document::TimeBase;
-use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair};
+use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
 use athermal::files::{FileError, Flush, Layout, Options, Reader, WithRevision, Writer, layout};
 use athermal::{Engine, Model};
@@ -43,8 +43,8 @@ pub struct Run {
     #[arg(long)]
     frozen: bool,
     /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: when the input ends, and at least once a
-    /// minute while rows come. Rows up to the last one known are passed over
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["swap_at", "watch"])]
+    /// minute while rows come. Rows up to the last one known are passed over. With `--watch` it is kept of whatever graph runs
+    #[arg(long, value_name = "FILE", conflicts_with = "swap_at")]
     state: Option<PathBuf>,
     #[command(flatten)]
     swap: swap::Options,
@@ -124,16 +124,17 @@ impl Run {
         };
         let read = swap::reading(&model, &swaps, &feed);
         let mut reader = self.open(terminal, layout(&read), options)?;
-        let mut ranged = Ranged::new(terminal, &mut reader, self.ranged(&read));
+        let mut engine = model.engine()?;
+        let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
+        let mut rest = kept.rest(terminal, &mut reader);
+        let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read));
         let live = LiveOptions {
             channels: feed,
             ..LiveOptions::default()
         };
         let (mut stepper, mut control) =
-            pair(&model, live).map_err(|error| Failure::Request(error.to_string()))?;
-        if self.frozen {
-            stepper.freeze(true);
-        }
+            pair_from(engine, live).map_err(|error| Failure::Request(error.to_string()))?;
+        stepper.freeze(self.frozen);
         let TimeBase::Column { column, .. } = &model.plan.time;
         let column = column.clone();
         let mut course = swap::Course::new(
@@ -182,8 +183,10 @@ impl Run {
                 outputs: &shown,
             };
             writer.put(&frame).map_err(outside)?;
+            kept.after_tick(stepper.engine()).map_err(outside)?;
         }
         writer.finish().map_err(outside)?;
+        kept.write(stepper.engine()).map_err(outside)?;
         course.end(&mut control);
         let engine = stepper.engine();
         self.tell(terminal, engine, &reader);

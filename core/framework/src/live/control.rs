@@ -156,29 +156,30 @@ impl fmt::Display for StageError {
 
 impl std::error::Error for StageError {}
 
-pub(super) fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Control), EngineError> {
-    let mut feed = Feed::of(&model.plan);
+/// The two ends of an engine of which there is a replica.
+pub(super) fn pair(engine: Engine, replica: Engine, options: LiveOptions) -> (Stepper, Control) {
+    let running = Arc::clone(engine.plan());
+    let mut feed = Feed::of(&running);
     for channel in &options.channels {
         if !feed.contains(channel) {
             feed.push(channel.clone());
         }
     }
     let feed: Arc<[Feed]> = feed.into();
-    let seat = || -> Result<Seated, EngineError> {
-        let engine = Engine::new(Arc::clone(&model.plan), &model.fitted)?;
-        Ok(Seated::new(engine, &feed, 0).expect("the feed has all channels of the plan"))
-    };
+    let seat =
+        |engine| Seated::new(engine, &feed, 0).expect("the feed has all channels of the plan");
     let record = feed.len() + Mark::WIDTH;
     let (mirror, ticks) = RingBuffer::new(options.mirrored.max(1) * record);
     let (departing, arriving) = RingBuffer::new(ON_THE_WAY);
     let (leaving, returning) = RingBuffer::new(ON_THE_WAY);
-    let stepper = Stepper::new(seat()?, Arc::clone(&feed), mirror, arriving, leaving);
-    let span = options.retain.max(model.plan.warm_up);
+    let frozen = engine.frozen();
+    let stepper = Stepper::new(seat(engine), Arc::clone(&feed), mirror, arriving, leaving);
+    let span = options.retain.max(running.warm_up);
     let control = Control {
         retained: Retained::new(feed.len(), span, options.memory),
         row: vec![f64::NAN; record],
-        replica: Some(seat()?),
-        running: Arc::clone(&model.plan),
+        replica: Some(seat(replica)),
+        running,
         options,
         feed,
         ticks,
@@ -190,10 +191,10 @@ pub(super) fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Cont
         previous: None,
         event: 0,
         last: None,
-        frozen: false,
+        frozen,
         generation: 0,
     };
-    Ok((stepper, control))
+    (stepper, control)
 }
 
 impl Control {

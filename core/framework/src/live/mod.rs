@@ -33,7 +33,9 @@ pub use sink::{Frame, Sink, SinkError};
 pub use source::{Samples, Source, SourceError};
 pub use stepper::{Stepped, Stepper};
 
-use crate::engine::EngineError;
+use std::sync::Arc;
+
+use crate::engine::{Engine, EngineError, RestoreError};
 use crate::model::Model;
 use crate::time::Duration;
 
@@ -69,5 +71,15 @@ impl Default for LiveOptions {
 /// # Errors
 /// When what was fitted does not belong to the graph.
 pub fn pair(model: &Model, options: LiveOptions) -> Result<(Stepper, Control), EngineError> {
-    control::pair(model, options)
+    let engine = || Engine::new(Arc::clone(&model.plan), &model.fitted);
+    Ok(control::pair(engine()?, engine()?, options))
+}
+
+/// The two ends of a graph that goes on from where an engine is.
+///
+/// # Errors
+/// When a node does not take its own state back, so that the engine cannot be copied.
+pub fn pair_from(engine: Engine, options: LiveOptions) -> Result<(Stepper, Control), RestoreError> {
+    let replica = engine.twin()?;
+    Ok(control::pair(engine, replica, options))
 }
