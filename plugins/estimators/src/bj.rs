@@ -29,8 +29,8 @@ use crate::order::Order;
 /// varies. So does what comes after more steps without features than ten, or than the
 /// model reaches back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard
 /// deviation of the truth about its prediction, larger after truths that are missing. Features that are missing are taken
-/// for the last ones, and what that adds to the error is not in it. Since the answer changes with time alone, the node runs
-/// at every tick.
+/// for the last ones; what that adds to the error is not in it, nor what the filters may be off by at the beginning of a
+/// segment. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bj {

@@ -26,8 +26,8 @@ use crate::order::Order;
 /// truth says where the filters are: each has its share of what that differs by, which dies away. So does what comes after
 /// more steps without features than ten, or than the model reaches back where that is more. With `learn = false` it stays
 /// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Features that are missing are
-/// taken for the last ones, and what that adds to the error is not in it. Since the answer changes with time alone, the
-/// node runs at every tick.
+/// taken for the last ones; what that adds to the error is not in it, nor what the filters may be off by at the beginning of
+/// a segment. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Oe {

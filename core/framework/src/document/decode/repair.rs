@@ -7,6 +7,9 @@ use crate::document::tree::{Data, Entry, Value};
 /// The index of what was taken out of a list; no list is that long.
 const GAP: usize = usize::MAX;
 
+/// In how many tables of an enum a missing key is looked for; the limit only bounds the time that a hopeless file takes.
+const MOST_TABLES: usize = 16;
+
 /// A copy of the tree without the values that were found wrong.
 pub(super) struct Repair {
     tree: Value,
@@ -62,7 +65,7 @@ impl Repair {
         if let Some(table) = inside(&mut self.tree, &mistake.path) {
             tables_without(table, key, &mut mistake.path.clone(), &mut tables);
         }
-        for (path, place) in tables {
+        for (path, place) in tables.into_iter().take(MOST_TABLES) {
             let first = self.read_with("", &path, key, &read);
             let (first, way) = (first.as_ref(), way(&path, key));
             if !first.is_some_and(|first| first == mistake || first.is_unknown(&way)) {
