@@ -188,6 +188,63 @@ fn a_graph_and_its_copy_differ_by_nothing_and_others_by_what_their_errors_vary()
 }
 
 #[test]
+fn what_is_seldom_valid_is_scored_on_its_own_instants_and_compared_with_none() {
+    let scratch = Scratch::new("compare-seldom");
+    let graph = scratch.file(
+        "graph.toml",
+        "schema = 1\n[time]\ncolumn = \"s\"\n[signals.out]\nunit = \"V\"\nchannels = [\"y\"]\ncolumn = \"{channel}\"\nmax_age = \"20s\"\n\
+         [nodes.often]\ntype = \"ar\"\ninputs.truth = \"out.y\"\nahead = \"10s\"\nlags = [\"0s\"]\n\
+         [nodes.seldom]\ntype = \"ar\"\ninputs.truth = \"out.y\"\nahead = \"10s\"\nlags = [\"700s\"]\n\
+         [outputs]\noften = \"often\"\nseldom = \"seldom\"\n",
+    );
+    // Loud at first, where only one of them predicts, and then hardly at all.
+    let rows: String = (0..100)
+        .map(|nth| {
+            let size = if nth < 75 { 5.0 } else { 0.1 };
+            format!("{},{:.4}\n", 10 * nth, size * (0.8 * f64::from(nth)).sin())
+        })
+        .collect();
+    let log = scratch.file("log.csv", format!("s,y\n{rows}"));
+    let told = athermal(&[&"compare", &graph, &"--data", &log, &"--on", &log])
+        .ended(0)
+        .out;
+    let line = |of: &str| told.lines().find(|line| line.contains(of)).unwrap();
+    assert!(line("often (ar)").contains('*'), "{told}");
+    assert!(!line("seldom (ar)").contains('*'), "{told}");
+    assert!(line("seldom (ar)").contains(" @29"), "{told}");
+    assert!(told.contains("compared with none"), "{told}");
+}
+
+#[test]
+fn graphs_that_mean_something_else_by_a_truth_are_told() {
+    let scratch = Scratch::new("compare-otherwise");
+    let log = simulated(&scratch, "log.csv", "linear-axis", 0.5, 1);
+    let other = scratch.file(
+        "other.toml",
+        format!(
+            "schema = 1\nextends = {:?}\nname = \"other\"\n[nodes.half]\ntype = \"scale\"\ninputs.signal = \"position\"\nfactor = 0.5\n\
+             [nodes.drift]\ninputs.signal = \"half\"\n",
+            graph("linear-axis")
+        ),
+    );
+    let compared = |second: &Path| {
+        athermal(&[
+            &"compare",
+            &graph("linear-axis"),
+            &second,
+            &"--data",
+            &log,
+            &"--on",
+            &log,
+        ])
+        .ended(0)
+    };
+    compared(&other).tells(&["of other has other values than that of linear-axis"]);
+    let same = compared(&graph("linear-axis"));
+    assert!(!same.told.contains("other values"), "{}", same.told);
+}
+
+#[test]
 fn horizons_are_not_compared_with_each_other() {
     let scratch = Scratch::new("compare-horizons");
     let log = simulated(&scratch, "log.csv", "die-tester", 1.0, 1);

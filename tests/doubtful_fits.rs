@@ -322,6 +322,11 @@ fn folds_that_cannot_be_cut_name_their_cause() {
     ]);
     let few = fit("folds", &node("3"), &explained(2), &[]).ended(1);
     few.tells(&["2 rows cannot be cut into 3 folds; at least two folds and one row in each"]);
+    let single = fit("folds", &node("40"), &explained(60), &[]).ended(1);
+    single.tells(&[
+        "in 40 folds of 60 rows some have one row",
+        "at most 20 folds",
+    ]);
 }
 
 #[test]

@@ -368,7 +368,7 @@ fn rows_beyond_the_memory_are_said_where_they_are_needed() {
     let Outcome::Failed(TrainingError::Unsolvable { reason }) = outcome("type = \"huber\"") else {
         panic!("it has no rows to go over")
     };
-    assert!(reason.contains("`--memory 2`"), "{reason}");
+    assert!(reason.contains("2 MB of the `--memory`"), "{reason}");
     assert!(matches!(
         outcome("type = \"lasso\"\nalpha = 0.1"),
         Outcome::Fitted(_)

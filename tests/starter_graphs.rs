@@ -275,3 +275,33 @@ fn decimal_commas_are_read_between_tabs() {
     assert!(told.contains("plate_degC: temperature"), "{told}");
     assert!(told.contains("Z_um: drifts"), "{told}");
 }
+
+#[test]
+fn a_log_is_not_written_over_by_its_own_graph() {
+    let folder = Folder::new("starter-own");
+    let log = "time_s,room_degC,Z_nm\n0,20,1\n10,21,2\n";
+    std::fs::write(folder.0.join("log.csv"), log).unwrap();
+    let output = folder.run(&["init", "log.csv", "-o", "./log.csv", "--force"]);
+    assert_eq!(output.status.code(), Some(2));
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(told.contains("this is the same file as"), "{told}");
+    let kept = std::fs::read_to_string(folder.0.join("log.csv")).unwrap();
+    assert_eq!(kept, log);
+}
+
+#[test]
+fn a_temperature_that_grows_is_no_time() {
+    let folder = Folder::new("starter-growing");
+    let mut log = "time_s,plate_degC,Z_nm\n".to_owned();
+    for row in 0..600 {
+        // Twenty rows within each second of a clock that tells whole ones.
+        let warm = 20.0 + 0.01 * f64::from(row);
+        writeln!(log, "{},{warm:.3},{:.1}", row / 20, 100.0 * warm).unwrap();
+    }
+    let (fine, told) = folder.init("log.csv", &log);
+    assert!(!fine, "{told}");
+    assert!(
+        told.contains("no column advances from row to row as a time does"),
+        "{told}"
+    );
+}

@@ -20,7 +20,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// Fit several graphs on the same data and score them on others, in one table
 ///
 /// Every prediction of every graph is a row, every axis a column. All that predict the same truth over the same horizon are scored
-/// on the instants at which all of them are valid, beside no model and persistence.
+/// on the instants at which all of them are valid, beside no model and persistence; one that is valid at less than half of the
+/// instants is scored on its own, and compared with none.
 ///
 /// Beside each score stands the standard error of its difference to the best of the column: the instants are cut, in order of
 /// time, into ten blocks of as many each, whose differences tell how much that of all of them would vary (batch means; Law and Kelton). A difference of less than
@@ -132,6 +133,16 @@ impl Compare {
         if comparisons.is_empty() {
             terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
         }
+        for column in comparisons.iter().flat_map(|of| &of.truths) {
+            if !column.otherwise.is_empty() {
+                terminal.warning(format_args!(
+                    "`{}` of {} has other values than that of {}, on which all are scored: name truths that are not the same differently",
+                    column.truth,
+                    column.otherwise.join(", "),
+                    fits[0].graph
+                ));
+            }
+        }
         for fit in &fits {
             for told in Lack::told(&fit.lacks) {
                 terminal.warning(format_args!("{}: {told}", fit.graph));
@@ -212,9 +223,18 @@ fn heading(comparison: &Comparison) -> String {
         }
         _ => String::new(),
     };
+    let own = if comparison
+        .rows
+        .iter()
+        .any(|row| row.own.iter().any(Option::is_some))
+    {
+        "@ valid at so few instants that it is scored on these alone, and compared with none\n"
+    } else {
+        ""
+    };
     format!(
         "RMSE in {}, {} ahead, {instants}; * best, ! worse than no model\n\
-         ± standard error of the difference to the best; ~ that may be chance\n{few}",
+         ± standard error of the difference to the best; ~ that may be chance\n{few}{own}",
         comparison.unit,
         stated(comparison.ahead_s)
     )
@@ -226,8 +246,13 @@ fn cell(comparison: &Comparison, row: usize, column: usize, truth: &Column) -> S
     let Some(rmse) = of(row) else {
         return "-".to_owned();
     };
-    let worse = truth.no_model.is_some_and(|zero| rmse > zero);
+    let own = comparison.rows[row].own[column];
+    let no_model = own.map_or(truth.no_model, |own| own.no_model);
+    let worse = no_model.is_some_and(|zero| rmse > zero);
     let worse = if worse { "!" } else { "" };
+    if let Some(own) = own {
+        return format!("{worse}{} @{}", number(rmse), count(own.count as u64));
+    }
     if truth.best == Some(row) {
         return format!("*{worse}{}", number(rmse));
     }
@@ -257,12 +282,14 @@ mod tests {
                 no_model: Some(2.39),
                 persistence: None,
                 best: Some(0),
+                otherwise: Vec::new(),
             }],
             rows: vec![athermal::diagnosis::comparison::Row {
                 graph: "a".to_owned(),
                 node: "vote".to_owned(),
                 kind: "mean",
                 rmse: vec![Some(rmse)],
+                own: vec![None],
                 difference_error: vec![None],
                 valid: vec![Some(1.0)],
             }],
@@ -279,6 +306,19 @@ mod tests {
     fn with_few_instants_it_is_said_that_the_best_may_be_chance() {
         assert!(describe(&one_row(19, 2.0), false).contains("best may be chance"));
         assert!(!describe(&one_row(20, 2.0), false).contains("best may be chance"));
+    }
+
+    #[test]
+    fn what_is_scored_on_instants_of_its_own_is_neither_best_nor_set_against_those_of_others() {
+        let mut seldom = one_row(100, 2.5);
+        seldom.truths[0].best = None;
+        seldom.rows[0].own[0] = Some(athermal::diagnosis::comparison::Own {
+            count: 40,
+            no_model: Some(2.6),
+        });
+        let told = describe(&seldom, false);
+        assert!(told.contains(" 2.50 @40"), "{told}");
+        assert!(told.contains("@ valid at so few instants"), "{told}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::aside::write_aside;
+use super::aside::{check_apart, write_aside};
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};
@@ -57,6 +57,7 @@ impl Init {
                 self.output.display()
             )));
         }
+        check_apart("--output", &self.output, [&*self.data])?;
         let starter = starter(&self.data, &told).map_err(|error| match error {
             NoStarter::File(error) => error.into(),
             NoStarter::Unfit(why) => Failure::Request(format!("{}: {why}", self.data.display())),

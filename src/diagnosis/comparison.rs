@@ -16,6 +16,9 @@ use crate::report::rms;
 /// the choice matters little (Schmeiser 1982); these are the fewest, and so the longest, since what moves a machine lasts for hours.
 pub const BLOCKS: usize = 10;
 
+/// Two values of a truth that differ by more than this share of it are not the same measurement, computed twice.
+const SAME: f64 = 1e-9;
+
 /// A graph that takes part.
 #[derive(Debug, Clone)]
 pub struct Contender {
@@ -49,14 +52,16 @@ pub struct Column {
     pub truth: String,
     /// Its name within its node: `Z1`.
     pub name: String,
-    /// Instants scored: those at which every prediction of it that is mostly valid has a value.
+    /// Instants scored: those at which every prediction of it that is valid at half of them or more has a value.
     pub count: usize,
     /// Root mean square of the truth: the error of no model.
     pub no_model: Option<f64>,
     /// The error of the truth at the smallest lag that sees nothing of the answer.
     pub persistence: Option<f64>,
-    /// The row with the smallest error.
+    /// The row with the smallest error on these instants.
     pub best: Option<usize>,
+    /// Graphs whose own truth of this name is another one than that of the first graph, which all are scored on.
+    pub otherwise: Vec<String>,
 }
 
 /// A node of a graph.
@@ -71,11 +76,22 @@ pub struct Row {
     pub kind: &'static str,
     /// The root mean square error for each truth; none where the node does not predict it.
     pub rmse: Vec<Option<f64>>,
+    /// For each truth whose prediction is valid at less than half of the instants those that it is scored on apart from the others.
+    pub own: Vec<Option<Own>>,
     /// The standard error of the difference of that error and the smallest of the truth, on the instants at which both are valid;
     /// none where there are too few to tell.
     pub difference_error: Vec<Option<f64>>,
     /// The share of all instants with a truth at which there is a prediction.
     pub valid: Vec<Option<f64>>,
+}
+
+/// The instants of a prediction that is seldom valid: nothing that is scored on others is comparable with it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Own {
+    /// How many there are.
+    pub count: usize,
+    /// The error of no model on them.
+    pub no_model: Option<f64>,
 }
 
 /// A prediction of a truth by one of the contenders.
@@ -148,6 +164,7 @@ fn table(key: Key, entries: &[Entry<'_>], below: Option<&Quantity>) -> Compariso
                 node,
                 kind,
                 rmse: Vec::new(),
+                own: Vec::new(),
                 difference_error: Vec::new(),
                 valid: Vec::new(),
             });
@@ -155,6 +172,7 @@ fn table(key: Key, entries: &[Entry<'_>], below: Option<&Quantity>) -> Compariso
     }
     for row in &mut rows {
         row.rmse.resize(truths.len(), None);
+        row.own.resize(truths.len(), None);
         row.difference_error.resize(truths.len(), None);
         row.valid.resize(truths.len(), None);
     }
@@ -223,20 +241,41 @@ fn column(
         let Some(row) = all.position(|row| row.graph == graph && row.node == node) else {
             continue;
         };
+        rows[row].valid[nth] = (!counted.is_empty()).then_some(valid[entry]);
+        if valid[entry] < RESTRICTS {
+            let there = || counted.iter().filter(|at| !value(entry, at).is_nan());
+            rows[row].rmse[nth] = rms(there().map(|at| value(entry, at) - truth(at)));
+            rows[row].own[nth] = Some(Own {
+                count: there().count(),
+                no_model: rms(there().map(|at| truth(at))),
+            });
+            continue;
+        }
         let of_entry: Vec<f64> = common
             .iter()
             .map(|at| value(entry, at) - truth(at))
             .collect();
         rows[row].rmse[nth] = rms(of_entry.iter().copied());
-        rows[row].valid[nth] = (!counted.is_empty()).then_some(valid[entry]);
         errors.push((row, of_entry));
     }
-    let size = |row: &Row| row.rmse[nth].unwrap_or(f64::INFINITY);
-    let best = (0..rows.len()).min_by(|&a, &b| size(&rows[a]).total_cmp(&size(&rows[b])));
+    let size = |row: &usize| rows[*row].rmse[nth].unwrap_or(f64::INFINITY);
+    let comparable = (0..rows.len()).filter(|&row| rows[row].own[nth].is_none());
+    let best = comparable.min_by(|a, b| size(a).total_cmp(&size(b)));
     let of_best = errors.iter().find(|(row, _)| Some(*row) == best);
     if let Some((_, of_best)) = of_best {
         for (row, of_entry) in &errors {
             rows[*row].difference_error[nth] = difference_error(of_entry, of_best);
+        }
+    }
+    let other = |entry: usize, places: &[usize]| {
+        let own = entries[entry].truth.values[places[entry]];
+        (own - truth(places)).abs() > SAME * truth(places).abs()
+    };
+    let mut otherwise: Vec<String> = Vec::new();
+    for (entry, of) in entries.iter().enumerate() {
+        let name = &of.contender.name;
+        if !otherwise.contains(name) && counted.iter().any(|at| other(entry, at)) {
+            otherwise.push(name.clone());
         }
     }
     let persistence = first.truth.persistence.get(&first.of.ahead);
@@ -248,6 +287,7 @@ fn column(
         no_model: rms(common.iter().map(|at| truth(at))),
         persistence: rms(common.iter().map(|at| lasting(at) - truth(at))),
         best: best.filter(|&best| rows[best].rmse[nth].is_some()),
+        otherwise,
     }
 }
 

@@ -3,6 +3,7 @@
 //! Days that are left out are cut out of the recording, so that no window of a row that is fitted on reaches into them; scores
 //! come from a pass over the whole of it. What a model learns at run time it learns there too.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use athermal_core::compile::Plan;
@@ -47,6 +48,8 @@ pub struct LeftOut {
     pub from_s: f64,
     /// How well it was predicted.
     pub scores: Vec<DayScore>,
+    /// What the fit did without because it had a value in too few rows of the other days: `thermal.Z1: gradients.room@5min`.
+    pub dropped: Vec<String>,
 }
 
 /// Fits on a number of days.
@@ -58,6 +61,8 @@ pub struct CurvePoint {
     pub fits: usize,
     /// How well they predicted the others, over all fits.
     pub scores: Vec<DayScore>,
+    /// What some of them did without because it had a value in too few rows.
+    pub dropped: Vec<String>,
 }
 
 /// How well a prediction did on days that its fit has not seen.
@@ -193,35 +198,39 @@ pub fn days(
     let numbers: Vec<usize> = NUMBERS.into_iter().filter(|&n| n + 1 < count).collect();
     let fits: usize = numbers.iter().map(|&n| placings(n, count).len()).sum();
     let (total, mut done) = ((fits + count) as u64, 0);
-    let mut run = |kept: &dyn Fn(usize) -> bool| -> Result<Vec<Vec<Errors>>, FitError> {
+    let mut run = |kept: &dyn Fn(usize) -> bool| -> Result<Run, FitError> {
         let kept: Vec<bool> = (0..count).map(kept).collect();
         progress(done, total);
         done += 1;
-        let fitted = fit_on(model, recording, &calendar, &kept)?;
+        let (fitted, dropped) = fit_on(model, recording, &calendar, &kept)?;
         let trace = trace(&model.plan, &fitted, recording, &mut |_, _| {})?;
-        Ok(errors(&trace, &calendar))
+        let errors = errors(&trace, &calendar);
+        Ok(Run { errors, dropped })
     };
-    let mut each = Vec::new();
+    let (mut each, mut dropped_of_each) = (Vec::new(), Vec::new());
     for out in 0..count {
-        let errors = run(&|day| day != out)?;
-        each.extend(errors.into_iter().nth(out));
+        let run = run(&|day| day != out)?;
+        each.extend(run.errors.into_iter().nth(out));
+        dropped_of_each.push(run.dropped);
     }
     let (plan, of) = (&*model.plan, &observation.trace);
     let left_out = each.iter().enumerate().map(|(out, errors)| LeftOut {
         day: calendar.numbers[out],
         from_s: (calendar.begins[out].1 - Instant::from_ns(0)).secs(),
         scores: scores(plan, of, errors, errors),
+        dropped: dropped_of_each[out].clone(),
     });
     let left_out = left_out.collect();
     let mut curve = Vec::new();
     for days in numbers {
-        let (mut sums, mut all_others) = (Vec::new(), Vec::new());
+        let (mut sums, mut all_others, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
         let placings = placings(days, count);
         for &from in &placings {
             let seen = from..from + days;
-            let errors = run(&|day| seen.contains(&day))?;
+            let run = run(&|day| seen.contains(&day))?;
+            dropped.extend(run.dropped);
             for day in (0..count).filter(|day| !seen.contains(day)) {
-                add(&mut sums, &errors[day]);
+                add(&mut sums, &run.errors[day]);
                 add(&mut all_others, &each[day]);
             }
         }
@@ -229,6 +238,7 @@ pub fn days(
             days,
             fits: placings.len(),
             scores: scores(plan, of, &sums, &all_others),
+            dropped: once(dropped),
         });
     }
     let mut all = Vec::new();
@@ -237,6 +247,7 @@ pub fn days(
         days: count - 1,
         fits: count,
         scores: scores(plan, of, &all, &all),
+        dropped: once(dropped_of_each.into_iter().flatten()),
     });
     Ok(Some(Days {
         day_s: day.secs(),
@@ -252,6 +263,19 @@ fn placings(days: usize, count: usize) -> Vec<usize> {
     let places = PLACINGS.min(last + 1);
     let spread = |nth: usize| nth * last / (places - 1).max(1);
     (0..places).map(spread).collect()
+}
+
+/// What a fit on some days came to.
+struct Run {
+    /// For each day and prediction.
+    errors: Vec<Vec<Errors>>,
+    dropped: Vec<String>,
+}
+
+/// Each name once, in order.
+fn once(names: impl IntoIterator<Item = String>) -> Vec<String> {
+    let names: BTreeSet<String> = names.into_iter().collect();
+    names.into_iter().collect()
 }
 
 /// Squared errors and squared truths of one prediction, and how many.
@@ -313,19 +337,23 @@ fn fit_on(
     recording: &dyn Recording,
     calendar: &Calendar,
     kept: &[bool],
-) -> Result<Fitted, FitError> {
+) -> Result<(Fitted, Vec<String>), FitError> {
     let some = SomeDays {
         recording,
         calendar,
         kept,
     };
-    let (fitted, _) = fit(
+    let (fitted, report) = fit(
         &Arc::clone(&model.plan),
         &some,
         &FitOptions::default(),
         &mut |_| {},
     )?;
-    Ok(fitted)
+    let dropped = report.estimators.iter().flat_map(|of| {
+        let names = of.dropped_candidates.iter();
+        names.map(|(name, _)| format!("{}: {name}", of.node))
+    });
+    Ok((fitted, dropped.collect()))
 }
 
 /// The days of a recording that are kept; where one is missing, a segment ends.

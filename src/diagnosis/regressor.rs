@@ -1,13 +1,14 @@
 //! Decides how well the data determine what an estimator has learned: condition, variance inflation, and what each regressor
 //! moves.
 
-use athermal_core::compile::PlannedRole;
-use athermal_core::engine::Engine;
+use athermal_core::compile::{PlannedRole, TrainingLimits};
+use athermal_core::engine::{Engine, Pairing};
 use athermal_core::fit::FitError;
 use athermal_core::model::{Model, number_or_none};
 use athermal_core::node::Predictor;
 use athermal_core::recording::{Event, Recording};
 use athermal_core::score::trace;
+use athermal_core::time::Instant;
 use athermal_numerics::{Collinearity, GramBlocks};
 use serde::{Serialize, Serializer};
 
@@ -18,7 +19,7 @@ pub struct Design {
     pub node: String,
     /// The unit of its predictions.
     pub unit: String,
-    /// Instants of its truth at which all its regressors had a value.
+    /// Truths within the limits of its fit before which it had run, as far before as it predicts, with all its regressors.
     pub rows: u64,
     /// The condition number of the standardised regressors; NaN (null in JSON) without rows, infinite (`"inf"`) where they are
     /// collinear.
@@ -53,6 +54,9 @@ struct Collecting<'a> {
     /// Gather and place of each regressor that is used.
     places: Vec<(usize, usize)>,
     row: Vec<f64>,
+    /// Its runs, of which each truth is paired with one as in a fit.
+    runs: Pairing,
+    limits: TrainingLimits,
     blocks: GramBlocks,
 }
 
@@ -63,8 +67,11 @@ struct Collecting<'a> {
 pub fn designs(model: &Model, recording: &dyn Recording) -> Result<Vec<Design>, FitError> {
     let mut collecting = collecting(model);
     let mut look = |engine: &Engine, event: Event| {
-        if let Event::Row(_) = event {
-            collecting.iter_mut().for_each(|of| of.look(engine));
+        for of in &mut collecting {
+            match event {
+                Event::Row(now) => of.look(engine, now),
+                Event::Segment => of.runs.clear(),
+            }
         }
     };
     trace(&model.plan, &model.fitted, recording, &mut look)?;
@@ -80,6 +87,7 @@ fn collecting(model: &Model) -> Vec<Collecting<'_>> {
                 regressors,
                 gathers,
                 truth,
+                training,
                 ..
             },
             Some(predictor),
@@ -101,6 +109,8 @@ fn collecting(model: &Model) -> Vec<Collecting<'_>> {
             truth: truth.slot,
             predictor: &**predictor,
             row: vec![0.0; used.len()],
+            runs: Pairing::new(truth, used.len()),
+            limits: *training,
             blocks: GramBlocks::with_row_memory(used.len(), 0),
             places: used.into_iter().map(|nth| places[nth]).collect(),
         });
@@ -109,16 +119,28 @@ fn collecting(model: &Model) -> Vec<Collecting<'_>> {
 }
 
 impl Collecting<'_> {
-    /// Rows are taken where the truth is, as often as in a fit.
-    fn look(&mut self, engine: &Engine) {
-        if engine.value(self.truth).is_nan() {
-            return;
+    fn look(&mut self, engine: &Engine, now: Instant) {
+        let Self {
+            node,
+            truth,
+            places,
+            row,
+            runs,
+            limits,
+            blocks,
+            ..
+        } = self;
+        if engine.ran(engine.plan().nodes[*node].slots.start) {
+            for (value, &(gather, place)) in row.iter_mut().zip(places.iter()) {
+                *value = engine.gathered(gather).0[place];
+            }
+            runs.run(now, [&row[..]]);
         }
-        for (value, &(gather, place)) in self.row.iter_mut().zip(&self.places) {
-            *value = engine.gathered(gather).0[place];
-        }
-        if self.row.iter().all(|value| value.is_finite()) {
-            self.blocks.push(&self.row, 0.0);
+        if limits.admits(engine.value(*truth))
+            && let Some(run) = runs.truth(now)
+            && run.row.iter().all(|value| value.is_finite())
+        {
+            blocks.push(run.row, 0.0);
         }
     }
 

@@ -3,6 +3,7 @@
 use athermal::core::time::Duration;
 use athermal::files::{Description, TimeForm, has_zone};
 
+use super::column::ends_in_unit;
 use crate::figures::time;
 
 /// The time of a log.
@@ -96,7 +97,10 @@ pub fn find(described: &Description, named: Option<&str>) -> Result<Clock, Strin
         return clock(described, index)
             .ok_or_else(|| format!("`{name}` does not advance from row to row as a time does"));
     }
+    // What is in degrees or in nanometres is no time, however steadily it grows.
+    let measured = |index: &usize| ends_in_unit(&described.columns[*index]);
     let mut likely: Vec<usize> = (0..described.columns.len()).collect();
+    likely.retain(|index| !measured(index));
     likely.sort_by_key(|&index| {
         let name = described.columns[index].to_lowercase();
         let first = words(&name).into_iter().next().unwrap_or_default();

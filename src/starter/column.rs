@@ -97,6 +97,13 @@ const DRIVES: [&str; 11] = [
     "rpm",
 ];
 
+/// Whether a name of several words ends in a unit, none of them one of time.
+pub fn ends_in_unit(name: &str) -> bool {
+    let words = words(name);
+    let unit = words.split_first().and_then(|(_, rest)| rest.last());
+    unit.is_some_and(|unit| UNITS.iter().any(|(ending, _)| ending == unit))
+}
+
 impl Column {
     /// What was guessed, for people.
     #[must_use]

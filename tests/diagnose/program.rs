@@ -1,6 +1,7 @@
 //! What `athermal diagnose` prints, draws and warns of.
 
 use std::ffi::OsStr;
+use std::fmt::Write as _;
 use std::path::Path;
 
 use super::workbench::{Scratch, athermal, athermal_on, graph, simulated};
@@ -208,4 +209,74 @@ fn the_coefficients_it_points_to_are_there_for_a_node_without_each_too() {
         &asked,
     ];
     athermal(&show).ended(0);
+}
+
+/// Three hours and a half of two sensors, of which the second lacks every eighth sample but for the second hour, and what both
+/// bring about.
+fn with_gaps() -> String {
+    let mut text = "time_s,a,b,y\n".to_owned();
+    for nth in 0..1260 {
+        let (a, b) = ((0.11 * f64::from(nth)).sin(), (0.37 * f64::from(nth)).cos());
+        let hour = nth / 360;
+        let there = hour == 1 || nth % 8 != 0;
+        let shown = if there { b.to_string() } else { String::new() };
+        let y = a + b + 0.1 * (2.9 * f64::from(nth)).sin();
+        writeln!(text, "{},{a},{shown},{y}", 10 * nth).unwrap();
+    }
+    text
+}
+
+const DIRECT: &str = "schema = 1\n[time]\ncolumn = \"time_s\"\n[signals.in]\nunit = \"V\"\nchannels = [\"a\", \"b\"]\ncolumn = \"{channel}\"\nmax_age = \"5s\"\n\
+    [signals.out]\nunit = \"V\"\nchannels = [\"y\"]\ncolumn = \"{channel}\"\nmax_age = \"5s\"\n\
+    [nodes.model]\ntype = \"linear\"\ninputs = { features = \"in\", truth = \"out.y\" }\nahead = \"20s\"\n[outputs]\nmodel = \"model\"\n";
+
+#[test]
+fn a_fit_on_other_days_that_does_without_a_sensor_is_told() {
+    let scratch = Scratch::new("diagnose-dropped");
+    let graph = scratch.file("graph.toml", DIRECT);
+    let log = scratch.file("log.csv", with_gaps());
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph, &"--data", &log, &"-o", &model]).ended(0);
+    let told = athermal(&[&"diagnose", &model, &"--data", &log, &"--day", &"1h"]).ended(0);
+    told.tells(&["model: in.b has a value in too few rows for fits without day 2"]);
+}
+
+#[test]
+fn the_rows_that_tell_how_well_data_determine_a_model_are_those_of_its_fit() {
+    let scratch = Scratch::new("diagnose-rows");
+    let graph = scratch.file("graph.toml", DIRECT.replace("20s", "200s"));
+    let log = scratch.file("log.csv", with_gaps());
+    let model = scratch.path("model.json");
+    let fitted = athermal(&[
+        &"fit",
+        &graph,
+        &"--data",
+        &log,
+        &"-o",
+        &model,
+        &"--format",
+        &"json",
+    ]);
+    let fitted = fitted.ended(0).json();
+    let diagnosed = athermal(&[
+        &"diagnose",
+        &model,
+        &"--data",
+        &log,
+        &"--no-fit",
+        &"--format",
+        &"json",
+    ]);
+    let diagnosed = diagnosed.ended(0).json();
+    let (fit, design) = (
+        &fitted["estimators"][0],
+        &diagnosed["diagnosis"]["designs"][0],
+    );
+    assert_eq!(fit["rows"], design["rows"], "{fit} {design}");
+    let number = |of: &serde_json::Value| of.as_f64().unwrap();
+    let conditions = [&fit["condition"], &design["condition"]].map(number);
+    assert!(
+        (conditions[0] / conditions[1] - 1.0).abs() < 1e-9,
+        "{conditions:?}"
+    );
 }

@@ -208,7 +208,12 @@ impl GramBlocks {
         } else {
             self.block_rows as u64
         };
+        let count = folds.count();
         let folds = folds.of_blocks(self.count(), size)?;
+        if folds.iter().any(|fold| fold.test.end - fold.test.start < 2) {
+            let rows = self.count();
+            return Err(NumericsError::FoldOfOneRow { folds: count, rows });
+        }
         let pieces = self.pieces(&folds);
         // Training rows are summed, not subtracted from a total, so that a fold of large values leaves no rounding in
         // the others.

@@ -80,6 +80,13 @@ pub enum NumericsError {
         /// How many rows there are.
         rows: u64,
     },
+    /// A fold of which one row is all that is tested.
+    FoldOfOneRow {
+        /// How many folds were asked for.
+        folds: usize,
+        /// How many rows there are.
+        rows: u64,
+    },
     /// Enough rows for the folds, but they come in blocks that cannot be cut.
     FoldsOfBlocks {
         /// How many folds were asked for.
@@ -154,6 +161,11 @@ impl fmt::Display for NumericsError {
             Self::Folds { folds, rows } => write!(
                 f,
                 "{rows} rows cannot be cut into {folds} folds; at least two folds and one row in each are needed"
+            ),
+            Self::FoldOfOneRow { folds, rows } => write!(
+                f,
+                "in {folds} folds of {rows} rows some have one row, which has no R²; take at most {} folds",
+                rows / 3
             ),
             Self::FoldsOfBlocks { folds, rows, block } => write!(
                 f,

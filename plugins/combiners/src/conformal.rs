@@ -16,9 +16,9 @@ use crate::mean::mean;
 /// The interval is `ŷ ± q`, with `q` the `⌈(n + 1)(1 − α)⌉`-th smallest of the `n` absolute errors in memory (Vovk, Gammerman
 /// and Shafer 2005). `α` starts at `1 − coverage`, and moves with every truth by `gain · (1 − coverage − miss)`, `miss` being
 /// 1 where the truth lay outside of the interval that was given for it and 0 where not (Gibbs and Candès 2021, equation 2).
-/// As there, `α` may fall below 0 and rise above 1, by `gain` at most (their lemma 4.1): what was missed is made up for. So the
-/// share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep outgrowing all that
-/// are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
+/// As there, `α` may fall below 0 and rise above 1, the farther the more intervals were given before a truth comes: what was missed
+/// is made up for. So the share of truths within comes to `coverage` also when a machine changes, as long as its errors do not keep
+/// outgrowing all that are in memory; it is a share over time, not at each instant. Only truths that the embargo lets through count.
 ///
 /// The prediction is passed on as it is; of several, it is their mean. The ports `lower` and `upper` have the ends. They
 /// have no value until there are `1/(1 − coverage) − 1` errors, 9 for nine tenths. Where more is asked for than any error in
@@ -116,6 +116,10 @@ struct Known {
 
 athermal_core::state!(Known, "conformal/1");
 
+/// The extent of an interval that no error in memory makes as wide as is asked for, and of one that is asked to hold nothing.
+const WIDEST: f64 = 1.0;
+const POINT: f64 = -1.0;
+
 /// A share such as 1 − 0.9 is not what it looks like in binary; a rank must not hang on its last bit.
 const ROUNDING: f64 = 1e-9;
 
@@ -126,14 +130,19 @@ impl Calibrating {
         ((coverage - ROUNDING) / (1.0 - coverage)).ceil()
     }
 
+    /// Which of the errors the interval reaches to, from 1; 0 or less of a point, and more than there are where none is enough.
+    fn rank(&self) -> f64 {
+        let count = self.sorted.len() as f64;
+        ((count + 1.0) * (1.0 - self.known.miscoverage) - ROUNDING).ceil()
+    }
+
     /// How far the interval reaches to either side; none while there are too few errors.
     fn reach(&self) -> Option<f64> {
         let count = self.sorted.len() as f64;
         if count < self.needed() {
             return None;
         }
-        let rank = ((count + 1.0) * (1.0 - self.known.miscoverage) - ROUNDING).ceil();
-        let rank = rank.clamp(0.0, count) as usize;
+        let rank = self.rank().clamp(0.0, count) as usize;
         Some(rank.checked_sub(1).map_or(0.0, |nth| self.sorted[nth]))
     }
 
@@ -159,20 +168,36 @@ impl Combine for Calibrating {
             .unwrap_or([f64::NAN; 2])
     }
 
-    fn judge(&mut self, [lower, upper]: [f64; 2], truth: f64) {
+    fn extent(&self) -> f64 {
+        let rank = self.rank();
+        if rank > self.sorted.len() as f64 {
+            WIDEST
+        } else if rank < 1.0 {
+            POINT
+        } else {
+            0.0
+        }
+    }
+
+    fn judge(&mut self, [lower, upper]: [f64; 2], extent: f64, truth: f64) {
         if lower.is_nan() || upper.is_nan() {
             return;
         }
-        let miss = if lower <= truth && truth <= upper {
-            0.0
-        } else {
-            1.0
-        };
+        let missed = !(lower <= truth && truth <= upper);
         let Conformal { coverage, gain, .. } = self.parameters;
-        let moved = self.known.miscoverage + gain * (1.0 - coverage - miss);
-        // In the source nothing is missed once α is below 0, and everything once it is above 1, so that it goes no farther than
-        // this (lemma 4.1). Here the largest error in memory stands for infinity: what lies beyond must not wind α up.
-        self.known.miscoverage = moved.clamp(-gain, 1.0 + gain);
+        let miss = if missed { 1.0 } else { 0.0 };
+        let before = self.known.miscoverage;
+        let moved = before + gain * (1.0 - coverage - miss);
+        // In the source nothing is missed by an interval without ends and everything by an empty one, so that α goes no farther than
+        // this where truths come at once (lemma 4.1). Here the largest error in memory stands for infinity and a point for nothing:
+        // what lies beyond the one or on the other must not wind α up.
+        self.known.miscoverage = if missed && extent == WIDEST {
+            moved.max(before.min(-gain))
+        } else if !missed && extent == POINT {
+            moved.min(before.max(1.0 + gain))
+        } else {
+            moved
+        };
     }
 
     fn observe(&mut self, votes: Votes<'_>, truth: f64, arrived: Instant) {
@@ -306,15 +331,15 @@ mod tests {
         }
         let reach = |node: &dyn Combine| node.interval(Votes(&[0.0]))[1];
         assert_eq!(reach(&*node), 9.0);
-        node.judge([-1.0, 1.0], 5.0);
+        node.judge([-1.0, 1.0], 0.0, 5.0);
         assert_eq!(reach(&*node), 11.0, "α is 0.4");
-        node.judge([-1.0, 1.0], 0.0);
-        node.judge([-1.0, 1.0], 0.0);
+        node.judge([-1.0, 1.0], 0.0, 0.0);
+        node.judge([-1.0, 1.0], 0.0, 0.0);
         assert_eq!(reach(&*node), 7.0, "α is 0.6");
-        node.judge([f64::NAN; 2], 5.0);
+        node.judge([f64::NAN; 2], 0.0, 5.0);
         assert_eq!(reach(&*node), 7.0, "nothing was said");
         for _ in 0..100 {
-            node.judge([-1.0, 1.0], 5.0);
+            node.judge([-1.0, 1.0], node.extent(), 5.0);
         }
         assert_eq!(reach(&*node), 18.0, "the largest there is");
     }
@@ -326,7 +351,7 @@ mod tests {
             node.observe(Votes(&[0.0]), second as f64, s(second));
         }
         let mut reach_after = |truth: f64| {
-            node.judge([-1.0, 1.0], truth);
+            node.judge([-1.0, 1.0], node.extent(), truth);
             node.interval(Votes(&[0.0]))[1]
         };
         // α moves by 1/8 from 1/2: to −1/4 and no farther, and stays below 1/20 for two hits more.
@@ -341,5 +366,40 @@ mod tests {
         });
         let reached: Vec<f64> = (0..4).map(|_| reach_after(5.0)).collect();
         assert_eq!(reached, [0.0, 0.0, 2.0, 4.0]);
+    }
+
+    /// Truths come after 60 more intervals have been given, and errors are three times as large in every other hour.
+    #[test]
+    fn intervals_hold_as_often_as_they_say_however_late_truths_come() {
+        use athermal_core::prng::Prng;
+        for gain in [0.005, 0.05, 0.2] {
+            let mut node = Conformal {
+                coverage: 0.9,
+                memory: Duration::from_ns(7_200_000_000_000),
+                gain,
+            }
+            .build(1);
+            let mut prng = Prng::stream(3, "late truths");
+            let mut given = VecDeque::new();
+            let (mut held, mut all) = (0.0, 0.0);
+            for nth in 0..30_000_i64 {
+                node.advance(s(10 * nth));
+                given.push_back((node.interval(Votes(&[0.0])), node.extent()));
+                if given.len() <= 60 {
+                    continue;
+                }
+                let (ends, extent) = given.pop_front().unwrap();
+                let size = if nth / 360 % 2 == 0 { 1.0 } else { 3.0 };
+                let truth = size * prng.normal();
+                node.judge(ends, extent, truth);
+                node.observe(Votes(&[0.0]), truth, s(10 * nth));
+                if !ends[0].is_nan() {
+                    all += 1.0;
+                    held += f64::from(u8::from(ends[0] <= truth && truth <= ends[1]));
+                }
+            }
+            let share = held / all;
+            assert!((share - 0.9).abs() < 0.006, "gain {gain}: {share}");
+        }
     }
 }

@@ -104,6 +104,9 @@ pub(crate) struct Errors {
     /// How often the means have changed, so that what follows from them is worked out only then.
     #[serde(skip)]
     changes: u64,
+    /// Up to when truths have been let through.
+    #[serde(skip, default = "long_ago")]
+    newest: Instant,
     /// Up to when nothing in memory is to be forgotten.
     #[serde(skip, default = "long_ago")]
     kept_until: Instant,
@@ -122,6 +125,7 @@ impl Errors {
             means: vec![None; voters],
             counts: vec![0.0; voters],
             changes: 0,
+            newest: long_ago(),
             kept_until: long_ago(),
         }
     }
@@ -139,7 +143,13 @@ impl Errors {
     /// How many errors of a voter are in memory.
     pub(crate) fn count(&self, voter: usize) -> f64 {
         match self.memory {
-            Memory::HalfLife(_) => self.counts[voter],
+            Memory::HalfLife(fading) => {
+                let last = self.squares[voter].front().map(|&(arrived, _)| arrived);
+                let idle = last.map_or(Duration::ZERO, |last| {
+                    (self.newest - last).max(Duration::ZERO)
+                });
+                self.counts[voter] * fading.left(idle)
+            }
             Memory::Time(_) | Memory::Truths(_) => self.squares[voter].len() as f64,
         }
     }
@@ -157,12 +167,21 @@ impl Errors {
         }
     }
 
-    /// Takes the error of one vote whose truth has arrived, unless it is so large that no mean of squares with it is a number.
-    pub(crate) fn observe_one(&mut self, voter: usize, vote: f64, truth: f64, arrived: Instant) {
+    /// Takes the error of one vote whose truth has arrived, unless it is so large that no mean of squares with it is a number;
+    /// whether it was taken.
+    pub(crate) fn observe_one(
+        &mut self,
+        voter: usize,
+        vote: f64,
+        truth: f64,
+        arrived: Instant,
+    ) -> bool {
         let square = (vote - truth) * (vote - truth);
-        if square <= LARGEST {
+        let takes = square <= LARGEST;
+        if takes {
             self.remember(voter, arrived, square);
         }
+        takes
     }
 
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
@@ -194,6 +213,7 @@ impl Errors {
 
     /// Forgets what arrived longer than the memory before `newest`.
     pub(crate) fn advance(&mut self, newest: Instant) {
+        self.newest = newest;
         if newest < self.kept_until || matches!(self.memory, Memory::Truths(_)) {
             return;
         }
@@ -221,6 +241,7 @@ impl Errors {
         for (arrived, _) in self.squares.iter_mut().flatten() {
             *arrived = *arrived + shift;
         }
+        self.newest = long_ago();
         self.kept_until = long_ago();
     }
 

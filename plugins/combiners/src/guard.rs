@@ -13,8 +13,8 @@ use crate::memory::Memory;
 ///
 /// Otherwise it predicts zero, which is what a machine without a model does. Before `min_truths` truths have been compared,
 /// nothing is known to do harm and the prediction passes. The port `reason` says why: 0 it passes and has done no harm, 1 it is held back, 2 it
-/// passes since too little is known. The port `weights` says 0 while it is held back. Of several predictions the mean is guarded, and
-/// held back when the worst of them does harm. Where all tell their standard deviation, the port `deviation` passes it on, or that of
+/// passes since too little is known. The port `weights` says 0 while it is held back. Of several predictions the mean of those that are
+/// there is guarded, and held back when one of them does harm on the truths that it predicted. Where all tell their standard deviation, the port `deviation` passes it on, or that of
 /// their mixture; while the prediction is held back there is none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -22,7 +22,7 @@ pub struct Guard {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
     /// ever less by `{ half_life = "15min" }`.
     pub memory: Memory,
-    /// How many truths must be in memory before a prediction is held back; 1 or more. With a `half_life` they count for less
+    /// How many truths of a prediction must be in memory before it is held back; 1 or more. With a `half_life` they count for less
     /// with age: one so short that fewer are ever left holds nothing back.
     #[serde(default = "five")]
     #[schemars(range(min = 1))]
@@ -87,8 +87,8 @@ impl Combiner for Guard {
             min_truths: self.min_truths as f64,
             voters,
         };
-        // Behind the voters stands one that always predicts zero.
-        Box::new(ByErrors::new(rule, voters + 1, self.memory))
+        // Behind the voters stands for each of them one that predicts zero whenever it predicts.
+        Box::new(ByErrors::new(rule, 2 * voters, self.memory))
     }
 }
 
@@ -99,34 +99,33 @@ struct Guarding {
 }
 
 impl Guarding {
-    fn judge(&self, errors: &Errors) -> f64 {
+    /// What is known of the votes that are there: that one does harm counts before that one is not known yet.
+    fn judge(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
         let means = errors.means();
-        let worst = means[..self.voters]
-            .iter()
-            .flatten()
-            .copied()
-            .fold(f64::NEG_INFINITY, f64::max);
-        match means[self.voters] {
-            Some(zero) if errors.count(self.voters) >= self.min_truths => {
-                if worst >= zero {
-                    reason::HARMS
-                } else {
-                    reason::HARMLESS
+        let mut judged = reason::HARMLESS;
+        for (voter, _) in votes.present() {
+            let zero = self.voters + voter;
+            match (means[voter], means[zero]) {
+                (Some(own), Some(of_zero)) if errors.count(zero) >= self.min_truths => {
+                    if own >= of_zero {
+                        return reason::HARMS;
+                    }
                 }
+                _ => judged = reason::UNKNOWN,
             }
-            _ => reason::UNKNOWN,
         }
+        judged
     }
 
-    fn passes(&self, errors: &Errors) -> bool {
-        self.judge(errors) != reason::HARMS
+    fn passes(&self, errors: &Errors, votes: Votes<'_>) -> bool {
+        self.judge(errors, votes) != reason::HARMS
     }
 }
 
 impl Rule for Guarding {
     fn combine(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
         let mean = mean(votes);
-        if mean.is_nan() || self.passes(errors) {
+        if mean.is_nan() || self.passes(errors, votes) {
             mean
         } else {
             0.0
@@ -134,7 +133,7 @@ impl Rule for Guarding {
     }
 
     fn weights(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) {
-        let passes = if self.passes(errors) { 1.0 } else { 0.0 };
+        let passes = if self.passes(errors, votes) { 1.0 } else { 0.0 };
         let count = votes.present().count() as f64;
         for (voter, _) in votes.present() {
             weights[voter] = passes / count;
@@ -143,13 +142,14 @@ impl Rule for Guarding {
 
     fn reason(&self, errors: &Errors, votes: Votes<'_>) -> f64 {
         let any = votes.present().next();
-        any.map_or(f64::NAN, |_| self.judge(errors))
+        any.map_or(f64::NAN, |_| self.judge(errors, votes))
     }
 
     fn observe(&self, errors: &mut Errors, votes: Votes<'_>, truth: f64, arrived: Instant) {
-        errors.observe(votes, truth, arrived);
-        if votes.present().next().is_some() {
-            errors.observe_one(self.voters, 0.0, truth, arrived);
+        for (voter, vote) in votes.present() {
+            if errors.observe_one(voter, vote, truth, arrived) {
+                errors.observe_one(self.voters + voter, 0.0, truth, arrived);
+            }
         }
     }
 
@@ -193,5 +193,57 @@ mod tests {
         }
         assert_eq!((guard.combine(vote), guard.reason(vote)), (7.0, 0.0));
         assert!(guard.reason(Votes(&[f64::NAN])).is_nan());
+    }
+
+    #[test]
+    fn of_several_those_that_are_there_are_judged_each_by_the_truths_that_it_predicted() {
+        let mut guard = Guard {
+            memory: Memory::Time(Duration::from_ns(600_000_000_000)),
+            min_truths: 2,
+        }
+        .build(3);
+        let gone = f64::NAN;
+        // The first predicts while truths are large, well for their size; the second is good and the third bad while they are small.
+        for second in [0, 1] {
+            guard.observe(Votes(&[60.0, gone, gone]), 100.0, s(second));
+        }
+        for second in 2..20 {
+            guard.observe(Votes(&[gone, 0.9, gone]), 1.0, s(second));
+        }
+        guard.observe(Votes(&[gone, gone, 9.0]), 1.0, s(20));
+        let judged = |guard: &dyn Combine, votes: [f64; 3]| {
+            let votes = Votes(&votes);
+            (guard.combine(votes), guard.reason(votes))
+        };
+        assert_eq!(judged(&*guard, [3.0, 1.0, gone]), (2.0, 0.0));
+        assert_eq!(
+            judged(&*guard, [gone, 1.0, 3.0]),
+            (2.0, 2.0),
+            "one truth is not enough"
+        );
+        guard.observe(Votes(&[gone, gone, 9.0]), 1.0, s(21));
+        assert_eq!(judged(&*guard, [gone, 1.0, 3.0]), (0.0, 1.0));
+        assert_eq!(judged(&*guard, [gone, 1.0, gone]), (1.0, 0.0));
+    }
+
+    #[test]
+    fn what_fades_counts_for_less_while_no_truth_comes() {
+        let half_life = Duration::from_ns(60_000_000_000);
+        let mut guard = Guard {
+            memory: Memory::HalfLife(crate::memory::Fading { half_life }),
+            min_truths: 5,
+        }
+        .build(1);
+        let vote = Votes(&[7.0]);
+        for second in 0..20 {
+            guard.observe(vote, 1.0, s(second));
+        }
+        guard.advance(s(20));
+        assert_eq!(guard.reason(vote), 1.0);
+        // Some 18 are left of twenty, and fewer than five two half-lives later.
+        guard.advance(s(20 + 90));
+        assert_eq!(guard.reason(vote), 1.0);
+        guard.advance(s(20 + 130));
+        assert_eq!((guard.combine(vote), guard.reason(vote)), (7.0, 2.0));
     }
 }

@@ -115,14 +115,14 @@ fn oracle_of_intervals_that_allow_for_what_they_missed() {
         };
         let now = Instant::from_ns(second * 1_000_000_000);
         node.advance(now);
-        let found = node.interval(Votes(&[prediction]));
+        let (found, extent) = (node.interval(Votes(&[prediction])), node.extent());
         assert_eq!(found[0].is_nan(), lower.is_nan(), "row {second}");
         if !lower.is_nan() {
             assert!((found[0] - lower).abs() < 1e-12 && (found[1] - upper).abs() < 1e-12);
             compared += 1.0;
             covered += f64::from(u8::from(found[0] <= truth && truth <= found[1]));
         }
-        node.judge(found, truth);
+        node.judge(found, extent, truth);
         node.observe(Votes(&[prediction]), truth, now);
     }
     assert!(compared > 900.0);

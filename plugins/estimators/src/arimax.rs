@@ -133,6 +133,37 @@ mod tests {
     }
 
     #[test]
+    fn what_is_told_not_to_be_integrated_is_fitted_on_all_rows_as_if_that_had_been_given() {
+        let mut prng = Prng::stream(7, "arimax in pieces");
+        let mut samples = Samples::new(1);
+        for nth in 0..600 {
+            if nth % 20 == 0 {
+                samples.segment();
+            }
+            let input = prng.normal();
+            samples.push([input], 2.0 * input + 0.5 * prng.normal());
+        }
+        let asked = |differences| Asked {
+            na: Some(0),
+            nb: Some(PerInput::one()),
+            nc: Some(1),
+            nk: Some(PerInput::none()),
+            differences,
+            places: vec![0],
+            features: 1,
+            ..Asked::default()
+        };
+        let fit = |differences| {
+            let mut report = TrainingReport::default();
+            let found = asked(differences).identify(&samples, 1, &mut report);
+            found.unwrap()
+        };
+        let (told, given) = (fit(Differences::Told), fit(Differences::Given(0)));
+        assert_eq!((told.model.differences, told.rows), (0, given.rows));
+        assert_eq!(told.residual_sum_of_squares, given.residual_sum_of_squares);
+    }
+
+    #[test]
     fn noise_that_wanders_is_integrated_and_noise_that_has_a_level_is_not() {
         let (wandering, tried) = told(1.0, None);
         assert_eq!((wandering, told(0.3, None).0), (1, 0));

@@ -321,7 +321,8 @@ pub(crate) fn rows_gone(blocks: &GramBlocks) -> TrainingError {
     let bytes = blocks.count() as f64 * (blocks.width() + 1) as f64 * size_of::<f64>() as f64;
     TrainingError::Unsolvable {
         reason: format!(
-            "it goes over its rows several times, and they did not fit in memory; `--memory {:.0}` would hold them",
+            "it goes over its rows several times, and they did not fit in memory: they take {:.0} MB of the `--memory` that all \
+             estimators share",
             (bytes / f64::from(1 << 20)).ceil() + 1.0
         ),
     }

@@ -15,8 +15,8 @@ use crate::folds::{Folds, tell_moved};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "method", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Selection {
-    /// From nothing on, the regressor that raises the mean R² over the folds most is added, the first of several equal
-    /// ones, until the gain is below the tolerance.
+    /// From nothing on, the regressor that raises the mean R² over the folds most is added, of several equal ones the
+    /// first, until the gain is below the tolerance. One is always taken, whatever it gains.
     Forward(CrossValidated),
     /// From all regressors on, the one that is missed least is taken out, until that loses more than the tolerance.
     Backward(CrossValidated),

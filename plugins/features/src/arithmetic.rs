@@ -22,7 +22,7 @@ pub struct Sum {
     pub weights: Option<Vec<f64>>,
 }
 
-/// The product of its inputs, such as an interaction of two temperatures; in the product of their units.
+/// The product of its inputs, such as an interaction of two temperatures.
 ///
 /// It exists while all inputs do; each is held up to its maximum age.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

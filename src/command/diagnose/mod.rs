@@ -4,11 +4,13 @@ mod next;
 mod responses;
 mod tables;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use athermal::Duration;
 use athermal::core::compile::{Plan, Wanted};
 use athermal::core::score::Lack;
+use athermal::diagnosis::day::Days;
 use athermal::diagnosis::{
     Diagnosis, Observation, Options, day, diagnose, is_called, plots, window,
 };
@@ -123,6 +125,9 @@ impl Diagnose {
     }
 
     fn tell(&self, terminal: &Terminal, diagnosis: &Diagnosis) {
+        if let Some(days) = &diagnosis.days {
+            Self::tell_dropped(terminal, days);
+        }
         if diagnosis.main.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is nothing to diagnose",
@@ -138,6 +143,30 @@ impl Diagnose {
             terminal.note(format_args!(
                 "no days left out: the data have {count} of {day}, and from 2 to {most} can be; {advice}"
             ));
+        }
+    }
+
+    /// Tells of what only some of the fits on parts of the data had, so that they differ by more than their days.
+    fn tell_dropped(terminal: &Terminal, days: &Days) {
+        let all = days.left_out.iter().flat_map(|day| &day.dropped);
+        let all = all.chain(days.curve.iter().flat_map(|point| &point.dropped));
+        let names: BTreeSet<&String> = all.collect();
+        for name in names {
+            let without = days
+                .left_out
+                .iter()
+                .filter(|day| day.dropped.contains(name));
+            let without: Vec<String> = without.map(|day| day.day.to_string()).collect();
+            if without.len() < days.left_out.len() {
+                let which = if without.is_empty() {
+                    "fits on a few days".to_owned()
+                } else {
+                    format!("fits without day {}", without.join(", "))
+                };
+                terminal.warning(format_args!(
+                    "{name} has a value in too few rows for {which}, which do without it: that tells in their scores too"
+                ));
+            }
         }
     }
 

@@ -12,8 +12,8 @@ use crate::time::{Duration, Instant};
 pub(crate) struct Vote {
     combine: Box<dyn Combine>,
     withheld: Option<Withheld>,
-    /// Both ends of the interval of this tick, for a combiner that gives intervals.
-    interval: Option<[f64; 2]>,
+    /// Both ends of the interval of this tick and its extent, for a combiner that gives intervals.
+    interval: Option<[f64; 3]>,
     /// What each vote of this tick weighs, for whoever reads it or a deviation.
     weights: Vec<f64>,
     /// How many truths it has been told that there was a vote for.
@@ -22,7 +22,7 @@ pub(crate) struct Vote {
 
 impl Vote {
     pub(crate) fn new(spec: &dyn Combiner, voters: usize, link: Option<TruthLink>) -> Self {
-        let interval = spec.covers().map(|_| [f64::NAN; 2]);
+        let interval = spec.covers().map(|_| [f64::NAN; 3]);
         // The interval that was given for a truth is written down with the votes for it.
         let width = voters + interval.map_or(0, |ends| ends.len());
         Self {
@@ -68,7 +68,8 @@ impl Vote {
     pub(crate) fn run(&mut self, votes: &Gathered, now: Instant) -> (f64, Instant) {
         let combined = unless_infinite(self.combine.combine(Votes(&votes.values)));
         if let Some(ends) = &mut self.interval {
-            *ends = self.combine.interval(Votes(&votes.values));
+            let [lower, upper] = self.combine.interval(Votes(&votes.values));
+            *ends = [lower, upper, self.combine.extent()];
         }
         if let Some(withheld) = &mut self.withheld {
             let ends = self.interval.as_ref().map_or(&[][..], |ends| &ends[..]);
@@ -87,7 +88,8 @@ impl Vote {
 
     /// Both ends of the interval of this tick.
     pub(crate) fn interval(&self) -> [f64; 2] {
-        self.interval.unwrap_or([f64::NAN; 2])
+        self.interval
+            .map_or([f64::NAN; 2], |[lower, upper, _]| [lower, upper])
     }
 
     /// The standard deviation of the truth about the combination of this tick, from those about the votes, which have been weighed.
@@ -188,8 +190,8 @@ impl Vote {
 /// Tells a truth; 1 if there was any vote for it.
 fn tell(combine: &mut dyn Combine, voters: usize, released: Released<'_>) -> u64 {
     let (votes, interval) = released.row.split_at(voters);
-    if let &[lower, upper] = interval {
-        combine.judge([lower, upper], released.truth);
+    if let &[lower, upper, extent] = interval {
+        combine.judge([lower, upper], extent, released.truth);
     }
     combine.observe(Votes(votes), released.truth, released.arrived);
     u64::from(Votes(votes).present().next().is_some())

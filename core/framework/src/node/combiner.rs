@@ -97,9 +97,14 @@ pub trait Combine: Send {
         [f64::NAN; 2]
     }
 
-    /// A truth, and both ends of the interval that was given for it, for kinds that give intervals: called before
-    /// [`observe`](Combine::observe).
-    fn judge(&mut self, _interval: [f64; 2], _truth: f64) {}
+    /// What must be known of an interval that is given now when its truth comes, beside its ends: no NaN.
+    fn extent(&self) -> f64 {
+        0.0
+    }
+
+    /// A truth, both ends of the interval that was given for it, and what [`extent`](Combine::extent) said then, for kinds that give
+    /// intervals: called before [`observe`](Combine::observe).
+    fn judge(&mut self, _interval: [f64; 2], _extent: f64, _truth: f64) {}
 
     /// Why these votes are combined as they are, for kinds that give reasons; the kind's documentation says what each
     /// number means.

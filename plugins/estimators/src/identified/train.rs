@@ -154,7 +154,8 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         if !self.fits() {
             let bytes = (self.count * self.bytes_per_row()) as f64;
             return Err(unsolvable(format!(
-                "it goes over its rows several times, and they did not fit in memory; `--memory {:.0}` would hold them",
+                "it goes over its rows several times, and they did not fit in memory: they take {:.0} MB of the `--memory` that all \
+                 estimators share",
                 (bytes / f64::from(1 << 20)).ceil() + 1.0
             )));
         }
@@ -311,15 +312,19 @@ impl Asked {
             unfit(error, samples)
         })?;
         let (fit, orders) = fits.swap_remove(best);
-        if self.penalty == 0.0 || orders.inputs.is_empty() {
+        let penalised = self.penalty > 0.0 && !orders.inputs.is_empty();
+        if !penalised && orders.first() == first {
             return Ok(fit);
         }
-        report.notes.push(
-            "orders are compared without the penalty, with which the chosen one is fitted"
-                .to_owned(),
-        );
+        if penalised {
+            report.notes.push(
+                "orders are compared without the penalty, with which the chosen one is fitted"
+                    .to_owned(),
+            );
+        }
+        // On all rows that it has a past for, and not only on those on which it was compared.
         let search = self.search(&orders, self.penalty);
-        let fit = search.fit(&orders, samples, first);
+        let fit = search.fit(&orders, samples, 0);
         fit.map_err(|error| unfit(error, samples))
     }
 
