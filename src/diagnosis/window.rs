@@ -20,6 +20,9 @@ pub const FEWEST_SAMPLES: f64 = 3.9;
 /// The widest window fits so many times into the recording.
 pub const WINDOWS_IN_RECORDING: f64 = 20.0;
 
+/// The share of a window that its samples span, as a slope asks for without another word.
+const LEAST_COVERED: f64 = 0.5;
+
 /// A truth's drift against its window.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Windows {
@@ -186,19 +189,22 @@ impl Drift {
         drift
     }
 
-    /// Adds a series. Windows overlap by three quarters.
+    /// Adds a series. Windows overlap by three quarters on the average: they are taken every so many samples, as truths come, and not
+    /// after so much time, or those after a gap, which are sparse, would be taken too often.
     fn add(&mut self, times: &[f64], values: &[f64], width_s: f64) {
-        let Some(&first) = times.first() else {
+        let [first, .., last] = times else {
             return;
         };
-        let (mut from, mut next_s) = (0, first + width_s);
-        for to in 0..times.len() {
-            if times[to] < next_s {
-                continue;
-            }
-            next_s = times[to] + width_s / 4.0;
+        let apart_s = (last - first) / (times.len() - 1) as f64;
+        let every = (width_s / 4.0 / apart_s - 1e-6).ceil().max(1.0) as usize;
+        let begin = times.partition_point(|time| *time < first + width_s);
+        let mut from = 0;
+        for to in (begin..times.len()).step_by(every) {
             while times[from] <= times[to] - width_s {
                 from += 1;
+            }
+            if times[to] - times[from] < LEAST_COVERED * width_s {
+                continue;
             }
             let Some((slope, error)) = line(&times[from..=to], &values[from..=to]) else {
                 continue;
@@ -319,5 +325,40 @@ mod tests {
         let ratio = |width| drift(5.0, width).ratio();
         assert!(ratio(10.0) < ratio(20.0) && ratio(20.0) < ratio(40.0));
         assert!(ratio(600.0) < ratio(100.0));
+    }
+
+    #[test]
+    fn samples_that_come_anyhow_have_the_noise_of_all_windows_that_a_slope_would_have() {
+        let bits = |nth: u64| {
+            (nth + 1)
+                .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                .rotate_left(17)
+                ^ nth
+        };
+        let hash = |nth: u64| bits(bits(nth)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        let there = (0..20_000_u64).filter(|&nth| hash(nth) >> 61 == 0);
+        let (times, values): (Vec<f64>, Vec<f64>) = there
+            .map(|nth| {
+                let sign = if hash(nth) & (1 << 40) == 0 {
+                    5.0
+                } else {
+                    -5.0
+                };
+                (10.0 * nth as f64, sign)
+            })
+            .unzip();
+        let mut squares = Vec::new();
+        for (to, &end) in times.iter().enumerate() {
+            let from = times.partition_point(|&time| time <= end - 300.0);
+            let covers = end - times[from] >= 150.0 && end >= times[0] + 300.0;
+            if let Some((_, error)) = line(&times[from..=to], &values[from..=to])
+                && covers
+            {
+                squares.push(error * error);
+            }
+        }
+        let all = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        let found = Drift::of(&times, &values, 300.0).noise();
+        assert!((found / all - 1.0).abs() < 0.05, "{found} {all}");
     }
 }

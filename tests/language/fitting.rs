@@ -7,7 +7,7 @@ use athermal::core::fit::{EstimatorFit, FitOptions, fit};
 use athermal::core::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
-use super::workbench::{plan, slot};
+use super::workbench::{plan, problems, slot};
 use super::{SAMPLES, SLOPES};
 
 /// A number between −1 and 1 that looks random.
@@ -269,5 +269,20 @@ out = \"thermal\"
         let one = fits(1, memory);
         assert_eq!(one, fits(2, memory), "with {memory} bytes of rows");
         assert_eq!(one, fits(6, memory), "with {memory} bytes of rows");
+    }
+}
+
+#[test]
+fn a_misspelt_key_that_the_framework_reads_is_put_right_too() {
+    let node = "[nodes.model]\ntype = \"rls\"\ninputs = { features = \"gradients\", truth = \"drift.Z\" }\nahead = \"5min\"\n";
+    for (wrong, right) in [
+        ("lean = true", "learn"),
+        ("trian.abs_truth = \"1 nm/min\"", "train"),
+        ("eech = \"axis\"", "each"),
+    ] {
+        let outputs = "[outputs]\nmodel = \"model\"\n";
+        let told = problems(&format!("{SAMPLES}{SLOPES}{node}{wrong}\n{outputs}"));
+        let help = format!("did you mean \"{right}\"?");
+        assert!(told.contains(&help), "{told}");
     }
 }

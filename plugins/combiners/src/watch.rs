@@ -29,8 +29,8 @@ macro_rules! reasons {
 /// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the usual error:
 /// `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, and an alarm where `m_t` has gone `λ` from its smallest or largest value (Page 1954;
 /// Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins anew. The usual error is the root mean
-/// square of all that have been taken; one that is larger than five times that counts as five (Huber 1981), so that neither a
-/// glitch nor the minutes after a change of set point are an alarm by themselves.
+/// square of all that have been taken, the present one among them; one that is larger than five times that counts as five
+/// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves.
 ///
 /// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985). Those of truths that
 /// overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much room: a bias as large as the

@@ -179,6 +179,15 @@ impl FileError {
     }
 }
 
+/// Whether a text holds a date such as `2013-07-04`, at its beginning or as an example.
+fn is_date(text: &str) -> bool {
+    let form = |four: &[u8]| four.iter().all(u8::is_ascii_digit);
+    let mut dates = text.as_bytes().windows(10);
+    dates.any(|of| {
+        form(&of[..4]) && of[4] == b'-' && form(&of[5..7]) && of[7] == b'-' && form(&of[8..])
+    })
+}
+
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -255,6 +264,9 @@ impl fmt::Display for FileError {
                 match found.as_str() {
                     "" => write!(f, "nothing")?,
                     found => write!(f, "`{found}`")?,
+                }
+                if is_date(found) && !is_date(expected) {
+                    return write!(f, "; `unit = \"rfc3339\"` in `[time]` reads such times");
                 }
                 write!(
                     f,
@@ -397,6 +409,16 @@ mod tests {
         assert_eq!(
             time.to_string(),
             "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently to leave the row out"
+        );
+        let dated = FileError::BadTime {
+            place: place(),
+            column: "time_s".into(),
+            found: "2026-03-01 10:00".into(),
+            expected: "a decimal number",
+        };
+        assert_eq!(
+            dated.to_string(),
+            "run.csv:12: column `time_s`: expected a decimal number, found `2026-03-01 10:00`; `unit = \"rfc3339\"` in `[time]` reads such times"
         );
         let count = FileError::CellCount {
             place: place(),

@@ -169,8 +169,9 @@ fn read_instance(
     let context = context(node, instance);
     diagnostics.within(context, |diagnostics| {
         let estimator =
-            decode_rest::<EstimatorKeys>(&framework, "the node", &|_| None, diagnostics);
-        let spec = (kind.read)(&parameters, diagnostics);
+            decode_rest::<EstimatorKeys>(&framework, "the node", &[], &|_| None, diagnostics);
+        let elsewhere = [kind.framework_keys(), &["each"]].concat();
+        let spec = (kind.read)(&parameters, &elsewhere, diagnostics);
         ReadParts {
             spec: spec.map(|spec| spec.map(Arc::from)),
             estimator,

@@ -79,8 +79,9 @@ pub struct Kind {
     pub version: &'static str,
     /// The input ports.
     pub inputs: fn() -> &'static [InputPort],
-    /// Reads its parameters, telling every mistake in them; after one, what could be read beside it.
-    pub read: fn(&Value, &mut Diagnostics) -> ReadSpec,
+    /// Reads its parameters, telling every mistake in them; after one, what could be read beside it. The keys are those of the node
+    /// that are read elsewhere.
+    pub read: fn(&Value, &[&str], &mut Diagnostics) -> ReadSpec,
     /// The JSON Schema of its parameters, with the documentation.
     pub schema: fn() -> schemars::Schema,
 }
@@ -120,6 +121,7 @@ inventory::collect!(Kind);
 #[doc(hidden)]
 pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     value: &Value,
+    elsewhere: &[&str],
     diagnostics: &mut Diagnostics,
 ) -> ReadSpec {
     let advice = |key: &str| {
@@ -127,7 +129,7 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
         let description = schema["properties"][key]["description"].as_str()?;
         Some(format!("add `{key}`: {}", first_paragraph(description)))
     };
-    let read = decode_rest::<T>(value, "the node", &advice, diagnostics)?;
+    let read = decode_rest::<T>(value, "the node", elsewhere, &advice, diagnostics)?;
     Some(read.map(|spec| Box::new(spec) as Box<dyn NodeSpec>))
 }
 

@@ -94,6 +94,16 @@ impl Mistake {
         self
     }
 
+    /// The same, with the keys that are read elsewhere beside those that an unknown one of the whole table may be meant for.
+    pub(super) fn beside(mut self, elsewhere: &[&str]) -> Self {
+        if self.path.len() == 1
+            && let DocumentProblem::UnknownKey { known, .. } = &mut self.problem
+        {
+            known.extend(elsewhere.iter().map(|&key| key.to_owned()));
+        }
+        self
+    }
+
     /// Reports it, its table called by the keys that lead there and `what` holds them all.
     pub(super) fn report(mut self, what: &str, diagnostics: &mut Diagnostics) {
         let steps = match self.problem {

@@ -28,13 +28,15 @@ pub fn decode<T: DeserializeOwned>(
     what: &str,
     diagnostics: &mut Diagnostics,
 ) -> Option<T> {
-    decode_rest(value, what, &|_| None, diagnostics)?.whole()
+    decode_rest(value, what, &[], &|_| None, diagnostics)?.whole()
 }
 
-/// As [`decode`], with what to write where a key of the table itself is missing, and with what could be read beside mistakes.
+/// As [`decode`], with keys of the table that are read elsewhere and may be meant by an unknown one, with what to write where one of
+/// its own is missing, and with what could be read beside mistakes.
 pub(crate) fn decode_rest<T: DeserializeOwned>(
     value: &Value,
     what: &str,
+    elsewhere: &[&str],
     advice: &dyn Fn(&str) -> Option<String>,
     diagnostics: &mut Diagnostics,
 ) -> Option<Decoded<T>> {
@@ -47,7 +49,7 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
             let repair = repair.get_or_insert_with(|| Repair::of(value));
             for mistake in unknown {
                 repair.take_out(&mistake.path);
-                mistake.clone().report(what, diagnostics);
+                mistake.clone().beside(elsewhere).report(what, diagnostics);
                 strange.push(mistake);
             }
         }
@@ -70,7 +72,8 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
         repair.place_missing_key(&mut mistake, first);
         let is_misspelt = strange.iter().any(|given| given.is_meant_for(&mistake));
         if !repair.explains(&mistake) && !is_misspelt {
-            mistake.clone().advised(advice).report(what, diagnostics);
+            let told = mistake.clone().advised(advice).beside(elsewhere);
+            told.report(what, diagnostics);
         }
         let goes_on = match mistake.missing_key() {
             Some(key) => {

@@ -106,7 +106,8 @@ fn readings(text: &str) -> (Vec<Parameters>, LeftOut) {
     if let Data::Table(table) = &mut tree.data {
         table.remove("schema");
     }
-    let read = decode_rest::<Parameters>(&tree, "node \"n\"", &|_| None, &mut diagnostics);
+    let read =
+        decode_rest::<Parameters>(&tree, "node \"n\"", &["each"], &|_| None, &mut diagnostics);
     let read = read.expect("something can be read");
     assert_eq!(diagnostics.error_count(), 1);
     let left_out = read.left_out().clone();
