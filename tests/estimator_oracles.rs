@@ -380,35 +380,6 @@ fn rows_beyond_the_memory_are_said_where_they_are_needed() {
 }
 
 #[test]
-fn too_many_terms_are_refused_with_a_way_out() {
-    let rows: Vec<Vec<f64>> = (0..200)
-        .map(|i| {
-            (0..32)
-                .map(|j| (0.1 * f64::from(i * (j + 1))).sin())
-                .collect()
-        })
-        .collect();
-    let channels: Vec<String> = (0..31).map(|column| format!("x{column}")).collect();
-    let default: Vec<String> = (0..COLUMNS).map(|column| format!("x{column}")).collect();
-    let text = graph_text("type = \"polynomial\"", "x")
-        .replace(&format!("{default:?}"), &format!("{channels:?}"));
-    let (_, report) = fit(
-        &plan(&text),
-        &recording(&rows),
-        &FitOptions::default(),
-        &mut |_| {},
-    )
-    .unwrap();
-    let Outcome::Failed(error) = &report.estimators[0].outcome else {
-        panic!("527 terms are too many")
-    };
-    assert!(
-        error.to_string().contains("`interactions = false`"),
-        "{error}"
-    );
-}
-
-#[test]
 fn every_mistake_in_a_parameter_is_told_with_its_place() {
     for (node, told) in [
         (

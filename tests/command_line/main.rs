@@ -7,6 +7,7 @@
 mod workbench;
 
 mod columns;
+mod features;
 mod files;
 mod gaps;
 mod machine_file;

@@ -160,6 +160,15 @@ impl Unit {
         &self.text
     }
 
+    /// What to write where a scale of temperature was meant, for the two letters that UCUM gives to something else.
+    pub fn scale_meant(&self) -> Option<&'static str> {
+        match &*self.text {
+            "C" => Some("degrees Celsius are \"Cel\"; \"C\" is the coulomb"),
+            "F" => Some("degrees Fahrenheit are \"[degF]\"; \"F\" is the farad"),
+            _ => None,
+        }
+    }
+
     /// True for points on a temperature scale (`Cel`, `[degF]`), which only samples and ranges have.
     pub fn is_temperature_point(&self) -> bool {
         self.point.is_some()

@@ -120,7 +120,6 @@ mod tests {
             differences: Differences::Told,
             order,
             places: vec![0],
-            features: 1,
             ..Asked::default()
         };
         let mut report = TrainingReport::default();
@@ -150,7 +149,6 @@ mod tests {
             nk: Some(PerInput::none()),
             differences,
             places: vec![0],
-            features: 1,
             ..Asked::default()
         };
         let fit = |differences| {

@@ -22,8 +22,8 @@ const MOST_TERMS: usize = 500;
 ///
 /// `ŷ(t + ahead) = ȳ + Σ θ_k p_k(z)` with products `p_k` of up to `degree` of the variables `z`: the features and the past
 /// truths, each about its mean in the rows of the fit and in units of its deviation there (Chen and Billings 1989). The constant
-/// and all products are candidates. Forward regression takes, one after the other, the one that explains most of what is left
-/// of the truth; its share of the truth's squares about their mean `ȳ` is the error-reduction ratio (Chen, Billings and Luo
+/// and all products, 499 at most, are candidates. Forward regression takes, one after the other, the one that explains most of
+/// what is left of the truth; its share of the truth's squares about their mean `ȳ` is the error-reduction ratio (Chen, Billings and Luo
 /// 1989), which the fit prints and keeps for every term. Coefficients are least squares.
 ///
 /// Outside the range of the fit powers grow without bound: there a variable counts in products as at the edge of the range,
@@ -99,6 +99,25 @@ impl Estimator for Narx {
             mistakes.push(Mistake::at("most", "`most` is 0 and must be 1 or more"));
         }
         mistakes
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        let variables = features * self.feature_lags.len() + self.lags.len();
+        if Term::all(variables, self.degree).len() <= MOST_TERMS {
+            return Vec::new();
+        }
+        let message = format!(
+            "{variables} features and lags give more than {MOST_TERMS} products of up to {}, the most that are compared",
+            self.degree
+        );
+        let mistake = Mistake::at("inputs.features", message)
+            .help("name fewer features, fewer lags, or a lower `degree`");
+        vec![
+            mistake
+                .rests_on("lags")
+                .rests_on("feature_lags")
+                .rests_on("degree"),
+        ]
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
@@ -205,10 +224,6 @@ impl Expanding {
 }
 
 impl NarxTrainer {
-    fn too_many(&self) -> bool {
-        self.terms.len() > MOST_TERMS
-    }
-
     fn expand(&mut self) {
         if self.expanding.is_some() {
             return;
@@ -274,9 +289,6 @@ impl NarxTrainer {
 
 impl Trainer for NarxTrainer {
     fn row(&mut self, regressors: &[f64], truth: f64) {
-        if self.too_many() {
-            return;
-        }
         for (range, &x) in self.range.iter_mut().zip(regressors) {
             *range = (range.0.min(x), range.1.max(x));
         }
@@ -293,15 +305,6 @@ impl Trainer for NarxTrainer {
     }
 
     fn finish(mut self: Box<Self>) -> Result<Trained, TrainingError> {
-        if self.too_many() {
-            return Err(TrainingError::Unsolvable {
-                reason: format!(
-                    "{} features and lags give more than {MOST_TERMS} products of up to {}: name fewer, or a lower `degree`",
-                    self.regressors.len(),
-                    self.parameters.degree
-                ),
-            });
-        }
         self.expand();
         let Some(expanding) = &mut self.expanding else {
             return Err(TrainingError::TooFewRows { rows: 0, needed: 2 });

@@ -23,8 +23,8 @@ const MOST_TERMS: usize = 500;
 ///
 /// `ŷ(t + ahead) = b₀ + Σ b_j z_j + Σ b_jk z_j z_k` with features centred and scaled by the rows of the fit, so that a square is not
 /// nearly its feature once more. Terms are chosen by stepwise regression, as Chen (1996) did for the thermal errors of a
-/// machining centre, unless another selection is stated. Outside the range of the fit a square grows without bound: put a
-/// `guard` behind it.
+/// machining centre, unless another selection is stated; there may be 500 of them at most. Outside the range of the fit a
+/// square grows without bound: put a `guard` behind it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Polynomial {
@@ -59,6 +59,28 @@ impl Estimator for Polynomial {
         let mut mistakes = self.solver.mistakes();
         mistakes.extend(self.selection.mistakes());
         mistakes
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        let squares = if self.squares { features } else { 0 };
+        let products = if self.interactions {
+            features * features.saturating_sub(1) / 2
+        } else {
+            0
+        };
+        let terms = features + squares + products;
+        if terms <= MOST_TERMS {
+            return Vec::new();
+        }
+        let message =
+            format!("{features} features give {terms} terms, and at most {MOST_TERMS} are fitted");
+        let fewer = if self.interactions {
+            "name fewer features, or set `interactions = false`"
+        } else {
+            "name fewer features"
+        };
+        let mistake = Mistake::at("inputs.features", message).help(fewer);
+        vec![mistake.rests_on("squares").rests_on("interactions")]
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
@@ -162,7 +184,7 @@ impl Expanding {
 
 impl PolynomialTrainer {
     fn expand(&mut self) {
-        if self.terms.len() > MOST_TERMS || self.expanding.is_some() {
+        if self.expanding.is_some() {
             return;
         }
         let features = &self.setup.regressors;
@@ -200,9 +222,6 @@ impl Trainer for PolynomialTrainer {
             expanding.row(&self.terms, regressors, truth);
             return;
         }
-        if self.terms.len() > MOST_TERMS {
-            return;
-        }
         self.running.partial_fit(regressors);
         self.waiting.extend_from_slice(regressors);
         self.waiting.push(truth);
@@ -212,15 +231,6 @@ impl Trainer for PolynomialTrainer {
     }
 
     fn finish(mut self: Box<Self>) -> Result<Trained, TrainingError> {
-        if self.terms.len() > MOST_TERMS {
-            return Err(TrainingError::Unsolvable {
-                reason: format!(
-                    "{} features give {} terms, and at most {MOST_TERMS} are fitted: name fewer features, or set `interactions = false`",
-                    self.setup.regressors.len(),
-                    self.terms.len()
-                ),
-            });
-        }
         self.expand();
         let Some(expanding) = self.expanding else {
             return Err(TrainingError::TooFewRows { rows: 0, needed: 2 });

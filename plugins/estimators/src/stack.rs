@@ -237,7 +237,6 @@ mod tests {
         let setup = TrainingSetup {
             regressors: (0..rows[0].0.len()).map(regressor).collect(),
             places: (0..rows[0].0.len()).collect(),
-            asked_for: rows[0].0.len(),
             error_unit: "nm/min".to_owned(),
             memory: 1 << 20,
             ahead: Duration::ZERO,

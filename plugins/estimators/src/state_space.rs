@@ -171,6 +171,28 @@ impl StateSpace {
         mistakes
     }
 
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        let shortest = *self.horizons().start();
+        let past = shortest.saturating_mul(features + 1);
+        if past <= LARGEST_PAST {
+            return Vec::new();
+        }
+        let shorter = match self.shortened(shortest) {
+            None => "",
+            Some(Shortened::ByStates) => {
+                ", or ask for fewer `states`, which allow a shorter horizon"
+            }
+            Some(Shortened::ByHorizon) => ", or give a shorter `horizon`",
+        };
+        let message = format!(
+            "{features} features over a horizon of {shortest} steps make a past of {past} values, and at most {LARGEST_PAST} are \
+             fitted"
+        );
+        let mistake =
+            Mistake::at("inputs.features", message).help(format!("name fewer features{shorter}"));
+        vec![mistake.rests_on("states").rests_on("horizon")]
+    }
+
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         Box::new(IdentifiedTrainer::new(setup, self.clone()))
     }
@@ -224,24 +246,6 @@ enum Shortened {
 impl Identify for StateSpace {
     fn every(&self) -> Option<Duration> {
         self.every
-    }
-
-    fn misfit(&self, inputs: usize) -> Option<String> {
-        let shortest = *self.horizons().start();
-        let past = shortest * (inputs + 1);
-        (past > LARGEST_PAST).then(|| {
-            let shorter = match self.shortened(shortest) {
-                None => "",
-                Some(Shortened::ByStates) => {
-                    ", or ask for fewer `states`, which allow a shorter horizon"
-                }
-                Some(Shortened::ByHorizon) => ", or give a shorter `horizon`",
-            };
-            format!(
-                "{inputs} features over a horizon of {shortest} steps make a past of {past} values, and at most \
-                 {LARGEST_PAST} are fitted: name fewer features{shorter}"
-            )
-        })
     }
 
     fn identify(
@@ -381,9 +385,10 @@ mod tests {
     fn too_long_a_past_names_what_makes_it_shorter_and_nothing_that_does_not() {
         let told = |states: States, horizon: Option<usize>, inputs: usize| {
             let asked = asking(states, horizon);
-            assert_eq!(asked.misfit(1), None);
-            let misfit = asked.misfit(inputs).unwrap();
-            misfit.split_once("name ").unwrap().1.to_owned()
+            assert!(asked.mistakes_for(1).is_empty());
+            let mistakes = asked.mistakes_for(inputs);
+            let help = mistakes[0].help.as_ref().unwrap();
+            help.strip_prefix("name ").unwrap().to_owned()
         };
         assert_eq!(told(States::default(), None, 500), "fewer features");
         assert_eq!(told(States::Given(2), Some(2), 500), "fewer features");

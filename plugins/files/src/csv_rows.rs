@@ -306,7 +306,7 @@ mod tests {
         let mixed = "t;a;b\n0;1,5;2\n1;1;1.234\n2;7;2,5\n";
         assert_eq!(
             error(mixed),
-            "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark, or read leniently to leave out those with another"
+            "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
         );
         let (rows, reader) = read_with(mixed, lenient());
         assert_eq!(rows, "0 [1.5, 2.0]; 1 [1.0, NaN]; 2 [7.0, 2.5]");
@@ -360,7 +360,7 @@ mod tests {
     fn a_row_keeps_its_line_after_comments_and_quoted_line_breaks() {
         assert_eq!(
             error("# one\nt,a,b\n0,\"1\n\",2\n\n# six\n1,off,2\n"),
-            "f.csv:7: column `a`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently to take it as absent"
+            "f.csv:7: column `a`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
         );
     }
 
@@ -413,7 +413,7 @@ mod tests {
         let text = "t,a,b\n0,1,2.5\n5,1\n6,1,2,3\n1,3,\n";
         assert_eq!(
             error(text),
-            "f.csv:3: 2 cells where the header has 3; correct the row, or read leniently to leave it out"
+            "f.csv:3: 2 cells where the header has 3; correct the row, or read leniently (`--lenient`) to leave it out"
         );
         let (rows, reader) = read_with(text, lenient());
         assert_eq!(rows, TWO_ROWS);

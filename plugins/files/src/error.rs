@@ -242,7 +242,7 @@ impl fmt::Display for FileError {
                 found,
             } => write!(
                 f,
-                "{place}: column `{column}`: expected a number, found `{found}`; leave the cell empty where there is no value, or read leniently to take it as absent"
+                "{place}: column `{column}`: expected a number, found `{found}`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
             ),
             Self::MixedMarks {
                 place,
@@ -252,7 +252,7 @@ impl fmt::Display for FileError {
                 since,
             } => write!(
                 f,
-                "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; write all numbers of a file with one mark, or read leniently to leave out those with another"
+                "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
             ),
             Self::BadTime {
                 place,
@@ -270,7 +270,7 @@ impl fmt::Display for FileError {
                 }
                 write!(
                     f,
-                    "; correct the time or how it is to be read, or read leniently to leave the row out"
+                    "; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
                 )
             }
             Self::TimeNotAfter {
@@ -287,11 +287,11 @@ impl fmt::Display for FileError {
                 found,
             } => write!(
                 f,
-                "{place}: {found} cells where the header has {expected}; correct the row, or read leniently to leave it out"
+                "{place}: {found} cells where the header has {expected}; correct the row, or read leniently (`--lenient`) to leave it out"
             ),
             Self::BadObject { place, reason } => write!(
                 f,
-                "{place}: expected one JSON object on the line: {reason}; write one object per line, or read leniently to leave the line out"
+                "{place}: expected one JSON object on the line: {reason}; write one object per line, or read leniently (`--lenient`) to leave the line out"
             ),
             Self::JsonArray { place } => write!(
                 f,
@@ -398,7 +398,7 @@ mod tests {
         };
         assert_eq!(
             bad.to_string(),
-            "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently to take it as absent"
+            "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
         );
         let time = FileError::BadTime {
             place: place(),
@@ -408,7 +408,7 @@ mod tests {
         };
         assert_eq!(
             time.to_string(),
-            "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently to leave the row out"
+            "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
         );
         let dated = FileError::BadTime {
             place: place(),
@@ -427,7 +427,7 @@ mod tests {
         };
         assert_eq!(
             count.to_string(),
-            "run.csv:12: 2 cells where the header has 3; correct the row, or read leniently to leave it out"
+            "run.csv:12: 2 cells where the header has 3; correct the row, or read leniently (`--lenient`) to leave it out"
         );
     }
 

@@ -401,7 +401,7 @@ mod tests {
         let text = "{\"t\":0,\"a\":1,\"b\":2}\n{\"t\":1 \"a\":1}\n[1]\n{\"t\":1} {}\n{\"t\":2,\"t\":3}\n{\"t\":4}\n";
         assert_eq!(
             error(text),
-            "standard input:2: expected one JSON object on the line: expected `,` or `}` at column 8; write one object per line, or read leniently to leave the line out"
+            "standard input:2: expected one JSON object on the line: expected `,` or `}` at column 8; write one object per line, or read leniently (`--lenient`) to leave the line out"
         );
         let (rows, reader) = read_with(text, true).unwrap();
         assert_eq!(rows, "0 [1.0, 2.0]; 4 [NaN, NaN]");

@@ -55,6 +55,9 @@ impl Resolver<'_> {
             beside = estimator.mistakes_beside(&self.channels[truth].channel.unit);
             link = ahead.and_then(|ahead| self.link(instance, truth, ahead));
         }
+        if let Some((Some(_), features)) = &features {
+            beside.extend(estimator.mistakes_for(features.len()));
+        }
         let sound = sound && beside.is_empty();
         self.mistakes(instance, beside);
         let (Some((truth_port, truth)), Some(link), Some((features_port, features))) =

@@ -8,7 +8,7 @@ use super::lacks::Lacks;
 use crate::diagnostic::{Names, Place};
 use crate::quantity::QuantityError;
 use crate::time::DurationError;
-use crate::unit::UnitError;
+use crate::unit::{Unit, UnitError};
 
 /// A mistake in a graph file that shows before the graph is looked at as a whole.
 #[derive(Debug, Clone, PartialEq)]
@@ -195,7 +195,7 @@ pub enum DocumentProblem {
         /// The unit of the end.
         found: String,
         /// The unit of the signal.
-        unit: String,
+        unit: Box<Unit>,
     },
     /// A range whose low end is not below its high end.
     RangeOrder {

@@ -65,7 +65,6 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
             .map(|&candidate| regressors[candidate].clone())
             .collect::<Vec<Regressor>>(),
         places: kept.clone(),
-        asked_for: regressors.len(),
         error_unit: plan.channels[trainee.link.slot]
             .channel
             .unit

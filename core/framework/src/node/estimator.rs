@@ -104,6 +104,11 @@ pub trait Estimator: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// Mistakes that show only beside so many features: more of them than it takes, or parameters for another number.
+    fn mistakes_for(&self, _features: usize) -> Vec<Mistake> {
+        Vec::new()
+    }
+
     /// The predictor of a kind that needs no fit, given the names of its regressors.
     fn fixed(&self, _regressors: &[String]) -> Option<Box<dyn Predictor>> {
         None
@@ -177,8 +182,6 @@ pub struct TrainingSetup {
     pub regressors: Vec<Regressor>,
     /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out.
     pub places: Vec<usize>,
-    /// How many it asked for.
-    pub asked_for: usize,
     /// The unit of errors, for what is told of the fit: that of the truth, or K where that is a temperature.
     pub error_unit: String,
     /// How many bytes of rows the trainer may keep.

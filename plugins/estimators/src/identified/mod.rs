@@ -5,6 +5,7 @@ mod per_input;
 mod told;
 mod train;
 
+use athermal_core::diagnostic::counted;
 use athermal_core::node::{Mistake, Regressors, Trainer, TrainingSetup};
 use athermal_core::time::Duration;
 use athermal_numerics::{InputOrders, Orders};
@@ -28,6 +29,10 @@ macro_rules! identified {
 
             fn mistakes(&self) -> Vec<athermal_core::node::Mistake> {
                 self.asked().mistakes()
+            }
+
+            fn mistakes_for(&self, features: usize) -> Vec<athermal_core::node::Mistake> {
+                self.asked().mistakes_for(features)
             }
 
             fn learns(&self) -> athermal_core::node::Learns {
@@ -99,9 +104,8 @@ pub(crate) struct Asked {
     pub(crate) penalty: f64,
     pub(crate) every: Option<Duration>,
     pub(crate) order: Option<Order>,
-    /// Where the inputs stand among the features, of which there are so many: those without values are left out.
+    /// Where the inputs stand among the features: those without values are left out.
     pub(crate) places: Vec<usize>,
-    pub(crate) features: usize,
 }
 
 impl Asked {
@@ -158,10 +162,27 @@ impl Asked {
         mistakes
     }
 
+    /// Lists of orders that are not as long as there are features.
+    pub(crate) fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        let lists = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
+        let mut mistakes = Vec::new();
+        for (name, orders) in lists {
+            if let Some(PerInput::Each(list)) = orders
+                && list.len() != features
+            {
+                let (orders, features) =
+                    (counted(list.len(), "order"), counted(features, "feature"));
+                let message = format!("`{name}` has {orders} for {features}");
+                let mistake = Mistake::at(name, message).rests_on("inputs.features");
+                mistakes.push(mistake.help("one number stands for all"));
+            }
+        }
+        mistakes
+    }
+
     pub(crate) fn trainer(self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         let asked = Self {
             places: setup.places.clone(),
-            features: setup.asked_for,
             ..self
         };
         Box::new(IdentifiedTrainer::new(setup, asked))
@@ -202,18 +223,5 @@ impl Asked {
             nd: chosen[3],
             differences,
         }
-    }
-
-    /// Lists of orders that are not as long as there are features.
-    fn misfit(&self) -> Option<String> {
-        let lists = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
-        lists.into_iter().find_map(|(name, orders)| match orders {
-            Some(PerInput::Each(list)) if list.len() != self.features => Some(format!(
-                "`{name}` has {} orders for {} features; one number stands for all",
-                list.len(),
-                self.features
-            )),
-            _ => None,
-        })
     }
 }

@@ -25,11 +25,6 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
     /// How long a step is, where that is stated.
     fn every(&self) -> Option<Duration>;
 
-    /// What does not fit so many inputs.
-    fn misfit(&self, _inputs: usize) -> Option<String> {
-        None
-    }
-
     /// The model, from samples of so many interleaved series; what there is to tell goes into the report.
     ///
     /// # Errors
@@ -159,9 +154,6 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 (bytes / f64::from(1 << 20)).ceil() + 1.0
             )));
         }
-        if let Some(misfit) = self.asked.misfit(self.names.len()) {
-            return Err(unsolvable(misfit));
-        }
         let apart = || match self.rows.len() {
             rows @ ..3 => TrainingError::TooFewRows { rows, needed: 3 },
             rows => unsolvable(format!(
@@ -208,10 +200,6 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
 impl Identify for Asked {
     fn every(&self) -> Option<Duration> {
         self.every
-    }
-
-    fn misfit(&self, _inputs: usize) -> Option<String> {
-        Asked::misfit(self)
     }
 
     fn identify(

@@ -81,8 +81,11 @@ impl Slope {
                     "the slope of `{}` ({}) cannot be in {unit}",
                     channel.name, channel.unit
                 );
-                mistakes
-                    .push(Mistake::at("unit", message).help(format!("a unit such as {natural}")));
+                let help = channel
+                    .unit
+                    .scale_meant()
+                    .map_or_else(|| format!("a unit such as {natural}"), str::to_owned);
+                mistakes.push(Mistake::at("unit", message).help(help));
                 break;
             }
         }

@@ -233,7 +233,7 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         // Where neither converts, the unit of the signal is the one mistake.
         let problem = DocumentProblem::RangeUnit {
             found: first.unit.to_string(),
-            unit: unit.to_string(),
+            unit: Box::new(unit.clone()),
         };
         diagnostics.report(*place, problem);
         return None;

@@ -313,11 +313,10 @@ impl Problem for DocumentProblem {
                     .to_owned(),
             ),
             Self::OneColumn { .. } => Some("put `{channel}` into the pattern".to_owned()),
-            Self::RangeUnit { unit, .. } => Some(match unit.as_str() {
-                "C" => "degrees Celsius are \"Cel\"; \"C\" is the coulomb".to_owned(),
-                "F" => "degrees Fahrenheit are \"[degF]\"; \"F\" is the farad".to_owned(),
-                _ => format!("write it in {unit}, or correct the signal's unit"),
-            }),
+            Self::RangeUnit { unit, .. } => Some(unit.scale_meant().map_or_else(
+                || format!("write it in {unit}, or correct the signal's unit"),
+                str::to_owned,
+            )),
             Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
             Self::UnknownChannel { name, known, .. } => one_of(name, known, "its channels are"),
             Self::EmptyList { .. } => Some("name at least one".to_owned()),

@@ -1,0 +1,94 @@
+//! Parameters that do not suit the number of features are told when a graph is checked, not after its data were read.
+
+use crate::mistakes::assert_told;
+use crate::workbench::{Scratch, athermal};
+
+fn graph(sensors: usize, node: &str) -> String {
+    let names: Vec<String> = (0..sensors).map(|nth| format!("\"t{nth}\"")).collect();
+    format!(
+        r#"schema = 1
+[signals.temperature]
+unit = "Cel"
+channels = [{}]
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = ["X"]
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+[nodes.model]
+inputs.features = "temperature"
+inputs.truth = "drift"
+ahead = "0s"
+{node}
+"#,
+        names.join(", ")
+    )
+}
+
+/// What is said of a graph that is refused.
+fn checked(name: &str, text: &str) -> String {
+    let scratch = Scratch::new(name);
+    let graph = scratch.file("graph.toml", text);
+    athermal(&[&"check", &graph]).ended(2).told
+}
+
+#[test]
+fn lists_of_orders_are_as_long_as_there_are_features() {
+    for kind in ["armax", "oe", "bj", "arimax"] {
+        let node = |list: &str| graph(2, &format!("type = \"{kind}\"\nnb = {list}\nnk = [0, 0]"));
+        let name = format!("command-line-lists-{kind}");
+        let expected = [(18, "`nb` has 3 orders for 2 features")];
+        assert_told(&name, &node("[1, 1, 1]"), &expected);
+        let expected = [(18, "`nb` has 1 order for 2 features")];
+        assert_told(&name, &node("[1]"), &expected);
+    }
+}
+
+#[test]
+fn more_features_than_a_kind_takes_are_told_beside_its_other_mistakes() {
+    let told = |name: &str, sensors: usize, node: &str, expected: &[(u64, &str)]| {
+        assert_told(
+            &format!("command-line-many-{name}"),
+            &graph(sensors, node),
+            expected,
+        );
+    };
+    let polynomial = [(14, "40 features give 860 terms")];
+    told("polynomial", 40, "type = \"polynomial\"", &polynomial);
+    let text = graph(40, "type = \"polynomial\"");
+    let way_out = "name fewer features, or set `interactions = false`";
+    assert!(checked("command-line-many-help", &text).contains(way_out));
+    let narx = [
+        (
+            14,
+            "41 features and lags give more than 500 products of up to 2",
+        ),
+        (19, "`most` is 0"),
+    ];
+    told(
+        "narx",
+        40,
+        "type = \"narx\"\nlags = [\"5min\"]\nmost = 0",
+        &narx,
+    );
+    let space = [(14, "60 features over a horizon of 100 steps")];
+    told("space", 60, "type = \"state_space\"\nhorizon = 100", &space);
+}
+
+#[test]
+fn a_scale_of_temperature_that_is_written_as_another_unit_is_named() {
+    let text = graph(1, "type = \"linear\"")
+        .replace("\"Cel\"", "\"C\"")
+        .replace(
+            "inputs.signal = \"position\"",
+            "inputs.signal = \"temperature\"\nunit = \"mK/min\"",
+        );
+    let told = checked("command-line-scale", &text);
+    assert!(
+        told.contains("degrees Celsius are \"Cel\"; \"C\" is the coulomb"),
+        "{told}"
+    );
+}
