@@ -126,6 +126,18 @@ fn outliers_strange_rows_and_gaps_are_told_and_leave_no_trace() {
     }
 }
 
+#[test]
+fn an_outlier_among_the_first_truths_is_held_off_by_what_the_fit_was_off_by() {
+    let mut rows = rows(6, 60, usize::MAX);
+    rows[4][2] = 1e6;
+    for node in [RLS, SGD] {
+        let outputs = run(&mut engine(&graph(node)), 0, &rows);
+        let told: Vec<f64> = outputs[3..8].iter().map(|outputs| outputs[1]).collect();
+        assert_eq!(told, [0.0, 0.0, 3.0, 0.0, 0.0], "{node}");
+        assert!(error(&rows, &outputs, 20) < 0.3, "{node}");
+    }
+}
+
 /// The same predictions but where the input itself was spoilt.
 fn same_predictions(a: &[Vec<f64>], b: &[Vec<f64>]) -> bool {
     let only = |run: &[Vec<f64>]| {

@@ -1,6 +1,6 @@
 //! Decides how a fitted linear model goes on learning; how it is fitted, and what it learns from, is decided elsewhere.
 
-use athermal_core::model::{number, numbers};
+use athermal_core::model::{number, number_or_none, numbers};
 use athermal_core::node::{
     Coefficients, Learner, Mistake, Predictor, Restored, State, TrainedRange,
 };
@@ -164,10 +164,22 @@ pub struct OnlinePredictor {
     recursion: Recursion,
     /// The range of the regressors in the fit.
     range: TrainedRange,
+    /// The root mean square of the errors of the fit, where nothing else says how large they are.
+    #[serde(
+        default,
+        with = "number_or_none",
+        skip_serializing_if = "Option::is_none"
+    )]
+    rmse: Option<f64>,
 }
 
 impl OnlinePredictor {
-    pub(crate) fn new(frame: Frame, recursion: Recursion, range: TrainedRange) -> Self {
+    pub(crate) fn new(
+        frame: Frame,
+        recursion: Recursion,
+        range: TrainedRange,
+        rmse: Option<f64>,
+    ) -> Self {
         let mut coefficients = vec![0.0; frame.regressors.len()];
         let intercept = frame.unscaled(&recursion, &mut coefficients);
         Self {
@@ -176,6 +188,7 @@ impl OnlinePredictor {
             frame,
             recursion,
             range,
+            rmse,
         }
     }
 }
@@ -211,10 +224,11 @@ impl Predictor for OnlinePredictor {
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {
-        Some(Box::new(OnlineLearner::new(OnlineState {
+        let state = OnlineState {
             frame: self.frame.clone(),
             recursion: self.recursion.clone(),
-        })))
+        };
+        Some(Box::new(OnlineLearner::new(state, self.rmse)))
     }
 
     fn trained_range(&self) -> Option<&TrainedRange> {
@@ -239,15 +253,17 @@ struct OnlineLearner {
     coefficients: Vec<f64>,
     intercept: f64,
     row: Vec<f64>,
+    rmse: Option<f64>,
 }
 
 impl OnlineLearner {
-    fn new(state: OnlineState) -> Self {
+    fn new(state: OnlineState, rmse: Option<f64>) -> Self {
         let width = state.frame.regressors.len();
         let mut learner = Self {
             coefficients: vec![0.0; width],
             intercept: 0.0,
             row: vec![1.0; width + 1],
+            rmse,
             state,
         };
         learner.refresh();
@@ -268,6 +284,10 @@ impl Learner for OnlineLearner {
     fn deviation(&self, regressors: &[f64], _of: Instant) -> f64 {
         let OnlineState { frame, recursion } = &self.state;
         frame.deviation(recursion, regressors)
+    }
+
+    fn usual_error(&self) -> f64 {
+        self.rmse.unwrap_or(f64::NAN)
     }
 
     fn learn(&mut self, regressors: &[f64], truth: f64, _at: Instant) {
@@ -312,7 +332,7 @@ impl Learner for OnlineLearner {
             },
             _ => return Restored::cold("it learned by another recursion"),
         };
-        *self = Self::new(known);
+        *self = Self::new(known, self.rmse);
         Restored::Accepted
     }
 }

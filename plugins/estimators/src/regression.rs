@@ -232,7 +232,7 @@ impl LinearTrainer {
         report.in_sample_rmse = Some(rmse);
         let online = self.range_of(&columns).map(|range| {
             let frame = Frame::new(names, &columns, &standard, mean);
-            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range)
+            OnlinePredictor::new(frame, Recursion::Sgd(sgd), range, Some(rmse))
         });
         Ok((model, online))
     }

@@ -237,6 +237,7 @@ impl RlsTrainer {
             frame,
             Recursion::Rls { rls, noise },
             range,
+            None,
         ))
     }
 }

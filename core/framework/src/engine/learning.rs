@@ -57,6 +57,7 @@ impl Learning {
     ) -> Option<Self> {
         let width = predictor.uses().len();
         let learner = predictor.learner()?;
+        let recent = RecentError::of_fit(learner.usual_error());
         Some(Self {
             at_once: truth.allows_present() && learner.extrapolates(),
             learner,
@@ -67,7 +68,7 @@ impl Learning {
                 predictor: Arc::clone(predictor),
                 planned,
                 training,
-                recent: RecentError::default(),
+                recent,
             },
             mode: Mode::OneStep,
             step: Step::new(truth.ahead.max(truth.span)),
@@ -194,7 +195,7 @@ impl Learning {
             if let Some(from) = &state.learning {
                 self.withheld.restore(from);
             }
-            self.gate.recent = state.recent.unwrap_or_default();
+            self.gate.recent = state.recent.unwrap_or(self.gate.recent);
         }
         answer
     }

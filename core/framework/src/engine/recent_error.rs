@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The mean square of the recent errors: the arithmetic mean of the first, an exponentially weighted one later.
+/// The mean square of the recent errors: the arithmetic mean of the first, an exponentially weighted one later. It begins as if
+/// there had been a few as large as those of the fit.
 ///
 /// Errors of a learner that tells how unsure a prediction is are weighed by that: after a gap in which a process has moved, or
 /// far from what is known, it may be off by more than it usually is.
@@ -19,6 +20,20 @@ pub(crate) struct RecentError {
 }
 
 impl RecentError {
+    /// None yet, with the root mean square of those of the fit; NaN where it is not known.
+    pub(super) fn of_fit(usual: f64) -> Self {
+        let square = usual * usual;
+        if square > 0.0 && square.is_finite() {
+            Self {
+                seen: Self::FIRST,
+                mean_square: square,
+                ..Self::default()
+            }
+        } else {
+            Self::default()
+        }
+    }
+
     /// How many errors weigh in.
     const MEMORY: u32 = 50;
     /// How many there must have been before one can be called too large.
@@ -39,9 +54,11 @@ impl RecentError {
             return false;
         }
         if self.refused >= Self::PATIENCE || weighed != self.weighed {
+            // A deviation says how large its errors are.
+            let known = weighed && !self.weighed;
             *self = Self {
                 weighed,
-                ..Self::default()
+                ..Self::of_fit(if known { 1.0 } else { f64::NAN })
             };
         }
         // Errors that were all 0, as of a machine at rest, say nothing of how large one may be.
@@ -81,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_errors_are_let_in_whatever_they_are() {
+    fn the_first_errors_are_let_in_where_nothing_says_how_large_they_may_be() {
         let mut recent = RecentError::default();
         for error in [1e-3, 1e3, 0.0, 5.0] {
             assert!(recent.admits(error, f64::NAN, 6.0));
@@ -132,12 +149,31 @@ mod tests {
             for _ in 0..100 {
                 assert!(recent.admits(1e-3, before, 6.0));
             }
-            assert!(recent.admits(1.0, now, 6.0), "{before}, {now}");
+            let error = if now == 1e-3 { 2e-3 } else { 1.0 };
+            assert!(recent.admits(error, now, 6.0), "{before}, {now}");
         }
         // As it was written when no error was weighed.
         let written = r#"{"seen":50,"mean_square":1e-6,"refused":0}"#;
         let mut recent: RecentError = serde_json::from_str(written).unwrap();
         assert!(!recent.admits(1.0, f64::NAN, 6.0));
-        assert!(recent.admits(1.0, 1e-3, 6.0));
+        assert!(recent.admits(2e-3, 1e-3, 6.0));
+    }
+
+    #[test]
+    fn the_first_errors_are_measured_by_those_of_the_fit() {
+        let mut recent = RecentError::of_fit(2.0);
+        assert!(!recent.admits(1e3, f64::NAN, 6.0) && recent.admits(5.0, f64::NAN, 6.0));
+        let mut weighed = RecentError::of_fit(f64::NAN);
+        assert!(!weighed.admits(1e3, 2.0, 6.0) && weighed.admits(5.0, 2.0, 6.0));
+    }
+
+    #[test]
+    fn a_fit_that_was_too_good_does_not_end_learning() {
+        let mut recent = RecentError::of_fit(1e-9);
+        let refused = (0..1000)
+            .take_while(|_| !recent.admits(1.0, f64::NAN, 6.0))
+            .count();
+        assert!(refused <= RecentError::PATIENCE as usize, "{refused}");
+        assert!((0..100).all(|_| recent.admits(1.0, f64::NAN, 6.0)));
     }
 }

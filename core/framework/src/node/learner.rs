@@ -102,6 +102,12 @@ pub trait Learner: Debug + Send {
         f64::NAN
     }
 
+    /// The root mean square by which the truths of the fit missed their predictions, for a kind that tells no deviation; NaN where
+    /// it is not known. The first truths that miss by much more are not handed over.
+    fn usual_error(&self) -> f64 {
+        f64::NAN
+    }
+
     /// Takes the regressors of a run, NaN where one is absent, which predicts the truth that will be measured at `of`; every
     /// truth that arrived up to `told` has been handed over, if it was to be. For learners whose state goes on without a
     /// truth; `of` never goes back, and nothing is allocated here once the number of runs within the horizon is known.
