@@ -123,6 +123,42 @@ fn a_fit_that_is_left_with_no_regressor_says_so_and_why() {
 }
 
 #[test]
+fn what_was_constant_in_the_fit_is_not_missed_by_a_prediction() {
+    let rows: String = (0..300)
+        .map(|row| (row, noise(row, 1)))
+        .map(|(row, u)| format!("{row},{u},5,{}\n", 3.0 * u + noise(row, 3)))
+        .collect();
+    let scratch = Scratch::new("doubtful-constant");
+    let data = scratch.file("data.csv", &format!("s,u,v,y\n{rows}"));
+    let without = scratch.file(
+        "dead.csv",
+        &format!("s,u,v,y\n{}", rows.replace(",5,", ",,")),
+    );
+    for kind in [
+        "\"linear\"",
+        "\"linear\"\nsolver = { type = \"ols\" }",
+        "\"linear\"\nsolver = { type = \"sgd\" }",
+        "\"huber\"",
+        "\"rls\"",
+    ] {
+        let text = graph(&format!("type = {kind}\n{FEATURES}"));
+        let (graph, model) = (
+            scratch.file("graph.toml", &text),
+            scratch.path("model.json"),
+        );
+        athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(0);
+        let run = |data| athermal(&[&"run", &model, &"-i", data]).ended(0).out;
+        let (whole, dead) = (run(&data), run(&without));
+        assert_eq!(
+            whole.lines().filter(|line| !line.ends_with(',')).count(),
+            301,
+            "{whole}"
+        );
+        assert_eq!(whole, dead, "{kind}");
+    }
+}
+
+#[test]
 fn a_fit_that_is_worse_than_the_mean_of_its_rows_is_doubted() {
     let node = format!(
         "type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"sgd\", eta0 = 1.2, power = 0.0, epochs = 1 }}"

@@ -88,20 +88,22 @@ impl Fit {
             Failure::Outside(format!("the model cannot be written as JSON: {error}"))
         })?;
         self.tell(terminal, &report);
+        let fits = report.estimators.iter();
+        let failed = fits
+            .filter(|fit| matches!(fit.outcome, Outcome::Failed(_)))
+            .count();
         if self.output.as_os_str() == "-" {
             print!("{text}");
         } else {
             write_aside(&self.output, &text)?;
             if terminal.format == Format::Table {
                 terminal.note(format_args!("wrote {}", self.output.display()));
-                terminal.note(self.next(&model));
+                if report.estimators.is_empty() || failed < report.estimators.len() {
+                    terminal.note(self.next(&model));
+                }
             }
         }
-        let failed = report
-            .estimators
-            .iter()
-            .any(|fit| matches!(fit.outcome, Outcome::Failed(_)));
-        Ok(if failed { Answer::No } else { Answer::Fine })
+        Ok(if failed > 0 { Answer::No } else { Answer::Fine })
     }
 
     /// What to type next: a score on data that the fit has not seen; a run, where there is nothing to score.

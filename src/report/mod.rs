@@ -155,10 +155,10 @@ pub fn gather(
     })
 }
 
-/// What a model must be loaded with so that a report can tell the standard error of the truth.
+/// What a model must be loaded with so that a report can tell the standard error of the truth, and how much intervals cover.
 pub const WANTED: Wanted = Wanted {
     standard_errors: true,
-    intervals: false,
+    intervals: true,
 };
 
 #[cfg(test)]

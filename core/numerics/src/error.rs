@@ -162,11 +162,16 @@ impl fmt::Display for NumericsError {
                 f,
                 "{rows} rows cannot be cut into {folds} folds; at least two folds and one row in each are needed"
             ),
-            Self::FoldOfOneRow { folds, rows } => write!(
-                f,
-                "in {folds} folds of {rows} rows some have one row, which has no R²; take at most {} folds",
-                rows / 3
-            ),
+            Self::FoldOfOneRow { folds, rows } => {
+                write!(
+                    f,
+                    "in {folds} folds of {rows} rows some have one row, which has no R²; "
+                )?;
+                match rows / 3 {
+                    0 | 1 => write!(f, "more rows are needed"),
+                    most => write!(f, "take at most {most} folds"),
+                }
+            }
             Self::FoldsOfBlocks { folds, rows, block } => write!(
                 f,
                 "{rows} rows cannot be cut into {folds} folds, since they did not fit in memory and are summed in blocks of {block} rows"

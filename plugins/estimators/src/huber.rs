@@ -126,10 +126,12 @@ impl Trainer for RobustTrainer {
                 .notes
                 .push("the minimum was not reached to the last digit".to_owned());
         }
-        let regressors = self.regressors.into_iter().map(|regressor| regressor.name);
+        let names = self.regressors.into_iter().map(|regressor| regressor.name);
+        let terms = names.zip(fit.coefficients);
+        let (regressors, coefficients) = terms.filter(|(_, b)| *b != 0.0).unzip();
         let predictor = LinearPredictor {
-            regressors: regressors.collect(),
-            coefficients: fit.coefficients,
+            regressors,
+            coefficients,
             intercept: fit.intercept,
             variance: None,
         };

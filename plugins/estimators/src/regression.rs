@@ -98,9 +98,9 @@ impl LinearTrainer {
     pub(crate) fn find(&self, report: &mut TrainingReport) -> Result<Found, TrainingError> {
         let gram = self.blocks.total();
         let standard = Standardization::of(&gram);
-        let (columns, alpha) = self.chosen(&standard.scales, report)?;
+        let (chosen, alpha) = self.chosen(&standard.scales, report)?;
         let squares = LeastSquares::ridge(alpha);
-        let solved = squares.solve(&gram, &columns, &standard.scales, self.blocks.rows());
+        let solved = squares.solve(&gram, &chosen, &standard.scales, self.blocks.rows());
         let fit = solved.map_err(told)?;
         report.condition = Some(fit.condition);
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
@@ -109,12 +109,15 @@ impl LinearTrainer {
             squares.solve(&gram, &all, &standard.scales, None).ok()
         });
         self.note(&fit, of_all.as_ref().unwrap_or(&fit), report);
-        let names = columns
+        // Nor is a prediction withheld where one of them is missing.
+        let fit = fit.without_constants();
+        let names = fit
+            .columns
             .iter()
             .map(|&column| self.regressors[column].name.clone())
             .collect();
         Ok(Found {
-            columns,
+            columns: fit.columns.clone(),
             names,
             gram,
             standard,

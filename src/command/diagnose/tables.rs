@@ -350,6 +350,7 @@ fn residuals(shown: &[&Residuals]) -> String {
             let verdict = match of.white {
                 Some(true) => "white",
                 Some(false) => "not white",
+                None if of.rms <= of.mean.abs() * (1.0 + f64::EPSILON) => "constant",
                 None => "too few",
             };
             vec![
@@ -423,8 +424,10 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
     });
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
     let most = days.count - 1;
+    let told = |(_, cells): &(String, Vec<String>)| cells.iter().any(|cell| cell != "-");
     let verdict = match enough {
         _ if most == 1 => "two are too few to tell",
+        _ if !curve.iter().any(told) => "nothing to compare",
         Some(enough) => {
             let days = counted(enough as u64, "day");
             let verb = if enough == 1 { "is" } else { "are" };
