@@ -419,6 +419,20 @@ fn the_verdict_tells_the_errors_of_the_table() {
 }
 
 #[test]
+fn the_scores_of_a_report_are_those_of_an_evaluation() {
+    let scratch = Scratch::new("report-scores");
+    let model = fitted(&scratch, "linear-axis", "linear-axis");
+    let days = simulated(&scratch, "days.csv", "linear-axis", 0.5, 2);
+    let facts = report(&model, &days, &[&"--format", &"json"]).json();
+    let more: [&dyn AsRef<std::ffi::OsStr>; 2] = [&"--format", &"json"];
+    let scores = athermal_on("evaluate", &model, &days, &more)
+        .ended(0)
+        .json();
+    assert!(facts["scores"][0]["interval"].is_object());
+    assert_eq!(facts["scores"], scores["scores"]);
+}
+
+#[test]
 fn dates_are_shown_as_hours_since_the_first_and_nothing_is_shaded_without_limits() {
     let scratch = Scratch::new("dates_are_shown_as_hours");
     let text = "schema = 1\nname = \"dated\"\n[time]\ncolumn = \"time\"\nunit = \"rfc3339\"\n\

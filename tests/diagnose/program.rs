@@ -144,6 +144,42 @@ fn why_there_is_nothing_is_said_and_nothing_is_told_as_no_number() {
 }
 
 #[test]
+fn a_truth_that_never_changes_is_called_so_and_no_number_of_days_enough_for_it() {
+    let scratch = Scratch::new("diagnose-constant");
+    let rows: String = (0..400)
+        .map(|row| format!("{row},{},7\n", row % 5))
+        .collect();
+    let data = scratch.file("still.csv", format!("s,u,y\n{rows}"));
+    let text = r#"schema = 1
+[time]
+column = "s"
+[signals.in]
+unit = "V"
+channels = ["u"]
+column = "{channel}"
+max_age = "1s"
+[signals.out]
+unit = "nm"
+channels = ["y"]
+column = "{channel}"
+max_age = "1s"
+[nodes.m]
+type = "linear"
+inputs.features = "in"
+inputs.truth = "out.y"
+ahead = "0s"
+[outputs]
+p = "m"
+"#;
+    let (graph, model) = (scratch.file("graph.toml", text), scratch.path("model.json"));
+    athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    let told = athermal_on("diagnose", &model, &data, &[&"--day", &"100s"]).ended(0);
+    assert!(told.out.contains("constant"), "{}", told.out);
+    assert!(told.out.contains("nothing to compare"), "{}", told.out);
+    assert!(!told.out.contains("enough to come within"), "{}", told.out);
+}
+
+#[test]
 fn what_is_infinite_is_told_as_such_in_the_table_and_as_json() {
     let scratch = Scratch::new("diagnose-collinear");
     let text = r#"schema = 1

@@ -257,7 +257,8 @@ impl Gate {
         let deviation = learner.deviation(row, arrived);
         let most = self.planned.outliers;
         // What has yet to find out where it is may be far off.
-        if learner.settled() && !self.recent.admits(error, deviation, most) {
+        let starts_anywhere = learner.extrapolates();
+        if learner.settled() && !self.recent.admits(error, deviation, most, starts_anywhere) {
             return Became::Outlier;
         }
         learner.learn(row, truth, arrived);

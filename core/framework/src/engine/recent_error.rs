@@ -44,9 +44,16 @@ impl RecentError {
     /// Whether an error is below so many times the recent root mean square, both in units of the standard deviation of what was
     /// predicted where there is one, which is finite and above 0. What was kept in other units is forgotten.
     ///
-    /// One that is not counts as if it were as large as that, so that what has changed for good is learned after a few; when
-    /// as many as there is patience for have been, what was before is forgotten.
-    pub(super) fn admits(&mut self, error: f64, deviation: f64, multiple: f64) -> bool {
+    /// One that is not below counts as if it were as large as that, so that what has changed for good is learned after a few; when
+    /// as many as there is patience for have been, what was before is forgotten. A deviation says how large the first errors are,
+    /// but for a learner that goes on from the last truths, and `starts_anywhere`.
+    pub(super) fn admits(
+        &mut self,
+        error: f64,
+        deviation: f64,
+        multiple: f64,
+        starts_anywhere: bool,
+    ) -> bool {
         let weighed = deviation > 0.0 && deviation < f64::INFINITY;
         let error = if weighed { error / deviation } else { error };
         let square = error * error;
@@ -54,8 +61,7 @@ impl RecentError {
             return false;
         }
         if self.refused >= Self::PATIENCE || weighed != self.weighed {
-            // A deviation says how large its errors are.
-            let known = weighed && !self.weighed;
+            let known = weighed && !self.weighed && !starts_anywhere;
             *self = Self {
                 weighed,
                 ..Self::of_fit(if known { 1.0 } else { f64::NAN })
@@ -84,15 +90,16 @@ mod tests {
     fn a_spike_is_held_off_and_a_lasting_change_is_let_in_after_a_few() {
         let mut recent = RecentError::default();
         for i in 0..200 {
-            assert!(recent.admits(if i % 2 == 0 { 1.0 } else { -1.0 }, f64::NAN, 6.0));
+            assert!(recent.admits(if i % 2 == 0 { 1.0 } else { -1.0 }, f64::NAN, 6.0, false));
         }
-        assert!(!recent.admits(20.0, f64::NAN, 6.0), "a spike");
-        assert!(recent.admits(1.0, f64::NAN, 6.0));
+        assert!(!recent.admits(20.0, f64::NAN, 6.0, false), "a spike");
+        assert!(recent.admits(1.0, f64::NAN, 6.0, false));
         assert!(
-            !recent.admits(f64::NAN, f64::NAN, 6.0) && !recent.admits(f64::INFINITY, f64::NAN, 6.0)
+            !recent.admits(f64::NAN, f64::NAN, 6.0, false)
+                && !recent.admits(f64::INFINITY, f64::NAN, 6.0, false)
         );
         let refused = (0..100)
-            .take_while(|_| !recent.admits(20.0, f64::NAN, 6.0))
+            .take_while(|_| !recent.admits(20.0, f64::NAN, 6.0, false))
             .count();
         assert!((1..10).contains(&refused), "{refused}");
     }
@@ -101,7 +108,7 @@ mod tests {
     fn the_first_errors_are_let_in_where_nothing_says_how_large_they_may_be() {
         let mut recent = RecentError::default();
         for error in [1e-3, 1e3, 0.0, 5.0] {
-            assert!(recent.admits(error, f64::NAN, 6.0));
+            assert!(recent.admits(error, f64::NAN, 6.0, false));
         }
     }
 
@@ -109,37 +116,40 @@ mod tests {
     fn a_long_rest_does_not_make_outliers_of_what_follows_for_longer_than_a_few() {
         let mut recent = RecentError::default();
         for _ in 0..100 {
-            assert!(recent.admits(1.0, f64::NAN, 6.0));
+            assert!(recent.admits(1.0, f64::NAN, 6.0, false));
         }
         for _ in 0..5000 {
-            assert!(recent.admits(0.0, f64::NAN, 6.0));
+            assert!(recent.admits(0.0, f64::NAN, 6.0, false));
         }
         let refused = (0..1000)
-            .take_while(|_| !recent.admits(1.0, f64::NAN, 6.0))
+            .take_while(|_| !recent.admits(1.0, f64::NAN, 6.0, false))
             .count();
         assert_eq!(refused, RecentError::PATIENCE as usize);
-        assert!((0..100).all(|_| recent.admits(1.0, f64::NAN, 6.0)));
-        assert!(!recent.admits(20.0, f64::NAN, 6.0), "a spike after that");
+        assert!((0..100).all(|_| recent.admits(1.0, f64::NAN, 6.0, false)));
+        assert!(
+            !recent.admits(20.0, f64::NAN, 6.0, false),
+            "a spike after that"
+        );
     }
 
     #[test]
     fn errors_that_were_all_zero_do_not_end_learning() {
         let mut recent = RecentError::default();
         for _ in 0..100 {
-            assert!(recent.admits(0.0, f64::NAN, 6.0));
+            assert!(recent.admits(0.0, f64::NAN, 6.0, false));
         }
-        assert!(recent.admits(1.0, f64::NAN, 6.0));
+        assert!(recent.admits(1.0, f64::NAN, 6.0, false));
     }
 
     #[test]
     fn an_error_is_as_large_as_the_prediction_was_unsure() {
         let mut recent = RecentError::default();
         for _ in 0..100 {
-            assert!(recent.admits(1.0, 0.5, 6.0));
+            assert!(recent.admits(1.0, 0.5, 6.0, false));
         }
-        assert!(!recent.admits(20.0, 0.5, 6.0), "a spike");
-        assert!(recent.admits(20.0, 10.0, 6.0), "after a gap");
-        assert!(!recent.admits(f64::INFINITY, 10.0, 6.0));
+        assert!(!recent.admits(20.0, 0.5, 6.0, false), "a spike");
+        assert!(recent.admits(20.0, 10.0, 6.0, false), "after a gap");
+        assert!(!recent.admits(f64::INFINITY, 10.0, 6.0, false));
     }
 
     #[test]
@@ -147,33 +157,37 @@ mod tests {
         for (before, now) in [(f64::NAN, 1e-3), (1e-3, 0.0), (1e-3, f64::INFINITY)] {
             let mut recent = RecentError::default();
             for _ in 0..100 {
-                assert!(recent.admits(1e-3, before, 6.0));
+                assert!(recent.admits(1e-3, before, 6.0, false));
             }
             let error = if now == 1e-3 { 2e-3 } else { 1.0 };
-            assert!(recent.admits(error, now, 6.0), "{before}, {now}");
+            assert!(recent.admits(error, now, 6.0, false), "{before}, {now}");
         }
         // As it was written when no error was weighed.
         let written = r#"{"seen":50,"mean_square":1e-6,"refused":0}"#;
         let mut recent: RecentError = serde_json::from_str(written).unwrap();
-        assert!(!recent.admits(1.0, f64::NAN, 6.0));
-        assert!(recent.admits(2e-3, 1e-3, 6.0));
+        assert!(!recent.admits(1.0, f64::NAN, 6.0, false));
+        assert!(recent.admits(2e-3, 1e-3, 6.0, false));
     }
 
     #[test]
     fn the_first_errors_are_measured_by_those_of_the_fit() {
         let mut recent = RecentError::of_fit(2.0);
-        assert!(!recent.admits(1e3, f64::NAN, 6.0) && recent.admits(5.0, f64::NAN, 6.0));
+        assert!(
+            !recent.admits(1e3, f64::NAN, 6.0, false) && recent.admits(5.0, f64::NAN, 6.0, false)
+        );
         let mut weighed = RecentError::of_fit(f64::NAN);
-        assert!(!weighed.admits(1e3, 2.0, 6.0) && weighed.admits(5.0, 2.0, 6.0));
+        assert!(!weighed.admits(1e3, 2.0, 6.0, false) && weighed.admits(5.0, 2.0, 6.0, false));
+        let mut following = RecentError::of_fit(f64::NAN);
+        assert!(following.admits(1e3, 2.0, 6.0, true));
     }
 
     #[test]
     fn a_fit_that_was_too_good_does_not_end_learning() {
         let mut recent = RecentError::of_fit(1e-9);
         let refused = (0..1000)
-            .take_while(|_| !recent.admits(1.0, f64::NAN, 6.0))
+            .take_while(|_| !recent.admits(1.0, f64::NAN, 6.0, false))
             .count();
         assert!(refused <= RecentError::PATIENCE as usize, "{refused}");
-        assert!((0..100).all(|_| recent.admits(1.0, f64::NAN, 6.0)));
+        assert!((0..100).all(|_| recent.admits(1.0, f64::NAN, 6.0, false)));
     }
 }
