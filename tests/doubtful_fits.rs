@@ -131,11 +131,9 @@ fn what_was_constant_in_the_fit_is_not_missed_by_a_prediction() {
         .map(|(row, u)| format!("{row},{u},5,{}\n", 3.0 * u + noise(row, 3)))
         .collect();
     let scratch = Scratch::new("doubtful-constant");
-    let data = scratch.file("data.csv", &format!("s,u,v,y\n{rows}"));
-    let without = scratch.file(
-        "dead.csv",
-        &format!("s,u,v,y\n{}", rows.replace(",5,", ",,")),
-    );
+    let data = scratch.file("data.csv", format!("s,u,v,y\n{rows}"));
+    let dead = rows.replace(",5,", ",,");
+    let without = scratch.file("dead.csv", format!("s,u,v,y\n{dead}"));
     for kind in [
         "\"linear\"",
         "\"linear\"\nsolver = { type = \"ols\" }",

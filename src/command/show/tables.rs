@@ -73,7 +73,7 @@ fn estimator(of: &Told, found: &Found) -> String {
     let rows = found.coefficients.iter().map(|of| {
         let error = of.standard_error.map_or("-".to_owned(), |it| digits(it, 3));
         let cells = [
-            digits(of.value, 5),
+            digits(of.value, places(of.value, of.standard_error)),
             error,
             of.per.clone().unwrap_or_default(),
         ];
@@ -211,9 +211,27 @@ fn fading(mode: &Mode) -> String {
     }
 }
 
+/// How many digits of a coefficient are told: five, and where it is known better, up to the second of its standard error.
+fn places(value: f64, error: Option<f64>) -> usize {
+    let known = error.map_or(0.0, |error| (value / error).abs().log10().ceil() + 2.0);
+    // As a number of digits NaN is none.
+    (known as usize).clamp(5, 12)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_coefficient_is_told_to_the_second_digit_of_its_standard_error() {
+        let told = |value: f64, error| digits(value, places(value, error));
+        assert_eq!(told(1_000_010.0, Some(0.0182)), "1.000010000e6");
+        assert_eq!(told(-0.523_456, Some(0.1)), "-0.52346");
+        assert_eq!(told(98.765_432_1, Some(0.000_12)), "98.765432");
+        assert_eq!(told(2.0, Some(0.0)), "2.00000000000");
+        assert_eq!(told(0.0, Some(0.0)), "0");
+        assert_eq!(told(1.5, None), "1.5000");
+    }
 
     #[test]
     fn a_type_that_does_not_tell_its_coefficients_is_said_to() {
