@@ -97,6 +97,11 @@ impl Feature for Difference {
         self.back() + self.max_age.unwrap_or_default()
     }
 
+    fn every_tick(&self) -> bool {
+        // A run of the producer that gave nothing is no new value, and still ends the hold of the one before.
+        true
+    }
+
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let channels = self.earlier(inputs.port("signal"));
         Box::new(Differencing {
