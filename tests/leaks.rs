@@ -259,6 +259,28 @@ fn a_truth_made_of_windows_over_windows_keeps_lags_out_of_both() {
     );
 }
 
+/// The value of a period may come when the next one is nearly over.
+#[test]
+fn a_truth_of_a_regular_clock_keeps_lags_out_of_all_the_time_that_it_may_reach_back() {
+    let graph = |method: &str, lag: &str| {
+        format!(
+            "[nodes.clock]\ntype = \"resample\"\ninputs.signal = \"position.X\"\nevery = \"5min\"\n{method}\n\
+             [nodes.past]\ntype = \"lag\"\ninputs.signal = \"position.X\"\nlags = [\"{lag}\"]\n\
+             [nodes.n]\ntype = \"linear\"\ninputs.features = \"past\"\ninputs.truth = \"clock.X\"\nahead = \"0s\"\n\
+             [outputs]\npredicted = \"n\"\n"
+        )
+    };
+    for method in ["method = \"mean\"", "method = \"last\""] {
+        assert_eq!(told(&graph(method, "10min")), []);
+        let leak = told(&graph(method, "9min"));
+        let smallest = "the smallest lag allowed is 10min";
+        assert!(leak[0].1.contains(smallest), "{}", leak[0].1);
+    }
+    assert_eq!(told(&graph("late = \"10s\"", "5min10s")), []);
+    let leak = told(&graph("late = \"10s\"", "5min"));
+    assert!(leak[0].1.contains("allowed is 310s"), "{}", leak[0].1);
+}
+
 #[test]
 fn a_gate_may_not_go_by_the_state_of_what_its_voters_predict() {
     let gate = |ahead: &str, state: &str| {

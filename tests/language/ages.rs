@@ -206,3 +206,36 @@ fn a_held_sample_that_nothing_bounds_is_a_mistake() {
     );
     assert!(told.contains("max_age"), "{told}");
 }
+
+#[test]
+fn a_value_of_a_regular_clock_counts_until_the_next_is_due() {
+    for method in ["mean", "last"] {
+        let text = format!(
+            r#"{SAMPLES}
+[nodes.clock]
+type = "resample"
+inputs.signal = "temperature"
+every = "1min"
+method = "{method}"
+[nodes.warm]
+type = "linear"
+inputs.features = "clock"
+inputs.truth = "position.Z"
+ahead = "0s"
+[outputs]
+out = "warm"
+"#
+        );
+        let fit = linear(&[("clock.room", 1.0), ("clock.chuck", 1.0)], 0.0);
+        let mut bench = Bench::new(&text, &[("warm", fit)]);
+        for tick in 1..=100 {
+            // Once a minute, now just before the end of a period and now just after.
+            let jitter = f64::from(tick * 7 % 11 - 5) * 0.3;
+            let now = 60.0 * f64::from(tick) + jitter;
+            let both = [("temperature.room", 1.0), ("temperature.chuck", 2.0)];
+            let given = bench.tick(now, &both);
+            let held = bench.value("clock.room");
+            assert_eq!(given[0].is_nan(), held.is_nan(), "{method} at {now}");
+        }
+    }
+}

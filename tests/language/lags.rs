@@ -132,3 +132,48 @@ fn persistence_of_a_slope_is_the_one_at_the_smallest_lag_that_shares_nothing() {
     check_persistence("5min", 0.0);
     check_persistence("10min", 0.0);
 }
+
+/// A spike filter gives nothing at 40 s for the room. Nodes that look back hear of it, whether the chuck has a sample there or not.
+#[test]
+fn looking_back_at_a_channel_does_not_depend_on_whether_another_is_fresh() {
+    let text = format!(
+        r#"{SAMPLES}
+[nodes.calm]
+type = "hampel"
+inputs.signal = "temperature"
+window = "2min"
+floor = "100 mK"
+[nodes.past]
+type = "lag"
+inputs.signal = "calm"
+lags = ["10s"]
+[nodes.step]
+type = "difference"
+inputs.signal = "calm"
+[nodes.over]
+type = "difference"
+inputs.signal = "calm"
+over = "10s"
+[outputs]
+past = "past"
+step = "step"
+over = "over"
+"#
+    );
+    for beside in [false, true] {
+        let mut bench = Bench::new(&text, &[]);
+        for tick in 0..=6 {
+            let now = 10.0 * f64::from(tick);
+            let room = if tick == 4 { 95.0 } else { 20.0 + 0.001 * now };
+            let both = [("temperature.room", room), ("temperature.chuck", 5.0)];
+            let there = if beside || tick != 4 { 2 } else { 1 };
+            bench.tick(now, &both[..there]);
+            assert_eq!(bench.value("calm.room").is_nan(), tick == 4, "at {now}");
+            for channel in ["past.room", "step.room", "over.room"] {
+                let expected = bench.ran(channel) && !bench.value(channel).is_nan();
+                let at = format!("{channel} at {now}, beside {beside}");
+                assert_eq!(expected, ![0, 4, 5].contains(&tick), "{at}");
+            }
+        }
+    }
+}

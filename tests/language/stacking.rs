@@ -146,6 +146,36 @@ fn a_voter_that_only_knows_its_own_rows_by_heart_gets_little_weight_as_in_the_or
 }
 
 #[test]
+fn thirds_of_the_data_hold_as_many_truths_each() {
+    let plan = plan(&nodes("ahead = \"0s\""));
+    let mut table = Table::default();
+    for tick in 0..900_i32 {
+        let t = f64::from(tick);
+        let (warm, calm) = ((0.13 * t).sin(), (0.031 * t).cos());
+        // Positions are measured in the first third, and seldom later.
+        let measured = tick < 300 || (600..606).contains(&tick);
+        let position = 3.0 * warm - calm + 0.1 * (1.7 * t * t).sin();
+        let position = if measured { position } else { f64::NAN };
+        let now = Instant::from_ns(i64::from(tick) * 10_000_000_000);
+        table.push(now, &[warm, calm, position]);
+    }
+    let (_, report) = fit(&plan, &table, &FitOptions::default(), &mut |_| {}).unwrap();
+    let stack = report.estimators.iter().find(|fit| fit.node == "stack");
+    let stack = stack.unwrap();
+    // The lags of one voter are cold in the first rows, which so are not complete.
+    assert_eq!(stack.rows + stack.dropped.incomplete, 306);
+    let Outcome::Fitted(report) = &stack.outcome else {
+        panic!("{:?}", stack.outcome);
+    };
+    let Figure::Named(weights) = &report.figures["weights"] else {
+        panic!("{report:?}");
+    };
+    let sum: f64 = weights.values().map(|weight| weight.0).sum();
+    assert!((sum - 1.0).abs() < 0.05, "{weights:?}");
+    assert!(report.in_sample_rmse.unwrap() < 0.15, "{report:?}");
+}
+
+#[test]
 fn votes_for_another_instant_than_the_stack_predicts_are_told() {
     let told = problems(&nodes("ahead = \"1min\""));
     assert!(told.contains("A050"), "{told}");
@@ -264,7 +294,8 @@ higher = \"never_higher\"
         let t = f64::from(row);
         let (room, chuck) = ((0.7 * t).sin(), (0.3 * t).cos());
         // What a kelvin does changes as time goes on.
-        let values = [room, chuck, (0.01 * t).sin() * room + 0.1 * chuck];
+        let per_kelvin = 1.0 + (0.01 * t).sin();
+        let values = [room, chuck, per_kelvin * room + 0.1 * chuck];
         table.push(Instant::from_ns(i64::from(row) * 10_000_000_000), &values);
     }
     let plan = plan(&graph);

@@ -15,7 +15,7 @@ use crate::share::{raise, shrink};
 ///
 /// `ŷ = Σ w_i ŷ_i` with `w_i ∝ RMSE_i^(−power)`, normalised, over the truths that the embargo let through within `memory`:
 /// only those count whose window does not overlap the predicted one. A voter without errors in memory takes the mean weight of the
-/// others; if no voter has any, all weights are equal. A voter without a prediction drops out and the rest are
+/// others that are there; if none of these has any, all weights are equal. A voter without a prediction drops out and the rest are
 /// renormalised, so that the vote goes on when a sensor dies. The port `weights` shows them.
 ///
 /// Recent errors are few and tell of the voters only roughly: `shrinkage` draws the weights towards equal ones (after Stock and Watson
@@ -32,12 +32,12 @@ use crate::share::{raise, shrink};
 #[serde(deny_unknown_fields)]
 pub struct AutoWeighted {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
-    /// ever less by `{ half_life = "15min" }`.
+    /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives: a voter without a newer one has none.
     pub memory: Memory,
-    /// How strongly errors count: 0 not at all, 2 as inverse variances do; at most 16.
-    #[serde(default = "two")]
+    /// How strongly errors count: 0 not at all, 2, which is the default, as inverse variances do; at most 16.
+    #[serde(default)]
     #[schemars(range(min = 0.0, max = 16.0))]
-    pub power: f64,
+    pub power: Option<f64>,
     /// How errors become weights.
     #[serde(default)]
     pub weights: Weighting,
@@ -51,9 +51,8 @@ pub struct AutoWeighted {
     pub floor: f64,
 }
 
-fn two() -> f64 {
-    2.0
-}
+/// The power where none is stated.
+const INVERSE_VARIANCE: f64 = 2.0;
 
 /// How errors become weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -80,11 +79,16 @@ impl Combiner for AutoWeighted {
 
     fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = self.memory.mistakes();
-        if !(0.0..=16.0).contains(&self.power) {
-            mistakes.push(Mistake::at(
-                "power",
-                format!("`power` is {} and must be from 0 to 16", self.power),
-            ));
+        if let Some(power) = self.power {
+            if !(0.0..=16.0).contains(&power) {
+                let message = format!("`power` is {power} and must be from 0 to 16");
+                mistakes.push(Mistake::at("power", message));
+            } else if self.weights != Weighting::InversePower {
+                let message = "`power` is for weights by inverse powers of errors";
+                let help = "leave it out, or use `weights = \"inverse_power\"`";
+                let mistake = Mistake::at("power", message).help(help);
+                mistakes.push(mistake.rests_on("weights"));
+            }
         }
         for (name, value) in [("shrinkage", self.shrinkage), ("floor", self.floor)] {
             if !(0.0..=1.0).contains(&value) {
@@ -170,7 +174,8 @@ impl Weigher {
 
     /// Gives each vote that is there its weight; what they are to be divided by.
     fn weigh(&self, errors: &Errors, votes: Votes<'_>, weights: &mut [f64]) -> f64 {
-        let (power, form) = (self.parameters.power, self.parameters.weights);
+        let power = self.parameters.power.unwrap_or(INVERSE_VARIANCE);
+        let form = self.parameters.weights;
         // Relative to the best voter, so that nothing over- or underflows; an error of exactly zero counts as the smallest
         // number there is.
         let best = known(errors, votes)

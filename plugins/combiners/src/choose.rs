@@ -18,7 +18,7 @@ const VOTERS: InputPort = InputPort::held("voters", "predictions of the same tru
 #[serde(deny_unknown_fields)]
 pub struct Best {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
-    /// ever less by `{ half_life = "15min" }`.
+    /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives.
     pub memory: Memory,
 }
 

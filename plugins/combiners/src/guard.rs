@@ -20,7 +20,7 @@ use crate::memory::Memory;
 #[serde(deny_unknown_fields)]
 pub struct Guard {
     /// How long an error is remembered, counted from when the embargo lets its truth through: `"15min"`, `{ truths = 12 }`, or
-    /// ever less by `{ half_life = "15min" }`.
+    /// ever less by `{ half_life = "15min" }`, and not at all after ten half-lives.
     pub memory: Memory,
     /// How many truths of a prediction must be in memory before it is held back; 1 or more. With a `half_life` they count for less
     /// with age: one so short that fewer are ever left holds nothing back.

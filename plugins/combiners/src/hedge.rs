@@ -26,6 +26,9 @@ use crate::share::raise;
 /// With `rate`, `η = rate / S`: errors are scaled by their own size so far, and the bound is `S ln n / rate + rate · T S / 8` once that has shown
 /// (Cesa-Bianchi and Lugosi 2006, theorem 2.2).
 ///
+/// One wild truth sets the scale of errors: what follows hardly counts beside it, until `half_life` forgets it. So screen truths, such as by
+/// `hampel`. A truth from which a vote lies so far that the square of its error is beyond all numbers, some 1e154, is passed over.
+///
 /// A voter without a prediction drops out, the rest are renormalised, and what it is owed neither grows nor shrinks while it is away (Freund, Schapire,
 /// Singer and Warmuth 1997). Before the first truth all weights are equal. The port `weights` shows them.
 /// Where all voters tell their standard deviation, the port `deviation` is that of their mixture, as of `auto_weighted`.

@@ -81,7 +81,8 @@ conformance!(
         memory = "5min"
         weights = "as_printed"
         "#
-    ),
+    )
+    .except(Rule::Ranges, "`power` is for inverse powers"),
     Case::new(
         r#"
         memory = "5min"
@@ -90,7 +91,7 @@ conformance!(
     )
     .except(
         Rule::Ranges,
-        "`shrinkage` and `floor` are for weights that add up to 1"
+        "`power` is for inverse powers, `shrinkage` and `floor` for weights that add up to 1"
     ),
     Case::new(
         r#"

@@ -53,7 +53,7 @@ fn compare(parameters: &dyn Combiner, file: &str, column: usize, tolerance: f64)
 fn vote(memory: Memory, shrinkage: f64, floor: f64) -> AutoWeighted {
     AutoWeighted {
         memory,
-        power: 2.0,
+        power: None,
         weights: Weighting::InversePower,
         shrinkage,
         floor,

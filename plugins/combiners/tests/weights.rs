@@ -15,7 +15,7 @@ fn s(seconds: i64) -> Instant {
 fn vote(memory_s: i64, power: f64, weights: Weighting) -> AutoWeighted {
     AutoWeighted {
         memory: Memory::Time(Duration::from_ns(memory_s * 1_000_000_000)),
-        power,
+        power: Some(power),
         weights,
         shrinkage: 0.0,
         floor: 0.0,
@@ -153,6 +153,24 @@ fn the_power_says_how_strongly_errors_count() {
             "{power}: {found} for {expected}"
         );
     }
+}
+
+#[test]
+fn a_power_that_is_stated_is_for_inverse_powers() {
+    for weights in [Weighting::AsPrinted, Weighting::AsPrintedRaw] {
+        let mistakes = vote(900, 3.0, weights).mistakes();
+        assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+        let without = AutoWeighted {
+            power: None,
+            ..vote(900, 3.0, weights)
+        };
+        assert!(without.mistakes().is_empty());
+    }
+    assert!(
+        vote(900, 3.0, Weighting::InversePower)
+            .mistakes()
+            .is_empty()
+    );
 }
 
 #[test]

@@ -314,7 +314,7 @@ fn diverged(model: &LinearPredictor, rate: LearningRate) -> TrainingError {
     );
     TrainingError::Unsolvable {
         reason: format!(
-            "the stochastic gradients diverged: {what} is not finite with `eta0` = {eta0}; a smaller `eta0` takes smaller steps"
+            "the stochastic gradients diverged: {what} is not finite with `eta0` = {eta0:?}; a smaller `eta0` takes smaller steps"
         ),
     }
 }

@@ -1,5 +1,7 @@
 //! Decides which ways there are to find coefficients, and what their parameters may be.
 
+use std::fmt::Debug;
+
 use athermal_core::node::{Learns, Mistake};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,12 +37,15 @@ pub enum Solver {
         #[serde(default = "quarter")]
         #[schemars(range(min = 0.0, max = 1.0))]
         power: f64,
-        /// How often the rows are gone through, at least once.
+        /// How often the rows are gone through, 1 to 10,000.
         #[serde(default = "five")]
-        #[schemars(range(min = 1))]
+        #[schemars(range(min = 1, max = 10_000))]
         epochs: usize,
     },
 }
+
+/// More often than this, rows of a fit are hardly ever gone through by intent, and it seems not to end.
+const MOST_EPOCHS: usize = 10_000;
 
 fn one() -> Penalty {
     Penalty::Fixed(1.0)
@@ -72,11 +77,11 @@ impl Solver {
     /// Parameters out of their range.
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
-        let mut check = |name: &str, value: f64, fits: bool, allowed: &str| {
+        let mut check = |name: &str, value: &dyn Debug, fits: bool, allowed: &str| {
             if !fits {
                 mistakes.push(Mistake::at(
                     format!("solver.{name}"),
-                    format!("`{name}` is {value} and must be {allowed}"),
+                    format!("`{name}` is {value:?} and must be {allowed}"),
                 ));
             }
         };
@@ -91,13 +96,18 @@ impl Solver {
             } => {
                 check(
                     "alpha",
-                    alpha,
+                    &alpha,
                     alpha >= 0.0 && alpha.is_finite(),
                     "0 or more",
                 );
-                check("eta0", eta0, eta0 > 0.0 && eta0.is_finite(), "above 0");
-                check("power", power, (0.0..=1.0).contains(&power), "from 0 to 1");
-                check("epochs", epochs as f64, epochs >= 1, "1 or more");
+                check("eta0", &eta0, eta0 > 0.0 && eta0.is_finite(), "above 0");
+                check("power", &power, (0.0..=1.0).contains(&power), "from 0 to 1");
+                check(
+                    "epochs",
+                    &epochs,
+                    (1..=MOST_EPOCHS).contains(&epochs),
+                    "from 1 to 10000",
+                );
             }
         }
         mistakes
@@ -139,5 +149,22 @@ impl Solver {
             Self::Ridge { alpha } => alpha,
             Self::Ols {} | Self::Sgd { .. } => Penalty::Fixed(0.0),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_gone_through_so_often_that_it_ends() {
+        let sgd = |epochs: usize| Solver::Sgd {
+            alpha: small_penalty(),
+            eta0: first_step(),
+            power: quarter(),
+            epochs,
+        };
+        let told = |epochs: usize| sgd(epochs).mistakes().len();
+        assert_eq!([0, 1, MOST_EPOCHS, MOST_EPOCHS + 1].map(told), [1, 0, 0, 1]);
     }
 }

@@ -15,11 +15,12 @@ use serde::{Deserialize, Serialize};
 /// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson 1974), without an
 /// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Predictions of the rows that
 /// an estimator was itself fitted on would flatter the one that fits them closest, so that weights are found on out-of-fold
-/// predictions: each third of the data is predicted by voters fitted on the rest. So voters are fitted four times, and those of
+/// predictions: each third of the data, with as many instants at which there is a truth, is predicted by voters fitted on the rest. So voters are fitted four times, and those of
 /// a voter that is a stack itself 13 times.
 ///
 /// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the others go by the
-/// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over. Only rows with
+/// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over.
+/// Where all weights are 0 there is no prediction. Only rows with
 /// all predictions take part in the fit, and a voter that lacks more than a tenth of them is left out. At most 10 voters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -84,6 +85,12 @@ impl Trainer for Stacking {
             reason: error.to_string(),
         })?;
         let weights = stacked.weights((1 << voters) - 1);
+        if weights.iter().all(|&weight| weight == 0.0) {
+            return Err(TrainingError::Unsolvable {
+                reason: "every weight is 0, since no voter says more of the truth than 0 does; look at the fits of the voters"
+                    .to_owned(),
+            });
+        }
         let explained: f64 = (0..voters)
             .map(|i| {
                 let mixed: f64 = (0..voters).map(|j| weights[j] * moments[(i, j)]).sum();
@@ -195,7 +202,12 @@ impl Predictor for Stacked {
             .enumerate()
             .filter(|(_, vote)| !vote.is_nan())
             .fold(0, |set, (voter, _)| set | 1 << voter);
-        let terms = self.weights(set).iter().zip(votes);
+        let weights = self.weights(set);
+        if weights.iter().all(|&weight| weight == 0.0) {
+            // Who is there has nothing to say, which is not the same as 0.
+            return f64::NAN;
+        }
+        let terms = weights.iter().zip(votes);
         terms
             .filter(|(_, vote)| !vote.is_nan())
             .map(|(weight, vote)| weight * vote)
@@ -283,6 +295,26 @@ mod tests {
         assert!((without - 1.0).abs() < 0.02, "{without}");
         let alone = stacked.predict(&[f64::NAN, 1.0, f64::NAN]);
         assert!(alone > 0.2 && alone < 0.8, "half of it is noise: {alone}");
+    }
+
+    #[test]
+    fn where_every_weight_is_zero_there_is_no_prediction() {
+        let stacked = fitted();
+        assert!(stacked.predict(&[f64::NAN; 3]).is_nan());
+        let mut rows = rows();
+        for (row, truth) in &mut rows {
+            row[1] = -*truth;
+        }
+        let rows: Vec<(&[f64], f64)> = rows.iter().map(|(row, truth)| (&row[..], *truth)).collect();
+        let wrong_way = stack(&rows).unwrap().predictor;
+        assert!(wrong_way.predict(&[f64::NAN, 1.0, f64::NAN]).is_nan());
+        assert!(wrong_way.predict(&[2.0, 1.0, 2.0]).is_finite());
+        let alone: Vec<(&[f64], f64)> = rows
+            .iter()
+            .map(|(row, truth)| (&row[1..2], *truth))
+            .collect();
+        let error = stack(&alone).unwrap_err().to_string();
+        assert!(error.starts_with("every weight is 0"), "{error}");
     }
 
     #[test]

@@ -14,9 +14,9 @@ use crate::past::{LookingBack, max_age, max_age_mistake};
 /// The change of each channel over a time, or from one value to the next: `x(t) − x(t − over)`.
 ///
 /// With every new value at `t` it takes the last value at or before `t − over` away; without `over`, the value before. That
-/// one must not have been older than `max_age` at that instant: by default as old as a held value of the channel may be, and without
-/// `over` older by the signal's `max_age`, since the value before of a slow clock is a whole period old. A difference of two samples
-/// has the noise of both, and that of a `slope` over the same time is smaller; over one sample it is the differencing of Box and
+/// one must not have been older than `max_age` at that instant: by default as old as a held value of the channel may be. Without
+/// `over`, what has a span may be older by the signal's `max_age`, since the value before of a slow clock is a whole period old; a
+/// sample may not. A difference of two samples has the noise of both, and that of a `slope` over the same time is smaller; over one sample it is the differencing of Box and
 /// Jenkins (1976). Differences of temperatures in Cel or K are in K, of those in \[degF\] in \[degR\].
 ///
 /// Two differences share a sample where one ends as the other begins, so that a value summarises `over` and `max_age`: where it
@@ -44,7 +44,8 @@ impl Difference {
     fn earlier(&self, channels: &[Channel]) -> Vec<Channel> {
         let mut channels = channels.to_vec();
         if self.over.is_none() {
-            for channel in &mut channels {
+            let spanning = |channel: &&mut Channel| channel.span > Duration::ZERO;
+            for channel in channels.iter_mut().filter(spanning) {
                 channel.span += channel.max_age.unwrap_or_default();
             }
         }
@@ -95,6 +96,11 @@ impl Feature for Difference {
 
     fn memory(&self) -> Duration {
         self.back() + self.max_age.unwrap_or_default()
+    }
+
+    fn every_tick(&self) -> bool {
+        // A run of the producer that gave nothing is no new value, and still ends the hold of the one before.
+        true
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {

@@ -38,7 +38,8 @@ pub struct Hampel {
     #[serde(default = "three_deviations")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub threshold: f64,
-    /// A distance from the median within which no sample is an outlier: `"5 mK"`; none by default.
+    /// A distance from the median within which no sample is an outlier: `"5 mK"`; none by default. Of temperatures it is a
+    /// difference: as anywhere, `"5 Cel"` stands for 5 K.
     #[serde(default)]
     pub floor: Option<Quantity>,
     /// The fewest samples in the window by which one is judged, 3 or more.

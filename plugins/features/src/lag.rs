@@ -83,6 +83,11 @@ impl Feature for Lag {
         longest.unwrap_or_default() + self.max_age.unwrap_or_default()
     }
 
+    fn every_tick(&self) -> bool {
+        // A run of the producer that gave nothing is no new value, and still ends the hold of the one before.
+        true
+    }
+
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let channels = inputs.port("signal");
         Box::new(Lagging {

@@ -36,9 +36,9 @@ pub struct Moving {
     #[serde(default = "three")]
     #[schemars(range(min = 1))]
     pub min_samples: usize,
-    /// The share of the window that its samples must span, 0 to 1.
+    /// The share of the window that its samples must span, 0 to below 1: `n` regular samples a window span `1 − 1/n` of it.
     #[serde(default = "half")]
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1.0))]
     pub min_coverage: f64,
     /// Whether a window that reaches back before the channel's first value has a value.
     #[serde(default)]

@@ -12,9 +12,12 @@ use serde::{Deserialize, Serialize};
 /// Brings each channel to a regular clock: one value for every period, made of the samples within it.
 ///
 /// Periods are `(k · every, (k + 1) · every]`, counted from the origin of time whatever the first sample, so that several nodes
-/// and several starts agree. A value comes at the first tick at or after the end of its period; where that is later by a whole
-/// period or more, and where a period holds no sample, there is none. The stamp is that of the newest sample within. Runs at
-/// every tick.
+/// and several starts agree. A value comes at the first tick at or after the end of its period; where that is later than `late`,
+/// and where a period holds no sample, there is none. The stamp is that of the newest sample within. Runs at every tick.
+///
+/// A value that comes late has no part in the time since the end of its period, and reaches back as much further. So its span is
+/// `every` and `late`, by default two periods, so that a held value counts until the next one is due. Where it is a truth, the
+/// embargo and the search for leaks go by that. Where ticks come at the ends of periods or often, a short `late` withholds less.
 ///
 /// Thinning out without averaging folds fast noise into slow: `mean`, the default, does not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -22,19 +25,39 @@ use serde::{Deserialize, Serialize};
 pub struct Resample {
     /// The length of a period.
     pub every: Duration,
+    /// How late after the end of its period a value may come, 0 to `every`; by default until the next period ends.
+    #[serde(default)]
+    pub late: Option<Duration>,
     /// What is made of the samples of a period.
     #[serde(default)]
     pub method: ResampleMethod,
+}
+
+impl Resample {
+    /// How late a value may come.
+    fn late(&self) -> Duration {
+        self.late.unwrap_or(self.every)
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("every", self.every));
+        let late = self.late();
+        if mistakes.is_empty() && !(Duration::ZERO..=self.every).contains(&late) {
+            let message = format!("`late` is {late} and must be from 0 s to {}", self.every);
+            mistakes.push(Mistake::at("late", message));
+        }
+        mistakes
+    }
 }
 
 /// What is made of the samples of a period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ResampleMethod {
-    /// Their mean, which summarises the period.
+    /// Their mean.
     #[default]
     Mean,
-    /// The last one. It counts for a period longer than the signal's `max_age`, since the next comes no sooner.
+    /// The last one.
     Last,
 }
 
@@ -49,18 +72,13 @@ impl Feature for Resample {
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        if let Some(mistake) = Mistake::unless_lasting("every", self.every) {
-            return Err(vec![mistake]);
+        let mistakes = self.mistakes();
+        if !mistakes.is_empty() {
+            return Err(mistakes);
         }
-        let regular = |channel: &Channel| match self.method {
-            ResampleMethod::Mean => Channel {
-                span: channel.span + self.every,
-                ..channel.clone()
-            },
-            ResampleMethod::Last => Channel {
-                max_age: channel.max_age.map(|age| age + self.every),
-                ..channel.clone()
-            },
+        let regular = |channel: &Channel| Channel {
+            span: channel.span + self.every + self.late(),
+            ..channel.clone()
         };
         Ok(vec![OutputPort {
             name: "signal",
@@ -156,7 +174,8 @@ impl Operator for Resampling {
         let end = self.known.end_of(tick.now);
         let is_open = self.known.end != Instant::MIN;
         if is_open && self.known.end < end {
-            let in_time = tick.now - self.known.end < self.known.every;
+            let late = tick.now - self.known.end;
+            let in_time = late < self.spec.every && late <= self.spec.late();
             self.close(outputs, in_time);
         }
         self.known.end = end;

@@ -49,9 +49,10 @@ pub(crate) fn window_mistakes(
         let message = format!("`min_samples` is {min_samples} and must be {fewest} or more");
         mistakes.push(Mistake::at("min_samples", message));
     }
-    if !(0.0..=1.0).contains(&min_coverage) {
-        let message = format!("`min_coverage` is {min_coverage} and must be from 0 to 1");
-        mistakes.push(Mistake::at("min_coverage", message));
+    if !(0.0..1.0).contains(&min_coverage) {
+        let message = format!("`min_coverage` is {min_coverage} and must be from 0 to below 1");
+        let help = "a window does not hold the sample at its beginning, so that samples a tenth of it apart span 0.9 of it";
+        mistakes.push(Mistake::at("min_coverage", message).help(help));
     }
     if windows.is_empty() {
         mistakes.push(
@@ -235,5 +236,11 @@ mod tests {
             harmonics: 4,
         };
         assert!(range.lengths().is_err());
+    }
+
+    #[test]
+    fn samples_need_not_span_all_of_a_window_which_they_cannot() {
+        let told = |coverage: f64| window_mistakes(&[s(60.0)], 3, 1, coverage).len();
+        assert_eq!([0.0, 0.999, 1.0, f64::NAN].map(told), [0, 0, 1, 1]);
     }
 }

@@ -504,3 +504,29 @@ fn a_difference_of_temperatures_may_be_given_in_their_own_unit() {
         assert_eq!(scaled(&floor, "outlier", &[20.0, 20.0, 20.0, 21.1]), 1.0);
     }
 }
+
+#[test]
+fn the_sample_before_counts_as_long_as_its_signal_says() {
+    let mut bench = Bench::new("type = \"difference\"\n", &["difference"]);
+    for (now, value, expected) in [(0.0, 1.0, None), (10.0, 2.0, Some(1.0)), (20.1, 4.0, None)] {
+        bench.tick(&[now, value, 0.0]);
+        let change = bench.output("difference.y");
+        assert_eq!((!change.is_nan()).then_some(change), expected, "at {now}");
+    }
+}
+
+#[test]
+fn what_comes_later_than_it_may_does_not_come() {
+    let node = "type = \"resample\"\nevery = \"10s\"\nlate = \"2s\"\n";
+    let mut bench = Bench::new(node, &["signal"]);
+    for (now, expected) in [
+        (9.0, None),
+        (12.0, Some(9.0)),
+        (22.1, None),
+        (30.0, Some(26.05)),
+    ] {
+        bench.tick(&[now, now, 0.0]);
+        let found = bench.output("signal.y");
+        assert_eq!((!found.is_nan()).then_some(found), expected, "at {now}");
+    }
+}

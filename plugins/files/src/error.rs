@@ -120,7 +120,16 @@ pub enum FileError {
         /// The line of the first of them.
         since: u64,
     },
-    /// A time cell that is not in the stated form, or beyond 64 bits of nanoseconds.
+    /// A time cell beyond 64 bits of nanoseconds.
+    TimeBeyond {
+        /// The row.
+        place: Place,
+        /// The name of the column.
+        column: String,
+        /// The text of the cell.
+        found: String,
+    },
+    /// A time cell that is not in the stated form.
     BadTime {
         /// The row.
         place: Place,
@@ -253,6 +262,14 @@ impl fmt::Display for FileError {
             } => write!(
                 f,
                 "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
+            ),
+            Self::TimeBeyond {
+                place,
+                column,
+                found,
+            } => write!(
+                f,
+                "{place}: column `{column}`: the time `{found}` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`, or read leniently (`--lenient`) to leave the row out"
             ),
             Self::BadTime {
                 place,
@@ -409,6 +426,15 @@ mod tests {
         assert_eq!(
             time.to_string(),
             "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
+        );
+        let beyond = FileError::TimeBeyond {
+            place: place(),
+            column: "time_s".into(),
+            found: "9223372046".into(),
+        };
+        assert_eq!(
+            beyond.to_string(),
+            "run.csv:12: column `time_s`: the time `9223372046` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`, or read leniently (`--lenient`) to leave the row out"
         );
         let dated = FileError::BadTime {
             place: place(),

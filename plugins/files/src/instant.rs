@@ -23,6 +23,16 @@ impl TimeForm {
         }
     }
 
+    /// Whether a cell is of this form, and its instant does not fit into 64 bits.
+    pub(crate) fn is_beyond(self, text: &[u8]) -> bool {
+        let is_of_form = match self {
+            Self::Numbers { .. } => Decimal::parse(text).is_some(),
+            Self::Samples { .. } => Decimal::parse(text).is_some_and(Decimal::is_whole),
+            Self::Rfc3339 => timestamp(text).is_some(),
+        };
+        is_of_form && self.read(text).is_none()
+    }
+
     /// What a cell should look like, for a message.
     pub(crate) fn expected(self) -> &'static str {
         match self {
@@ -92,8 +102,20 @@ mod tests {
     }
 
     #[test]
-    fn a_date_beyond_64_bits_of_nanoseconds_is_refused() {
-        assert_eq!(TimeForm::Rfc3339.read(b"2400-01-01T00:00:00Z"), None);
-        assert_eq!(TimeForm::Rfc3339.read(b"yesterday"), None);
+    fn a_time_beyond_64_bits_of_nanoseconds_is_refused_and_told_from_what_is_none() {
+        let seconds = TimeForm::Numbers {
+            ns_per_unit: 1_000_000_000,
+        };
+        for (form, text, beyond) in [
+            (TimeForm::Rfc3339, "2400-01-01T00:00:00Z", true),
+            (TimeForm::Rfc3339, "yesterday", false),
+            (seconds, "9223372046", true),
+            (seconds, "-1e300", true),
+            (seconds, "1h", false),
+        ] {
+            assert_eq!(form.read(text.as_bytes()), None, "{text}");
+            assert_eq!(form.is_beyond(text.as_bytes()), beyond, "{text}");
+        }
+        assert!(!seconds.is_beyond(b"9223372036"));
     }
 }

@@ -158,11 +158,21 @@ fn read_time<C: Cells>(
         Err(_) => None,
     };
     if time_ns.is_none() {
-        ledger.refuse_row(|| FileError::BadTime {
-            place: rows.place(),
-            column: time.column.clone(),
-            found: excerpt(cell),
-            expected: time.form.expected(),
+        ledger.refuse_row(|| {
+            let (place, column, found) = (rows.place(), time.column.clone(), excerpt(cell));
+            if time.form.is_beyond(text.as_bytes()) {
+                return FileError::TimeBeyond {
+                    place,
+                    column,
+                    found,
+                };
+            }
+            FileError::BadTime {
+                place,
+                column,
+                found,
+                expected: time.form.expected(),
+            }
         })?;
     } else if time.form == TimeForm::Rfc3339 {
         let report = &mut ledger.report;

@@ -30,36 +30,16 @@ impl Share {
         self.within.contains(&tick) && !self.without.iter().any(|range| range.contains(&tick))
     }
 
-    /// The ticks of the share, of which there are `ticks` in all, cut into so many parts of about the same size. A part may reach
-    /// across ticks that are not in the share.
-    pub(super) fn cut(&self, ticks: u64, parts: u64) -> Vec<Range<u64>> {
-        let within = self.within.start..self.within.end.min(ticks);
-        // Where the share begins or ends, in order.
-        let edges = self
-            .without
-            .iter()
-            .flat_map(|range| [range.start, range.end]);
-        let mut edges: Vec<u64> = edges.filter(|edge| within.contains(edge)).collect();
-        edges.extend([within.start, within.end]);
-        edges.sort_unstable();
-        let runs: Vec<Range<u64>> = edges
-            .windows(2)
-            .map(|edge| edge[0]..edge[1])
-            .filter(|run| self.contains(run.start))
-            .collect();
-        let count: u64 = runs.iter().map(|run| run.end - run.start).sum();
-        // The tick before which so many of the share lie.
-        let after = |mut before: u64| {
-            for run in &runs {
-                let length = run.end - run.start;
-                if before < length {
-                    return run.start + before;
-                }
-                before -= length;
-            }
-            within.end
+    /// The share cut into so many parts that hold about the same number of these ticks, which are in order. A part may reach across
+    /// ticks that are not in the share.
+    pub(super) fn cut(&self, ticks: &[u64], parts: usize) -> Vec<Range<u64>> {
+        let own = ticks.iter().copied().filter(|&tick| self.contains(tick));
+        let own: Vec<u64> = own.collect();
+        let edge = |nth: usize| match own.get(own.len() * nth / parts) {
+            _ if nth == 0 => self.within.start,
+            Some(&tick) if nth < parts => tick,
+            _ => self.within.end,
         };
-        let edge = |nth: u64| after(count * nth / parts);
         (0..parts).map(|nth| edge(nth)..edge(nth + 1)).collect()
     }
 }
@@ -341,22 +321,33 @@ mod tests {
 
     #[test]
     fn what_is_left_of_a_share_is_cut_into_parts_of_the_same_size() {
+        let ticks: Vec<u64> = (0..600).collect();
         let all = Share::all();
-        assert_eq!(all.cut(600, 3), [0..200, 200..400, 400..600]);
+        assert_eq!(all.cut(&ticks, 3), [0..200, 200..400, 400..u64::MAX]);
         let mut without = all.clone();
         without.without.push(200..400);
         // The part in the middle reaches across what is not there.
-        let parts = without.cut(600, 3);
-        assert_eq!(parts, [0..133, 133..466, 466..600]);
+        let parts = without.cut(&ticks, 3);
+        assert_eq!(parts, [0..133, 133..466, 466..u64::MAX]);
         without.without.push(parts[1].clone());
-        assert_eq!(without.cut(600, 2), [0..466, 466..600]);
-        let count = |part: &Range<u64>| part.clone().filter(|&tick| without.contains(tick)).count();
-        let cut = without.cut(600, 4);
+        assert_eq!(without.cut(&ticks, 2), [0..466, 466..u64::MAX]);
+        let count = |part: &Range<u64>| {
+            let own = ticks.iter().filter(|&&tick| without.contains(tick));
+            own.filter(|tick| part.contains(tick)).count()
+        };
+        let cut = without.cut(&ticks, 4);
         assert!(
             cut.iter().all(|part| (66..=67).contains(&count(part))),
             "{cut:?}"
         );
-        assert_eq!(all.cut(2, 3).len(), 3, "some of them are empty");
-        assert_eq!(all.cut(0, 2), [0..0, 0..0]);
+        assert_eq!(all.cut(&ticks[..2], 3).len(), 3, "some of them are empty");
+        assert_eq!(all.cut(&[], 2), [0..u64::MAX, u64::MAX..u64::MAX]);
+    }
+
+    #[test]
+    fn ticks_that_are_counted_decide_where_a_share_is_cut() {
+        let ticks = [3, 4, 5, 6, 900, 901];
+        let parts = Share::all().cut(&ticks, 3);
+        assert_eq!(parts, [0..5, 5..900, 900..u64::MAX]);
     }
 }

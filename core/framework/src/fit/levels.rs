@@ -20,6 +20,10 @@ pub(super) struct Fitting<'a> {
     progress: &'a mut dyn FnMut(u64),
     /// What is to be fitted, by level: nodes of a level are fed by levels below only.
     levels: Vec<Level>,
+    /// The truths that estimators learn from which are fed by others.
+    truths: Vec<usize>,
+    /// The ticks with one of them, as the last pass met them: by those folds are cut.
+    counted: Counted,
     stepped: u64,
     report: FitReport,
 }
@@ -55,8 +59,8 @@ impl Course {
         }
     }
 
-    /// The same ticks without each of so many folds, of which there are `ticks` in all.
-    fn without_folds(&self, ticks: u64, folds: u64) -> Vec<(Range<u64>, Course)> {
+    /// The same ticks without each of so many folds, with about the same number of these ticks in each.
+    fn without_folds(&self, ticks: &[u64], folds: usize) -> Vec<(Range<u64>, Course)> {
         let folds = self.share.cut(ticks, folds).into_iter();
         folds
             .map(|fold| {
@@ -65,6 +69,40 @@ impl Course {
                 (fold, Course::of(share))
             })
             .collect()
+    }
+}
+
+/// The numbers of the ticks that count: of all of them, or of every so many where there are more than can be kept.
+#[derive(Default)]
+struct Counted {
+    ticks: Vec<u64>,
+    /// How many ticks there were.
+    passed: u64,
+    /// How many of them count.
+    found: u64,
+    /// How many times every second one has been let go.
+    halved: u32,
+}
+
+impl Counted {
+    const MOST: usize = 1 << 16;
+
+    fn tick(&mut self, counts: bool) {
+        if counts {
+            if self.found.trailing_zeros() >= self.halved {
+                self.ticks.push(self.passed);
+            }
+            self.found += 1;
+        }
+        self.passed += 1;
+        if self.ticks.len() > Self::MOST {
+            let mut nth = 0_usize;
+            self.ticks.retain(|_| {
+                nth += 1;
+                nth % 2 == 1
+            });
+            self.halved += 1;
+        }
     }
 }
 
@@ -82,7 +120,13 @@ impl<'a> Fitting<'a> {
         progress: &'a mut dyn FnMut(u64),
     ) -> Self {
         let levels = levels(plan);
+        let above = levels.iter().filter(|level| level.of_predictions);
+        let rows = above.flat_map(|level| &level.nodes);
+        let rows = rows.filter_map(|&node| plan.nodes[node].rows());
+        let truths = rows.map(|rows| rows.truth.slot).collect();
         Self {
+            truths,
+            counted: Counted::default(),
             plan,
             recording,
             options,
@@ -151,8 +195,8 @@ impl<'a> Fitting<'a> {
             }]);
         }
         if course.folds.is_empty() {
-            let folds = self.options.folds.max(2) as u64;
-            course.folds = course.without_folds(self.report.ticks, folds);
+            let folds = self.options.folds.max(2);
+            course.folds = course.without_folds(&self.counted.ticks, folds);
         }
         let mut parts = Vec::new();
         for (fold, without) in &mut course.folds {
@@ -208,6 +252,8 @@ impl<'a> Fitting<'a> {
             }
             let mut engine = Engine::new(Arc::clone(self.plan), &part.fitted)?;
             let (stepped, progress) = (&mut self.stepped, &mut self.progress);
+            let (truths, counted) = (&self.truths, &mut self.counted);
+            *counted = Counted::default();
             let passed = drive(&mut engine, self.recording, |engine, event| {
                 collector.look(
                     engine,
@@ -216,6 +262,8 @@ impl<'a> Fitting<'a> {
                     live.as_deref_mut().map(Vec::as_mut_slice),
                 );
                 if matches!(event, Event::Row(_)) {
+                    let came = |&slot: &usize| !engine.value(slot).is_nan();
+                    counted.tick(truths.iter().any(came));
                     *stepped += 1;
                     if stepped.is_multiple_of(4096) {
                         progress(*stepped);
@@ -271,4 +319,25 @@ fn levels(plan: &Plan) -> Vec<Level> {
         level.feeding = level.nodes.iter().filter(feeding).copied().collect();
     }
     levels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_more_ticks_than_can_be_kept_every_so_many_counts() {
+        let mut counted = Counted::default();
+        let all = 5 * Counted::MOST as u64;
+        for tick in 0..2 * all {
+            counted.tick(tick % 2 == 1);
+        }
+        assert!(counted.ticks.len() <= Counted::MOST);
+        // They are as far apart from the first to the last.
+        let apart = |pair: &[u64]| pair[1] - pair[0] == 16;
+        assert!(counted.ticks.windows(2).all(apart));
+        assert_eq!(counted.ticks[0], 1);
+        let parts = Share::all().cut(&counted.ticks, 2);
+        assert!(parts[0].end.abs_diff(all) < 16, "{parts:?}");
+    }
 }
