@@ -339,28 +339,37 @@ impl Asked {
 /// and none for filters that are large and cancel out.
 const START_SPREAD: f64 = std::f64::consts::SQRT_2;
 
-/// In pieces of fewer samples on average, polynomials of the noise are found less exactly than the theory says.
+/// In pieces of fewer samples on average, polynomials are found less exactly than the theory says.
 const SHORT_PIECE: usize = 50;
 
 /// Tells of pieces that are too short for a model of the noise.
 fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingReport) {
     let pieces = samples.records().count();
     let length = samples.count() / pieces.max(1);
-    let of_noise = [("`C`", &model.c), ("`D`", &model.d)];
-    let of_noise = of_noise.iter().filter(|(_, of)| !of.is_empty());
-    let names: Vec<&str> = of_noise.map(|(name, _)| *name).collect();
-    if pieces < 2 || length >= SHORT_PIECE || names.is_empty() {
+    let has_c = !model.c.is_empty();
+    // Without `C`, `A` is found by least squares on what was measured, whatever was before a piece.
+    let blurred = [
+        ("`A`", has_c && !model.a.is_empty()),
+        ("`C`", has_c),
+        ("`D`", !model.d.is_empty()),
+    ];
+    let names: Vec<&str> = blurred
+        .iter()
+        .filter_map(|&(name, is)| is.then_some(name))
+        .collect();
+    let names = match &names[..] {
+        [] => return,
+        [name] => format!("{name} is"),
+        [others @ .., last] => format!("{} and {last} are", others.join(", ")),
+    };
+    if pieces < 2 || length >= SHORT_PIECE {
         return;
     }
     report.figure("pieces", pieces);
     report.figure("samples_per_piece", length);
     report.notes.push(format!(
-        "its samples are in {pieces} pieces of {length} on average, each of which begins without a past: in so short ones {} found \
-         less exactly than the standard errors say",
-        match names[..] {
-            [name] => format!("{name} is"),
-            _ => format!("{} are", names.join(" and ")),
-        }
+        "its samples are in {pieces} pieces of {length} on average, each of which begins without a past: in so short ones {names} \
+         found less exactly than the standard errors say"
     ));
 }
 
@@ -472,8 +481,9 @@ mod tests {
             samples.segment();
             (0..20).for_each(|nth| samples.push([], f64::from(nth % 2)));
         }
-        let told = |nc: usize, nd: usize| {
+        let told = |na: usize, nc: usize, nd: usize| {
             let model = Polynomials::zero(&Orders {
+                na,
                 nc,
                 nd,
                 ..Orders::default()
@@ -488,9 +498,10 @@ mod tests {
                  less exactly than the standard errors say"
             )
         };
-        assert_eq!(told(1, 0), [expected("`C` is")]);
-        assert_eq!(told(1, 2), [expected("`C` and `D` are")]);
-        assert!(told(0, 0).is_empty());
+        assert_eq!(told(0, 1, 0), [expected("`C` is")]);
+        assert_eq!(told(2, 1, 0), [expected("`A` and `C` are")]);
+        assert_eq!(told(0, 1, 2), [expected("`C` and `D` are")]);
+        assert!(told(2, 0, 0).is_empty());
     }
 
     #[test]
