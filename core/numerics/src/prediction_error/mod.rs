@@ -4,6 +4,7 @@
 //! All kinds are cases of one model (Ljung 1999, eq. 4.33): `A(q) (y − μ) = Σ B_i(q)/F_i(q) u_i + C(q)/(D(q) (1 − q⁻¹)^d) e`.
 
 mod anywhere;
+mod begin;
 mod brought;
 mod criteria;
 mod initial;

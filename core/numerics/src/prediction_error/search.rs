@@ -3,8 +3,8 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::anywhere::{Beginning, beginnings, off_rest};
-use super::initial;
+use super::anywhere::{Beginning, beginnings};
+use super::begin::Begun;
 use super::precision::held;
 use super::residuals::{Counted, Left, Segment, counted_from};
 use super::{Orders, Polynomials, Samples};
@@ -15,21 +15,18 @@ use crate::{GramBlocks, NumericsError};
 const SETTLED: f64 = 1e-22;
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
 const TOLERANCE: f64 = 1e-14;
-/// The same where only the size of the sum is asked for.
-const ROUGH: f64 = 1e-4;
 /// A search that ends while it still gains more than this has not converged.
 const SMALL: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e12;
 /// Sums that differ by this share are the same but for rounding.
 const SAME: f64 = 1e-12;
-/// The least mean square of how far from rest a filter begins, so that what its start counts is a number.
-const LEAST_SQUARE: f64 = 1e-12;
 /// Steps by the gradient alone at the end.
 const POLISHING: usize = 4;
 
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B` and on how far from rest
 /// filters begin, by damped Gauss–Newton
-/// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models.
+/// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models. Where filters of several inputs could
+/// stand in for each other, it is searched from all starts, among them the best model of shorter filters, and the best end is kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictionError {
     /// What is added to the sum: so many times the squares of the coefficients of `B`.
@@ -89,7 +86,7 @@ impl PredictionErrorFit {
 #[derive(Debug)]
 pub(super) struct Judged {
     pub(super) model: Polynomials,
-    left: Left,
+    pub(super) left: Left,
     /// What is made least.
     pub(super) sum: f64,
 }
@@ -132,13 +129,11 @@ impl PredictionError {
             });
         }
         let radius = remembered(samples);
-        let mut begin = initial::starts(orders, samples, self.penalty, radius)?;
-        let mut counted = Counted::from(first);
-        let mut before = 0;
-        if orders.starts() > 0 && self.start_spread.is_finite() {
-            (counted, before, begin) = self.roughly(begin, samples, first, radius)?;
-        }
-        let start = self.best(begin, samples, &counted)?;
+        let Begun {
+            counted,
+            start,
+            steps: before,
+        } = self.begun(orders, samples, first, radius)?;
         let (found, steps, converged) = self.search(start, samples, &counted, radius, TOLERANCE);
         let Judged { model, left, .. } = self.polished(found, samples, &counted, radius);
         Ok(PredictionErrorFit {
@@ -152,51 +147,6 @@ impl PredictionError {
             steps: before + steps,
             converged,
         })
-    }
-
-    /// What starts count where something is known of them: pieces begin anywhere, so that each filter is as far from rest there as
-    /// it is on average. That, and how large innovations are, is known afterwards: it is searched roughly, with what the models to
-    /// begin with leave wherever their filters begin. Returns how many steps that took, and the model that it led to.
-    fn roughly(
-        &self,
-        begin: Vec<Polynomials>,
-        samples: &Samples,
-        first: usize,
-        radius: f64,
-    ) -> Result<(Counted, usize, Vec<Polynomials>), NumericsError> {
-        let rows = samples.counted(first) as f64;
-        let most = self.start_spread * self.start_spread;
-        // Squares that are together more than may be are all as much smaller.
-        let counts = |sum: f64, squares: &[f64]| {
-            let scale = (most / squares.iter().sum::<f64>()).min(1.0);
-            let of = |square: &f64| sum / rows / (scale * square).max(LEAST_SQUARE);
-            Counted {
-                first,
-                starts: squares.iter().map(of).collect(),
-            }
-        };
-        let free = |model: &Polynomials| Left::by(model, samples, &Counted::from(first)).squares;
-        let least = begin.iter().map(free).fold(f64::INFINITY, f64::min);
-        let starts = begin.first().map_or(0, Polynomials::starts);
-        let counted = counts(least, &vec![most; starts]);
-        let start = self.best(begin, samples, &counted)?;
-        let (Judged { model, left, .. }, steps, _) =
-            self.search(start, samples, &counted, radius, ROUGH);
-        let squares = off_rest(&model, samples, &left.starts);
-        Ok((counts(left.sum(), &squares), steps, vec![model]))
-    }
-
-    fn best(
-        &self,
-        of: Vec<Polynomials>,
-        samples: &Samples,
-        counted: &Counted,
-    ) -> Result<Judged, NumericsError> {
-        of.into_iter()
-            .map(|model| self.judged(model, samples, counted))
-            .filter(|of| of.sum.is_finite())
-            .min_by(|of, other| of.sum.total_cmp(&other.sum))
-            .ok_or(NumericsError::NotFinite)
     }
 
     pub(super) fn judged(
@@ -215,7 +165,7 @@ impl PredictionError {
         }
     }
 
-    fn search(
+    pub(super) fn search(
         &self,
         start: Judged,
         samples: &Samples,

@@ -6,7 +6,7 @@ use faer::Mat;
 
 use super::lagged::{Lagged, Projected, power, pseudo_inverse, spectrum, windows};
 use super::model::{product, spectral_radius};
-use super::refine::refine;
+use super::refine::{beginning, refine};
 use super::{Record, StateSpace};
 use crate::NumericsError;
 use crate::checks::check_parameter;
@@ -73,7 +73,8 @@ pub struct Identification {
     pub singular_values: Vec<f64>,
     /// Whether a mode grew and was brought back.
     pub stabilised: bool,
-    /// The sum of the squares of one-step errors, the first `horizon` of each record not counted, and how many there were.
+    /// The sum of the squares of one-step errors, each record beginning in the state from which they are least and its first
+    /// `horizon` not counted, and how many there were.
     pub errors: (f64, usize),
 }
 
@@ -147,7 +148,7 @@ impl Subspace {
         }
         let mut errors = (0.0, 0);
         for record in records {
-            let expected = model.one_step(record, &vec![0.0; order]);
+            let expected = model.one_step(record, &beginning(&model, record)?);
             for (y, expected) in record.outputs.iter().zip(&expected).skip(self.horizon) {
                 errors.0 += (y - expected).powi(2);
                 errors.1 += 1;

@@ -77,6 +77,25 @@ pub(super) fn refine(
     Ok(())
 }
 
+/// The state in which a record begins from which its one-step errors are least.
+pub(super) fn beginning(
+    model: &StateSpace,
+    record: &Record<'_>,
+) -> Result<Vec<f64>, NumericsError> {
+    let order = model.order();
+    let begin = order * model.d.len();
+    let of_start = Responses {
+        model,
+        direct: 0,
+        of_gain: 0,
+    };
+    let products = of_start.products(record, &vec![0.0; order]);
+    let own = products.submatrix(begin, begin, order, order);
+    let with_errors = products.submatrix(begin, begin + order, order, 1);
+    let start = pseudo_inverse(&own.to_owned())? * with_errors;
+    Ok((0..order).map(|i| start[(i, 0)]).collect())
+}
+
 /// The largest modulus among the eigenvalues of `A − K C`.
 fn radius(model: &StateSpace) -> f64 {
     spectral_radius(&filter(model))

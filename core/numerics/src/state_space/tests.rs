@@ -235,6 +235,32 @@ fn without_inputs_the_output_is_told_from_itself() {
 }
 
 #[test]
+fn errors_are_those_of_forecasts_and_not_of_where_short_records_begin() {
+    let (mut draw, deviation) = (draws::normal(5), 0.1);
+    let (mut inputs, mut outputs, mut state) = (Vec::new(), Vec::new(), 0.0);
+    for _ in 0..3000 {
+        let (input, innovation) = (draw(), deviation * draw());
+        inputs.push(input);
+        outputs.push(state + innovation);
+        state = 0.95 * state + 0.3 * input + 0.05 * innovation;
+    }
+    let parts = inputs.chunks(20).zip(outputs.chunks(20));
+    let records: Vec<Record<'_>> = parts
+        .map(|(inputs, outputs)| Record { inputs, outputs })
+        .collect();
+    for refined in [false, true] {
+        let how = Subspace {
+            refined,
+            order: StateOrder::Given(1),
+            ..PLAIN
+        };
+        let found = how.identify(&records, 1).unwrap();
+        let mean_square = found.errors.0 / found.errors.1 as f64;
+        near(mean_square.sqrt(), deviation, 0.1 * deviation);
+    }
+}
+
+#[test]
 fn wrong_requests_are_refused() {
     let (inputs, outputs, _) = scaled();
     let record = Record {

@@ -227,6 +227,8 @@ impl Identify for Asked {
             beginning.square *= spread * spread;
         }
         tell_pieces(samples, &fit.model, report);
+        let pieces = samples.records().count();
+        tell_starts(pieces, fit.starts, fit.rows, report);
         report.figure("converged", fit.converged);
         report.figure("steps_of_search", fit.steps);
         if !fit.converged {
@@ -339,28 +341,56 @@ impl Asked {
 /// and none for filters that are large and cancel out.
 const START_SPREAD: f64 = std::f64::consts::SQRT_2;
 
-/// In pieces of fewer samples on average, polynomials of the noise are found less exactly than the theory says.
+/// In pieces of fewer samples on average, polynomials are found less exactly than the theory says.
 const SHORT_PIECE: usize = 50;
 
-/// Tells of pieces that are too short for a model of the noise.
+/// Tells of pieces that are too short for filters and for a model of the noise.
 fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingReport) {
     let pieces = samples.records().count();
     let length = samples.count() / pieces.max(1);
-    let of_noise = [("`C`", &model.c), ("`D`", &model.d)];
-    let of_noise = of_noise.iter().filter(|(_, of)| !of.is_empty());
-    let names: Vec<&str> = of_noise.map(|(name, _)| *name).collect();
-    if pieces < 2 || length >= SHORT_PIECE || names.is_empty() {
+    let filtered = model.inputs.iter().any(|input| !input.f.is_empty());
+    let has_c = !model.c.is_empty();
+    // Without `C`, `A` is found by least squares on what was measured, whatever was before a piece.
+    let blurred = [
+        ("`A`", has_c && !model.a.is_empty()),
+        ("`F`", filtered),
+        ("`C`", has_c),
+        ("`D`", !model.d.is_empty()),
+    ];
+    let names: Vec<&str> = blurred
+        .iter()
+        .filter_map(|&(name, is)| is.then_some(name))
+        .collect();
+    let names = match &names[..] {
+        [] => return,
+        [name] => format!("{name} is"),
+        [others @ .., last] => format!("{} and {last} are", others.join(", ")),
+    };
+    if pieces < 2 || length >= SHORT_PIECE {
         return;
     }
     report.figure("pieces", pieces);
     report.figure("samples_per_piece", length);
     report.notes.push(format!(
-        "its samples are in {pieces} pieces of {length} on average, each of which begins without a past: in so short ones {} found \
-         less exactly than the standard errors say",
-        match names[..] {
-            [name] => format!("{name} is"),
-            _ => format!("{} are", names.join(" and ")),
-        }
+        "its samples are in {pieces} pieces of {length} on average, each of which begins without a past: in so short ones {names} \
+         found less exactly than the standard errors say"
+    ));
+}
+
+/// The share of the rows from which errors on them are doubted where it takes so many to tell where filters begin.
+const STARTS: f64 = 0.1;
+
+/// Tells of errors that are small since the fit found where filters begin in each piece, which a run does not.
+fn tell_starts(pieces: usize, starts: usize, rows: usize, report: &mut TrainingReport) {
+    let share = starts as f64 / rows as f64;
+    if pieces < 2 || share < STARTS {
+        return;
+    }
+    report.figure("starts", starts);
+    report.notes.push(format!(
+        "{:.0} % of what its rows tell goes into where its filters begin in each of {pieces} pieces, which a run does not know: there \
+         it errs more than the error on the rows of the fit and `deviation` say",
+        100.0 * share,
     ));
 }
 
@@ -464,6 +494,7 @@ impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use athermal_numerics::InputOrders;
 
     #[test]
     fn short_pieces_are_told_with_the_polynomials_that_they_blur() {
@@ -472,8 +503,10 @@ mod tests {
             samples.segment();
             (0..20).for_each(|nth| samples.push([], f64::from(nth % 2)));
         }
-        let told = |nc: usize, nd: usize| {
+        let told = |na: usize, nf: usize, nc: usize, nd: usize| {
             let model = Polynomials::zero(&Orders {
+                na,
+                inputs: vec![InputOrders { nb: 1, nk: 0, nf }],
                 nc,
                 nd,
                 ..Orders::default()
@@ -488,9 +521,28 @@ mod tests {
                  less exactly than the standard errors say"
             )
         };
-        assert_eq!(told(1, 0), [expected("`C` is")]);
-        assert_eq!(told(1, 2), [expected("`C` and `D` are")]);
-        assert!(told(0, 0).is_empty());
+        assert_eq!(told(0, 0, 1, 0), [expected("`C` is")]);
+        assert_eq!(told(2, 0, 1, 0), [expected("`A` and `C` are")]);
+        assert_eq!(told(0, 1, 0, 0), [expected("`F` is")]);
+        assert_eq!(told(0, 2, 1, 2), [expected("`F`, `C` and `D` are")]);
+        assert!(told(2, 0, 0, 0).is_empty());
+    }
+
+    #[test]
+    fn errors_that_rest_on_where_filters_begin_in_many_pieces_are_told() {
+        let told = |pieces: usize, starts: usize| {
+            let mut report = TrainingReport::default();
+            tell_starts(pieces, starts, 200, &mut report);
+            report.notes
+        };
+        assert_eq!(
+            told(60, 70),
+            [
+                "35 % of what its rows tell goes into where its filters begin in each of 60 pieces, which a run does not know: there \
+                 it errs more than the error on the rows of the fit and `deviation` say"
+            ]
+        );
+        assert!(told(60, 15).is_empty() && told(1, 70).is_empty());
     }
 
     #[test]
