@@ -389,7 +389,7 @@ fn tell_starts(pieces: usize, starts: usize, rows: usize, report: &mut TrainingR
     report.figure("starts", starts);
     report.notes.push(format!(
         "{:.0} % of what its rows tell goes into where its filters begin in each of {pieces} pieces, which a run does not know: there \
-         it errs more than the error on the rows of the fit and `deviation` say",
+         it errs more than the error on the rows of the fit and `deviation` say; `arx` and `armax` begin with truths instead",
         100.0 * share,
     ));
 }
@@ -539,7 +539,7 @@ mod tests {
             told(60, 70),
             [
                 "35 % of what its rows tell goes into where its filters begin in each of 60 pieces, which a run does not know: there \
-                 it errs more than the error on the rows of the fit and `deviation` say"
+                 it errs more than the error on the rows of the fit and `deviation` say; `arx` and `armax` begin with truths instead"
             ]
         );
         assert!(told(60, 15).is_empty() && told(1, 70).is_empty());
