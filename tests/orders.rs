@@ -170,6 +170,7 @@ fn the_search_for_a_model_without_a_moving_average_compares_as_least_squares_do(
     assert_eq!(tried.len(), expected.len());
     for (tried, expected) in tried.iter().zip(&expected) {
         assert_eq!(tried["order"], format!("na {}", expected["na"]));
+        assert_eq!(tried["letters"]["na"], expected["na"]);
         for figure in ["aic", "bic"] {
             let (found, expected) = (
                 tried[figure].as_f64().unwrap(),

@@ -66,7 +66,7 @@ impl LagOrder {
             let coefficients = columns.len() - fit.constant.len() + 1;
             let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
             tried.push(Tried {
-                name: self.order.names(&orders).collect::<Vec<_>>().join(", "),
+                letters: self.order.letters(&orders).collect(),
                 coefficients,
                 starts: 0,
                 figures,

@@ -1,5 +1,6 @@
 //! Decides how a user asks for orders to be compared, and how the comparison is told; not how a model of an order is fitted.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use athermal_core::node::{Mistake, OrderFigure, OrderTable, TrainingReport, TriedOrder};
@@ -91,12 +92,28 @@ pub struct Order {
 /// A model that was compared with others.
 #[derive(Debug)]
 pub(crate) struct Tried {
-    /// What is open of its orders, as a report tells it.
-    pub(crate) name: String,
+    /// What is open of its orders: each letter with its number.
+    pub(crate) letters: Vec<(&'static str, usize)>,
     pub(crate) coefficients: usize,
     /// The starts of filters that were found beside them.
     pub(crate) starts: usize,
     pub(crate) figures: InformationCriteria,
+}
+
+/// An order as a report tells it.
+fn named(letters: &[(&str, usize)]) -> String {
+    let told = letters
+        .iter()
+        .map(|(letter, order)| format!("{letter} {order}"));
+    told.collect::<Vec<_>>().join(", ")
+}
+
+/// The same for programs.
+fn numbered(letters: &[(&str, usize)]) -> BTreeMap<String, usize> {
+    let told = letters
+        .iter()
+        .map(|&(letter, order)| (letter.to_owned(), order));
+    told.collect()
 }
 
 /// An order that may be compared: its letter.
@@ -174,11 +191,13 @@ impl Order {
         self.ranges().map(|range| range.is_some())
     }
 
-    /// The open orders, each as a report tells it.
-    pub(crate) fn names<'a>(&self, orders: &'a [usize; 6]) -> impl Iterator<Item = String> + 'a {
-        let open = LETTERS.iter().zip(orders).zip(self.open());
-        let open = open.filter(|(_, open)| *open);
-        open.map(|((letter, order), _)| format!("{letter} {order}"))
+    /// The open orders, each letter with its number.
+    pub(crate) fn letters(
+        &self,
+        orders: &[usize; 6],
+    ) -> impl Iterator<Item = (&'static str, usize)> {
+        let open = LETTERS.into_iter().zip(*orders).zip(self.open());
+        open.filter_map(|(letter, open)| open.then_some(letter))
     }
 
     /// The best of what was tried; the table goes into the report. Orders with nearly as many coefficients as there are rows fit
@@ -202,7 +221,8 @@ impl Order {
             .collect();
         let places: Vec<usize> = ranked.iter().map(|(place, _)| *place).collect();
         let told = ranked.into_iter().map(|(_, tried)| TriedOrder {
-            order: tried.name,
+            order: named(&tried.letters),
+            letters: numbered(&tried.letters),
             coefficients: tried.coefficients,
             aic: tried.figures.aic,
             aicc: tried.figures.aicc,

@@ -1,6 +1,7 @@
 //! Decides what the author of an estimator implements: learning from rows, and predicting from a row.
 
 use std::any::Any;
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 use schemars::JsonSchema;
@@ -357,8 +358,11 @@ impl TriedOrder {
 /// An order of a model, and what it is worth: small is good.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TriedOrder {
-    /// Its letters: `na 2, nb 1`.
+    /// What is open of it, for people: `na 2, nb 1`.
     pub order: String,
+    /// The same for programs: each letter with its number.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub letters: BTreeMap<String, usize>,
     /// How many coefficients it has.
     pub coefficients: usize,
     /// Akaike's information criterion.

@@ -282,7 +282,7 @@ impl Asked {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     tried.push(Tried {
-                        name: self.name(&order, &candidate, orders.differences),
+                        letters: self.letters(&order, &candidate, orders.differences),
                         coefficients,
                         starts: fit.starts,
                         figures: InformationCriteria::of(
@@ -327,12 +327,16 @@ impl Asked {
         }
     }
 
-    /// What is open of an order, as a report tells it.
-    fn name(&self, order: &Order, orders: &[usize; 6], differences: usize) -> String {
+    /// What is open of an order.
+    fn letters(
+        &self,
+        order: &Order,
+        orders: &[usize; 6],
+        differences: usize,
+    ) -> Vec<(&'static str, usize)> {
         let told = matches!(self.differences, Differences::Told);
-        let differences = told.then(|| format!("differences {differences}"));
-        let parts: Vec<String> = order.names(orders).chain(differences).collect();
-        parts.join(", ")
+        let differences = told.then_some(("differences", differences));
+        order.letters(orders).chain(differences).collect()
     }
 }
 
