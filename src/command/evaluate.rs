@@ -94,13 +94,7 @@ impl Evaluate {
     /// # Errors
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let model = load_fitted(
-            &self.model,
-            Wanted {
-                standard_errors: true,
-                intervals: true,
-            },
-        )?;
+        let model = load_fitted(&self.model, Wanted::SCORES)?;
         if let Some(limit) = &self.abs_truth_below {
             check_limit(limit, &model)?;
         }

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use athermal::chart::Plot;
+use athermal::core::compile::Wanted;
 use athermal::core::fit::FitError;
 use athermal::core::score::Lack;
-use athermal::report::{WANTED, gather, page, plots, text};
+use athermal::report::{gather, page, plots, text};
 use clap::Args;
 
 use super::aside::check_apart;
@@ -49,7 +50,7 @@ impl Report {
             let read = self.data.paths().chain([&*self.model]);
             check_apart("--output", output, read)?;
         }
-        let model = load_fitted(&self.model, WANTED)?;
+        let model = load_fitted(&self.model, Wanted::SCORES)?;
         let dataset = self.data.dataset();
         let names = dataset
             .paths()

@@ -24,7 +24,6 @@ pub use text::text;
 pub use verdict::Verdict;
 pub use worth::{Settling, StepLoss, Worth};
 
-use athermal_core::compile::Wanted;
 use athermal_core::diagnostic::digits;
 use athermal_core::model::{Card, Model};
 use athermal_core::recording::Recording;
@@ -154,12 +153,6 @@ pub fn gather(
         card: model.card.clone(),
     })
 }
-
-/// What a model must be loaded with so that a report can tell the standard error of the truth, and how much intervals cover.
-pub const WANTED: Wanted = Wanted {
-    standard_errors: true,
-    intervals: true,
-};
 
 #[cfg(test)]
 mod tests {

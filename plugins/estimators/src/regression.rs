@@ -31,7 +31,6 @@ pub(crate) struct LinearTrainer {
 
 /// A fit of the chosen columns, and what it stands on.
 pub(crate) struct Found {
-    pub(crate) columns: Vec<usize>,
     pub(crate) names: Vec<String>,
     pub(crate) gram: Gram,
     pub(crate) standard: Standardization,
@@ -117,7 +116,6 @@ impl LinearTrainer {
             .map(|&column| self.regressors[column].name.clone())
             .collect();
         Ok(Found {
-            columns: fit.columns.clone(),
             names,
             gram,
             standard,
@@ -189,9 +187,9 @@ impl LinearTrainer {
         report: &mut TrainingReport,
     ) -> Result<(LinearPredictor, Option<OnlinePredictor>), TrainingError> {
         let Found {
-            columns,
             names,
             standard,
+            fit: LinearFit { columns, .. },
             ..
         } = found;
         let rows = self.blocks.rows().ok_or_else(|| rows_gone(&self.blocks))?;

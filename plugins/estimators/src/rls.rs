@@ -203,14 +203,17 @@ impl RlsTrainer {
             forgetting, alpha, ..
         } = self.parameters;
         let found = self.rows.find(report)?;
-        let (count, used) = (found.gram.count() as f64, found.columns.len() as f64 + 1.0);
+        let (count, used) = (
+            found.gram.count() as f64,
+            found.fit.columns.len() as f64 + 1.0,
+        );
         let squares = found.fit.residual_sum_of_squares;
         // Even a fit without error has truths that are rounded.
         let noise = (squares / (count - used).max(1.0))
             .sqrt()
             .max(f64::MIN_POSITIVE.sqrt());
         let rows = forgetting.memory().min(count);
-        let (columns, scales) = (&found.columns, &found.standard.scales);
+        let (columns, scales) = (&found.fit.columns, &found.standard.scales);
         let covariance = covariance_of(&found.gram, columns, scales, alpha, rows).map_err(told)?;
         let trace: f64 = covariance.iter().step_by(columns.len() + 2).sum();
         let options = RlsOptions {

@@ -328,6 +328,9 @@ impl<'a> Tables<'a> {
     }
 }
 
+/// A root mean square that is larger than the mean by this share is so by rounding.
+const SAME: f64 = 1e-12;
+
 /// Residuals of one unit and spacing.
 fn residuals(shown: &[&Residuals]) -> String {
     let Some(first) = shown.first() else {
@@ -350,7 +353,7 @@ fn residuals(shown: &[&Residuals]) -> String {
             let verdict = match of.white {
                 Some(true) => "white",
                 Some(false) => "not white",
-                None if of.rms <= of.mean.abs() * (1.0 + f64::EPSILON) => "constant",
+                None if of.rms <= of.mean.abs() * (1.0 + SAME) => "constant",
                 None => "too few",
             };
             vec![
@@ -417,6 +420,9 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
         let label = format!("day {}", of.day);
         (label, cells(&of.scores, |score| score.rmse))
     });
+    let scores = days.curve.iter().flat_map(|point| &point.scores);
+    let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
+    let compares = of_shown.any(|score| score.ratio().is_some());
     let curve = days.curve.iter().map(|point| {
         let (days, fits) = (point.days as u64, point.fits as u64);
         let label = format!("{} ({})", counted(days, "day"), counted(fits, "fit"));
@@ -424,10 +430,9 @@ fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
     });
     let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
     let most = days.count - 1;
-    let told = |(_, cells): &(String, Vec<String>)| cells.iter().any(|cell| cell != "-");
     let verdict = match enough {
         _ if most == 1 => "two are too few to tell",
-        _ if !curve.iter().any(told) => "nothing to compare",
+        _ if !compares => "nothing to compare",
         Some(enough) => {
             let days = counted(enough as u64, "day");
             let verb = if enough == 1 { "is" } else { "are" };

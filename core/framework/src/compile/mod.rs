@@ -53,6 +53,14 @@ pub struct Wanted {
     pub intervals: bool,
 }
 
+impl Wanted {
+    /// All of it, as whoever scores a model wants.
+    pub const SCORES: Self = Self {
+        standard_errors: true,
+        intervals: true,
+    };
+}
+
 /// What could be made of a graph that has mistakes: enough to look at its tests, not to run it.
 #[derive(Debug)]
 pub struct Part {

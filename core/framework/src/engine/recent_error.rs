@@ -20,6 +20,13 @@ pub(crate) struct RecentError {
 }
 
 impl RecentError {
+    /// How many errors weigh in.
+    const MEMORY: u32 = 50;
+    /// How many there must have been before one can be called too large.
+    const FIRST: u32 = 10;
+    /// How many in a row can be too large: after a long rest all of a machine that moves again would be for much longer.
+    const PATIENCE: u32 = 20;
+
     /// None yet, with the root mean square of those of the fit; NaN where it is not known.
     pub(super) fn of_fit(usual: f64) -> Self {
         let square = usual * usual;
@@ -33,13 +40,6 @@ impl RecentError {
             Self::default()
         }
     }
-
-    /// How many errors weigh in.
-    const MEMORY: u32 = 50;
-    /// How many there must have been before one can be called too large.
-    const FIRST: u32 = 10;
-    /// How many in a row can be too large: after a long rest all of a machine that moves again would be for much longer.
-    const PATIENCE: u32 = 20;
 
     /// Whether an error is below so many times the recent root mean square, both in units of the standard deviation of what was
     /// predicted where there is one, which is finite and above 0. What was kept in other units is forgotten.

@@ -42,20 +42,23 @@ impl PredictionError {
     ) -> Result<Begun, NumericsError> {
         let several = has_several_ends(orders);
         let most = if several { usize::MAX } else { 1 };
-        let mut led = self.led(orders, samples, first, radius, most)?;
-        if several {
-            let (ends, steps) = self.ends(led.models, samples, &led.counted, radius, most)?;
-            led.steps += steps;
-            led.models = ends.into_iter().take(1).map(|end| end.model).collect();
-        }
-        let models = led.models.into_iter();
-        let judged = models.map(|model| self.judged(model, samples, &led.counted));
-        let finite = judged.filter(|of| of.sum.is_finite());
-        let start = finite.min_by(|of, other| of.sum.total_cmp(&other.sum));
+        let Led {
+            models,
+            counted,
+            mut steps,
+        } = self.led(orders, samples, first, radius, most)?;
+        let start = if several {
+            let (mut ends, more) = self.ends(models, samples, &counted, radius, most)?;
+            steps += more;
+            ends.swap_remove(0)
+        } else {
+            let mut judged = self.in_order(models, samples, &counted).into_iter();
+            judged.next().ok_or(NumericsError::NotFinite)?
+        };
         Ok(Begun {
-            start: start.ok_or(NumericsError::NotFinite)?,
-            counted: led.counted,
-            steps: led.steps,
+            start,
+            counted,
+            steps,
         })
     }
 
@@ -144,6 +147,20 @@ impl PredictionError {
         })
     }
 
+    /// What these models leave, the best first, without those of which that is no number.
+    fn in_order(
+        &self,
+        models: Vec<Polynomials>,
+        samples: &Samples,
+        counted: &Counted,
+    ) -> Vec<Judged> {
+        let models = models.into_iter();
+        let judged = models.map(|model| self.judged(model, samples, counted));
+        let mut finite: Vec<Judged> = judged.filter(|of| of.sum.is_finite()).collect();
+        finite.sort_by(|of, other| of.sum.total_cmp(&other.sum));
+        finite
+    }
+
     /// The models to which rough searches from the best of these lead, of at most so many, the best first, and in how many steps
     /// to that.
     fn ends(
@@ -154,12 +171,8 @@ impl PredictionError {
         radius: f64,
         most: usize,
     ) -> Result<(Vec<Judged>, usize), NumericsError> {
-        let begin = begin.into_iter();
-        let judged = begin.map(|model| self.judged(model, samples, counted));
-        let mut begin: Vec<Judged> = judged.filter(|of| of.sum.is_finite()).collect();
-        begin.sort_by(|of, other| of.sum.total_cmp(&other.sum));
-        begin.truncate(most);
-        let searched = begin.into_iter().map(|start| {
+        let begin = self.in_order(begin, samples, counted);
+        let searched = begin.into_iter().take(most).map(|start| {
             let (end, steps, _) = self.search(start, samples, counted, radius, ROUGH);
             (end, steps)
         });

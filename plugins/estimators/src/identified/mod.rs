@@ -118,6 +118,11 @@ impl Asked {
         }
     }
 
+    /// The orders of inputs, by their letters.
+    fn of_inputs(&self) -> [(&'static str, &Option<PerInput>); 3] {
+        [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)]
+    }
+
     pub(crate) fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         let has = [
@@ -129,7 +134,6 @@ impl Asked {
             self.nk.is_some(),
         ];
         let of_all = [("na", self.na), ("nc", self.nc), ("nd", self.nd)];
-        let of_inputs = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
         let mut check = |name: &str, order: usize| {
             if order > LARGEST {
                 let message = format!("`{name}` is {order} and must be 0 to {LARGEST}");
@@ -139,7 +143,7 @@ impl Asked {
         for (name, order) in of_all {
             order.into_iter().for_each(|order| check(name, order));
         }
-        for (name, orders) in of_inputs {
+        for (name, orders) in self.of_inputs() {
             let orders = orders.iter().flat_map(PerInput::each);
             orders.for_each(|order| check(name, order));
         }
@@ -164,9 +168,8 @@ impl Asked {
 
     /// Lists of orders that are not as long as there are features.
     pub(crate) fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
-        let lists = [("nb", &self.nb), ("nf", &self.nf), ("nk", &self.nk)];
         let mut mistakes = Vec::new();
-        for (name, orders) in lists {
+        for (name, orders) in self.of_inputs() {
             if let Some(PerInput::Each(list)) = orders
                 && list.len() != features
             {
