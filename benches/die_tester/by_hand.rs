@@ -59,7 +59,7 @@ impl Linear {
             }
         }
         let rest: f64 = rest.iter().map(of).sum();
-        self.intercept + ((sums[0] + sums[1]) + (sums[2] + sums[3]) + rest)
+        self.intercept + ((sums[0] + sums[2]) + (sums[1] + sums[3]) + rest)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Decides in which order a product of two vectors is summed.
 
-/// `Σ a_j b_j` of two vectors of one length, in four strands so that it does not wait for each addition.
+/// `Σ a_j b_j` of two vectors of one length, in four strands so that it does not wait for each addition. Strands are summed with the
+/// next but one: a processor that adds two numbers at once then takes them as they lie.
 #[inline]
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -13,5 +14,5 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
