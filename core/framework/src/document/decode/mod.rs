@@ -40,11 +40,41 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
     advice: &dyn Fn(&str) -> Option<String>,
     diagnostics: &mut Diagnostics,
 ) -> Option<Decoded<T>> {
+    let last = RefCell::new(None);
+    let read = |tree: &Value| {
+        let (result, unknown) = attempt::<T>(tree);
+        let (read, mistake) = match result {
+            Ok(read) => (Some(read), None),
+            Err(error) => (None, Some(error.into_mistake(value.place))),
+        };
+        last.replace(read);
+        (mistake, unknown)
+    };
+    let (others, left_out) = mend(value, what, elsewhere, advice, &read, diagnostics)?;
+    let whole = last.take()?;
+    let others = others.iter().filter_map(|tree| attempt::<T>(tree).0.ok());
+    Some(Decoded::of(whole, others.collect(), left_out))
+}
+
+/// Reads a tree as some type: the first mistake, where there is one, and the unknown keys that were passed over.
+type Read<'a> = &'a dyn Fn(&Value) -> (Option<Mistake>, Vec<Mistake>);
+
+/// Reports all mistakes until what is left can be read, which is the last that was: other trees that may be meant as well, and
+/// what was left out. It does not know the type, so that there is one of it for all.
+fn mend(
+    value: &Value,
+    what: &str,
+    elsewhere: &[&str],
+    advice: &dyn Fn(&str) -> Option<String>,
+    read: Read<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Option<(Vec<Value>, LeftOut)> {
     let mut repair: Option<Repair> = None;
     let mut strange: Vec<Mistake> = Vec::new();
+    let first = |tree: &Value| read(tree).0;
     // Each turn takes at least one value out of the tree; the limit only bounds the time that a hopeless file takes.
     for _ in 0..200 {
-        let (result, unknown) = attempt::<T>(repair.as_ref().map_or(value, Repair::tree));
+        let (mistake, unknown) = read(repair.as_ref().map_or(value, Repair::tree));
         if !unknown.is_empty() {
             let repair = repair.get_or_insert_with(|| Repair::of(value));
             for mistake in unknown {
@@ -53,22 +83,14 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
                 strange.push(mistake);
             }
         }
-        let mut mistake = match result {
-            Ok(value) => {
-                let meant = strange.iter().filter_map(Mistake::meant);
-                let touched = repair.as_ref().map_or(&[][..], Repair::touched);
-                let left_out = LeftOut::of(touched.iter().cloned().chain(meant));
-                let others = repair.iter().flat_map(Repair::others);
-                let others = others.filter_map(|tree| attempt::<T>(&tree).0.ok());
-                return Some(Decoded::of(value, others.collect(), left_out));
-            }
-            Err(error) => error.into_mistake(value.place),
+        let Some(mut mistake) = mistake else {
+            let meant = strange.iter().filter_map(Mistake::meant);
+            let touched = repair.as_ref().map_or(&[][..], Repair::touched);
+            let left_out = LeftOut::of(touched.iter().cloned().chain(meant));
+            let others = repair.iter().flat_map(Repair::others);
+            return Some((others.collect(), left_out));
         };
         let repair = repair.get_or_insert_with(|| Repair::of(value));
-        let first = |tree: &Value| {
-            let error = attempt::<T>(tree).0.err()?;
-            Some(error.into_mistake(value.place))
-        };
         repair.place_missing_key(&mut mistake, first);
         let is_misspelt = strange.iter().any(|given| given.is_meant_for(&mistake));
         if !repair.explains(&mistake) && !is_misspelt {
@@ -77,17 +99,16 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
         }
         let goes_on = match mistake.missing_key() {
             Some(key) => {
-                let stands_in = |tree: &Value| match attempt::<T>(tree).0 {
-                    Ok(_) => true,
-                    Err(error) => {
-                        let next = error.into_mistake(value.place);
-                        let at_key = next.path.len() > mistake.path.len()
-                            && next.path.starts_with(&mistake.path)
-                            && next.path[mistake.path.len()].is_key(key);
-                        let still_missing =
-                            next.path == mistake.path && next.missing_key() == Some(key);
-                        !at_key && !still_missing
-                    }
+                let stands_in = |tree: &Value| {
+                    let Some(next) = first(tree) else {
+                        return true;
+                    };
+                    let at_key = next.path.len() > mistake.path.len()
+                        && next.path.starts_with(&mistake.path)
+                        && next.path[mistake.path.len()].is_key(key);
+                    let still_missing =
+                        next.path == mistake.path && next.missing_key() == Some(key);
+                    !at_key && !still_missing
                 };
                 repair.put_in(&mistake.path, key, stands_in)
                     || repair.choose(&mistake.path, key, word(value, &mistake.path, key), first)

@@ -51,7 +51,11 @@ pub(super) struct TreeDeserializer<'a> {
 
 impl<'a> TreeDeserializer<'a> {
     fn located<T>(&self, result: Result<T, DecodeError>) -> Result<T, DecodeError> {
-        result.map_err(|error| error.at(self.value, || self.place.path()))
+        result.map_err(|error| self.locate(error))
+    }
+
+    fn locate(&self, error: DecodeError) -> DecodeError {
+        error.at(self.value, || self.place.path())
     }
 
     fn wrong_type<T>(&self, expected: &dyn de::Expected) -> Result<T, DecodeError> {
@@ -212,6 +216,34 @@ struct TableAccess<'b> {
     current: Option<(&'b str, &'b Entry)>,
 }
 
+impl<'b> TableAccess<'b> {
+    /// The next entry that is not of an unknown key.
+    fn next_known(&mut self) -> Option<(&'b str, &'b Entry)> {
+        for (key, entry) in self.entries.by_ref() {
+            let Some(fields) = self.fields.filter(|fields| !fields.contains(&key)) else {
+                return Some((key, entry));
+            };
+            let known = fields.iter().map(|field| (*field).to_owned()).collect();
+            let problem = DocumentProblem::UnknownKey {
+                key: key.to_owned(),
+                what: String::new(),
+                known,
+            };
+            self.of.unknown.borrow_mut().push(Mistake {
+                path: self.of.place.below(StepRef::Key(key)).path(),
+                place: entry.key,
+                problem,
+            });
+        }
+        None
+    }
+
+    fn at_key(&self, error: DecodeError, key: &str, entry: &Entry) -> DecodeError {
+        let at_key = Value::new(entry.key, Data::Text(key.to_owned()));
+        error.at(&at_key, || self.of.place.below(StepRef::Key(key)).path())
+    }
+}
+
 impl<'de> de::MapAccess<'de> for TableAccess<'_> {
     type Error = DecodeError;
 
@@ -219,32 +251,13 @@ impl<'de> de::MapAccess<'de> for TableAccess<'_> {
         &mut self,
         seed: K,
     ) -> Result<Option<K::Value>, DecodeError> {
-        for (key, entry) in self.entries.by_ref() {
-            let place = self.of.place.below(StepRef::Key(key));
-            if let Some(fields) = self.fields
-                && !fields.contains(&key)
-            {
-                let known = fields.iter().map(|field| (*field).to_owned()).collect();
-                let problem = DocumentProblem::UnknownKey {
-                    key: key.to_owned(),
-                    what: String::new(),
-                    known,
-                };
-                self.of.unknown.borrow_mut().push(Mistake {
-                    path: place.path(),
-                    place: entry.key,
-                    problem,
-                });
-                continue;
-            }
-            self.current = Some((key, entry));
-            let deserializer: StrDeserializer<'_, DecodeError> = key.into_deserializer();
-            return seed.deserialize(deserializer).map(Some).map_err(|error| {
-                let at_key = Value::new(entry.key, Data::Text(key.to_owned()));
-                error.at(&at_key, || place.path())
-            });
-        }
-        Ok(None)
+        self.current = self.next_known();
+        let Some((key, entry)) = self.current else {
+            return Ok(None);
+        };
+        let deserializer: StrDeserializer<'_, DecodeError> = key.into_deserializer();
+        let read = seed.deserialize(deserializer).map(Some);
+        read.map_err(|error| self.at_key(error, key, entry))
     }
 
     fn next_value_seed<S: DeserializeSeed<'de>>(
