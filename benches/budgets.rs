@@ -17,14 +17,20 @@ fn main() {
     println!("{:<52}{:>14}{:>14}", "", "measured", "budget");
     let shipped = model();
     let mut by_hand = Shipped::new(&shipped);
-    live("selected slopes", &shipped, ticks(9.0, 2), |tick| {
-        by_hand.step(tick)
-    });
+    let mut step = |tick: &Tick| by_hand.step(tick);
+    live("selected slopes", &shipped, ticks(9.0, 2), Some(&mut step));
     let all = dense::model();
     let mut by_hand = Dense::new(&all);
-    live("all of 64 slopes", &all, dense::ticks(9.0, 2), |tick| {
-        by_hand.step(tick)
-    });
+    let mut step = |tick: &Tick| by_hand.step(tick);
+    let of_all = dense::ticks(9.0, 2);
+    live("all of 64 slopes", &all, of_all.clone(), Some(&mut step));
+    let learning = dense::learning();
+    live(
+        "all of 64 slopes that go on learning",
+        &learning,
+        of_all,
+        None,
+    );
     program();
 }
 
@@ -32,13 +38,15 @@ fn tell(work: &str, measured: &str, budget: &str) {
     println!("{work:<52}{measured:>14}{budget:>14}");
 }
 
-fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: impl FnMut(&Tick) -> [f64; 6]) {
+type ByHand<'a> = &'a mut dyn FnMut(&Tick) -> [f64; 6];
+
+fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: Option<ByHand<'_>>) {
     println!("models of {of}:");
     let measured = warm.split_off(17_280);
     let mut engine = model.engine().expect("the fit belongs to the graph");
     for tick in &warm {
         engine.step(tick.0, &tick.1).expect("ticks are in order");
-        by_hand(tick);
+        by_hand.as_mut().map(|step| step(tick));
     }
     let start = Clock::now();
     let engine = times(&measured, |tick| {
@@ -46,17 +54,22 @@ fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: impl FnMut(&T
         std::hint::black_box(outputs.expect("ticks are in order"));
     });
     let seconds = start.elapsed().as_secs_f64();
-    let by_hand = times(&measured, |tick| {
-        std::hint::black_box(by_hand(tick));
+    let by_hand = by_hand.map(|step| {
+        times(&measured, |tick| {
+            std::hint::black_box(step(tick));
+        })
     });
     for (name, truth, budgets) in [
         ("a tick that carries truth", true, ["3 µs", "15 µs", "1.5"]),
         ("a tick without truth", false, ["", "", ""]),
     ] {
         let of = |times: &[Duration]| Quantiles::of(times, &measured, truth);
-        let (engine, by_hand) = (of(&engine), of(&by_hand));
+        let engine = of(&engine);
         tell(&format!("{name}, median"), &us(engine.median), budgets[0]);
         tell(&format!("{name}, 99.9 %"), &us(engine.rare), budgets[1]);
+        let Some(by_hand) = by_hand.as_ref().map(|times| of(times)) else {
+            continue;
+        };
         tell(&format!("{name}, by hand, median"), &us(by_hand.median), "");
         let ratio = engine.median.as_secs_f64() / by_hand.median.as_secs_f64();
         tell(

@@ -3,7 +3,7 @@
 use athermal::Model;
 use athermal::core::prng::Prng;
 
-use super::{AXES, Tick, fitted, text};
+use super::{AXES, Tick};
 
 const NOISE: f64 = 1e-3;
 
@@ -29,14 +29,28 @@ pub fn ticks(days: f64, seed: u64) -> Vec<Tick> {
 
 /// The graph, fitted on a week.
 pub fn model() -> Model {
+    super::fitted(&text(""), &ticks(7.0, 1))
+}
+
+/// The same in which all estimators go on learning, by stochastic gradients.
+pub fn learning() -> Model {
+    super::fitted(
+        &text("\nlearn = true\nsolver = { type = \"sgd\" }"),
+        &ticks(7.0, 1),
+    )
+}
+
+/// The graph, with more keys for each estimator.
+fn text(of_estimators: &str) -> String {
     let windows = "windows = [\"150s\", \"250s\", \"350s\", \"450s\", \"600s\", \"750s\", \"1000s\", \"1350s\"]";
-    let lines = text();
-    let lines = lines
+    let shipped = super::text();
+    let lines = shipped
         .lines()
-        .filter(|line| !line.starts_with("selection"))
+        .filter(|line| !line.starts_with("selection") && !line.starts_with("solver"))
         .map(|line| match line.split_once("harmonics") {
             Some(_) => windows.to_owned(),
+            None if line.starts_with("train.abs_truth") => format!("{line}{of_estimators}"),
             None => line.replace("\"chuck\"]", "\"chuck\", \"frame\", \"stage\"]"),
         });
-    fitted(&lines.collect::<Vec<_>>().join("\n"), &ticks(7.0, 1))
+    lines.collect::<Vec<_>>().join("\n")
 }
