@@ -26,6 +26,10 @@ use crate::windows::three;
 /// until half of the samples lie beyond it. The port `outlier` says 1 where a sample was one and 0 where it was none; it is absent, and
 /// the sample passes, while the window holds fewer than `min_samples`.
 ///
+/// What wanders within the window, as temperatures do, is farthest from the median at its newest end and then looks like a spike:
+/// take a window of some ten samples, and a `floor` of what does no harm. Of the reference machines' bodies, sampled every 10 s,
+/// 6 to 9 % of the sound samples were taken out over 5 minutes without a floor, and at most 0.1 % over 70 s with one of 20 mK.
+///
 /// Samples that hardly ever differ make `S` zero, and then any change an outlier: give `floor`, such as one step of a coarse
 /// sensor. With `replace = "median"` an outlier becomes the median instead of absent; a value is then made of the whole window,
 /// and its span says so.
