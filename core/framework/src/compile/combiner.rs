@@ -226,7 +226,7 @@ impl Resolver<'_> {
     }
 
     /// The prediction beside which an estimator or combiner gives this slot.
-    fn told_of(&self, slot: usize) -> Option<usize> {
+    pub(super) fn told_of(&self, slot: usize) -> Option<usize> {
         let node = &self.nodes[self.channels[slot].node?];
         let (_, predictions) = node.ports.first()?;
         let predicts = !matches!(node.role, PlannedRole::Feature { .. });

@@ -255,7 +255,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A056",
         "a truth that is a prediction",
-        "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth."
+        "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what tells of one, such as its `deviation` or `weights`."
     ),
     code!(
         "A057",
