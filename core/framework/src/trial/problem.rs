@@ -135,6 +135,14 @@ impl Problem for TrialProblem {
         }
     }
 
+    // A list replaces the one that it is laid over, whole.
+    fn inherits_nothing(&self) -> bool {
+        matches!(
+            self,
+            Self::NoData | Self::NothingExpected { .. } | Self::Keys { .. } | Self::NoShape
+        )
+    }
+
     fn message(&self) -> String {
         match self {
             Self::NoData => "the test has nothing to run over".to_owned(),
