@@ -136,6 +136,22 @@ fn a_graph_that_lacks_outputs_of_what_runs_is_told() {
 }
 
 #[test]
+fn a_graph_that_looks_back_further_than_the_past_reaches_says_how_far() {
+    let scratch = desk("past");
+    let long = "schema = 1\nextends = \"graph.toml\"\nname = \"long\"\nnodes.drift = { windows = [\"10min\"] }\n";
+    scratch.file("long.toml", long);
+    let early = run(&scratch, &[&swap(&scratch, "100s", "long.toml")]).ended(0);
+    early.tells(&[
+        "drift: warmed by the past",
+        "the past to warm it by is 90s, and it looks back as far as",
+    ]);
+    let short = long.replace("10min", "20s");
+    scratch.file("short.toml", short);
+    let late = run(&scratch, &[&swap(&scratch, "290s", "short.toml")]).ended(0);
+    assert!(!late.told.contains("looks back as far"), "{}", late.told);
+}
+
+#[test]
 fn a_worse_graph_is_refused_with_figures_and_a_margin_lets_it_pass() {
     let scratch = desk("shadow");
     let at = swap(&scratch, "1100", "still.toml");
