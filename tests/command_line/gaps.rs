@@ -257,3 +257,35 @@ and = 3
     ];
     assert_told("command-line-rests-on", &text, &expected);
 }
+
+#[test]
+fn an_input_of_another_name_in_the_place_of_the_one_that_is_missing_is_one_mistake() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "zero"
+inputs.truth = "drift.X"
+ahead = "0s"
+[nodes.sure]
+type = "conformal"
+inputs.voters = "thermal"
+inputs.truth = "drift.X"
+memory = "1h"
+[nodes.none]
+type = "conformal"
+inputs.voters = "thermal"
+inputs.others = "thermal"
+inputs.truth = "drift.X"
+memory = "1h"
+"#;
+    let expected = [
+        (24, "`conformal` has no input `voters`"),
+        (27, "`conformal` needs the input `prediction`"),
+        (29, "`conformal` has no input `voters`"),
+        (30, "`conformal` has no input `others`"),
+    ];
+    assert_told("command-line-other-input", &text, &expected);
+    let scratch = Scratch::new("command-line-other-input-help");
+    let graph = scratch.file("wrong.toml", text);
+    let told = athermal(&[&"check", &graph]).ended(2).told;
+    assert!(told.contains("did you mean `prediction`?"), "{told}");
+}

@@ -39,6 +39,7 @@ pub enum CompileProblem {
     UnknownInput {
         kind: &'static str,
         input: String,
+        meant: Option<&'static str>,
         known: Vec<&'static str>,
     },
     /// An input that the kind needs and the node does not give.
@@ -465,7 +466,10 @@ impl Problem for CompileProblem {
                 }
                 None => or_one_of(channel, known, "its channels are"),
             },
-            Self::UnknownInput { input, known, .. } => or_known(input, known, "its inputs are"),
+            Self::UnknownInput { meant, known, .. } => match meant {
+                Some(meant) => format!("did you mean `{meant}`?"),
+                None => format!("its inputs are {}", names(known)),
+            },
             Self::MissingInput { input, summary, .. } => {
                 format!("add `inputs.{input} = \"…\"`: {summary}")
             }
