@@ -384,6 +384,34 @@ fn backwards_the_smallest_set_within_one_standard_error_is_looked_for_beyond_the
 }
 
 #[test]
+fn a_selection_in_which_nothing_beats_the_mean_says_so() {
+    const NOTE: &str =
+        "no choice of regressors that was tried predicts the folds better than their mean";
+    let node = |method: &str| {
+        format!("type = \"linear\"\n{FEATURES}\nselection = {{ method = \"{method}\" }}")
+    };
+    for method in ["forward", "backward", "floating"] {
+        // The level of the truth is another in each fold, and the features say nothing of it.
+        let levels = data(90, |row, _, _| 5.0 * (row / 30) as f64 + noise(row, 3));
+        let told = fit("no-better", &node(method), &levels, &["--format", "json"]).ended(0);
+        let told = &told.json()["estimators"][0];
+        let notes = told["notes"].as_array().unwrap();
+        let note_of = |note: &&serde_json::Value| note.as_str().unwrap().starts_with(NOTE);
+        assert_eq!(
+            notes.iter().filter(note_of).count(),
+            1,
+            "{method}: {told:#}"
+        );
+        let best = told["figures"]["best_r2"].as_f64().unwrap();
+        assert!(best < 0.0, "{best}");
+        let good = fit("no-better", &node(method), &explained(90), &[])
+            .ended(0)
+            .out;
+        assert!(!good.contains(NOTE), "{good}");
+    }
+}
+
+#[test]
 fn f_tests_that_take_nothing_tell_what_they_left() {
     let rows = data(100, |row, _, _| noise(row, 3));
     let node = format!(

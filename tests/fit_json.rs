@@ -256,7 +256,7 @@ fn figures_are_what_the_model_computes_with() {
     assert_eq!(figures("ordinary")["constant"][0], "x.stays");
     assert_eq!(figures("ordinary")["collinear"][0], "x.follows");
     assert_eq!(figures("ordinary")["rank"], 2);
-    assert_eq!(figures("sparse")["features"], 4);
+    assert_eq!(figures("sparse")["features"], 3);
     let values = figures("states")["singular_values"].clone();
     let values: Vec<f64> = values
         .as_array()

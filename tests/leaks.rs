@@ -302,3 +302,29 @@ fn a_gate_may_not_go_by_the_state_of_what_its_voters_predict() {
         leak[0].0
     );
 }
+
+#[test]
+fn what_is_measured_does_not_vote_on_itself() {
+    let vote = |voter: &str, kind: &str| {
+        format!(
+            "[nodes.ago]\ntype = \"lag\"\ninputs.signal = \"drift.X\"\nlags = [\"1min\", \"5min\"]\n\
+             [nodes.linear]\ntype = \"linear\"\ninputs.features = \"temperature\"\ninputs.truth = \"drift.X\"\nahead = \"0s\"\n\
+             [nodes.vote]\ntype = \"{kind}\"\ninputs.voters = {voter}\n[outputs]\npredicted = \"vote\"\n"
+        )
+    };
+    for leaking in [r#"["linear", "drift.X"]"#, r#"["linear", "ago.X@1min"]"#] {
+        let leak = told(&vote(leaking, "mean"));
+        assert_eq!(leak.len(), 1, "{leaking}: {leak:?}");
+        assert!(
+            leak[0].1.contains("the smallest lag allowed is 5min"),
+            "{leak:?}"
+        );
+    }
+    for fine in [r#"["linear", "ago.X@5min"]"#, r#"["linear", "drift.Y"]"#] {
+        let leak = told(&vote(fine, "mean"));
+        assert!(leak.is_empty(), "{fine}: {leak:?}");
+    }
+    // What is measured, and a prediction in its place where it is not, is no prediction and is not scored as one.
+    let instead = told(&vote(r#"["drift.X", "linear"]"#, "fallback"));
+    assert!(instead.is_empty(), "{instead:?}");
+}

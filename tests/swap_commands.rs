@@ -136,6 +136,38 @@ fn a_graph_that_lacks_outputs_of_what_runs_is_told() {
 }
 
 #[test]
+fn a_graph_that_looks_back_further_than_the_past_reaches_says_how_far() {
+    let scratch = desk("past");
+    let long = "schema = 1\nextends = \"graph.toml\"\nname = \"long\"\nnodes.drift = { windows = [\"10min\"] }\n";
+    scratch.file("long.toml", long);
+    let early = run(&scratch, &[&swap(&scratch, "100s", "long.toml")]).ended(0);
+    early.tells(&[
+        "drift: warmed by the past",
+        "the past to warm it by is 90s, and it looks back as far as",
+    ]);
+    let short = long.replace("10min", "20s");
+    scratch.file("short.toml", short);
+    let late = run(&scratch, &[&swap(&scratch, "290s", "short.toml")]).ended(0);
+    assert!(!late.told.contains("looks back as far"), "{}", late.told);
+}
+
+#[test]
+fn a_graph_of_another_machine_is_told_by_the_outputs_that_it_leaves_empty() {
+    let scratch = desk("silent");
+    scratch.file("data.csv", format!("time_s,Z\n{}", rows(1000, 400)));
+    let other = "schema = 1\nextends = \"graph.toml\"\nname = \"other\"\n\
+                 signals.position = { column = \"other_{channel}\", optional = [\"Z\"] }\n";
+    scratch.file("other.toml", other);
+    let silent = run(&scratch, &[&swap(&scratch, "3000s", "other.toml")]).ended(0);
+    silent.tells(&[
+        "other.toml gives no `predicted.Z` over the past",
+        "that it was warmed by",
+    ]);
+    let own = run(&scratch, &[&swap(&scratch, "3000s", "still.toml")]).ended(0);
+    assert!(!own.told.contains("gives no"), "{}", own.told);
+}
+
+#[test]
 fn a_worse_graph_is_refused_with_figures_and_a_margin_lets_it_pass() {
     let scratch = desk("shadow");
     let at = swap(&scratch, "1100", "still.toml");

@@ -70,17 +70,17 @@ impl Compare {
             if let Some(limit) = &self.abs_truth_below {
                 check_limit(limit, &model)?;
             }
-            models.push((path, model));
+            models.push((path.display().to_string(), model));
         }
+        let graphs = models.iter();
+        let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
         let on = self.data.others(self.on.clone());
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
-        for (path, mut model) in models {
+        for ((path, mut model), name) in models.into_iter().zip(names) {
             let began = Instant::now();
             let options = FitOptions::default();
             let (_, report) = fit_without_card(&mut model, &self.data, &options, terminal)?;
             let seconds = began.elapsed().as_secs_f64();
-            let path = path.display().to_string();
-            let name = free_name(model.plan.name.as_deref(), &path, &fits);
             let dataset = on.dataset();
             let mut progress = terminal.progress("scoring");
             let mut ticks = 0;
@@ -156,13 +156,24 @@ impl Compare {
     }
 }
 
-/// What a graph is called: graphs that share a name are told apart by their files, and files that come again by a number.
-fn free_name(own: Option<&str>, path: &str, fits: &[Fitted]) -> String {
-    let own = own.unwrap_or(path).to_owned();
-    let again = (2..).map(|nth| format!("{path} ({nth})"));
-    let mut names = [own, path.to_owned()].into_iter().chain(again);
-    let free = names.find(|name| fits.iter().all(|fit| fit.graph != *name));
-    free.unwrap_or_default()
+/// What graphs are called, by their names and files: all that share a name are called by their files, and files that come again
+/// have a number too.
+fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (own, path) in graphs.clone() {
+        let own = own.filter(|own| {
+            graphs
+                .clone()
+                .filter(|(name, _)| *name == Some(own))
+                .count()
+                == 1
+        });
+        let again = (2..).map(|nth| format!("{path} ({nth})"));
+        let first = own.unwrap_or(path).to_owned();
+        let mut free = std::iter::once(first).chain(again);
+        names.extend(free.find(|name| !names.contains(name)));
+    }
+    names
 }
 
 /// Whether a node could not be fitted; each is told.
@@ -336,18 +347,16 @@ mod tests {
     }
 
     #[test]
-    fn a_graph_that_comes_again_has_rows_of_its_own() {
-        let mut fits: Vec<Fitted> = Vec::new();
-        for expected in ["a", "a.toml", "a.toml (2)"] {
-            let graph = free_name(Some("a"), "a.toml", &fits);
-            assert_eq!(graph, expected);
-            fits.push(Fitted {
-                graph,
-                path: "a.toml".to_owned(),
-                seconds: 0.0,
-                report: FitReport::default(),
-                lacks: Vec::new(),
-            });
-        }
+    fn graphs_that_share_a_name_are_called_by_their_files() {
+        let called = |graphs: &[(Option<&str>, &str)]| names(graphs.iter().copied());
+        let shared = [
+            (Some("a"), "one.toml"),
+            (Some("b"), "b.toml"),
+            (Some("a"), "two.toml"),
+            (None, "no.toml"),
+        ];
+        assert_eq!(called(&shared), ["one.toml", "b", "two.toml", "no.toml"]);
+        let again = [(Some("a"), "a.toml"); 3];
+        assert_eq!(called(&again), ["a.toml", "a.toml (2)", "a.toml (3)"]);
     }
 }

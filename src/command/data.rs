@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Format, Options, Report};
 use clap::Args;
+use serde_json::{Value, json};
 
 use crate::figures::{count, counted};
 use crate::invocation::{program, quoted};
@@ -165,6 +166,14 @@ pub fn tell(
 ) {
     tell_repeated(terminal, reports.iter().map(|(file, _)| file));
     for (file, report) in reports {
+        for (other, rows) in &report.overlaps {
+            let all = counted(report.rows, "row");
+            let lie = if *rows == 1 { "lies" } else { "lie" };
+            terminal.warning(format_args!(
+                "{file}: {} of its {all} {lie} in the period of {other}; files are not merged, so what both have counts twice",
+                count(*rows)
+            ));
+        }
         let counted = [
             (&report.bad_cells, "unreadable cell", "taken as missing"),
             (&report.refused_rows, "unreadable row", "left out"),
@@ -202,6 +211,20 @@ pub fn tell(
             counted(*n, "sample")
         ));
     }
+}
+
+/// What is told to programs, with the files whose periods overlap, where there are any, under `overlaps`.
+pub fn with_overlaps(mut told: Value, reports: &[(String, Report)]) -> Value {
+    let each = |(file, report): &(String, Report)| {
+        let of =
+            |(other, rows): &(String, u64)| json!({ "file": file, "with": other, "rows": rows });
+        report.overlaps.iter().map(of).collect::<Vec<_>>()
+    };
+    let all: Vec<Value> = reports.iter().flat_map(each).collect();
+    if !all.is_empty() {
+        told["overlaps"] = all.into();
+    }
+    told
 }
 
 /// The checksum of a content as text: [`athermal::core::engine::fnv_1a`] in hexadecimal digits.

@@ -124,17 +124,15 @@ impl Evaluate {
             let period = scores.period.map(|(from, to)| {
                 json!({ "from_s": from.as_ns() as f64 / 1e9, "to_s": to.as_ns() as f64 / 1e9, "ticks": scores.ticks })
             });
-            println!(
-                "{:#}",
-                json!({
-                    "data": files,
-                    "mode": self.mode.name(),
-                    "steps": self.steps,
-                    "period": period,
-                    "scores": scores.scores,
-                    "lacks": scores.lacks,
-                })
-            );
+            let told = json!({
+                "data": files,
+                "mode": self.mode.name(),
+                "steps": self.steps,
+                "period": period,
+                "scores": scores.scores,
+                "lacks": scores.lacks,
+            });
+            println!("{:#}", data::with_overlaps(told, &dataset.reports()));
         } else {
             print!("{}", describe(&scores, mode));
         }

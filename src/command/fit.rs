@@ -83,11 +83,11 @@ impl Fit {
             threads: self.threads.count(),
             ..FitOptions::default()
         };
-        let report = fit_on(&mut model, &self.data, &options, terminal)?;
+        let (dataset, report) = fit_on(&mut model, &self.data, &options, terminal)?;
         let text = model.to_text().map_err(|error| {
             Failure::Outside(format!("the model cannot be written as JSON: {error}"))
         })?;
-        self.tell(terminal, &report);
+        self.tell(terminal, &dataset, &report);
         let fits = report.estimators.iter();
         let failed = fits
             .filter(|fit| matches!(fit.outcome, Outcome::Failed(_)))
@@ -137,7 +137,7 @@ impl Fit {
         }
     }
 
-    fn tell(&self, terminal: &Terminal, report: &FitReport) {
+    fn tell(&self, terminal: &Terminal, dataset: &Dataset, report: &FitReport) {
         let to_stdout = self.output.as_os_str() == "-";
         if terminal.format == Format::Json && !to_stdout {
             let estimators: Vec<_> = report
@@ -151,10 +151,8 @@ impl Fit {
                     (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
-            println!(
-                "{:#}",
-                json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators })
-            );
+            let told = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
+            println!("{:#}", data::with_overlaps(told, &dataset.reports()));
             return;
         }
         for fit in &report.estimators {
@@ -180,7 +178,7 @@ pub fn fit_on(
     data: &Data,
     options: &FitOptions,
     terminal: &Terminal,
-) -> Result<FitReport, Failure> {
+) -> Result<(Dataset, FitReport), Failure> {
     let (dataset, report) = fit_without_card(model, data, options, terminal)?;
     data::note_zone(terminal, &dataset.reports());
     model.card = Some(Card {
@@ -194,7 +192,7 @@ pub fn fit_on(
         ticks: report.ticks,
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
-    Ok(report)
+    Ok((dataset, report))
 }
 
 /// The same for a model that is not kept: a card has the checksums of all data.

@@ -277,6 +277,15 @@ impl<'a> Course<'a> {
         let staged = control.stage(&model, false).map_err(refused)?;
         self.tell_lacking(&model, &path);
         self.terminal.note(report(&path, staged));
+        let (past, silent) = staged.silent();
+        if !silent.is_empty() {
+            let named: Vec<_> = silent.iter().map(|name| format!("`{name}`")).collect();
+            self.terminal.warning(format_args!(
+                "{} gives no {} over the past {past} that it was warmed by: are its sensors those of this machine?",
+                path.display(),
+                named.join(", ")
+            ));
+        }
         self.staged = Some((model, path));
         match self.options.shadow {
             Some(duration) => control
@@ -433,6 +442,12 @@ fn report(path: &Path, staged: &Staged) -> String {
             Carry::Cold { reason } => ("cold", reason.clone()),
         };
         let _ = write!(text, "\n  {}: {word}, {why}", node.node);
+    }
+    if let Some((past, wanted)) = staged.too_short_a_past() {
+        let _ = write!(
+            text,
+            "\n  the past to warm it by is {past}, and it looks back as far as {wanted}: until then it may give less than it will"
+        );
     }
     text
 }

@@ -20,6 +20,56 @@ fn a_file_that_is_given_twice_is_told_to_count_twice() {
 }
 
 #[test]
+fn files_of_the_same_days_are_told_to_overlap() {
+    let (scratch, _, counted, model) = desk("overlap");
+    let fitted = scratch.path("fitted.toml");
+    // Seconds since 1970.
+    let since = 1_700_000_000;
+    let one = scratch.file("one.csv", csv(&rows(since, 60)));
+    let two = scratch.file("two.csv", csv(&rows(since + 400, 60)));
+    let fit = |data: [&PathBuf; 2], more: &str| {
+        let output = scratch.path("overlap.json");
+        let files: [&dyn AsRef<std::ffi::OsStr>; 9] = [
+            &"fit",
+            &fitted,
+            &"-o",
+            &output,
+            &"--format",
+            &more,
+            &"--data",
+            data[0],
+            data[1],
+        ];
+        athermal(&files).ended(0)
+    };
+    let told = fit([&one, &two], "table");
+    told.tells(&[
+        "20 of its 60 rows lie in the period of",
+        "one.csv; files are not merged",
+    ]);
+    let overlaps = serde_json::json!([
+        { "file": two.display().to_string(), "with": one.display().to_string(), "rows": 20 }
+    ]);
+    assert_eq!(fit([&one, &two], "json").json()["overlaps"], overlaps);
+    let evaluated = athermal(&[
+        &"evaluate",
+        &model,
+        &"--format",
+        &"json",
+        &"--data",
+        &two,
+        &one,
+    ])
+    .ended(0);
+    assert_eq!(evaluated.json()["overlaps"], overlaps);
+    // Where each file counts from its own beginning, the times of one say nothing of those of another.
+    let later = scratch.file("later.csv", csv(&rows(100, 60)));
+    let told = fit([&counted, &later], "json");
+    assert!(!told.told.contains("period"), "{}", told.told);
+    assert!(told.json().get("overlaps").is_none());
+}
+
+#[test]
 fn an_ending_that_names_no_format_is_refused_before_anything_is_written() {
     let (scratch, plain, data, _) = desk("ending");
     let unknown = scratch.path("out.xyz");

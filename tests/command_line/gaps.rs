@@ -52,6 +52,7 @@ expect = [{ of = "vote.Z1", given_above = 0.5, rmse_belw = "1 nm" }]
         (25, "slpe"),
         (31, "no key \"form\""),
         (32, "\"{axis}\" stands for nothing"),
+        (33, "nothing to run over"),
         (35, "no key \"rmse_belw\""),
     ];
     assert_told("command-line-no-parent", text, &expected);
@@ -161,6 +162,42 @@ ahead = "5min"
 }
 
 #[test]
+fn an_input_among_the_parameters_is_one_mistake_that_says_where_it_belongs() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "linear"
+feature = "temperature"
+truth = "drift.X"
+ahead = "5min"
+[nodes.one]
+type = "slope"
+in = { signal = "temperatur" }
+windows = ["5min"]
+[nodes.filtered]
+type = "state_space"
+inputs = { features = "temperature", truth = "drift.X" }
+ahead = "5min"
+states = 2
+stats = 2
+"#;
+    let expected = [
+        (20, "node \"thermal\" has no key \"feature\""),
+        (21, "node \"thermal\" has no key \"truth\""),
+        (25, "node \"one\" has no key \"in\""),
+        (25, "`temperatur`"),
+        (32, "no key \"stats\""),
+    ];
+    assert_told("command-line-input-as-key", &text, &expected);
+    let scratch = Scratch::new("command-line-input-as-key-help");
+    let graph = scratch.file("wrong.toml", text);
+    let told = athermal(&[&"check", &graph]).ended(2).told;
+    for port in ["features", "truth"] {
+        let help = format!("`{port}` is an input: write `inputs.{port} = …`");
+        assert!(told.contains(&help), "{told}");
+    }
+}
+
+#[test]
 fn the_sections_of_a_running_machine_are_checked() {
     let text = SOUND.replace("[outputs]\npredicted = \"thermal\"\n", "")
         + r#"[outputs]
@@ -219,4 +256,36 @@ and = 3
         (32, "no key \"and\""),
     ];
     assert_told("command-line-rests-on", &text, &expected);
+}
+
+#[test]
+fn an_input_of_another_name_in_the_place_of_the_one_that_is_missing_is_one_mistake() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "zero"
+inputs.truth = "drift.X"
+ahead = "0s"
+[nodes.sure]
+type = "conformal"
+inputs.voters = "thermal"
+inputs.truth = "drift.X"
+memory = "1h"
+[nodes.none]
+type = "conformal"
+inputs.voters = "thermal"
+inputs.others = "thermal"
+inputs.truth = "drift.X"
+memory = "1h"
+"#;
+    let expected = [
+        (24, "`conformal` has no input `voters`"),
+        (27, "`conformal` needs the input `prediction`"),
+        (29, "`conformal` has no input `voters`"),
+        (30, "`conformal` has no input `others`"),
+    ];
+    assert_told("command-line-other-input", &text, &expected);
+    let scratch = Scratch::new("command-line-other-input-help");
+    let graph = scratch.file("wrong.toml", text);
+    let told = athermal(&[&"check", &graph]).ended(2).told;
+    assert!(told.contains("did you mean `prediction`?"), "{told}");
 }

@@ -92,3 +92,33 @@ expect = [{ of = "drift.Z", given_above = 0.5 }, { of = "drift.X", equals = "3 K
     ];
     assert_told("command-line-tests-beside", &text, &expected);
 }
+
+#[test]
+fn an_inherited_test_of_a_node_that_was_removed_names_the_way_out() {
+    let scratch = Scratch::new("command-line-inherited-tests");
+    let of_it = "[nodes.old]\ntype = \"zero\"\ninputs.truth = \"drift.X\"\nahead = \"0s\"\n\
+                 [[tests]]\nname = \"a\"\ninputs = { \"temperature.a\" = { ramp = \"1 K/s\", for = \"1h\", every = \"10s\" } }\n\
+                 expect = [{ of = \"old\", absent = true }]\n";
+    let sound = SOUND.replace("thermal", "drift");
+    scratch.file("base.toml", sound.clone() + of_it);
+    let extending = |own: &str| {
+        let text = format!("schema = 1\nextends = \"base.toml\"\n{own}nodes.old = false\n");
+        let graph = scratch.file("mine.toml", text);
+        athermal(&[&"check", &graph])
+    };
+    let told = extending("").ended(2).told;
+    let told: String = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("there is no node or signal `old`"), "{told}");
+    let file = scratch.path("mine.toml");
+    let way_out = format!(
+        "`tests = []` in {}, or tests of its own there, take the place of those that it inherits",
+        file.display()
+    );
+    assert!(told.contains(&way_out), "{told}");
+    extending("tests = []\n").ended(0);
+    // In the file where the test stands, that is no way out.
+    let wrong = sound + &of_it.replace("of = \"old\"", "of = \"older\"");
+    let own = scratch.file("own.toml", wrong);
+    let own = athermal(&[&"check", &own]).ended(2).told;
+    assert!(!own.contains("inherits"), "{own}");
+}

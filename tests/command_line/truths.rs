@@ -1,6 +1,7 @@
 //! What is said of the truths that predictions are scored against.
 
 use crate::desk;
+use crate::mistakes::{SOUND, assert_told};
 use crate::workbench::athermal;
 
 #[test]
@@ -16,4 +17,56 @@ fn the_error_of_a_truth_is_told_as_what_it_is() {
         let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(help.contains(part), "{help}");
     }
+}
+
+#[test]
+fn what_tells_of_a_prediction_is_no_truth_whatever_its_horizon() {
+    let text = SOUND.to_owned()
+        + r#"[nodes.thermal]
+type = "rls"
+inputs.features = "temperature"
+inputs.truth = "drift.X"
+ahead = "0s"
+[nodes.vote]
+type = "auto_weighted"
+inputs.voters = "thermal"
+inputs.truth = "drift.X"
+memory = "15min"
+[nodes.of-deviation]
+type = "persistence"
+inputs.truth = "thermal:deviation"
+ahead = "0s"
+[nodes.of-weight]
+type = "linear"
+inputs.features = "temperature"
+inputs.truth = "vote:weights"
+ahead = "5min"
+[nodes.of-learning]
+type = "persistence"
+inputs.truth = "thermal:learning"
+ahead = "0s"
+[nodes.sure]
+type = "stack"
+inputs.voters = ["thermal", "thermal:deviation"]
+inputs.truth = "drift.X"
+ahead = "0s"
+[[tests]]
+name = "compared"
+on = "days.csv"
+expect = [{ of = "thermal", beats = ["thermal:deviation"] }]
+"#;
+    let expected = [
+        (
+            30,
+            "`thermal:deviation.X` tells of the prediction `thermal.X` and cannot be the truth",
+        ),
+        (35, "`vote:weights.weight-thermal` tells of the prediction"),
+        (39, "`thermal:learning.X` tells of the prediction"),
+        (
+            43,
+            "`thermal:deviation.X` tells of the prediction `thermal` and is none",
+        ),
+        (49, "`thermal:deviation` does not predict `drift.X`"),
+    ];
+    assert_told("command-line-truth-of-prediction", &text, &expected);
 }

@@ -84,6 +84,32 @@ fn the_program_tells_everything_in_eighty_columns_and_as_json_and_draws_it() {
 }
 
 #[test]
+fn predictions_that_are_put_out_and_not_shown_are_named() {
+    let scratch = Scratch::new("diagnose-others");
+    let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);
+    let text = format!(
+        "schema = 1\nextends = {:?}\ntests = []\n[nodes.same]\ntype = \"persistence\"\neach = \"axis\"\n\
+         inputs.truth = \"drift.{{axis}}\"\nahead = \"5min\"\n[outputs]\nlast = \"same\"\n",
+        graph("die-tester")
+    );
+    let graph = scratch.file("graph.toml", text);
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let diagnosed = |more: &[&dyn AsRef<OsStr>]| {
+        let no_fit: [&dyn AsRef<OsStr>; 1] = [&"--no-fit"];
+        athermal_on("diagnose", &model, &log, &[&no_fit[..], more].concat()).ended(0)
+    };
+    diagnosed(&[]).tells(&["the first prediction of each truth", "--of same"]);
+    for more in [
+        [&"--of" as &dyn AsRef<OsStr>, &"same"],
+        [&"--format", &"json"],
+    ] {
+        let told = diagnosed(&more).told;
+        assert!(!told.contains("the first prediction"), "{told}");
+    }
+}
+
+#[test]
 fn what_cannot_be_diagnosed_is_told_with_a_way_out() {
     let scratch = Scratch::new("undiagnosed");
     let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);

@@ -80,17 +80,6 @@ impl LinearFit {
         let terms = self.columns.iter().zip(&self.coefficients);
         terms.fold(self.intercept, |sum, (&column, b)| sum + b * x[column])
     }
-
-    /// The same model without the constant columns, which say nothing in it.
-    #[must_use]
-    pub fn without_constants(mut self) -> Self {
-        let constant = std::mem::take(&mut self.constant);
-        let terms = self.columns.iter().zip(&self.coefficients);
-        (self.columns, self.coefficients) = terms
-            .filter(|(column, _)| !constant.contains(column))
-            .unzip();
-        self
-    }
 }
 
 impl LeastSquares {

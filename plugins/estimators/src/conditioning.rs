@@ -1,28 +1,21 @@
-//! Decides how columns that say nothing, or nothing new, are told; what is made of them is each estimator's.
+//! Decides how columns that say nothing new are told; what is made of them is each estimator's.
 
 use athermal_core::node::{Figure, TrainingReport};
 use athermal_numerics::{Gram, LeastSquares, LinearFit, Standardization};
 
-/// Names the constant columns of a fit and those that are nearly a combination of others.
+/// Names the columns of a fit that are nearly a combination of others.
 pub(crate) fn name_columns<'a>(
     fit: &LinearFit,
     name: impl Fn(usize) -> &'a str,
     report: &mut TrainingReport,
 ) {
-    let told = [
-        ("constant", "constant, so without effect", &fit.constant),
-        (
-            "collinear",
-            "nearly a combination of the others",
-            &fit.collinear,
-        ),
-    ];
-    for (figure, what, columns) in told {
-        let names: Vec<&str> = columns.iter().map(|&column| name(column)).collect();
-        if !names.is_empty() {
-            report.notes.push(format!("{what}: {}", names.join(", ")));
-            report.figure(figure, Figure::names(names));
-        }
+    let names: Vec<&str> = fit.collinear.iter().map(|&column| name(column)).collect();
+    if !names.is_empty() {
+        let all = names.join(", ");
+        report
+            .notes
+            .push(format!("nearly a combination of the others: {all}"));
+        report.figure("collinear", Figure::names(names));
     }
 }
 

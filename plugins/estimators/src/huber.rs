@@ -127,11 +127,9 @@ impl Trainer for RobustTrainer {
                 .push("the minimum was not reached to the last digit".to_owned());
         }
         let names = self.regressors.into_iter().map(|regressor| regressor.name);
-        let terms = names.zip(fit.coefficients);
-        let (regressors, coefficients) = terms.filter(|(_, b)| *b != 0.0).unzip();
         let predictor = LinearPredictor {
-            regressors,
-            coefficients,
+            regressors: names.collect(),
+            coefficients: fit.coefficients,
             intercept: fit.intercept,
             variance: None,
         };

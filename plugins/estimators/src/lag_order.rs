@@ -63,7 +63,7 @@ impl LagOrder {
             let fit = LeastSquares::ordinary()
                 .solve(&gram, &columns, scales, blocks.rows())
                 .map_err(told)?;
-            let coefficients = columns.len() - fit.constant.len() + 1;
+            let coefficients = columns.len() + 1;
             let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
             tried.push(Tried {
                 letters: self.order.letters(&orders).collect(),

@@ -108,8 +108,6 @@ impl LinearTrainer {
             squares.solve(&gram, &all, &standard.scales, None).ok()
         });
         self.note(&fit, of_all.as_ref().unwrap_or(&fit), report);
-        // Nor is a prediction withheld where one of them is missing.
-        let fit = fit.without_constants();
         let names = fit
             .columns
             .iter()
@@ -246,7 +244,7 @@ impl LinearTrainer {
             // The least squares only looked at the regressors; the coefficients are found in another way.
             _ if matches!(self.solver, Solver::Sgd { .. }) => {}
             // Every coefficient is determined, so there is nothing to worry about.
-            Method::Svd { rank } if rank + fit.constant.len() == fit.columns.len() => {}
+            Method::Svd { rank } if rank == fit.columns.len() => {}
             Method::Svd { rank } => {
                 report.figure("rank", rank);
                 report.figure("coefficients", fit.columns.len());

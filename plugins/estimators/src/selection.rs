@@ -217,6 +217,7 @@ impl Selection {
                 report.figure("left_out_from_start", Figure::names(names));
             }
         }
+        tell_worse_than_mean(&selected, report);
         if how.one_standard_error
             && let Some(smallest) = selected.within_one_standard_error()
         {
@@ -235,6 +236,19 @@ impl Selection {
             return Ok(smallest.columns);
         }
         Ok(selected.columns)
+    }
+}
+
+/// Tells of a search in which nothing was better than no regressor at all.
+fn tell_worse_than_mean(selected: &athermal_numerics::Selection, report: &mut TrainingReport) {
+    let start = selected.start.iter().map(|start| start.mean);
+    let steps = selected.steps.iter().map(|step| step.mean);
+    let best = start.chain(steps).reduce(f64::max);
+    if let Some(best) = best.filter(|best| *best < 0.0) {
+        report.figure("best_r2", best);
+        report.notes.push(format!(
+            "no choice of regressors that was tried predicts the folds better than their mean does: R² is {best:.4} at best"
+        ));
     }
 }
 

@@ -46,6 +46,10 @@ impl Estimator for Stack {
         }
     }
 
+    fn needs_constants(&self) -> bool {
+        true
+    }
+
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
         let names = setup.regressors.iter();
         let names: Vec<String> = names.map(|voter| voter.name.clone()).collect();

@@ -21,6 +21,8 @@ pub struct Report {
     pub without_zone: Option<Place>,
     /// The last line, when it was cut off in the middle and left out.
     pub truncated: Option<Place>,
+    /// Files read before in the same recording, with how many rows are dated within the period of each.
+    pub overlaps: Vec<(String, u64)>,
 }
 
 /// How often something was met, and the first time.

@@ -1,9 +1,10 @@
 //! Several files as one recording: their order, and where one does not continue the other. Not how a file is read.
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use crate::{FileError, Layout, Options, Reader, Report, Row};
+use crate::{FileError, Layout, Options, Reader, Report, Row, TimeForm};
 
 /// What comes next in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +23,8 @@ pub enum Event {
 /// instant of the one before continues it; one that starts at or before it, such as when each counts from 0, is a segment of its own.
 /// That also holds for files that cover the same period with different columns: they are not merged. A file
 /// without rows is passed over.
+///
+/// Where times are dates, or numbers that must be some, the reports tell how many rows lie in the period of another file.
 pub struct Recording {
     rest: std::vec::IntoIter<PathBuf>,
     layout: Layout,
@@ -31,7 +34,16 @@ pub struct Recording {
     /// The first row of a segment waits until the break has been told.
     waiting: Option<Row>,
     reports: Vec<(String, Report)>,
+    /// The first and last instants of the files that have been read, by their place among the reports.
+    periods: Vec<(usize, RangeInclusive<i64>)>,
+    /// The period of the file that is read, as far as it has been.
+    period: Option<RangeInclusive<i64>>,
+    /// How many rows of it lie in each period before.
+    within: Vec<u64>,
 }
+
+/// From here on, in nanoseconds since 1970, a number is taken for a date: it is of 2001, or a machine that has counted for 31 years.
+const DATED_NS: i64 = 1_000_000_000_000_000_000;
 
 impl Recording {
     /// Opens each file once to check its columns and to see its first row, and puts them in order.
@@ -60,6 +72,9 @@ impl Recording {
             last_ns: None,
             waiting: None,
             reports: Vec::new(),
+            periods: Vec::new(),
+            period: None,
+            within: Vec::new(),
         })
     }
 
@@ -98,14 +113,43 @@ impl Recording {
     }
 
     fn advanced_to(&mut self, row: &Row) -> Event {
-        self.last_ns = Some(row.time_ns);
+        let now = row.time_ns;
+        self.last_ns = Some(now);
+        let first = self.period.as_ref().map_or(now, |period| *period.start());
+        self.period = Some(first..=now);
+        if self.is_dated(now) {
+            for (rows, (_, period)) in self.within.iter_mut().zip(&self.periods) {
+                *rows += u64::from(period.contains(&now));
+            }
+        }
         Event::Row
     }
 
-    fn close(&mut self) {
-        if let Some((name, reader)) = self.current.take() {
-            self.reports.push((name, reader.report().clone()));
+    /// Whether an instant is the same in all files, and not counted from the beginning of its own.
+    fn is_dated(&self, time_ns: i64) -> bool {
+        match self.layout.time.form {
+            TimeForm::Rfc3339 => true,
+            TimeForm::Numbers { .. } => time_ns >= DATED_NS,
+            TimeForm::Samples { .. } => false,
         }
+    }
+
+    fn close(&mut self) {
+        let Some((name, reader)) = self.current.take() else {
+            return;
+        };
+        let mut report = reader.report().clone();
+        for (&rows, (file, _)) in self.within.iter().zip(&self.periods) {
+            let file = &self.reports[*file].0;
+            if rows > 0 && *file != name {
+                report.overlaps.push((file.clone(), rows));
+            }
+        }
+        if let Some(period) = self.period.take() {
+            self.periods.push((self.reports.len(), period));
+        }
+        self.within = vec![0; self.periods.len()];
+        self.reports.push((name, report));
     }
 }
 
@@ -134,8 +178,8 @@ mod tests {
     use super::*;
     use crate::TimeForm;
 
-    /// Reads the parts, each in a file of its own, and tells rows by their value and breaks by `|`.
-    fn told(test: &str, parts: &[&str]) -> String {
+    /// Reads the parts, each in a file of its own, to their end, and tells rows by their value and breaks by `|`.
+    fn read(test: &str, form: TimeForm, parts: &[&str], look: impl FnOnce(&Recording)) -> String {
         let folder =
             std::env::temp_dir().join(format!("athermal-files-{}-{test}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
@@ -145,7 +189,7 @@ mod tests {
         for (path, part) in paths.iter().zip(parts) {
             std::fs::write(path, part).unwrap();
         }
-        let layout = Layout::new("t", TimeForm::SECONDS, ["x"]);
+        let layout = Layout::new("t", form, ["x"]);
         let mut recording = Recording::join(&paths, layout, Options::default()).unwrap();
         let mut row = Row::default();
         let mut told = String::new();
@@ -157,8 +201,13 @@ mod tests {
             }
         }
         assert_eq!(recording.reports().len(), parts.len());
+        look(&recording);
         std::fs::remove_dir_all(&folder).unwrap();
         told.trim_end().to_owned()
+    }
+
+    fn told(test: &str, parts: &[&str]) -> String {
+        read(test, TimeForm::SECONDS, parts, |_| {})
     }
 
     #[test]
@@ -185,6 +234,47 @@ mod tests {
     fn files_that_overlap_are_segments() {
         let parts = ["t,x\n5,3\n15,4\n", "t,x\n0,1\n10,2\n"];
         assert_eq!(told("overlap", &parts), "1@0 2@10 | 3@5 4@15");
+    }
+
+    #[test]
+    fn rows_dated_within_another_file_are_counted_by_that_file() {
+        let counted = |test: &str, form: TimeForm, parts: &[&str]| {
+            let mut all: Vec<Vec<u64>> = Vec::new();
+            read(test, form, parts, |recording| {
+                let files = recording.reports().iter();
+                all = files
+                    .map(|(_, report)| report.overlaps.iter().map(|(_, rows)| *rows).collect())
+                    .collect();
+            });
+            all
+        };
+        let none: Vec<Vec<u64>> = vec![Vec::new(); 3];
+        let dated = |days: [u32; 2]| {
+            format!(
+                "t,x\n2025-03-{:02}T00:00:00Z,1\n2025-03-{:02}T00:00:00Z,2\n",
+                days[0], days[1]
+            )
+        };
+        let (one, two, three) = (dated([1, 5]), dated([4, 9]), dated([5, 7]));
+        let parts = [&*one, &*two, &*three];
+        assert_eq!(
+            counted("dated", TimeForm::Rfc3339, &parts),
+            [vec![], vec![1], vec![1, 2]]
+        );
+        let apart = [dated([1, 2]), dated([3, 4]), dated([5, 6])];
+        let apart: Vec<&str> = apart.iter().map(String::as_str).collect();
+        assert_eq!(counted("apart", TimeForm::Rfc3339, &apart), none);
+        // Seconds since 1970 are dates too; those since each file began are not.
+        let seconds = [
+            "t,x\n1700000000,1\n1700000100,2\n",
+            "t,x\n1700000050,1\n1700000200,2\n",
+        ];
+        assert_eq!(
+            counted("seconds", TimeForm::SECONDS, &seconds),
+            [vec![], vec![1]]
+        );
+        let again = ["t,x\n0,1\n10,2\n"; 3];
+        assert_eq!(counted("counted", TimeForm::SECONDS, &again), none);
     }
 
     #[test]

@@ -42,7 +42,8 @@ pub struct Diagnose {
     model: PathBuf,
     #[command(flatten)]
     data: Data,
-    /// Show these predictions, by node, channel or axis, each with all its regressors; else what the graph puts out
+    /// Show these predictions, by node, channel or axis, each with all its regressors; else the first of each truth that the graph
+    /// puts out
     #[arg(long, num_args = 1.., value_name = "NAME")]
     of: Vec<String>,
     /// Set the signal to noise of each drift against the window that it is taken over, noise being the standard error of its
@@ -108,6 +109,9 @@ impl Diagnose {
             terminal.warning(told);
         }
         self.tell(terminal, &diagnosis);
+        if self.of.is_empty() && terminal.format == Format::Table {
+            tell_others(terminal, &model.plan, &diagnosis);
+        }
         tell_empty(terminal, &model.plan, &diagnosis, &observation);
         let drifts = window::any(&model.plan);
         if self.window && !drifts {
@@ -186,6 +190,25 @@ impl Diagnose {
             "{graph} predicts nothing called `{unknown}`; there are {}",
             known.join(", ")
         )))
+    }
+}
+
+/// Names predictions that the graph puts out beside those that are shown.
+fn tell_others(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis) {
+    let outputs = plan
+        .outputs
+        .iter()
+        .map(|output| &plan.channels[output.slot]);
+    let predictions = outputs.filter(|of| of.predicts.is_some());
+    let is_shown = |name: &str| diagnosis.main.iter().any(|main| main.prediction == name);
+    let others = predictions.filter(|of| !is_shown(&of.name));
+    let nodes: BTreeSet<&str> = others.filter_map(|of| of.name.split('.').next()).collect();
+    if !nodes.is_empty() {
+        let nodes: Vec<&str> = nodes.into_iter().collect();
+        terminal.note(format_args!(
+            "shown is the first prediction of each truth that the graph puts out; the others:\n  --of {}",
+            nodes.join(" ")
+        ));
     }
 }
 

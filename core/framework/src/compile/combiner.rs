@@ -70,19 +70,24 @@ impl Resolver<'_> {
             unit,
             ..self.channels[first].channel.clone()
         };
-        if let (Some((port, slot)), Some(predicts)) = (state, predicts) {
-            let link = TruthLink {
-                slot: predicts,
-                ahead,
-                span: self.channels[predicts].channel.span,
-                limit: Duration::ZERO,
-            };
+        // Predictions have been looked at with the nodes that make them; what else votes or tells a state may see the answer too.
+        let unseen = voters.iter().copied();
+        let unseen = unseen.filter(|&slot| self.channels[slot].predicts.is_none());
+        let unseen = [(port.name, unseen.collect::<Vec<usize>>())];
+        let state_of = state.map(|(port, slot)| (port.name, vec![slot]));
+        for (input, features) in unseen.into_iter().chain(state_of) {
+            let Some(predicts) = predicts else { continue };
             self.suspects.push(Suspect {
-                place: instance.input_place(port.name),
+                place: instance.input_place(input),
                 context: instance.context(),
-                features: vec![slot],
+                features,
                 lag: Duration::ZERO,
-                link,
+                link: TruthLink {
+                    slot: predicts,
+                    ahead,
+                    span: self.channels[predicts].channel.span,
+                    limit: Duration::ZERO,
+                },
             });
         }
         let slots = voters.iter().copied().chain(state.map(|(_, slot)| slot));
@@ -226,7 +231,7 @@ impl Resolver<'_> {
     }
 
     /// The prediction beside which an estimator or combiner gives this slot.
-    fn told_of(&self, slot: usize) -> Option<usize> {
+    pub(super) fn told_of(&self, slot: usize) -> Option<usize> {
         let node = &self.nodes[self.channels[slot].node?];
         let (_, predictions) = node.ports.first()?;
         let predicts = !matches!(node.role, PlannedRole::Feature { .. });

@@ -233,6 +233,16 @@ impl Resolver<'_> {
                 .report(instance.input_place("truth"), problem);
             return None;
         }
+        if let Some(prediction) = self.told_of(truth) {
+            let name = |slot: usize| self.channels[slot].name.clone();
+            let problem = CompileProblem::TruthOfPrediction {
+                channel: name(truth),
+                prediction: name(prediction),
+            };
+            self.diagnostics
+                .report(instance.input_place("truth"), problem);
+            return None;
+        }
         let span = channel.span;
         if let Some(node) = self.endless(truth) {
             let channel = self.channels[truth].name.clone();

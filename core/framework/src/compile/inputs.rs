@@ -15,6 +15,31 @@ use crate::unit::Unit;
 /// The inputs of which every channel counts once; a product may well have one twice.
 const COUNTS_ONCE: [&str; 2] = ["features", "voters"];
 
+/// Which input of its kind one is meant to be that the kind does not have: the nearest, or where none is near, the only one that
+/// is missing.
+pub(super) fn meant_input(instance: &Declared<'_>, given: &str) -> Option<&'static str> {
+    let ports = (instance.kind.inputs)();
+    let names = || ports.iter().map(|port| port.name);
+    let is_strange = |given: &str| names().all(|name| name != given);
+    if !is_strange(given) {
+        return None;
+    }
+    if let near @ Some(_) = nearest(given, names()) {
+        return near;
+    }
+    let all = instance.decl.inputs.iter().map(|input| &*input.port);
+    let near: Vec<Option<&str>> = all
+        .filter(|given| is_strange(given))
+        .map(|given| nearest(given, names()))
+        .collect();
+    let is_given = |name: &str| instance.input(name).is_some() || near.contains(&Some(name));
+    let required = ports.iter().filter(|port| !port.optional);
+    let mut missing = required.filter(|port| !is_given(port.name));
+    let only = missing.next().filter(|_| missing.next().is_none())?;
+    let others = near.iter().filter(|near| near.is_none()).count();
+    (others == 1).then_some(only.name)
+}
+
 impl Resolver<'_> {
     /// Looks up what an input refers to: slots in order, none for an optional input left out.
     pub(crate) fn slots(
@@ -63,13 +88,8 @@ impl Resolver<'_> {
 
     /// Tells that an input is missing, unless it is there under a name that is told to be none.
     pub(super) fn missing_input(&mut self, instance: &Declared<'_>, port: &InputPort) {
-        let ports = (instance.kind.inputs)();
-        let names = || ports.iter().map(|port| port.name);
-        let meant = |given: &str| {
-            let strange = names().all(|name| name != given);
-            strange && nearest(given, names()) == Some(port.name)
-        };
-        if instance.decl.inputs.iter().any(|input| meant(&input.port)) {
+        let is_meant = |given: &str| meant_input(instance, given) == Some(port.name);
+        if instance.decl.inputs.iter().any(|of| is_meant(&of.port)) {
             return;
         }
         let problem = CompileProblem::MissingInput {

@@ -39,6 +39,7 @@ pub enum CompileProblem {
     UnknownInput {
         kind: &'static str,
         input: String,
+        meant: Option<&'static str>,
         known: Vec<&'static str>,
     },
     /// An input that the kind needs and the node does not give.
@@ -130,6 +131,8 @@ pub enum CompileProblem {
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
     PredictedTruth { channel: String },
+    /// A truth that tells of a prediction, as its standard deviation does.
+    TruthOfPrediction { channel: String, prediction: String },
     /// A truth made of values that depend on all of the past.
     EndlessTruth { channel: String, node: String },
     /// A limit of a unit that is not the truth's.
@@ -212,7 +215,7 @@ impl Problem for CompileProblem {
             Self::NoMaxAge { .. } => "A053",
             Self::Parameter { .. } => "A054",
             Self::NoHorizon { .. } => "A055",
-            Self::PredictedTruth { .. } => "A056",
+            Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "A056",
             Self::LimitUnit { .. } => "A057",
             Self::DuplicateName { .. } => "A058",
             Self::UnusedNode { .. } => "A059",
@@ -261,6 +264,7 @@ impl Problem for CompileProblem {
             | Self::NeverLearns { .. }
             | Self::NoHorizon { .. }
             | Self::PredictedTruth { .. }
+            | Self::TruthOfPrediction { .. }
             | Self::EndlessTruth { .. }
             | Self::LimitUnit { .. }
             | Self::DuplicateName { .. }
@@ -367,6 +371,14 @@ impl Problem for CompileProblem {
             Self::PredictedTruth { channel } => {
                 format!("`{channel}` is a prediction and cannot be the truth")
             }
+            Self::TruthOfPrediction {
+                channel,
+                prediction,
+            } => {
+                format!(
+                    "`{channel}` tells of the prediction `{prediction}` and cannot be the truth"
+                )
+            }
             Self::EndlessTruth { channel, node } => {
                 format!("`{channel}` cannot be the truth, since `{node}` remembers all of the past")
             }
@@ -423,7 +435,7 @@ impl Problem for CompileProblem {
             Self::Parameter { .. } | Self::Doubt { .. } => "here",
             Self::NoHorizon { .. } => "`ahead` is missing",
             Self::NeverLearns { .. } => "stays as it was fitted",
-            Self::PredictedTruth { .. } => "not measured",
+            Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "not measured",
             Self::EndlessTruth { .. } => "of no span",
             Self::LimitUnit { .. } => "another unit",
             Self::DuplicateName { .. } => "the name is taken",
@@ -454,7 +466,10 @@ impl Problem for CompileProblem {
                 }
                 None => or_one_of(channel, known, "its channels are"),
             },
-            Self::UnknownInput { input, known, .. } => or_known(input, known, "its inputs are"),
+            Self::UnknownInput { meant, known, .. } => match meant {
+                Some(meant) => format!("did you mean `{meant}`?"),
+                None => format!("its inputs are {}", names(known)),
+            },
             Self::MissingInput { input, summary, .. } => {
                 format!("add `inputs.{input} = \"…\"`: {summary}")
             }
@@ -509,7 +524,7 @@ impl Problem for CompileProblem {
             Self::NoHorizon { .. } => {
                 "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor".to_owned()
             }
-            Self::PredictedTruth { .. } => {
+            Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => {
                 "refer to something measured, such as the slope of a position".to_owned()
             }
             Self::EndlessTruth { node, .. } => format!(

@@ -1,5 +1,6 @@
 //! Decides what is told of an instance that cannot be resolved, since mistakes in it have been told: all that is wrong with the rest.
 
+use super::inputs::meant_input;
 use super::instance::{Declared, ReadParts};
 use super::keys::Learn;
 use super::problem::CompileProblem;
@@ -111,6 +112,7 @@ impl Resolver<'_> {
             let problem = CompileProblem::UnknownInput {
                 kind: declared.kind.name,
                 input: input.port.clone(),
+                meant: meant_input(declared, &input.port),
                 known: ports.iter().map(|port| port.name).collect(),
             };
             self.diagnostics.report(input.place, problem);

@@ -55,6 +55,12 @@ pub trait Problem {
 
     /// Whether it may only follow from something else that is missing, so that it is not told where parts of a file could not be read.
     fn may_follow_from_a_gap(&self) -> bool;
+
+    /// Whether that is so only of what could not be read beside it, since nothing of another file would be laid under what stands
+    /// there.
+    fn inherits_nothing(&self) -> bool {
+        false
+    }
 }
 
 /// A problem at a place.
@@ -229,7 +235,9 @@ impl Diagnostics {
     }
 
     fn note(&mut self, context: Option<String>, place: Option<Place>, problem: &dyn Problem) {
-        if problem.may_follow_from_a_gap() && place.map_or(self.open, |place| self.is_open(place)) {
+        let open = self.open && !problem.inherits_nothing();
+        let is_open = open || place.is_some_and(|place| self.gaps.hold(place));
+        if problem.may_follow_from_a_gap() && is_open {
             // Whoever counts learns that something is wrong here.
             self.reported += usize::from(problem.severity() == Severity::Error);
             return;

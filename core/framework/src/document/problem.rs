@@ -63,6 +63,15 @@ pub enum DocumentProblem {
         /// The keys that are known there.
         known: Vec<String>,
     },
+    /// An input that stands among the parameters of its node.
+    InputAsKey {
+        /// The key.
+        key: String,
+        /// The node.
+        what: String,
+        /// The input.
+        input: String,
+    },
     /// A key that has no default is not there.
     MissingKey {
         /// The key.

@@ -1,12 +1,24 @@
 //! Decides which fits are doubted for the rows that they stand on; not which rows those are.
 
 use crate::diagnostic::counted;
-use crate::node::{Predictor, TrainingReport};
+use crate::node::{Figure, Predictor, TrainingReport};
 
 /// A fit whose error is larger than that of the mean by this factor is no better than none.
 const WORSE_THAN_MEAN: f64 = 1.1;
 /// The share of a mean that rounding may make up.
 const ROUNDING: f64 = 1e-9;
+
+/// Tells of the regressors that were left out since they stay the same.
+pub(super) fn tell_constant<'a>(names: impl Iterator<Item = &'a str>, report: &mut TrainingReport) {
+    let names: Vec<&str> = names.collect();
+    if !names.is_empty() {
+        let all = names.join(", ");
+        report
+            .notes
+            .push(format!("constant, so without effect: {all}"));
+        report.figure("constant", Figure::names(names));
+    }
+}
 
 /// The truths of the complete rows.
 #[derive(Debug, Clone, Copy, Default)]

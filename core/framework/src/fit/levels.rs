@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::collect::{Collector, Share};
+use super::collect::{Collector, Share, Trainee};
 use super::drive::{Passed, drive};
 use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
@@ -226,18 +226,47 @@ impl<'a> Fitting<'a> {
         if !collector.overflowed {
             return Ok(train_kept(self.plan, &collector, self.options));
         }
-        let memory = self.options.memory / nodes.len().max(1);
-        let mut makings: Vec<Making> = collector
-            .trainees
-            .iter()
-            .map(|trainee| begin(self.plan, trainee, memory))
-            .collect();
-        let mut second = Collector::new(self.plan, nodes, 0);
-        self.pass(&mut second, parts, Some(&mut makings))?;
+        let all = collector.trainees.iter();
+        let mut makings =
+            self.stream(all.map(|trainee| (trainee, Vec::new())), nodes.len(), parts)?;
+        // Which candidates stay the same in the rows that are complete is known at their end; without them it takes another pass.
+        let constants = makings.iter().map(Making::constant).enumerate();
+        let again: Vec<_> = constants.filter(|(_, all)| !all.is_empty()).collect();
+        if !again.is_empty() {
+            for (nth, _) in again.iter().rev() {
+                makings.remove(*nth);
+            }
+            let places: Vec<usize> = again.iter().map(|(nth, _)| *nth).collect();
+            let without = again
+                .into_iter()
+                .map(|(nth, constant)| (&collector.trainees[nth], constant));
+            let made = self.stream(without, nodes.len(), parts)?;
+            for (nth, making) in places.into_iter().zip(made) {
+                makings.insert(nth, making);
+            }
+        }
         let ended = collector.trainees.iter().zip(makings);
         Ok(ended
             .map(|(trainee, making)| end(self.plan, &collector, trainee, making, true))
             .collect())
+    }
+
+    /// Reads the data once more for some of so many estimators of a level, each without some of its candidates.
+    fn stream<'t>(
+        &mut self,
+        trainees: impl Iterator<Item = (&'t Trainee, Vec<usize>)>,
+        of: usize,
+        parts: &[Part],
+    ) -> Result<Vec<Making>, FitError> {
+        let memory = self.options.memory / of.max(1);
+        let (mut nodes, mut makings) = (Vec::new(), Vec::new());
+        for (trainee, constant) in trainees {
+            nodes.push(trainee.node);
+            makings.push(begin(self.plan, trainee, memory, constant));
+        }
+        let mut collector = Collector::new(self.plan, &nodes, 0);
+        self.pass(&mut collector, parts, Some(&mut makings))?;
+        Ok(makings)
     }
 
     fn pass(

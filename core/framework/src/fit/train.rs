@@ -3,8 +3,9 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::FitOptions;
+use super::candidates::Range;
 use super::collect::{Collector, Sink, Trainee};
-use super::doubt::Truths;
+use super::doubt::{Truths, tell_constant};
 use super::report::{EstimatorFit, Outcome};
 use crate::compile::{Plan, PlannedRole};
 use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
@@ -14,12 +15,50 @@ use crate::time::Instant;
 pub(super) struct Making {
     trainer: Box<dyn Trainer>,
     kept: Vec<usize>,
+    /// The candidates that were left out since they stay the same.
+    constant: Vec<usize>,
+    may_leave_out: MayLeaveOut,
     row: Vec<f64>,
     all: Vec<f64>,
     truths: Truths,
-    /// The largest values, in size, of the candidates that were kept and of the truth.
-    largest: Vec<f64>,
+    /// The ranges of the candidates that were kept and of the truth.
+    ranges: Vec<Range>,
     incomplete: u64,
+}
+
+/// Which candidates a trainer may be made to do without.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MayLeaveOut {
+    /// None: its model has no constant of its own.
+    None,
+    /// Not all: what encodes nothing has nothing to give.
+    NotAll,
+    /// Any: what is left is the constant.
+    Any,
+}
+
+impl Making {
+    /// The candidates that stay the same in all complete rows, where a trainer has been given some that may be left out. It is to
+    /// be made again without them: a model that has a constant of its own learns nothing from them, and would give no prediction
+    /// where their sensors are dead. Rows that lacked nothing else then come back, so that none of the others can stay the same.
+    ///
+    /// Where an estimator is fitted without each fold, one that stays the same in the rest alone is left out of that fit alone:
+    /// it would have no effect in it, so that what is predicted for the fold is the same.
+    pub(super) fn constant(&self) -> Vec<usize> {
+        let candidates = self.kept.iter().zip(&self.ranges);
+        let stay = candidates.filter(|(_, range)| range.is_one_value());
+        let stay: Vec<usize> = stay.map(|(&candidate, _)| candidate).collect();
+        let may = match self.may_leave_out {
+            MayLeaveOut::None => false,
+            MayLeaveOut::NotAll => stay.len() < self.kept.len(),
+            MayLeaveOut::Any => true,
+        };
+        if may && self.truths.rows >= LEAST_ROWS {
+            stay
+        } else {
+            Vec::new()
+        }
+    }
 }
 
 impl Sink for Making {
@@ -35,8 +74,8 @@ impl Sink for Making {
             self.incomplete += 1;
         } else {
             self.truths.count(truth);
-            for (largest, value) in self.largest.iter_mut().zip(self.row.iter().chain([&truth])) {
-                *largest = largest.max(value.abs());
+            for (range, value) in self.ranges.iter_mut().zip(self.row.iter().chain([&truth])) {
+                range.include(*value);
             }
             self.trainer.row_at(at, &self.row, truth);
         }
@@ -50,15 +89,16 @@ impl Sink for Making {
 /// A fit, and what there is to tell about it.
 pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 
-/// Starts the fit of one estimator, now that it is known which candidates have values.
-pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
+/// Starts the fit of one estimator, now that it is known which candidates have values, and which of them stay the same.
+pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec<usize>) -> Making {
     let node = &plan.nodes[trainee.node];
     let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
     let learns = match &node.role {
         PlannedRole::Estimator { learning, .. } => learning.is_some(),
         PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => false,
     };
-    let kept = trainee.validity.kept();
+    let mut kept = trainee.validity.kept();
+    kept.retain(|candidate| !constant.contains(candidate));
     let setup = TrainingSetup {
         regressors: kept
             .iter()
@@ -75,18 +115,24 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize) -> Making {
         span: trainee.link.span,
         learns,
     };
-    let trainer = match node.spec.role() {
-        Role::Estimator(estimator) => estimator.trainer(&setup),
-        Role::Feature(feature) => feature
-            .encoder()
-            .expect("a feature with rows has an encoder")
-            .trainer(&setup),
+    let (trainer, may_leave_out) = match node.spec.role() {
+        Role::Estimator(estimator) if estimator.needs_constants() => {
+            (estimator.trainer(&setup), MayLeaveOut::None)
+        }
+        Role::Estimator(estimator) => (estimator.trainer(&setup), MayLeaveOut::Any),
+        Role::Feature(feature) => {
+            let encoder = feature.encoder();
+            let encoder = encoder.expect("a feature with rows has an encoder");
+            (encoder.trainer(&setup), MayLeaveOut::NotAll)
+        }
         Role::Combiner(_) => unreachable!("a combiner is not fitted"),
     };
     Making {
         trainer,
+        constant,
+        may_leave_out,
         row: Vec::with_capacity(kept.len()),
-        largest: vec![0.0; kept.len() + 1],
+        ranges: vec![Range::NONE; kept.len() + 1],
         all: Vec::new(),
         kept,
         truths: Truths::default(),
@@ -112,8 +158,9 @@ pub(super) fn end(
     let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
     let mut dropped = trainee.dropped;
     dropped.incomplete = making.incomplete;
+    let has_values = trainee.validity.kept();
     let dropped_candidates = (0..regressors.len())
-        .filter(|candidate| !making.kept.contains(candidate))
+        .filter(|candidate| !has_values.contains(candidate))
         .map(|candidate| {
             (
                 regressors[candidate].name.clone(),
@@ -137,13 +184,14 @@ pub(super) fn end(
             needed: LEAST_ROWS as usize,
         })
     } else {
-        let overflows = making.largest.iter().position(|value| *value > LARGEST);
+        let mut ranges = making.ranges.iter();
+        let overflows = ranges.position(|range| range.largest() > LARGEST);
         let too_large = overflows.map(|nth| TrainingError::TooLarge {
             name: match making.kept.get(nth) {
                 Some(&candidate) => regressors[candidate].name.clone(),
                 None => truth.name.clone(),
             },
-            largest: making.largest[nth],
+            largest: making.ranges[nth].largest(),
         });
         let trained = making.trainer.finish();
         // What a trainer says of sums that overflowed is not their cause.
@@ -154,6 +202,8 @@ pub(super) fn end(
             predictor,
             mut report,
         }) => {
+            let constant = making.constant.iter();
+            tell_constant(constant.map(|&nth| &*regressors[nth].name), &mut report);
             truths.doubt(predictor.as_ref(), regressors.len(), &mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
@@ -187,8 +237,13 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
             }
             let trainee = &collector.trainees[index];
             // The whole memory, or how folds are cut would depend on the number of threads.
-            let mut making = begin(plan, trainee, options.memory);
+            let mut making = begin(plan, trainee, options.memory, Vec::new());
             collector.replay(index, &mut making);
+            let constant = making.constant();
+            if !constant.is_empty() {
+                making = begin(plan, trainee, options.memory, constant);
+                collector.replay(index, &mut making);
+            }
             made.push((index, end(plan, collector, trainee, making, false)));
         }
     };

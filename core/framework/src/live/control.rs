@@ -8,10 +8,11 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::handover::{Feed, Happening, Mark, Seated};
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
+use super::staged::{Staged, cold};
 use super::{LiveOptions, Stepper};
 use crate::compile::Plan;
 use crate::document::TimeBase;
-use crate::engine::{Carry, Engine, EngineError, Heritage, NodeCarry, RestoreError};
+use crate::engine::{Engine, EngineError, Heritage, NodeCarry, RestoreError};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
 
@@ -44,13 +45,6 @@ pub struct Control {
     row: Vec<f64>,
 }
 
-/// A graph that is ready to take over, and kept so.
-pub struct Staged {
-    seated: Seated,
-    carry: Vec<NodeCarry>,
-    shadow: Option<Shadow>,
-}
-
 /// The graph before the last swap, kept warm for a while yet.
 struct Previous {
     seated: Seated,
@@ -68,8 +62,14 @@ struct Committed {
 
 /// Where a graph goes that the engine thread sends back.
 enum Origin {
-    Staged { carry: Vec<NodeCarry> },
-    Previous { left: Duration },
+    Staged {
+        carry: Vec<NodeCarry>,
+        past: Duration,
+        gave: Vec<bool>,
+    },
+    Previous {
+        left: Duration,
+    },
 }
 
 /// What has happened since the last look.
@@ -236,8 +236,20 @@ impl Control {
             .map_err(|channels| StageError::MissingChannels { channels })?;
         seated.engine.freeze(self.frozen);
         let mut warmed = false;
+        let slots: Vec<usize> = model
+            .plan
+            .outputs
+            .iter()
+            .map(|output| output.slot)
+            .collect();
+        let mut gave = vec![false; slots.len()];
         self.retained.for_each(|time, samples| match time {
-            Some(time) => warmed |= seated.step(time, samples).is_ok(),
+            Some(time) => {
+                warmed |= seated.step(time, samples).is_ok();
+                for (gave, &slot) in gave.iter_mut().zip(&slots) {
+                    *gave |= !seated.engine.value(slot).is_nan();
+                }
+            }
             None => seated.segment(),
         });
         let carry = match &self.replica {
@@ -252,6 +264,8 @@ impl Control {
         Ok(self.staged.insert(Staged {
             seated,
             carry,
+            past: self.retained.span(),
+            gave,
             shadow: None,
         }))
     }
@@ -301,8 +315,15 @@ impl Control {
             self.staged = Some(staged);
             return Err(error);
         }
-        let Staged { seated, carry, .. } = staged;
-        self.committed = Some(Committed::new(seated, Origin::Staged { carry }));
+        let Staged {
+            seated,
+            carry,
+            past,
+            gave,
+            ..
+        } = staged;
+        let origin = Origin::Staged { carry, past, gave };
+        self.committed = Some(Committed::new(seated, origin));
         Ok(())
     }
 
@@ -497,10 +518,12 @@ impl Control {
                 continue;
             };
             match origin {
-                Origin::Staged { carry } => {
+                Origin::Staged { carry, past, gave } => {
                     self.staged = Some(Staged {
                         seated,
                         carry,
+                        past,
+                        gave,
                         shadow: None,
                     });
                 }
@@ -534,53 +557,11 @@ impl Committed {
     }
 }
 
-impl Staged {
-    /// What becomes of each node, in the order of the new plan.
-    #[must_use]
-    pub fn carry(&self) -> &[NodeCarry] {
-        &self.carry
-    }
-
-    /// The revision of the graph.
-    #[must_use]
-    pub fn revision(&self) -> &str {
-        &self.seated.revision
-    }
-}
-
-fn cold(engine: &Engine, warmed: bool) -> Vec<NodeCarry> {
-    let reason = || "ticks were missed, so that nothing is known of what runs".to_owned();
-    let outcome = || {
-        if warmed {
-            Carry::Warmed { reason: reason() }
-        } else {
-            Carry::Cold { reason: reason() }
-        }
-    };
-    engine
-        .plan()
-        .nodes
-        .iter()
-        .map(|node| NodeCarry {
-            node: node.instance(),
-            outcome: outcome(),
-        })
-        .collect()
-}
-
 impl fmt::Debug for Control {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Control")
             .field("event", &self.event)
             .field("generation", &self.generation)
-            .finish_non_exhaustive()
-    }
-}
-
-impl fmt::Debug for Staged {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Staged")
-            .field("revision", &self.seated.revision)
             .finish_non_exhaustive()
     }
 }

@@ -22,15 +22,17 @@ mod run;
 mod shadow;
 mod sink;
 mod source;
+mod staged;
 mod stepper;
 
-pub use control::{Control, Notice, StageError, Staged};
+pub use control::{Control, Notice, StageError};
 pub use handover::Feed;
 pub use refit::Refit;
 pub use run::{RunError, run, run_keeping};
 pub use shadow::{Compared, Shadow, Verdict};
 pub use sink::{Frame, Sink, SinkError};
 pub use source::{Samples, Source, SourceError};
+pub use staged::Staged;
 pub use stepper::{Stepped, Stepper};
 
 use std::sync::Arc;

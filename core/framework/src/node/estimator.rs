@@ -131,6 +131,12 @@ pub trait Estimator: Debug + Send + Sync {
         false
     }
 
+    /// Whether a regressor that stays the same in all rows of a fit may say something, as it does in a model without a constant of
+    /// its own. From any other it is left out, so that its predictions go on when the sensor behind it is dead.
+    fn needs_constants(&self) -> bool {
+        false
+    }
+
     /// What learns from the rows.
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer>;
 }
@@ -181,7 +187,8 @@ pub struct Regressor {
 pub struct TrainingSetup {
     /// The regressors, in the order of a row's values.
     pub regressors: Vec<Regressor>,
-    /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out.
+    /// Which of the regressors that the estimator asked for these are: those without values in too many rows are left out, and those
+    /// that stay the same in all of them, unless it [needs](Estimator::needs_constants) them.
     pub places: Vec<usize>,
     /// The unit of errors, for what is told of the fit: that of the truth, or K where that is a temperature.
     pub error_unit: String,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::channels::Channels;
 use super::data::{DataSet, Simulation};
 use super::expectation::Expectation;
-use super::problem::TrialProblem;
+use super::problem::{NotFound, TrialProblem};
 use super::series::{Series, Synthetic};
 use super::shape;
 use super::table::SimulationTable;
@@ -108,11 +108,14 @@ fn read(
             }
         }
         let context = text.map_or_else(|| "a test".to_owned(), |name| format!("test \"{name}\""));
+        let own = graph.tree.place.source;
+        let inherited_by = (test.place.source != own).then(|| sources.path(own).to_owned());
         let trial = diagnostics.within(context, |diagnostics| {
             Declaring {
                 plan,
                 channels: &channels,
                 part,
+                inherited_by,
                 reader,
                 sources,
                 schedules: &mut schedules,
@@ -157,6 +160,8 @@ pub(super) struct Declaring<'a> {
     channels: &'a Channels<'a>,
     /// What of a graph with mistakes is missing in the plan; none where it has no mistakes.
     part: Option<&'a Part>,
+    /// The file that inherits the test, where it stands in another.
+    inherited_by: Option<String>,
     reader: &'a dyn FileReader,
     sources: &'a mut Sources,
     schedules: &'a mut Schedules,
@@ -492,7 +497,12 @@ impl Declaring<'_> {
     fn not_found(&mut self, reference: &str, place: Place, problem: CompileProblem) {
         let name = Reference::parse(reference).whole_node();
         if !self.part.is_some_and(|part| part.is_broken(&name)) {
-            self.diagnostics.report(place, problem);
+            let inherited_by = self.inherited_by.clone();
+            let not_found = NotFound {
+                problem,
+                inherited_by,
+            };
+            self.diagnostics.report(place, not_found);
         }
     }
 

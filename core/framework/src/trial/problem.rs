@@ -1,5 +1,6 @@
 //! Decides what can be wrong with a test before it is run, and how it is said.
 
+use crate::compile::CompileProblem;
 use crate::diagnostic::{Place, Problem, nearest};
 use crate::fault::FaultError;
 use crate::machine::schedule::Reason;
@@ -132,6 +133,14 @@ impl Problem for TrialProblem {
             | Self::Schedule(_)
             | Self::Range { .. } => false,
         }
+    }
+
+    // A list replaces the one that it is laid over, whole.
+    fn inherits_nothing(&self) -> bool {
+        matches!(
+            self,
+            Self::NoData | Self::NothingExpected { .. } | Self::Keys { .. } | Self::NoShape
+        )
     }
 
     fn message(&self) -> String {
@@ -291,5 +300,44 @@ impl Problem for TrialProblem {
             Self::DuplicateName { first, .. } => vec![(*first, "the other is here".to_owned())],
             _ => Vec::new(),
         }
+    }
+}
+
+/// A reference of a test that names nothing in the graph.
+pub(super) struct NotFound {
+    pub(super) problem: CompileProblem,
+    /// The file that inherits the test, and maybe lacks on purpose what it names.
+    pub(super) inherited_by: Option<String>,
+}
+
+impl Problem for NotFound {
+    fn code(&self) -> &'static str {
+        self.problem.code()
+    }
+
+    fn may_follow_from_a_gap(&self) -> bool {
+        self.problem.may_follow_from_a_gap()
+    }
+
+    fn message(&self) -> String {
+        self.problem.message()
+    }
+
+    fn label(&self) -> String {
+        self.problem.label()
+    }
+
+    fn help(&self) -> Option<String> {
+        let help = self.problem.help();
+        let Some(file) = &self.inherited_by else {
+            return help;
+        };
+        let way_out = format!(
+            "`tests = []` in {file}, or tests of its own there, take the place of those that it inherits"
+        );
+        Some(match help {
+            Some(help) => format!("{help}; {way_out}"),
+            None => way_out,
+        })
     }
 }

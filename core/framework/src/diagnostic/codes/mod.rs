@@ -235,7 +235,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A052",
         "part of the answer",
-        "A regressor overlaps the value that is predicted. Windows of neighbouring truths overlap, so a recent truth, or a feature made of the truth's signal, contains part of the answer, and scores would flatter. A lag of at least the truth's span less `ahead` is free of it."
+        "A regressor, or a vote that is no prediction, overlaps the value that is predicted. Windows of neighbouring truths overlap, so a recent truth, or a feature made of the truth's signal, contains part of the answer, and scores would flatter. A lag of at least the truth's span less `ahead` is free of it."
     ),
     code!(
         "A053",
@@ -255,7 +255,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A056",
         "a truth that is a prediction",
-        "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth."
+        "An estimator learns from what was measured. A prediction, or a combination of predictions, is no truth, nor is what tells of one, such as its `deviation` or `weights`."
     ),
     code!(
         "A057",

@@ -57,7 +57,7 @@ impl Problem for DocumentProblem {
             Self::TooLarge { .. } | Self::TooDeep { .. } | Self::LongChain { .. } => "A003",
             Self::SchemaMissing | Self::SchemaUnknown { .. } => "A004",
             Self::ExtendsLoop { .. } => "A005",
-            Self::UnknownKey { .. } => "A006",
+            Self::UnknownKey { .. } | Self::InputAsKey { .. } => "A006",
             Self::MissingKey { .. } => "A007",
             Self::WrongType { .. } => "A008",
             Self::UnknownChoice { .. } => "A009",
@@ -99,7 +99,9 @@ impl Problem for DocumentProblem {
             ),
             Self::SchemaMissing => "the file does not say which schema it follows".to_owned(),
             Self::SchemaUnknown { found } => format!("the schema is 1, found {found}"),
-            Self::UnknownKey { key, what, .. } => format!("{what} has no key \"{key}\""),
+            Self::UnknownKey { key, what, .. } | Self::InputAsKey { key, what, .. } => {
+                format!("{what} has no key \"{key}\"")
+            }
             Self::MissingKey { key, what, .. } => format!("{what} needs the key \"{key}\""),
             Self::WrongType {
                 key,
@@ -207,7 +209,7 @@ impl Problem for DocumentProblem {
             Self::ExtendsLoop { .. } | Self::LongChain { .. } => "extends this file".to_owned(),
             Self::SchemaMissing => "`schema = 1` is missing".to_owned(),
             Self::SchemaUnknown { .. } => "not 1".to_owned(),
-            Self::UnknownKey { .. } => "unknown key".to_owned(),
+            Self::UnknownKey { .. } | Self::InputAsKey { .. } => "unknown key".to_owned(),
             Self::MissingKey { key, .. } => format!("\"{key}\" is missing"),
             Self::WrongType { expected, .. } => format!("expected {expected}"),
             Self::UnknownChoice { .. } => "not a choice".to_owned(),
@@ -244,6 +246,9 @@ impl Problem for DocumentProblem {
                     })
             }
             Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
+            Self::InputAsKey { input, .. } => {
+                Some(format!("`{input}` is an input: write `inputs.{input} = …`"))
+            }
             Self::MissingKey { advice, .. } => advice.clone(),
             Self::WrongType { lacks, .. } => lacks.as_ref().map(Lacks::help),
             Self::UnknownChoice { found, choices, .. } => {
@@ -365,6 +370,7 @@ impl Problem for DocumentProblem {
             | Self::SchemaMissing
             | Self::SchemaUnknown { .. }
             | Self::UnknownKey { .. }
+            | Self::InputAsKey { .. }
             | Self::WrongType { .. }
             | Self::UnknownChoice { .. }
             | Self::Refused { .. }

@@ -1,0 +1,83 @@
+//! A graph that is ready to take over, and what is told of it; decides nothing of when it does.
+
+use std::fmt;
+
+use super::handover::Seated;
+use super::shadow::Shadow;
+use crate::engine::{Carry, Engine, NodeCarry};
+use crate::time::Duration;
+
+/// A graph that is ready to take over, and kept so.
+pub struct Staged {
+    pub(super) seated: Seated,
+    pub(super) carry: Vec<NodeCarry>,
+    /// How much of the past it was warmed by.
+    pub(super) past: Duration,
+    /// For each output, whether it had a value on the way.
+    pub(super) gave: Vec<bool>,
+    pub(super) shadow: Option<Shadow>,
+}
+
+impl Staged {
+    /// What becomes of each node, in the order of the new plan.
+    #[must_use]
+    pub fn carry(&self) -> &[NodeCarry] {
+        &self.carry
+    }
+
+    /// The revision of the graph.
+    #[must_use]
+    pub fn revision(&self) -> &str {
+        &self.seated.revision
+    }
+
+    /// How much of the past there was to warm it by, where some of it was and that is less than it looks back: beside that, how long
+    /// what it gives may depend on what came before.
+    #[must_use]
+    pub fn too_short_a_past(&self) -> Option<(Duration, Duration)> {
+        let is_warmed = |node: &NodeCarry| matches!(node.outcome, Carry::Warmed { .. });
+        let wanted = self.seated.engine.plan().warm_up;
+        let short = self.past < wanted && self.carry.iter().any(is_warmed);
+        short.then_some((self.past, wanted))
+    }
+
+    /// How much of the past there was to warm it by, where that is as much as it looks back, and the outputs that had no value
+    /// anywhere in it: they are not likely to have any.
+    #[must_use]
+    pub fn silent(&self) -> (Duration, Vec<&str>) {
+        let plan = self.seated.engine.plan();
+        let enough = self.past >= plan.warm_up && self.past > Duration::ZERO;
+        let outputs = plan.outputs.iter().zip(&self.gave);
+        let silent = outputs.filter(|(_, gave)| enough && !**gave);
+        (self.past, silent.map(|(output, _)| &*output.name).collect())
+    }
+}
+
+/// What becomes of each node of an engine where nothing is known of what runs.
+pub(super) fn cold(engine: &Engine, warmed: bool) -> Vec<NodeCarry> {
+    let reason = || "ticks were missed, so that nothing is known of what runs".to_owned();
+    let outcome = || {
+        if warmed {
+            Carry::Warmed { reason: reason() }
+        } else {
+            Carry::Cold { reason: reason() }
+        }
+    };
+    engine
+        .plan()
+        .nodes
+        .iter()
+        .map(|node| NodeCarry {
+            node: node.instance(),
+            outcome: outcome(),
+        })
+        .collect()
+}
+
+impl fmt::Debug for Staged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Staged")
+            .field("revision", &self.seated.revision)
+            .finish_non_exhaustive()
+    }
+}
