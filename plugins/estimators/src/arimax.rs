@@ -158,7 +158,7 @@ mod tests {
         };
         let (told, given) = (fit(Differences::Told), fit(Differences::Given(0)));
         assert_eq!((told.model.differences, told.rows), (0, given.rows));
-        assert_eq!(told.residual_sum_of_squares, given.residual_sum_of_squares);
+        assert_eq!(told.squared_errors, given.squared_errors);
     }
 
     #[test]

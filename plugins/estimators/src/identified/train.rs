@@ -43,8 +43,9 @@ pub(crate) struct Found {
     pub(crate) model: Polynomials,
     /// The standard errors of its coefficients, where they are known; of a polynomial that has none, an empty list.
     pub(crate) errors: Option<Polynomials>,
-    pub(crate) residual_sum_of_squares: f64,
-    /// How many residuals are in it.
+    /// The sum of their squares.
+    pub(crate) squared_errors: f64,
+    /// How many are in it.
     pub(crate) rows: usize,
     /// The variance of an innovation.
     pub(crate) variance: f64,
@@ -174,7 +175,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         let truths = self.rows.iter().map(|row| row.truth);
         tell_rows(&self.names, &self.regressors, truths, report);
         pace.tell(report);
-        report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
+        report.in_sample_rmse = Some((found.squared_errors / found.rows as f64).sqrt());
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
         Ok(Identified {
@@ -222,13 +223,13 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
+        fit.squared_errors *= spread * spread;
         for beginning in &mut fit.beginnings {
             beginning.times *= spread;
             beginning.square *= spread * spread;
         }
         tell_pieces(samples, &fit.model, report);
-        let pieces = samples.records().count();
-        tell_starts(pieces, fit.starts, fit.rows, report);
+        tell_starts(samples.pieces(), fit.starts, fit.rows, report);
         report.figure("converged", fit.converged);
         report.figure("steps_of_search", fit.steps);
         if !fit.converged {
@@ -238,7 +239,7 @@ impl Identify for Asked {
             ));
         }
         Ok(Found {
-            residual_sum_of_squares: fit.residual_sum_of_squares,
+            squared_errors: fit.squared_errors,
             rows: fit.rows,
             variance: fit.variance(),
             beginnings: fit.beginnings,
@@ -266,19 +267,24 @@ impl Asked {
             && self.order.is_none()
         {
             return self
-                .search(orders, self.penalty)
+                .search(orders, self.penalty, 0)
                 .fit(orders, samples, 0)
                 .map_err(|error| unfit(error, samples));
         }
         let firsts = candidates.iter().map(|(_, orders)| orders.first());
         let first = firsts.max().unwrap_or(0);
+        let measured = candidates.iter().map(|(_, orders)| orders.measured());
+        let measured = measured.max().unwrap_or(0);
         let mut tried = Vec::new();
         let mut fits = Vec::new();
         let mut failed = None;
         // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
         for (candidate, orders) in candidates {
             let coefficients = orders.coefficients();
-            match self.search(&orders, 0.0).fit(&orders, samples, first) {
+            match self
+                .search(&orders, 0.0, measured)
+                .fit(&orders, samples, first)
+            {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     tried.push(Tried {
@@ -296,14 +302,15 @@ impl Asked {
                 Err(error) => failed = Some(error),
             }
         }
-        let rows = samples.counted(first);
+        let rows = samples.counted(first, measured);
         let best = order.best(rows, tried, report).map_err(|too_few| {
             let error = failed.unwrap_or(too_few);
             unfit(error, samples)
         })?;
         let (fit, orders) = fits.swap_remove(best);
         let penalised = self.penalty > 0.0 && !orders.inputs.is_empty();
-        if !penalised && orders.first() == first {
+        let as_compared = samples.missing() == 0 || orders.measured() == measured;
+        if !penalised && orders.first() == first && as_compared {
             return Ok(fit);
         }
         if penalised {
@@ -313,17 +320,18 @@ impl Asked {
             );
         }
         // On all rows that it has a past for, and not only on those on which it was compared.
-        let search = self.search(&orders, self.penalty);
+        let search = self.search(&orders, self.penalty, 0);
         let fit = search.fit(&orders, samples, 0);
         fit.map_err(|error| unfit(error, samples))
     }
 
-    fn search(&self, orders: &Orders, penalty: f64) -> PredictionError {
+    fn search(&self, orders: &Orders, penalty: f64, measured: usize) -> PredictionError {
         let most = MOST_WORK / orders.coefficients().max(1);
         PredictionError {
             penalty,
             most_steps: most.clamp(20, 100),
             start_spread: START_SPREAD,
+            measured,
         }
     }
 
@@ -350,7 +358,7 @@ const SHORT_PIECE: usize = 50;
 
 /// Tells of pieces that are too short for filters and for a model of the noise.
 fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingReport) {
-    let pieces = samples.records().count();
+    let pieces = samples.pieces();
     let length = samples.count() / pieces.max(1);
     let filtered = model.inputs.iter().any(|input| !input.f.is_empty());
     let has_c = !model.c.is_empty();
@@ -405,7 +413,7 @@ fn unfit(error: NumericsError, samples: &Samples) -> TrainingError {
             reason: format!(
                 "{found} of {} rows have all the past that these orders look back on, and at least {needed} are needed: \
                  smaller orders, or more rows without gaps, would help",
-                samples.counted(0)
+                samples.counted(0, 0)
             ),
         },
         error => told(error),
