@@ -149,6 +149,7 @@ impl Estimator for Rls {
                 TruthLags::None
             },
             every_tick: lagged,
+            ..Regressors::default()
         }
     }
 

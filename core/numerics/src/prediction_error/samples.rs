@@ -161,6 +161,14 @@ impl Samples {
         })
     }
 
+    /// The inputs of each sample, and its value unless that is missing.
+    pub fn all(&self) -> impl Iterator<Item = (&[f64], Option<f64>)> {
+        (0..self.values.len()).map(|at| {
+            let known = self.is_complete(&(at..at + 1)).then(|| self.values[at]);
+            (&self.inputs[at * self.width..(at + 1) * self.width], known)
+        })
+    }
+
     /// How many segments there are.
     #[must_use]
     pub fn pieces(&self) -> usize {
