@@ -144,9 +144,10 @@ impl Rows {
                         continue;
                     }
                     if let (Some(last), true) = (last, steps >= 1.5) {
-                        let room = |of: &Bridges| of.missing.saturating_sub(samples.missing());
+                        let lacking = steps.round() as usize - 1;
                         let bridged = bridges.is_some_and(|of| {
-                            steps < MOST_STEPS.min(room(&of) as i64 + 2) as f64
+                            samples.missing().saturating_add(lacking) <= of.missing
+                                && steps < MOST_STEPS as f64
                                 && self.seen(last, nth, pace.step, of.unseen)
                         });
                         if bridged {
@@ -336,7 +337,7 @@ mod tests {
         };
         let room = |missing| Some(Bridges { unseen: 1, missing });
         assert_eq!(pieces(room(10)), (1, 2));
-        assert_eq!(pieces(room(1)), (3, 0));
+        assert_eq!(pieces(room(1)), (2, 1));
         assert_eq!(pieces(None), (3, 0));
     }
 }

@@ -209,6 +209,7 @@ impl Identify for Asked {
             beginning.times *= spread;
             beginning.square *= spread * spread;
         }
+        tell_missing(samples, report);
         tell_pieces(samples, &fit.model, report);
         tell_starts(samples.pieces(), fit.starts, fit.rows, report);
         report.figure("converged", fit.converged);
@@ -333,6 +334,19 @@ impl Asked {
 /// truths that are fitted are in. That of filters that do not go along is at most 1; twice the square leaves room for some that do,
 /// and none for filters that are large and cancel out.
 const START_SPREAD: f64 = std::f64::consts::SQRT_2;
+
+/// Tells of samples through which a model goes without a truth.
+fn tell_missing(samples: &Samples, report: &mut TrainingReport) {
+    let (missing, all) = (samples.missing(), samples.missing() + samples.count());
+    if missing == 0 {
+        return;
+    }
+    report.figure("missing_truths", missing);
+    report.figure("samples", all);
+    report.notes.push(format!(
+        "at {missing} of its samples the truth is missing, {all} in all: the model is followed through them, as while it runs"
+    ));
+}
 
 /// In pieces of fewer samples on average, polynomials are found less exactly than the theory says.
 const SHORT_PIECE: usize = 50;
