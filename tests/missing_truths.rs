@@ -1,5 +1,7 @@
 //! Identified models of a log in which truths are missing here and there.
 
+#![allow(clippy::unwrap_used)]
+
 mod workbench;
 
 use std::sync::Arc;
