@@ -17,8 +17,8 @@ use super::starts::{OVER, Start, left_of_start};
 use super::stepper::{product, push};
 use super::{Polynomials, Samples};
 
-/// How far a coefficient of the noise is moved to either side to see what changes with it.
-const BESIDE: f64 = 1e-5;
+/// How far a coefficient of the noise is moved to see what changes with it, about where rounding and curvature count the same.
+const BESIDE: f64 = 1e-7;
 
 /// A model in a segment of which values are missing.
 pub(super) struct Gapped<'a> {
@@ -266,16 +266,14 @@ impl<'a> Gapped<'a> {
         let flat = model.flat();
         for column in of_noise {
             let step = BESIDE * flat[column].abs().max(1.0);
-            let beside = |by: f64| {
-                let mut flat = flat.clone();
-                flat[column] += by;
-                self.errors_of(&Gains::new(&model.with(&flat), values), &explained)
-            };
-            let both = beside(step).into_iter().zip(beside(-step));
-            for (row, (above, below)) in both.enumerate() {
-                let slope = |above: f64, below: f64| (above - below) / (2.0 * step);
-                slopes.scaled[(row, column)] = slope(above.scaled, below.scaled);
-                slopes.log_variance[(row, column)] = slope(above.log_variance, below.log_variance);
+            let mut moved = flat.clone();
+            moved[column] += step;
+            let gains = Gains::new(&model.with(&moved), values);
+            let beside = self.errors_of(&gains, &explained);
+            for (row, (at, beside)) in slopes.errors.iter().zip(beside).enumerate() {
+                let slope = |at: f64, beside: f64| (beside - at) / step;
+                slopes.scaled[(row, column)] = slope(at.scaled, beside.scaled);
+                slopes.log_variance[(row, column)] = slope(at.log_variance, beside.log_variance);
             }
         }
         slopes
