@@ -12,23 +12,24 @@ use crate::order::Order;
 ///
 /// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999, section
 /// 4.2). Without features it is ARIMA. The sum of squared one-step prediction errors is made least by damped Gauss–Newton
-/// steps with exact derivatives, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C`
-/// stay inside the unit circle.
+/// steps, starting where Hannan and Rissanen (1982) end on the differences; roots of `A` and `C` stay inside the unit
+/// circle.
 ///
 /// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is told
 /// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 tell the order).
 ///
-/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
-/// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
-/// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts
-/// as so many steps, rounded; what those that are missing were is told from the truths that follow too, as in a Kalman
-/// filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and predicts as many
-/// steps ahead of the newest as there are. Where truths or rows are missing in the fit, the filters start again. A segment
-/// begins with its first truth, as if that and the features had always been what they are, and so does what comes after
-/// more steps without features than ten, or than the model reaches back where that is more; with `learn = false` it stays
-/// at rest. The port `deviation` is the standard deviation of the truth about its prediction, larger after truths that are
-/// missing. Features that are missing are taken for the last ones, and what that adds to the error is not in it. Since the
-/// answer changes with time alone, the node runs at every tick.
+/// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
+/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
+/// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
+/// counts as so many steps, rounded; what those that are missing were is told from the truths that follow too, as in a
+/// Kalman filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and predicts as
+/// many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its limits, the model
+/// is followed through them in the same way: errors count in their variance, as the likelihood has it. A segment begins
+/// with its first truth, as if that and the features had always been what they are, and so does, in the fit too, what
+/// comes after more steps without features than ten, or than the model reaches back where that is more; with
+/// `learn = false` it stays at rest. The port `deviation` is the standard deviation of the truth about its prediction, larger
+/// after truths that are missing. Features that are missing are taken for the last ones, and what that adds to the error
+/// is not in it. Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arimax {
@@ -158,7 +159,7 @@ mod tests {
         };
         let (told, given) = (fit(Differences::Told), fit(Differences::Given(0)));
         assert_eq!((told.model.differences, told.rows), (0, given.rows));
-        assert_eq!(told.residual_sum_of_squares, given.residual_sum_of_squares);
+        assert_eq!(told.squared_errors, given.squared_errors);
     }
 
     #[test]

@@ -65,6 +65,7 @@ impl Estimator for Arx {
             feature_lags: self.feature_lags.clone(),
             truth_lags: TruthLags::At(self.lags.clone()),
             every_tick: true,
+            ..Regressors::default()
         }
     }
 

@@ -11,10 +11,10 @@ use crate::order::Order;
 /// Box–Jenkins: what the features bring about, and noise that has filters of its own.
 ///
 /// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + C(q)/D(q) e` (Box and Jenkins 1970; Ljung 1999, section 4.2). The sum of
-/// squared one-step prediction errors is made least by damped Gauss–Newton steps with exact derivatives, starting where
-/// Steiglitz and McBride (1965) end for the features and Hannan and Rissanen (1982) for the noise; where several features
-/// have filters, one of them of more than one pole, from other starts too, among them the best model with shorter filters,
-/// and the best end is kept. Roots of each `F`, `C` and `D` stay inside the unit circle.
+/// squared one-step prediction errors is made least by damped Gauss–Newton steps, starting where Steiglitz and McBride
+/// (1965) end for the features and Hannan and Rissanen (1982) for the noise; where several features have filters, one of
+/// them of more than one pole, from other starts too, among them the best model with shorter filters, and the best end is
+/// kept. Roots of each `F`, `C` and `D` stay inside the unit circle.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
 /// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
@@ -23,15 +23,17 @@ use crate::order::Order;
 /// filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and predicts as many
 /// steps ahead of the newest as there are.
 ///
-/// Where truths or rows are missing in the fit, the filters start again: what those of the features gave before is found
-/// for each piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it, and counts as found in
-/// criteria and errors; the noise begins without a past. Running, a segment begins with its first truth, as if that and the
-/// features had always been what they are; what they do not explain of it the filters and the noise share by how much each
-/// varies. So does what comes after more steps without features than ten, or than the
-/// model reaches back where that is more; with `learn = false` it stays at rest. The port `deviation` is the standard
-/// deviation of the truth about its prediction, larger after truths that are missing. Features that are missing are taken
-/// for the last ones; what that adds to the error is not in it, nor what the filters may be off by at the beginning of a
-/// segment. Since the answer changes with time alone, the node runs at every tick.
+/// Where truths are missing in the fit, or outside of its limits, the model is followed through them in the same way:
+/// errors count in their variance, as the likelihood has it. After more steps without features than ten, or than the
+/// model reaches back where that is more, as in each segment, the filters start again: what those of the features gave
+/// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
+/// and counts as found in criteria and errors; the noise begins without a past. Running, a segment begins with its first
+/// truth, as if that and the features had always been what they are; what they do not explain of it the filters and the
+/// noise share by how much each varies. So does what comes after as many steps without features; with `learn = false` it
+/// stays at rest. The port `deviation` is the standard deviation of the truth about its prediction, larger after truths
+/// that are missing. Features that are missing are taken for the last ones; what that adds to the error is not in it, nor
+/// what the filters may be off by at the beginning of a segment. Since the answer changes with time alone, the node runs
+/// at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bj {

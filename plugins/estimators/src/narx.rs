@@ -78,6 +78,7 @@ impl Estimator for Narx {
             feature_lags: self.feature_lags.clone(),
             truth_lags: TruthLags::At(self.lags.clone()),
             every_tick: true,
+            ..Regressors::default()
         }
     }
 

@@ -21,14 +21,15 @@ use crate::order::Order;
 /// series of its own, which are fitted together and followed side by side. The time between two truths of a series counts
 /// as so many steps, rounded. Running, it goes on by the features alone.
 ///
-/// Where truths or rows are missing in the fit, the filters start again: what they gave before is found for each piece
-/// beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it, and counts as found in criteria and
-/// errors. Running, a segment begins at rest, as if the features had always been what they are first, until the first
-/// truth says where the filters are: each has its share of what that differs by, which dies away. So does what comes after
-/// more steps without features than ten, or than the model reaches back where that is more. With `learn = false` it stays
-/// at rest. The port `deviation` is the standard deviation of the truth about its prediction. Features that are missing are
-/// taken for the last ones; what that adds to the error is not in it, nor what the filters may be off by at the beginning of
-/// a segment. Since the answer changes with time alone, the node runs at every tick.
+/// Where truths are missing in the fit, or outside of its limits, the filters go on. After more steps without features
+/// than ten, or than the model reaches back where that is more, as in each segment, they start again: what they gave
+/// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
+/// and counts as found in criteria and errors. Running, a segment begins at rest, as if the features had always been what
+/// they are first, until the first truth says where the filters are: each has its share of what that differs by, which
+/// dies away. So does what comes after as many steps without features. With `learn = false` it stays at rest. The port
+/// `deviation` is the standard deviation of the truth about its prediction. Features that are missing are taken for the
+/// last ones; what that adds to the error is not in it, nor what the filters may be off by at the beginning of a segment.
+/// Since the answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Oe {

@@ -150,6 +150,7 @@ impl Estimator for Rls {
                 TruthLags::None
             },
             every_tick: lagged,
+            ..Regressors::default()
         }
     }
 

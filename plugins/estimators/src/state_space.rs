@@ -332,7 +332,7 @@ impl Identify for StateSpace {
         let left = rows.saturating_sub(coefficients).max(1);
         Ok(Found {
             beginnings: Vec::new(),
-            residual_sum_of_squares: squares * scale * scale,
+            squared_errors: squares * scale * scale,
             rows,
             variance: squares * scale * scale / left as f64,
             errors: None,

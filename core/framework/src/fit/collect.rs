@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::between::Between;
 use super::candidates::Validity;
 use super::report::Dropped;
 use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
 use crate::engine::{Engine, Pairing};
-use crate::node::TrainingError;
+use crate::node::{Role, Runs, TrainingError};
 use crate::recording::Event;
 use crate::time::Instant;
 
@@ -53,8 +54,9 @@ struct Tap {
     width: usize,
     kept: Vec<f64>,
     last_kept: Option<u64>,
-    /// Whether there was any run.
+    /// Whether there was any run, and one in this tick.
     ran: bool,
+    runs: bool,
 }
 
 /// The examples of one estimator.
@@ -70,9 +72,20 @@ pub(super) struct Trainee {
     truths: Vec<(Instant, f64)>,
     /// For each example and tap, the number of the kept row.
     rows: Vec<u32>,
+    /// The runs between truths, of a trainer that asks for them.
+    between: Option<Between>,
+    kept_between: KeptBetween,
     /// The first example of each segment after the first.
     breaks: Vec<usize>,
     segment_pending: bool,
+}
+
+/// Runs between truths that are kept.
+#[derive(Default)]
+struct KeptBetween {
+    /// The example that each comes before, and what it predicts.
+    runs: Vec<(usize, Instant)>,
+    rows: Vec<f64>,
 }
 
 /// Collects the examples of several estimators while an engine is driven.
@@ -81,6 +94,8 @@ pub(super) struct Collector {
     pub(super) trainees: Vec<Trainee>,
     memory: usize,
     bytes: usize,
+    /// Set once runs between truths no longer fit beside the rows: there are none from then on.
+    without_runs: bool,
     /// Set once rows no longer fit: from then on they are only counted.
     pub(super) overflowed: bool,
     tick: u64,
@@ -91,6 +106,7 @@ pub(super) struct Collector {
 /// Takes the examples of one estimator, in order.
 pub(super) trait Sink {
     fn row<'a>(&mut self, at: Instant, parts: impl Iterator<Item = &'a [f64]> + Clone, truth: f64);
+    fn run(&mut self, of: Instant, row: &[f64]);
     fn segment(&mut self);
 }
 
@@ -123,14 +139,25 @@ impl Collector {
                         kept: Vec::new(),
                         last_kept: None,
                         ran: false,
+                        runs: false,
                     });
                     taps.len() - 1
                 })
+            };
+            let wanted = match plan.nodes[node].spec.role() {
+                Role::Estimator(estimator) => estimator.regressors().runs,
+                Role::Feature(_) | Role::Combiner(_) => Runs::OfTruths,
+            };
+            let between = match wanted {
+                Runs::OfTruths => None,
+                Runs::BetweenTruths { every } => Some(Between::new(every, regressors.len())),
             };
             trainees.push(Trainee {
                 node,
                 link: truth,
                 limits: training,
+                between,
+                kept_between: KeptBetween::default(),
                 taps: gathers.iter().map(shared).collect(),
                 validity: Validity::new(regressors.len()),
                 dropped: Dropped::default(),
@@ -145,6 +172,7 @@ impl Collector {
             trainees,
             memory,
             bytes: 0,
+            without_runs: false,
             overflowed: false,
             tick: 0,
             silent: measured(plan),
@@ -172,13 +200,17 @@ impl Collector {
         self.silent.retain(|&slot| engine.value(slot).is_nan());
         for tap in &mut self.taps {
             let fresh = |&gather: &usize| engine.gathered(gather).1;
-            if tap.triggers.is_empty() || tap.triggers.iter().any(fresh) {
+            tap.runs = tap.triggers.is_empty() || tap.triggers.iter().any(fresh);
+            if tap.runs {
                 tap.pairing.run(now, [engine.gathered(tap.gather).0]);
                 tap.ran = true;
             }
         }
         let tick = self.tick;
         self.tick += 1;
+        if share.contains(tick) {
+            self.run(engine, now);
+        }
         for index in 0..self.trainees.len() {
             let slot = self.trainees[index].link.slot;
             let truth = engine.value(slot);
@@ -199,10 +231,28 @@ impl Collector {
                 if std::mem::take(&mut trainee.segment_pending) {
                     live[index].segment();
                 }
+                if let Some(between) = &mut trainee.between {
+                    between.truth(now, |of, row| live[index].run(of, row));
+                }
                 let parts = trainee.taps.iter().map(|&tap| taps[tap].pairing.last());
                 live[index].row(now, parts, truth);
             } else {
                 self.keep(index, now, truth);
+            }
+        }
+    }
+
+    /// Takes the runs of this tick for the trainers that ask for those between truths.
+    fn run(&mut self, engine: &Engine, now: Instant) {
+        let taps = &self.taps;
+        for trainee in &mut self.trainees {
+            let Some(between) = &mut trainee.between else {
+                continue;
+            };
+            if trainee.taps.iter().all(|&tap| taps[tap].runs) {
+                let parts = trainee.taps.iter();
+                let parts = parts.map(|&tap| engine.gathered(taps[tap].gather).0);
+                between.run(now + trainee.link.ahead, parts);
             }
         }
     }
@@ -239,9 +289,16 @@ impl Collector {
         let trainee = &self.trainees[index];
         let mut breaks = trainee.breaks.iter().peekable();
         let width = trainee.taps.len();
+        let KeptBetween { runs, rows } = &trainee.kept_between;
+        let of_run = rows.len() / runs.len().max(1);
+        let mut between = runs.iter().zip(0..).peekable();
         for (example, &(at, truth)) in trainee.truths.iter().enumerate() {
             while breaks.next_if(|&&at| at <= example).is_some() {
                 sink.segment();
+            }
+            while let Some((&(_, of), nth)) = between.next_if(|((before, _), _)| *before <= example)
+            {
+                sink.run(of, &rows[nth * of_run..(nth + 1) * of_run]);
             }
             let rows = &trainee.rows[example * width..(example + 1) * width];
             let parts = trainee.taps.iter().zip(rows).map(|(&tap, &row)| {
@@ -264,6 +321,17 @@ impl Collector {
         if std::mem::take(&mut trainee.segment_pending) {
             trainee.breaks.push(trainee.truths.len());
         }
+        if let Some(between) = &mut trainee.between {
+            let (kept, example) = (&mut trainee.kept_between, trainee.truths.len());
+            let without = self.without_runs;
+            between.truth(at, |of, row| {
+                if !without {
+                    kept.runs.push((example, of));
+                    kept.rows.extend_from_slice(row);
+                    self.bytes += size_of::<(usize, Instant)>() + size_of_val(row);
+                }
+            });
+        }
         trainee.truths.push((at, truth));
         self.bytes += size_of::<(Instant, f64)>();
         for &tap in &trainee.taps {
@@ -280,7 +348,19 @@ impl Collector {
             self.bytes += size_of::<u32>();
         }
         if self.bytes > self.memory {
+            self.forget_runs();
+        }
+        if self.bytes > self.memory {
             self.overflow();
+        }
+    }
+
+    /// Lets go of the runs between truths, which are not to take the room of rows.
+    fn forget_runs(&mut self) {
+        self.without_runs = true;
+        for trainee in &mut self.trainees {
+            let KeptBetween { runs, rows } = std::mem::take(&mut trainee.kept_between);
+            self.bytes -= size_of_val(&runs[..]) + size_of_val(&rows[..]);
         }
     }
 
@@ -302,6 +382,9 @@ impl Collector {
         }
         for trainee in &mut self.trainees {
             trainee.segment_pending = true;
+            if let Some(between) = &mut trainee.between {
+                between.segment();
+            }
         }
     }
 }

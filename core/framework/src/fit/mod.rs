@@ -1,6 +1,7 @@
 //! Decides how the estimators of a plan are trained on a recording: which rows they see, in which passes; not how an
 //! estimator learns.
 
+mod between;
 mod candidates;
 mod collect;
 mod doubt;

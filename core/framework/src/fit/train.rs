@@ -81,6 +81,15 @@ impl Sink for Making {
         }
     }
 
+    fn run(&mut self, of: Instant, row: &[f64]) {
+        self.row.clear();
+        self.row
+            .extend(self.kept.iter().map(|&candidate| row[candidate]));
+        if !self.row.iter().any(|value| value.is_nan()) {
+            self.trainer.run_at(of, &self.row);
+        }
+    }
+
     fn segment(&mut self) {
         self.trainer.segment();
     }

@@ -150,6 +150,23 @@ pub struct Regressors {
     pub truth_lags: TruthLags,
     /// Whether the answer changes with time alone, so that the node runs at every tick.
     pub every_tick: bool,
+    /// Which runs its trainer is told of.
+    pub runs: Runs,
+}
+
+/// Which runs a trainer is told of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Runs {
+    /// Those that truths belong to, as rows.
+    #[default]
+    OfTruths,
+    /// Also those between two rows that are further apart than usual, for trainers that follow the regressors where a truth is
+    /// missing: see [`Trainer::run_at`].
+    BetweenTruths {
+        /// How far apart truths are wanted; without it, or where they come more often, the typical distance of the last ones is
+        /// usual.
+        every: Option<Duration>,
+    },
 }
 
 /// The lags at which the truth is a regressor.
@@ -211,6 +228,14 @@ pub trait Trainer: Send {
     fn row_at(&mut self, _at: Instant, regressors: &[f64], truth: f64) {
         self.row(regressors, truth);
     }
+
+    /// A run between the last row and the next: its regressors, all of them present, and the instant whose truth it predicts, from
+    /// which nothing is learned. That truth has not been measured, lies outside of the limits of the fit, or never comes.
+    ///
+    /// Only trainers are told that ask for it ([`Runs::BetweenTruths`]), and only where rows are further apart than usual: of the
+    /// runs between them, some in each such distance. Nothing is told of the part of the data that a fold leaves out, nor where
+    /// rows alone fill the memory of the fit.
+    fn run_at(&mut self, _of: Instant, _regressors: &[f64]) {}
 
     /// The next row belongs to another segment of the data.
     fn segment(&mut self) {}

@@ -28,7 +28,7 @@ pub use combiner::{Combine, Combiner, Evidence, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, OrderFigure, OrderTable, Predictor, Regressor, Regressors,
+    CandidateScore, Estimator, OrderFigure, OrderTable, Predictor, Regressor, Regressors, Runs,
     SelectionStep, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};

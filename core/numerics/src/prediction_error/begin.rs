@@ -76,13 +76,22 @@ impl PredictionError {
             models.extend(self.with_shorter_filters(orders, samples, first, radius, most));
         }
         if orders.starts() > 0 && self.start_spread.is_finite() {
-            return self.roughly(models, samples, first, radius, most);
+            let counted = self.counted(orders, first);
+            return self.roughly(models, samples, &counted, radius, most);
         }
         Ok(Led {
-            counted: Counted::from(first),
+            counted: self.counted(orders, first),
             models,
             steps: 0,
         })
+    }
+
+    /// What counts in a search of which nothing is known of starts.
+    fn counted(&self, orders: &Orders, first: usize) -> Counted {
+        Counted {
+            measured: self.measured.max(orders.measured()),
+            ..Counted::from(first)
+        }
     }
 
     /// The best model whose longest filters have a coefficient less, which is 0: no search that begins there errs more.
@@ -118,22 +127,22 @@ impl PredictionError {
         &self,
         begin: Vec<Polynomials>,
         samples: &Samples,
-        first: usize,
+        unknown: &Counted,
         radius: f64,
         most: usize,
     ) -> Result<Led, NumericsError> {
-        let rows = samples.counted(first) as f64;
+        let rows = samples.counted(unknown.first, unknown.measured) as f64;
         let most_squares = self.start_spread * self.start_spread;
         // Squares that are together more than may be are all as much smaller.
         let counts = |sum: f64, squares: &[f64]| {
             let scale = (most_squares / squares.iter().sum::<f64>()).min(1.0);
             let of = |square: &f64| sum / rows / (scale * square).max(LEAST_SQUARE);
             Counted {
-                first,
                 starts: squares.iter().map(of).collect(),
+                ..unknown.clone()
             }
         };
-        let free = |model: &Polynomials| Left::by(model, samples, &Counted::from(first)).squares;
+        let free = |model: &Polynomials| Left::by(model, samples, unknown).innovations();
         let least = begin.iter().map(free).fold(f64::INFINITY, f64::min);
         let starts = begin.first().map_or(0, Polynomials::starts);
         let counted = counts(least, &vec![most_squares; starts]);
@@ -141,7 +150,7 @@ impl PredictionError {
         let Judged { model, left, .. } = &ends[0];
         let squares = off_rest(model, samples, &left.starts);
         Ok(Led {
-            counted: counts(left.sum(), &squares),
+            counted: counts(left.sum() / left.mean, &squares),
             steps,
             models: ends.into_iter().map(|end| end.model).collect(),
         })

@@ -18,7 +18,7 @@ pub(super) fn starts(
     penalty: f64,
     radius: f64,
 ) -> Result<Vec<Polynomials>, NumericsError> {
-    let mut differenced = samples.clone();
+    let mut differenced = samples.filled();
     for _ in 0..orders.differences {
         differenced = differenced.differenced();
     }

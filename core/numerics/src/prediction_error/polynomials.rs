@@ -51,6 +51,12 @@ impl Orders {
         reaches.max().unwrap_or(0).max(self.na) + self.nd + self.differences
     }
 
+    /// How many values directly before a residual must be known so that nothing that it needs is in doubt.
+    #[must_use]
+    pub fn measured(&self) -> usize {
+        self.na + self.nd + self.differences
+    }
+
     /// How many values that filters gave before a segment have to be found.
     #[must_use]
     pub fn starts(&self) -> usize {

@@ -14,7 +14,7 @@ const SHARE: f64 = 1e-3;
 impl PredictionError {
     /// The standard errors of all coefficients that this search found in these samples, each in the place of its coefficient:
     /// `s √((JᵀJ)⁻¹)_ii` with the Jacobian `J` of the residuals and their variance `s²` (Ljung 1999, eq. 9.17 and 9.18); with a
-    /// penalty those of the posterior, as in ridge.
+    /// penalty those of the posterior, as in ridge. Where values are missing, what variances of predictions tell is in it.
     ///
     /// A polynomial that only the bound of stability holds where it is has none, and its list is empty: the theory is that of a
     /// minimum, which there lies outside. Those of the others are told as if it were known. None at all where the samples do
@@ -27,6 +27,7 @@ impl PredictionError {
     ) -> Option<Polynomials> {
         let counted = Counted {
             first: fit.first,
+            measured: fit.measured,
             starts: fit.start_counts.clone(),
         };
         let at = self.judged(fit.model.clone(), samples, &counted);
@@ -41,7 +42,7 @@ impl PredictionError {
         let mut errors = vec![f64::NAN; held.len()];
         for (i, &place) in free.iter().enumerate() {
             let square = root.col(i).squared_norm_l2();
-            errors[place] = (fit.variance() * square).sqrt() / scale(i);
+            errors[place] = (fit.variance() * fit.variance_ratio * square).sqrt() / scale(i);
         }
         let known = free.iter().all(|&place| errors[place].is_finite());
         known.then(|| without_held(fit.model.with(&errors)))

@@ -3,9 +3,11 @@
 //!
 //! What the noise was before a segment begins, and that was not foreseen, is taken to be 0.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::brought::Brought;
+use super::missing::Gapped;
 use super::polynomials::back;
 use super::ring::Ring;
 use super::starts::{FreeResponses, Start};
@@ -13,8 +15,8 @@ use super::{Orders, Polynomials, Samples};
 
 /// A model in a segment of samples.
 pub(super) struct Segment<'a> {
-    model: &'a Polynomials,
-    values: Vec<f64>,
+    pub(super) model: &'a Polynomials,
+    pub(super) values: Vec<f64>,
     pub(super) inputs: Vec<Vec<f64>>,
     counted: &'a Counted,
 }
@@ -24,6 +26,8 @@ pub(super) struct Segment<'a> {
 pub(super) struct Counted {
     /// The residuals of a segment before are not counted.
     pub(super) first: usize,
+    /// Where values of it are missing, nor are those before which not so many in a row are known.
+    pub(super) measured: usize,
     /// What the squares of the values of a start count; nothing where there are none.
     pub(super) starts: Vec<f64>,
 }
@@ -33,6 +37,7 @@ impl Counted {
     pub(super) fn from(first: usize) -> Self {
         Self {
             first,
+            measured: 0,
             starts: Vec::new(),
         }
     }
@@ -148,39 +153,79 @@ impl<'a> Segment<'a> {
 /// What a model leaves, wherever its filters begin.
 #[derive(Debug)]
 pub(super) struct Left {
-    /// The residuals that are counted, by segment.
+    /// The residuals that are counted, by segment. Where values are missing, each is in the standard deviation of its prediction,
+    /// times the root of `mean`.
     pub(super) residuals: Vec<Vec<f64>>,
     pub(super) starts: Vec<Start>,
-    pub(super) free: FreeResponses,
+    /// Of the segments of which no value is missing.
+    free: FreeResponses,
+    /// Of the others, by their number.
+    free_in_gapped: BTreeMap<usize, FreeResponses>,
     /// The sum of the squared residuals; infinite where it is not a number.
     pub(super) squares: f64,
     /// What the squares of the starts count.
-    of_starts: f64,
+    pub(super) of_starts: f64,
+    /// The geometric mean of the variances of predictions, in that of an innovation: 1 where no value is missing.
+    pub(super) mean: f64,
+    /// The sum of the squares of what predictions are off by.
+    pub(super) squared_errors: f64,
 }
 
 impl Left {
     pub(super) fn by(model: &Polynomials, samples: &Samples, counted: &Counted) -> Self {
         let free = FreeResponses::new(model, samples, counted);
         let (mut all, mut starts) = (Vec::new(), Vec::new());
+        let (mut free_in_gapped, mut log_variances) = (BTreeMap::new(), BTreeMap::new());
         let rest = vec![0.0; free.starts()];
-        for segment in samples.segments() {
-            let segment = Segment::new(model, samples, segment, counted);
-            let mut residuals = segment.residuals(&rest);
-            starts.push(free.begin(&mut residuals));
-            all.push(residuals);
+        for (nth, segment) in samples.segments().enumerate() {
+            if samples.is_complete(&segment) {
+                let segment = Segment::new(model, samples, segment, counted);
+                let mut residuals = segment.residuals(&rest);
+                starts.push(free.begin(&mut residuals));
+                all.push(residuals);
+            } else {
+                let gapped = Gapped::new(model, samples, segment, counted);
+                let errors = gapped.errors(&rest);
+                let mut residuals: Vec<f64> = errors.iter().map(|error| error.scaled).collect();
+                let own = FreeResponses::in_gapped(&gapped, residuals.len(), counted);
+                starts.push(own.begin(&mut residuals));
+                free_in_gapped.insert(nth, own);
+                let own = errors.iter().map(|error| error.log_variance);
+                log_variances.insert(nth, own.collect::<Vec<f64>>());
+                all.push(residuals);
+            }
         }
         let squares =
             |values: &mut dyn Iterator<Item = &f64>| values.map(|value| value * value).sum::<f64>();
+        let (mut mean, mut squared_errors) = (1.0, None);
+        if samples.missing() > 0 {
+            let rows = all.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+            mean = (log_variances.values().flatten().sum::<f64>() / rows).exp();
+            let mut sum = 0.0;
+            for (nth, residuals) in all.iter().enumerate() {
+                let variances = log_variances.get(&nth).into_iter().flatten();
+                let variances = variances.map(|log| log.exp()).chain(std::iter::repeat(1.0));
+                let errors = residuals.iter().zip(variances);
+                sum += errors.map(|(error, of)| error * error * of).sum::<f64>();
+            }
+            squared_errors = Some(sum);
+            let scale = mean.sqrt();
+            all.iter_mut().flatten().for_each(|error| *error *= scale);
+        }
         let sum = squares(&mut all.iter().flatten());
+        let of_starts: f64 = starts
+            .iter()
+            .map(|start| start.counting(&counted.starts))
+            .sum();
         Self {
             squares: if sum.is_finite() { sum } else { f64::INFINITY },
-            of_starts: starts
-                .iter()
-                .map(|start| start.counting(&counted.starts))
-                .sum(),
+            of_starts: mean * of_starts,
+            squared_errors: squared_errors.unwrap_or(sum),
             residuals: all,
             starts,
             free,
+            free_in_gapped,
+            mean,
         }
     }
 
@@ -189,9 +234,19 @@ impl Left {
         self.squares + self.of_starts
     }
 
+    /// The sum of the squares, each over the variance of its prediction in that of an innovation.
+    pub(super) fn innovations(&self) -> f64 {
+        self.squares / self.mean
+    }
+
     /// How many starts the residuals tell.
     pub(super) fn told(&self) -> f64 {
         self.starts.iter().map(|start| start.told).sum()
+    }
+
+    /// What becomes of a start in the residuals of a segment.
+    pub(super) fn free(&self, segment: usize) -> &FreeResponses {
+        self.free_in_gapped.get(&segment).unwrap_or(&self.free)
     }
 }
 

@@ -5,6 +5,7 @@ use faer::{Mat, Side};
 
 use super::anywhere::{Beginning, beginnings};
 use super::begin::Begun;
+use super::missing::Weighted;
 use super::precision::held;
 use super::residuals::{Counted, Left, Segment, counted_from};
 use super::{Orders, Polynomials, Samples};
@@ -37,6 +38,9 @@ pub struct PredictionError {
     /// they are first, as a standard deviation above 0. Each is taken to be as far off as it is at samples anywhere, but that their
     /// squares are together no more than the square of this. Infinite where nothing is known of it.
     pub start_spread: f64,
+    /// Of a segment of which values are missing nothing is counted before so many of them in a row are known, or as many as the
+    /// model needs, whichever are more: models of several orders that are to be compared need the same.
+    pub measured: usize,
 }
 
 impl Default for PredictionError {
@@ -45,6 +49,7 @@ impl Default for PredictionError {
             penalty: 0.0,
             most_steps: 100,
             start_spread: f64::INFINITY,
+            measured: 0,
         }
     }
 }
@@ -54,12 +59,20 @@ impl Default for PredictionError {
 pub struct PredictionErrorFit {
     /// The model.
     pub model: Polynomials,
-    /// Without the penalty.
+    /// What was made least, without the penalty. Where values are missing that is the sum of squared prediction errors, each over
+    /// its variance in that of an innovation, times the geometric mean of these variances, and stands for the likelihood as the sum
+    /// of squares does elsewhere.
     pub residual_sum_of_squares: f64,
+    /// The sum of the squared prediction errors themselves: the same where nothing is missing.
+    pub squared_errors: f64,
+    /// The geometric mean of the variances of predictions, in that of an innovation: 1 where nothing is missing.
+    pub variance_ratio: f64,
     /// Residuals that were counted.
     pub rows: usize,
     /// How many samples of each segment were not.
     pub first: usize,
+    /// How many values in a row had to be known before.
+    pub measured: usize,
     /// How many values that filters gave before the segments were found beside the coefficients, as far as samples tell them.
     pub starts: usize,
     /// Where the filter of each input begins in a run; nothing where they are taken to be at rest.
@@ -78,7 +91,7 @@ impl PredictionErrorFit {
     pub fn variance(&self) -> f64 {
         let found = self.model.flat().len() + self.starts;
         let left = self.rows.saturating_sub(found).max(1);
-        self.residual_sum_of_squares / left as f64
+        self.residual_sum_of_squares / left as f64 / self.variance_ratio
     }
 }
 
@@ -114,10 +127,11 @@ impl PredictionError {
             });
         }
         let first = counted_from(orders, first);
-        let rows = samples.counted(first);
+        let measured = self.measured.max(orders.measured());
+        let rows = samples.counted(first, measured);
         // Of which nothing is known beforehand, samples must tell.
         let starts = if self.start_spread.is_infinite() {
-            samples.starts(orders, first)
+            samples.starts(orders, first, measured)
         } else {
             0
         };
@@ -138,10 +152,13 @@ impl PredictionError {
         let Judged { model, left, .. } = self.polished(found, samples, &counted, radius);
         Ok(PredictionErrorFit {
             residual_sum_of_squares: left.squares,
+            squared_errors: left.squared_errors,
+            variance_ratio: left.mean,
             beginnings: beginnings(&model, samples, &left.starts),
             model,
             rows,
             first,
+            measured,
             starts: left.told().round() as usize,
             start_counts: counted.starts,
             steps: before + steps,
@@ -159,7 +176,7 @@ impl PredictionError {
         let squares: f64 = b.filter(|(_, of_b)| *of_b).map(|(b, _)| b * b).sum();
         let left = Left::by(&model, samples, counted);
         Judged {
-            sum: left.sum() + self.penalty * squares,
+            sum: left.sum() + self.penalty * squares * left.mean,
             model,
             left,
         }
@@ -274,22 +291,27 @@ impl PredictionError {
         let flat = model.flat();
         let count = flat.len();
         let mut rows = GramBlocks::with_row_memory(count, 0);
-        let starts = left.free.starts();
+        let weighted = Weighted::new(model, samples, counted, &left.starts, left.mean);
         let mut followed = Mat::<f64>::zeros(count, count);
         for (nth, segment) in samples.segments().enumerate() {
             let segment = Segment::new(model, samples, segment, counted);
+            let (start, free) = (&left.starts[nth].values, left.free(nth));
             let residuals = left.residuals[nth].len();
-            let lasting = left.free.lasting(residuals);
-            let mut across = Mat::<f64>::zeros(count, starts);
+            let lasting = free.lasting(residuals);
+            let mut across = Mat::<f64>::zeros(count, free.starts());
             let mut row = 0;
-            segment.derivatives(&left.starts[nth].values, |residual, by| {
+            let take = |residual: f64, by: &[f64]| {
                 rows.push(by, residual);
                 if row < lasting {
-                    left.free.add_products(row, by, &mut across);
+                    free.add_products(row, by, &mut across);
                 }
                 row += 1;
-            });
-            if let Some(by_start) = left.free.followed(&across, residuals) {
+            };
+            match &weighted {
+                Some(weighted) => weighted.derivatives(nth, &segment, start, take),
+                None => segment.derivatives(start, take),
+            }
+            if let Some(by_start) = free.followed(&across, residuals) {
                 followed += by_start;
             }
         }
@@ -298,9 +320,15 @@ impl PredictionError {
         // The starts of the segments follow where the coefficients go.
         let mut hessian = moments.submatrix(0, 0, count, count) - followed;
         let of_b = model.penalised();
+        let penalty = self.penalty * left.mean;
         for i in (0..count).filter(|&i| of_b[i]) {
-            hessian[(i, i)] += self.penalty;
-            gradient[i] += self.penalty * flat[i];
+            hessian[(i, i)] += penalty;
+            gradient[i] += penalty * flat[i];
+        }
+        if let Some(weighted) = weighted {
+            let rows = left.residuals.iter().map(Vec::len).sum::<usize>().max(1);
+            let square = left.squares / rows as f64;
+            weighted.add(&mut hessian, &mut gradient, square, at.sum - left.squares);
         }
         (hessian, gradient)
     }

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 
 use faer::Mat;
 
+use super::missing::Gapped;
 use super::polynomials::back;
 use super::residuals::Counted;
 use super::{Polynomials, Samples};
 use crate::state_space::pseudo_inverse_above;
 
 /// What is left of 1 when nothing of it can be seen any more beside numbers about 1.
-const OVER: f64 = 1e-20;
+pub(super) const OVER: f64 = 1e-20;
 
 /// Of starts that lead to nearly the same, what is less than this share of all that they lead to is not told.
 const DISTINCT: f64 = 1e-8;
@@ -26,7 +27,7 @@ pub(super) struct Start {
     pub(super) told: f64,
 }
 
-/// What becomes of a start in the residuals of a segment: the same in all segments.
+/// What becomes of a start in the residuals of a segment: the same in all segments of which no value is missing.
 #[derive(Debug)]
 pub(super) struct FreeResponses {
     /// How the residuals, from the first that is counted until nothing is left of a start, change with each of its values.
@@ -60,6 +61,25 @@ impl FreeResponses {
             let of = |nth| free_response(model, f, nth, samples.longest(), counted);
             responses.extend((0..f.len()).map(of));
         }
+        let complete = samples
+            .segments()
+            .filter(|segment| samples.is_complete(segment));
+        let rows = complete.map(|segment| segment.len().saturating_sub(counted.begin(model)));
+        Self::of(&responses, rows, counted)
+    }
+
+    /// Those of a segment of which values are missing, of so many residuals.
+    pub(super) fn in_gapped(segment: &Gapped, residuals: usize, counted: &Counted) -> Self {
+        let responses = segment.free_responses();
+        Self::of(&responses, std::iter::once(residuals), counted)
+    }
+
+    /// Of what becomes of each value in the residuals, in segments of so many.
+    fn of(
+        responses: &[Vec<f64>],
+        residuals: impl Iterator<Item = usize>,
+        counted: &Counted,
+    ) -> Self {
         let longest = responses.iter().map(Vec::len).max().unwrap_or(0);
         let mut free = Self {
             derivatives: Mat::from_fn(longest, responses.len(), |row, nth| {
@@ -68,8 +88,8 @@ impl FreeResponses {
             told: BTreeMap::new(),
         };
         if free.starts() > 0 && counted.starts.iter().all(|of| of.is_finite()) {
-            for segment in samples.segments() {
-                let rows = free.lasting(segment.len().saturating_sub(counted.begin(model)));
+            for rows in residuals {
+                let rows = free.lasting(rows);
                 if !free.told.contains_key(&rows) {
                     free.told.insert(rows, free.told_by(rows, counted));
                 }
@@ -185,4 +205,18 @@ fn free_response(
     }
     residuals.drain(..counted.begin(model).min(residuals.len()));
     residuals
+}
+
+/// What is left in each sample of the `nth` value that a filter gave before a segment, until that is nothing.
+pub(super) fn left_of_start(f: &[f64], nth: usize, longest: usize) -> Vec<f64> {
+    // From the oldest of what the filter gave before the first sample.
+    let mut left = vec![0.0; f.len()];
+    left[f.len() - 1 - nth] = 1.0;
+    let mut quiet = 0;
+    while left.len() < f.len() + longest && quiet <= f.len() {
+        left.push(-back(f, &left));
+        let over = left[left.len() - 1].abs() < OVER;
+        quiet = if over { quiet + 1 } else { 0 };
+    }
+    left.split_off(f.len())
 }

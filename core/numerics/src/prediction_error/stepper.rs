@@ -1,13 +1,11 @@
 //! Decides what a model predicts from sample to sample, and what it makes of samples that are missing.
 
-mod doubt;
-
 use serde::{Deserialize, Serialize};
 
+use super::doubt::Doubt;
 use super::{Polynomials, Transfer};
 use crate::NumericsError;
 use crate::checks::check_length;
-use doubt::Doubt;
 
 /// A model, followed sample by sample. Nothing is allocated once it is built.
 ///
@@ -297,12 +295,12 @@ impl Stepper {
 }
 
 /// `Σ p_j x_j` over the first of both.
-fn product(polynomial: &[f64], past: &[f64]) -> f64 {
+pub(super) fn product(polynomial: &[f64], past: &[f64]) -> f64 {
     polynomial.iter().zip(past).map(|(p, x)| p * x).sum()
 }
 
 /// Puts a value before those of the past, and forgets the oldest.
-fn push(past: &mut [f64], value: f64) {
+pub(super) fn push(past: &mut [f64], value: f64) {
     if let Some(last) = past.len().checked_sub(1) {
         past.copy_within(..last, 1);
         past[0] = value;

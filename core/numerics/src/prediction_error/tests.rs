@@ -6,7 +6,7 @@ use super::*;
 use crate::draws::uniform as noise;
 
 /// What a model gives when it is fed noise, in two segments.
-fn simulated(model: &Polynomials, count: usize, spread: f64, seed: u64) -> Samples {
+pub(super) fn simulated(model: &Polynomials, count: usize, spread: f64, seed: u64) -> Samples {
     let mut samples = Samples::new(model.inputs.len());
     let (mut u, mut e) = (noise(seed), noise(seed + 1));
     for length in [count / 3, count - count / 3] {
@@ -35,7 +35,7 @@ fn transfer(delay: usize, b: &[f64], f: &[f64]) -> Transfer {
     }
 }
 
-fn orders(model: &Polynomials) -> Orders {
+pub(super) fn orders(model: &Polynomials) -> Orders {
     let inputs = model.inputs.iter().map(|of| InputOrders {
         nb: of.b.len(),
         nk: of.delay,
@@ -51,7 +51,7 @@ fn orders(model: &Polynomials) -> Orders {
 }
 
 /// A model of every kind.
-fn models() -> Vec<(&'static str, Polynomials)> {
+pub(super) fn models() -> Vec<(&'static str, Polynomials)> {
     let none = Polynomials {
         a: vec![],
         inputs: vec![],
@@ -134,8 +134,8 @@ fn derivatives_are_those_of_the_residuals() {
                 let mut row = 0;
                 segment.derivatives(start, |residual, by| {
                     let mut by_start = Mat::zeros(1, start.len());
-                    if row < left.free.lasting(usize::MAX) {
-                        left.free.add_products(row, &[1.0], &mut by_start);
+                    if row < left.free(0).lasting(usize::MAX) {
+                        left.free(0).add_products(row, &[1.0], &mut by_start);
                     }
                     let by_start = (0..start.len()).map(|nth| by_start[(0, nth)]);
                     all.push((
@@ -317,6 +317,7 @@ fn a_filter_at_the_edge_of_stability_leaves_the_others_their_best() {
     let at = fit.model.flat();
     let counted = Counted {
         first: fit.first,
+        measured: fit.measured,
         starts: fit.start_counts.clone(),
     };
     let least = search.judged(fit.model.clone(), &samples, &counted).sum;

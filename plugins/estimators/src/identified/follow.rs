@@ -19,7 +19,9 @@ pub(super) const MOST_SERIES: usize = 16;
 pub(super) const MOST_DIFFERENCES: usize = 2;
 /// After more steps than that without inputs a model begins anew, unless it reaches further back itself. A mode that hardly
 /// decays would go anywhere with inputs that stay as they last were.
-const UNSEEN: usize = 10;
+pub(super) const UNSEEN: usize = 10;
+/// Of what lies more steps back nothing is left.
+pub(super) const MOST_STEPS: i64 = 10_000;
 /// How many runs within a step are kept.
 const RUNS_PER_STEP: i64 = 16;
 
@@ -276,9 +278,7 @@ impl Known {
 
     /// How many steps lie between two instants.
     fn steps(&self, from: Instant, to: Instant) -> i64 {
-        let steps = ((to - from).secs() / self.step.secs()).round();
-        // More than that are forgotten anyway.
-        (steps as i64).clamp(1, 10_000)
+        steps(to - from, self.step)
     }
 
     /// The series whose newest sample is the newest that lies a step before an instant.
@@ -292,8 +292,14 @@ impl Known {
     }
 }
 
+/// How many steps a duration takes.
+pub(super) fn steps(of: Duration, step: Duration) -> i64 {
+    let steps = (of.secs() / step.secs()).round();
+    (steps as i64).clamp(1, MOST_STEPS)
+}
+
 /// So many parts of a duration.
-fn part(of: Duration, count: i64, parts: i64) -> Duration {
+pub(super) fn part(of: Duration, count: i64, parts: i64) -> Duration {
     let ns = i128::from(of.as_ns()) * i128::from(count) / i128::from(parts.max(1));
     Duration::from_ns(i64::try_from(ns).unwrap_or(i64::MAX))
 }
@@ -328,8 +334,8 @@ impl Learner for Following {
                 continue;
             }
             let steps = ((overdue - at).secs() / known.step.secs()) as i64;
-            if steps > 10_000 {
-                next = next + part(known.step, steps - 10_000, 1);
+            if steps > MOST_STEPS {
+                next = next + part(known.step, steps - MOST_STEPS, 1);
             }
             let stepper = self.scratch.get_mut();
             std::mem::swap(stepper, &mut known.series[nth].stepper);

@@ -2,11 +2,12 @@
 
 mod follow;
 mod per_input;
+mod rows;
 mod told;
 mod train;
 
 use athermal_core::diagnostic::counted;
-use athermal_core::node::{Mistake, Regressors, Trainer, TrainingSetup};
+use athermal_core::node::{Mistake, Regressors, Runs, Trainer, TrainingSetup};
 use athermal_core::time::Duration;
 use athermal_numerics::{InputOrders, Orders};
 
@@ -109,9 +110,12 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
-    /// The features as the run saw them, where there can be any.
+    /// The features as the run saw them, where there can be any, which go on where a truth is missing.
     pub(crate) fn regressors(&self) -> Regressors {
+        let every = self.every;
+        let runs = self.nb.as_ref().map(|_| Runs::BetweenTruths { every });
         Regressors {
+            runs: runs.unwrap_or_default(),
             feature_lags: self.nb.iter().map(|_| Duration::ZERO).collect(),
             every_tick: true,
             ..Regressors::default()

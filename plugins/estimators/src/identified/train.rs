@@ -4,10 +4,11 @@ use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, Train
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
     Beginning, InformationCriteria, NumericsError, Orders, Polynomials, PredictionError,
-    PredictionErrorFit, Samples, Standardization, Standardizer,
+    PredictionErrorFit, Samples, Standardizer,
 };
 
-use super::follow::{Identified, MOST_SERIES};
+use super::follow::{Identified, UNSEEN};
+use super::rows::{Bridges, Pace, Rows};
 use super::{Asked, Differences};
 use crate::conditioning::tell_rows;
 use crate::order::{Order, Tried};
@@ -24,6 +25,12 @@ const MOST_WORK: usize = 1000;
 pub(crate) trait Identify: std::fmt::Debug + Send {
     /// How long a step is, where that is stated.
     fn every(&self) -> Option<Duration>;
+
+    /// Over how many steps without a run at most inputs stay as they last were where truths are missing; none where a truth that
+    /// is missing ends a piece.
+    fn bridges(&self) -> Option<usize> {
+        None
+    }
 
     /// The model, from samples of so many interleaved series; what there is to tell goes into the report.
     ///
@@ -43,8 +50,9 @@ pub(crate) struct Found {
     pub(crate) model: Polynomials,
     /// The standard errors of its coefficients, where they are known; of a polynomial that has none, an empty list.
     pub(crate) errors: Option<Polynomials>,
-    pub(crate) residual_sum_of_squares: f64,
-    /// How many residuals are in it.
+    /// The sum of their squares.
+    pub(crate) squared_errors: f64,
+    /// How many are in it.
     pub(crate) rows: usize,
     /// The variance of an innovation.
     pub(crate) variance: f64,
@@ -59,18 +67,10 @@ pub(crate) struct IdentifiedTrainer<Kind> {
     names: Vec<String>,
     span: Duration,
     memory: usize,
-    rows: Vec<Row>,
-    regressors: Vec<f64>,
-    begins: bool,
+    rows: Rows,
     count: usize,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Row {
-    at: Instant,
-    truth: f64,
-    /// Whether a segment begins with it.
-    begins: bool,
+    /// Whether runs between rows are kept: not once there is no room for them beside the rows.
+    keeps_runs: bool,
 }
 
 impl<Kind: Identify> IdentifiedTrainer<Kind> {
@@ -84,64 +84,28 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             names: names.collect(),
             span: setup.span,
             memory: setup.memory,
-            rows: Vec::new(),
-            regressors: Vec::new(),
-            begins: true,
+            rows: Rows::new(setup.regressors.len()),
             count: 0,
+            keeps_runs: true,
         }
     }
 
     fn bytes_per_row(&self) -> usize {
-        size_of::<Row>() + self.names.len() * size_of::<f64>()
+        Rows::bytes_per_row(self.names.len())
     }
 
     fn fits(&self) -> bool {
         self.count * self.bytes_per_row() <= self.memory
     }
 
-    /// The typical time from one truth to the next.
-    fn between(&self) -> Option<Duration> {
-        let pairs = self.rows.windows(2).filter(|pair| !pair[1].begins);
-        let mut between: Vec<Duration> = pairs.map(|pair| pair[1].at - pair[0].at).collect();
-        between.sort_unstable();
-        between
-            .get(between.len() / 2)
-            .copied()
-            .filter(|&between| between > Duration::ZERO)
-    }
-
-    /// The rows as samples of several interleaved series, each as far apart as a step; where one is missing, a series ends and
-    /// another begins.
-    fn samples(&self, pace: Pace, standard: &Standardization) -> Samples {
-        let width = self.names.len();
-        let step = pace.step.secs();
-        let mut samples = Samples::new(width);
-        let mut from = 0;
-        while from < self.rows.len() {
-            let rest = &self.rows[from + 1..];
-            let length = 1 + rest.iter().position(|row| row.begins).unwrap_or(rest.len());
-            for series in 0..pace.series {
-                let series = series * pace.truths / pace.series;
-                samples.segment();
-                let mut last: Option<Instant> = None;
-                for nth in (from + series..from + length).step_by(pace.truths) {
-                    let Row { at, truth, .. } = self.rows[nth];
-                    let steps = last.map_or(1.0, |last| (at - last).secs() / step);
-                    if steps < 0.5 {
-                        continue;
-                    }
-                    if steps >= 1.5 {
-                        samples.segment();
-                    }
-                    last = Some(at);
-                    let mut inputs = self.regressors[nth * width..(nth + 1) * width].to_vec();
-                    standard.apply(&mut inputs);
-                    samples.push(inputs, truth);
-                }
-            }
-            from += length;
+    /// Lets go of runs where they do not fit beside the rows.
+    fn make_room(&mut self) {
+        // A run takes no more than a row.
+        let all = self.count + self.rows.runs();
+        if all * self.bytes_per_row() > self.memory {
+            self.keeps_runs = false;
+            self.rows.forget_runs();
         }
-        samples
     }
 
     fn solve(&self, report: &mut TrainingReport) -> Result<Identified, TrainingError> {
@@ -154,27 +118,37 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 (bytes / f64::from(1 << 20)).ceil() + 1.0
             )));
         }
-        let apart = || match self.rows.len() {
+        let apart = || match self.rows.count() {
             rows @ ..3 => TrainingError::TooFewRows { rows, needed: 3 },
             rows => unsolvable(format!(
                 "there is a gap before each of the {rows} rows, and the model needs rows that follow each other"
             )),
         };
-        let between = self.between().ok_or_else(apart)?;
+        let between = self.rows.between().ok_or_else(apart)?;
         let pace = Pace::of(self.asked.every(), self.span, between);
         let mut standard = Standardizer::new(self.names.len());
         if !self.names.is_empty() {
-            self.regressors
+            let regressors = self.rows.regressors();
+            regressors
                 .chunks_exact(self.names.len())
                 .for_each(|row| standard.partial_fit(row));
         }
         let standard = standard.standardization();
-        let samples = self.samples(pace, &standard);
+        let bridges = self.asked.bridges().filter(|_| self.keeps_runs);
+        let bridges = bridges.map(|unseen| Bridges {
+            unseen,
+            missing: self.memory / self.bytes_per_row(),
+        });
+        let samples = self.rows.samples(pace, &standard, bridges);
         let found = self.asked.identify(&samples, pace.series, report)?;
-        let truths = self.rows.iter().map(|row| row.truth);
-        tell_rows(&self.names, &self.regressors, truths, report);
+        tell_rows(
+            &self.names,
+            self.rows.regressors(),
+            self.rows.truths(),
+            report,
+        );
         pace.tell(report);
-        report.in_sample_rmse = Some((found.residual_sum_of_squares / found.rows as f64).sqrt());
+        report.in_sample_rmse = Some((found.squared_errors / found.rows as f64).sqrt());
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
         Ok(Identified {
@@ -202,6 +176,14 @@ impl Identify for Asked {
         self.every
     }
 
+    fn bridges(&self) -> Option<usize> {
+        let order = self.order.unwrap_or_default();
+        let tried = order.combinations(self.given()).into_iter();
+        let inputs = tried.flat_map(|one| self.orders(&one, 0).inputs);
+        let longest = inputs.map(|input| input.nk + input.nb).max().unwrap_or(0);
+        Some(longest.max(UNSEEN))
+    }
+
     fn identify(
         &self,
         samples: &Samples,
@@ -222,13 +204,14 @@ impl Identify for Asked {
             errors.rescale(spread);
         }
         fit.residual_sum_of_squares *= spread * spread;
+        fit.squared_errors *= spread * spread;
         for beginning in &mut fit.beginnings {
             beginning.times *= spread;
             beginning.square *= spread * spread;
         }
+        tell_missing(samples, report);
         tell_pieces(samples, &fit.model, report);
-        let pieces = samples.records().count();
-        tell_starts(pieces, fit.starts, fit.rows, report);
+        tell_starts(samples.pieces(), fit.starts, fit.rows, report);
         report.figure("converged", fit.converged);
         report.figure("steps_of_search", fit.steps);
         if !fit.converged {
@@ -238,7 +221,7 @@ impl Identify for Asked {
             ));
         }
         Ok(Found {
-            residual_sum_of_squares: fit.residual_sum_of_squares,
+            squared_errors: fit.squared_errors,
             rows: fit.rows,
             variance: fit.variance(),
             beginnings: fit.beginnings,
@@ -266,19 +249,24 @@ impl Asked {
             && self.order.is_none()
         {
             return self
-                .search(orders, self.penalty)
+                .search(orders, self.penalty, 0)
                 .fit(orders, samples, 0)
                 .map_err(|error| unfit(error, samples));
         }
         let firsts = candidates.iter().map(|(_, orders)| orders.first());
         let first = firsts.max().unwrap_or(0);
+        let measured = candidates.iter().map(|(_, orders)| orders.measured());
+        let measured = measured.max().unwrap_or(0);
         let mut tried = Vec::new();
         let mut fits = Vec::new();
         let mut failed = None;
         // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
         for (candidate, orders) in candidates {
             let coefficients = orders.coefficients();
-            match self.search(&orders, 0.0).fit(&orders, samples, first) {
+            match self
+                .search(&orders, 0.0, measured)
+                .fit(&orders, samples, first)
+            {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     tried.push(Tried {
@@ -296,14 +284,15 @@ impl Asked {
                 Err(error) => failed = Some(error),
             }
         }
-        let rows = samples.counted(first);
+        let rows = samples.counted(first, measured);
         let best = order.best(rows, tried, report).map_err(|too_few| {
             let error = failed.unwrap_or(too_few);
             unfit(error, samples)
         })?;
         let (fit, orders) = fits.swap_remove(best);
         let penalised = self.penalty > 0.0 && !orders.inputs.is_empty();
-        if !penalised && orders.first() == first {
+        let as_compared = samples.missing() == 0 || orders.measured() == measured;
+        if !penalised && orders.first() == first && as_compared {
             return Ok(fit);
         }
         if penalised {
@@ -313,17 +302,18 @@ impl Asked {
             );
         }
         // On all rows that it has a past for, and not only on those on which it was compared.
-        let search = self.search(&orders, self.penalty);
+        let search = self.search(&orders, self.penalty, 0);
         let fit = search.fit(&orders, samples, 0);
         fit.map_err(|error| unfit(error, samples))
     }
 
-    fn search(&self, orders: &Orders, penalty: f64) -> PredictionError {
+    fn search(&self, orders: &Orders, penalty: f64, measured: usize) -> PredictionError {
         let most = MOST_WORK / orders.coefficients().max(1);
         PredictionError {
             penalty,
             most_steps: most.clamp(20, 100),
             start_spread: START_SPREAD,
+            measured,
         }
     }
 
@@ -345,12 +335,25 @@ impl Asked {
 /// and none for filters that are large and cancel out.
 const START_SPREAD: f64 = std::f64::consts::SQRT_2;
 
+/// Tells of samples through which a model goes without a truth.
+fn tell_missing(samples: &Samples, report: &mut TrainingReport) {
+    let (missing, all) = (samples.missing(), samples.missing() + samples.count());
+    if missing == 0 {
+        return;
+    }
+    report.figure("missing_truths", missing);
+    report.figure("samples", all);
+    report.notes.push(format!(
+        "at {missing} of its samples the truth is missing, {all} in all: the model is followed through them, as while it runs"
+    ));
+}
+
 /// In pieces of fewer samples on average, polynomials are found less exactly than the theory says.
 const SHORT_PIECE: usize = 50;
 
 /// Tells of pieces that are too short for filters and for a model of the noise.
 fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingReport) {
-    let pieces = samples.records().count();
+    let pieces = samples.pieces();
     let length = samples.count() / pieces.max(1);
     let filtered = model.inputs.iter().any(|input| !input.f.is_empty());
     let has_c = !model.c.is_empty();
@@ -405,64 +408,17 @@ fn unfit(error: NumericsError, samples: &Samples) -> TrainingError {
             reason: format!(
                 "{found} of {} rows have all the past that these orders look back on, and at least {needed} are needed: \
                  smaller orders, or more rows without gaps, would help",
-                samples.counted(0)
+                samples.counted(0, 0)
             ),
         },
         error => told(error),
     }
 }
 
-/// How samples follow each other.
-#[derive(Debug, Clone, Copy)]
-struct Pace {
-    step: Duration,
-    /// How many truths come within a step.
-    truths: usize,
-    /// How many of them begin a series of their own: all, or so many of them at even distances.
-    series: usize,
-}
-
-impl Pace {
-    fn of(every: Option<Duration>, span: Duration, between: Duration) -> Self {
-        let step = every.unwrap_or_else(|| span.max(between));
-        let truths = ((step.secs() / between.secs()).round() as usize).max(1);
-        Self {
-            step,
-            truths,
-            series: truths.min(MOST_SERIES),
-        }
-    }
-
-    fn tell(self, report: &mut TrainingReport) {
-        report.figure("step_s", self.step.secs());
-        report.figure("series", self.series);
-        report.figure("truths_within_a_step", self.truths);
-        report.notes.push(self.told());
-    }
-
-    fn told(self) -> String {
-        let Self {
-            step,
-            truths,
-            series,
-        } = self;
-        match series {
-            1 => format!("a step is {step}"),
-            series if series == truths => {
-                format!("a step is {step}, in {series} interleaved series")
-            }
-            series => format!(
-                "a step is {step}, in {series} interleaved series of the {truths} truths within one; the others are \
-                 not used"
-            ),
-        }
-    }
-}
-
 impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
     fn row(&mut self, regressors: &[f64], truth: f64) {
         let second = Duration::from_ns(1_000_000_000);
-        let last = self.rows.last().map(|row| row.at);
+        let last = self.rows.last();
         self.row_at(
             last.map_or(Instant::from_ns(0), |last| last + second),
             regressors,
@@ -473,16 +429,22 @@ impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
     fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
         self.count += 1;
         if !self.fits() {
-            (self.rows, self.regressors) = (Vec::new(), Vec::new());
+            self.rows = Rows::new(self.names.len());
             return;
         }
-        let begins = std::mem::take(&mut self.begins);
-        self.rows.push(Row { at, truth, begins });
-        self.regressors.extend_from_slice(regressors);
+        self.rows.push(at, regressors, truth);
+        self.make_room();
+    }
+
+    fn run_at(&mut self, of: Instant, regressors: &[f64]) {
+        if self.keeps_runs && self.fits() {
+            self.rows.run(of, regressors);
+            self.make_room();
+        }
     }
 
     fn segment(&mut self) {
-        self.begins = true;
+        self.rows.segment();
     }
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
@@ -547,38 +509,5 @@ mod tests {
             ]
         );
         assert!(told(60, 15).is_empty() && told(1, 70).is_empty());
-    }
-
-    #[test]
-    fn of_truths_that_come_much_faster_than_a_step_the_samples_are_a_step_apart() {
-        let second = Duration::from_ns(1_000_000_000);
-        let at = |nth: i64| Instant::from_ns(0) + Duration::from_ns(nth * 2_000_000_000);
-        let trainer = IdentifiedTrainer {
-            asked: Asked::default(),
-            names: Vec::new(),
-            span: second,
-            memory: usize::MAX,
-            rows: (0..500)
-                .map(|nth| Row {
-                    at: at(nth),
-                    truth: 2.0 * nth as f64,
-                    begins: nth == 0,
-                })
-                .collect(),
-            regressors: Vec::new(),
-            begins: false,
-            count: 500,
-        };
-        let pace = Pace::of(None, Duration::from_ns(99_000_000_000), at(1) - at(0));
-        let samples = trainer.samples(pace, &Standardizer::new(0).standardization());
-        let mut series = 0;
-        for record in samples.records() {
-            series += 1;
-            let apart = record.outputs.windows(2).map(|pair| pair[1] - pair[0]);
-            assert!(apart.into_iter().all(|apart| apart == 100.0));
-        }
-        assert_eq!(series, MOST_SERIES);
-        let told = "16 interleaved series of the 50 truths within one; the others are not used";
-        assert!(pace.told().ends_with(told), "{}", pace.told());
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::super::Polynomials;
-use super::product;
+use super::Polynomials;
+use super::stepper::product;
 use crate::scratch::Scratch;
 
 /// The covariance `P` of the past `z` that a model goes by, in the variance of an innovation: of past values, of past values of
