@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
-use athermal::core::fit::{EstimatorFit, FitOptions, fit};
+use athermal::core::fit::{EstimatorFit, FitOptions, Outcome, fit};
 use athermal::core::recording::{Event, Table};
 use athermal::{Engine, Instant};
 
@@ -84,6 +84,13 @@ fn a_column_of_nothing_costs_no_rows_and_is_named() {
     }
 }
 
+fn notes(fit: &EstimatorFit) -> &[String] {
+    match &fit.outcome {
+        Outcome::Fitted(report) => &report.notes,
+        Outcome::Failed(error) => panic!("{error}"),
+    }
+}
+
 #[test]
 fn a_candidate_there_in_nine_of_ten_rows_stays_and_costs_the_tenth() {
     let plan = thermal();
@@ -99,6 +106,12 @@ fn a_candidate_there_in_nine_of_ten_rows_stays_and_costs_the_tenth() {
         whole.rows + whole.dropped.incomplete
     );
     assert!(holed.dropped.incomplete > 40, "{holed:?}");
+    let told = format!(
+        "many rows are incomplete for want of a value from temperature.chuck ({})",
+        holed.dropped.incomplete
+    );
+    assert_eq!(notes(&holed), [told]);
+    assert_eq!(notes(&whole), [""; 0]);
 }
 
 #[test]
@@ -120,6 +133,7 @@ out = \"thermal\"
     assert!(fit.dropped_candidates.is_empty(), "{fit:?}");
     // Drift exists from 300 s, the long slopes from 3,600 s.
     assert_eq!((fit.rows, fit.dropped.incomplete), (2000 - 360, 330));
+    assert_eq!(notes(&fit), [""; 0]);
 }
 
 #[test]

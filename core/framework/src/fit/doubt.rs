@@ -1,12 +1,85 @@
 //! Decides which fits are doubted for the rows that they stand on; not which rows those are.
 
-use crate::diagnostic::counted;
-use crate::node::{Figure, Predictor, TrainingReport};
+use indexmap::IndexMap;
+
+use crate::channel::is_cold;
+use crate::diagnostic::{count, counted};
+use crate::node::{Figure, Predictor, Regressor, TrainingReport};
 
 /// A fit whose error is larger than that of the mean by this factor is no better than none.
 const WORSE_THAN_MEAN: f64 = 1.1;
 /// The share of a mean that rounding may make up.
 const ROUNDING: f64 = 1e-9;
+
+/// The share of the rows from which it is told what those that are incomplete lack.
+const MANY_INCOMPLETE: f64 = 0.01;
+/// So many of what they lack are named.
+const NAMED: usize = 3;
+
+/// What incomplete rows lack, but for windows that were still cold.
+#[derive(Debug, Clone)]
+pub(super) struct Lacking {
+    rows: u64,
+    /// The rows that lack each regressor.
+    each: Vec<u64>,
+}
+
+impl Lacking {
+    /// Nothing yet, of so many regressors.
+    pub(super) fn new(regressors: usize) -> Self {
+        Self {
+            rows: 0,
+            each: vec![0; regressors],
+        }
+    }
+
+    /// An incomplete row.
+    pub(super) fn count(&mut self, row: &[f64]) {
+        let lacks = |value: &f64| value.is_nan() && !is_cold(*value);
+        self.rows += u64::from(row.iter().any(lacks));
+        for (count, value) in self.each.iter_mut().zip(row) {
+            *count += u64::from(lacks(value));
+        }
+    }
+
+    /// Tells where values were missing that cost a fit many of its rows, of which so many are complete; by sensor, since what is
+    /// made of one lacks a value with the others.
+    pub(super) fn tell<'a>(
+        &self,
+        regressors: impl Iterator<Item = &'a Regressor>,
+        complete: u64,
+        report: &mut TrainingReport,
+    ) {
+        let many = MANY_INCOMPLETE * (complete + self.rows) as f64;
+        if self.rows == 0 || (self.rows as f64) < many {
+            return;
+        }
+        let mut sources = IndexMap::<&str, u64>::new();
+        for (regressor, &count) in regressors.zip(&self.each) {
+            let source = match &regressor.sensors[..] {
+                [sensor] => sensor,
+                _ => &regressor.name,
+            };
+            let most = sources.entry(source).or_default();
+            *most = count.max(*most);
+        }
+        sources.retain(|_, count| *count > 0);
+        sources.sort_by(|_, one, _, other| other.cmp(one));
+        let named = sources.iter().take(NAMED);
+        let mut told: Vec<String> = named
+            .map(|(name, rows)| format!("{name} ({})", count(*rows)))
+            .collect();
+        if sources.len() > NAMED {
+            told.push(format!("and {} more", sources.len() - NAMED));
+        }
+        report.notes.push(format!(
+            "many rows are incomplete for want of a value from {}",
+            told.join(", ")
+        ));
+        let each = sources.iter().map(|(&name, &rows)| (name, rows as f64));
+        report.figure("lacking", Figure::named(each));
+    }
+}
 
 /// Tells of the regressors that were left out since they stay the same.
 pub(super) fn tell_constant<'a>(names: impl Iterator<Item = &'a str>, report: &mut TrainingReport) {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::FitOptions;
 use super::candidates::Range;
 use super::collect::{Collector, Sink, Trainee};
-use super::doubt::{Truths, tell_constant};
+use super::doubt::{Lacking, Truths, tell_constant};
 use super::report::{EstimatorFit, Outcome};
 use crate::compile::{Plan, PlannedRole};
 use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
@@ -24,6 +24,7 @@ pub(super) struct Making {
     /// The ranges of the candidates that were kept and of the truth.
     ranges: Vec<Range>,
     incomplete: u64,
+    lacking: Lacking,
 }
 
 /// Which candidates a trainer may be made to do without.
@@ -72,6 +73,7 @@ impl Sink for Making {
             .extend(self.kept.iter().map(|&candidate| self.all[candidate]));
         if self.row.iter().any(|value| value.is_nan()) {
             self.incomplete += 1;
+            self.lacking.count(&self.row);
         } else {
             self.truths.count(truth);
             for (range, value) in self.ranges.iter_mut().zip(self.row.iter().chain([&truth])) {
@@ -143,6 +145,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
         row: Vec::with_capacity(kept.len()),
         ranges: vec![Range::NONE; kept.len() + 1],
         all: Vec::new(),
+        lacking: Lacking::new(kept.len()),
         kept,
         truths: Truths::default(),
         incomplete: 0,
@@ -213,6 +216,8 @@ pub(super) fn end(
         }) => {
             let constant = making.constant.iter();
             tell_constant(constant.map(|&nth| &*regressors[nth].name), &mut report);
+            let kept = making.kept.iter().map(|&nth| &regressors[nth]);
+            making.lacking.tell(kept, truths.rows, &mut report);
             truths.doubt(predictor.as_ref(), regressors.len(), &mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
