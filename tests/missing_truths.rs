@@ -140,3 +140,18 @@ fn where_rows_alone_fill_the_memory_a_truth_that_is_missing_ends_a_piece() {
     let pieces = report.figures.get("pieces");
     assert!(pieces.is_some(), "{:?}", report.notes);
 }
+
+#[test]
+fn orders_are_compared_by_the_likelihood_on_the_same_rows() {
+    let (_, column, _) = MODELS[2];
+    let node = "type = \"arma\"\norder = { by = \"bic\", na = \"0..4\", nc = \"0..2\" }";
+    let (_, report) = fitted(node, |row| row[column], &FitOptions::default());
+    let orders = report.orders.unwrap();
+    assert_eq!(orders.tried[orders.chosen].order, "na 2, nc 1");
+    // Nothing is counted before four truths in a row, which the longest needs.
+    let known = |row: &[Vec<f64>]| row.iter().all(|row| !row[column].is_nan());
+    let rows = rows();
+    let begin = 4 + rows.windows(4).position(known).unwrap();
+    let counted = rows[begin..].iter().filter(|row| !row[column].is_nan());
+    assert_eq!(orders.rows, counted.count());
+}
