@@ -159,6 +159,26 @@ fn what_was_constant_in_the_fit_is_not_missed_by_a_prediction() {
 }
 
 #[test]
+fn the_square_of_what_is_on_or_off_is_no_term() {
+    let scratch = Scratch::new("doubtful-square");
+    let row = |row: usize| {
+        let (on, v) = (row % 2, noise(row, 2));
+        format!("{row},{on},{v},{}\n", 2.0 * on as f64 + 3.0 * v)
+    };
+    let rows: String = (0..200).map(row).collect();
+    let data = scratch.file("data.csv", format!("s,u,v,y\n{rows}"));
+    let node = format!(
+        "type = \"polynomial\"\n{FEATURES}\nselection = {{ method = \"forward\", by = \"sensor\" }}"
+    );
+    let graph = scratch.file("graph.toml", graph(&node));
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(0);
+    let told = athermal(&[&"show", &model, &"--format", &"coefficients"]).ended(0);
+    assert!(told.out.contains("in.v²"), "{}", told.out);
+    assert!(!told.out.contains("in.u²"), "{}", told.out);
+}
+
+#[test]
 fn a_fit_that_is_worse_than_the_mean_of_its_rows_is_doubted() {
     let node = format!(
         "type = \"linear\"\n{FEATURES}\nsolver = {{ type = \"sgd\", eta0 = 1.2, power = 0.0, epochs = 1 }}"

@@ -241,6 +241,8 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
             collector.replay(index, &mut making);
             let constant = making.constant();
             if !constant.is_empty() {
+                // What the first one keeps is gone before the next keeps as much.
+                drop(making);
                 making = begin(plan, trainee, options.memory, constant);
                 collector.replay(index, &mut making);
             }
