@@ -119,6 +119,14 @@ fn a_fit_that_is_left_with_no_regressor_says_so_and_why() {
         let says_none = told.contains("no regressor is left to predict from");
         assert_eq!(says_none, !left, "{told}");
     }
+    // What follows the truth has its past to go by.
+    let follows = |kind: &str, more: &str| {
+        let node = format!("type = \"{kind}\"\ninputs.features = \"in.v\"\n{more}");
+        let told = fit("left-past", &node, &rows, &[]).ended(0).out;
+        told.contains("no regressor is left, so it predicts from the past of the truth alone")
+    };
+    assert!(follows("armax", "") && !follows("armax", "learn = false"));
+    assert!(!follows("oe", "") && !follows("rls", ""));
     for told in [&none.out, &some.out] {
         assert!(told.contains("constant, so without effect: in.v"), "{told}");
     }
