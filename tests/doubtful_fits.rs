@@ -119,6 +119,14 @@ fn a_fit_that_is_left_with_no_regressor_says_so_and_why() {
         let says_none = told.contains("no regressor is left to predict from");
         assert_eq!(says_none, !left, "{told}");
     }
+    // What follows the truth has its past to go by.
+    let follows = |kind: &str, more: &str| {
+        let node = format!("type = \"{kind}\"\ninputs.features = \"in.v\"\n{more}");
+        let told = fit("left-past", &node, &rows, &[]).ended(0).out;
+        told.contains("no regressor is left, so it predicts from the past of the truth alone")
+    };
+    assert!(follows("armax", "") && !follows("armax", "learn = false"));
+    assert!(!follows("oe", "") && !follows("rls", ""));
     for told in [&none.out, &some.out] {
         assert!(told.contains("constant, so without effect: in.v"), "{told}");
     }
@@ -156,6 +164,26 @@ fn what_was_constant_in_the_fit_is_not_missed_by_a_prediction() {
         );
         assert_eq!(whole, dead, "{kind}");
     }
+}
+
+#[test]
+fn the_square_of_what_is_on_or_off_is_no_term() {
+    let scratch = Scratch::new("doubtful-square");
+    let row = |row: usize| {
+        let (on, v) = (row % 2, noise(row, 2));
+        format!("{row},{on},{v},{}\n", 2.0 * on as f64 + 3.0 * v)
+    };
+    let rows: String = (0..200).map(row).collect();
+    let data = scratch.file("data.csv", format!("s,u,v,y\n{rows}"));
+    let node = format!(
+        "type = \"polynomial\"\n{FEATURES}\nselection = {{ method = \"forward\", by = \"sensor\" }}"
+    );
+    let graph = scratch.file("graph.toml", graph(&node));
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(0);
+    let told = athermal(&[&"show", &model, &"--format", &"coefficients"]).ended(0);
+    assert!(told.out.contains("in.v²"), "{}", told.out);
+    assert!(!told.out.contains("in.u²"), "{}", told.out);
 }
 
 #[test]

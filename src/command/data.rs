@@ -168,10 +168,13 @@ pub fn tell(
     for (file, report) in reports {
         for (other, rows) in &report.overlaps {
             let all = counted(report.rows, "row");
+            let some = match *rows {
+                rows if rows == report.rows => "all".to_owned(),
+                rows => count(rows),
+            };
             let lie = if *rows == 1 { "lies" } else { "lie" };
             terminal.warning(format_args!(
-                "{file}: {} of its {all} {lie} in the period of {other}; files are not merged, so what both have counts twice",
-                count(*rows)
+                "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so what both have counts twice"
             ));
         }
         let counted = [

@@ -244,7 +244,7 @@ impl Trainer for PolynomialTrainer {
             centres: Vec::new(),
             scales: Vec::new(),
             terms: Vec::new(),
-            coefficients: linear.coefficients,
+            coefficients: Vec::new(),
             intercept: linear.intercept,
         };
         let mut used: Vec<usize> = Vec::new();
@@ -256,11 +256,14 @@ impl Trainer for PolynomialTrainer {
                     used.len() - 1
                 })
         };
-        for name in &linear.regressors {
+        // The square of what is on or off may stay the same, though the feature does not.
+        let varying = linear.regressors.iter().zip(linear.coefficients);
+        for (name, coefficient) in varying.filter(|(_, b)| *b != 0.0) {
             let term = self.terms.iter().find(|term| term.name(features) == *name);
             let term = term.expect("the fit chose among these terms");
             let first = place(term.0);
             predictor.terms.push(Term(first, term.1.map(&mut place)));
+            predictor.coefficients.push(coefficient);
         }
         for &feature in &used {
             predictor.regressors.push(features[feature].name.clone());

@@ -217,7 +217,9 @@ impl Selection {
                 report.figure("left_out_from_start", Figure::names(names));
             }
         }
-        tell_worse_than_mean(&selected, report);
+        if !regressors.is_empty() {
+            tell_worse_than_mean(&selected, report);
+        }
         if how.one_standard_error
             && let Some(smallest) = selected.within_one_standard_error()
         {

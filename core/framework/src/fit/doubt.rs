@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 
 use crate::channel::is_cold;
 use crate::diagnostic::{count, counted};
-use crate::node::{Figure, Predictor, Regressor, TrainingReport};
+use crate::node::{Figure, Noise, Of, Predictor, Regressor, Term, TrainingReport};
 
 /// A fit whose error is larger than that of the mean by this factor is no better than none.
 const WORSE_THAN_MEAN: f64 = 1.1;
@@ -93,6 +93,17 @@ pub(super) fn tell_constant<'a>(names: impl Iterator<Item = &'a str>, report: &m
     }
 }
 
+/// Whether a model follows the truth: by polynomials, or a level that wanders.
+fn looks_back(predictor: &dyn Predictor) -> bool {
+    predictor.coefficients().is_some_and(|model| {
+        let wanders = |noise: &Noise| noise.per_s.is_some() && noise.deviation > 0.0;
+        let is_power = |term: &Term| matches!(term.of, Of::Power { .. });
+        model.differences > 0
+            || model.terms.iter().any(is_power)
+            || model.noises.iter().any(wanders)
+    })
+}
+
 /// The truths of the complete rows.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Truths {
@@ -118,18 +129,22 @@ impl Truths {
         self.squares += off * (truth - self.mean);
     }
 
-    /// Tells of a fit that says little, for all that its error may be small; `asked_for` is how many regressors its node has.
+    /// Tells of a fit that says little, for all that its error may be small; `asked_for` is how many regressors its node has, and
+    /// `learns` whether it is told truths while it runs.
     pub(super) fn doubt(
         self,
         predictor: &dyn Predictor,
-        asked_for: usize,
+        (asked_for, learns): (usize, bool),
         report: &mut TrainingReport,
     ) {
         if asked_for > 0 && predictor.uses().is_empty() {
             report.figure("regressors_left", 0_usize);
-            report
-                .notes
-                .push("no regressor is left to predict from".to_owned());
+            let note = if learns && looks_back(predictor) {
+                "no regressor is left, so it predicts from the past of the truth alone"
+            } else {
+                "no regressor is left to predict from"
+            };
+            report.notes.push(note.to_owned());
         }
         if !self.changes {
             report.figure("constant_truth", self.first);

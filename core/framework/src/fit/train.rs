@@ -18,6 +18,8 @@ pub(super) struct Making {
     /// The candidates that were left out since they stay the same.
     constant: Vec<usize>,
     may_leave_out: MayLeaveOut,
+    /// Whether the estimator is told truths while it runs.
+    learns: bool,
     row: Vec<f64>,
     all: Vec<f64>,
     truths: Truths,
@@ -142,6 +144,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
         trainer,
         constant,
         may_leave_out,
+        learns,
         row: Vec::with_capacity(kept.len()),
         ranges: vec![Range::NONE; kept.len() + 1],
         all: Vec::new(),
@@ -218,7 +221,8 @@ pub(super) fn end(
             tell_constant(constant.map(|&nth| &*regressors[nth].name), &mut report);
             let kept = making.kept.iter().map(|&nth| &regressors[nth]);
             making.lacking.tell(kept, truths.rows, &mut report);
-            truths.doubt(predictor.as_ref(), regressors.len(), &mut report);
+            let asked = (regressors.len(), making.learns);
+            truths.doubt(predictor.as_ref(), asked, &mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
         Err(error) => (Outcome::Failed(error), None),
@@ -255,6 +259,8 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
             collector.replay(index, &mut making);
             let constant = making.constant();
             if !constant.is_empty() {
+                // What the first one keeps is gone before the next keeps as much.
+                drop(making);
                 making = begin(plan, trainee, options.memory, constant);
                 collector.replay(index, &mut making);
             }

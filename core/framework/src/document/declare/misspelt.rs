@@ -93,9 +93,9 @@ fn given_as(node: &Table) -> Vec<(String, Meant)> {
     };
     let strange = node.iter().filter(|(key, _)| !OWN_KEYS.contains(key));
     let suspects = strange.filter_map(|(key, entry)| {
-        let is_near = nearest(key, OWN_KEYS) == Some(INPUTS);
+        let is_near = || nearest(key, OWN_KEYS) == Some(INPUTS);
         let table = entry.value.as_table();
-        let meant = if table.is_some_and(|table| is_near || are_inputs(table)) {
+        let meant = if table.is_some_and(|table| is_near() || are_inputs(table)) {
             Meant::Inputs
         } else {
             let near = nearest(key, ports());
