@@ -318,6 +318,20 @@ fn a_truth_without_a_value_is_not_blamed_on_the_features() {
 }
 
 #[test]
+fn a_truth_that_is_never_whole_names_what_it_lacks() {
+    let slope = "type = \"linear\"\ninputs.features = \"in\"\n\
+                 [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"out\"\nwindows = [\"100s\"]";
+    let text = graph(slope).replace("inputs.truth = \"out.y\"", "inputs.truth = \"drift.y\"");
+    let short = fit_graph("whole", &text, &explained(60), &[]).ended(1);
+    short.tells(&[
+        "`drift.y` has no value in the data, though `out.y` has some: it looks back 100s, and nowhere do they fill that",
+    ]);
+    let none = data(200, |_, _, _| f64::NAN).replace("NaN", "");
+    let none = fit_graph("whole", &text, &none, &[]).ended(1);
+    none.tells(&["`drift.y` has no value in the data, since `out.y` has none"]);
+}
+
+#[test]
 fn sensors_without_a_value_are_named_and_the_truth_is_not_blamed() {
     let without = |channel: usize| {
         let rows = explained(50);
