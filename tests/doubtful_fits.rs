@@ -167,6 +167,48 @@ fn what_was_constant_in_the_fit_is_not_missed_by_a_prediction() {
 }
 
 #[test]
+fn orders_stand_with_their_inputs_where_one_is_left_out() {
+    let scratch = Scratch::new("doubtful-orders");
+    let rows: String = (0..200)
+        .map(|row| format!("{row},5,{},{}\n", noise(row, 2), noise(row - row.min(1), 2)))
+        .collect();
+    let data = scratch.file("data.csv", format!("s,u,v,y\n{rows}"));
+    let graph = scratch.file(
+        "graph.toml",
+        graph(&format!(
+            "type = \"armax\"\n{FEATURES}\nnb = [4, 1]\nnk = [3, 1]"
+        )),
+    );
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(0);
+    let told = athermal(&[&"show", &model, &"--format", &"coefficients"]).ended(0);
+    let of_inputs = told
+        .out
+        .lines()
+        .filter(|line| line.trim().starts_with("B "));
+    let of_inputs: Vec<&str> = of_inputs.collect();
+    assert_eq!(of_inputs.len(), 1, "{}", told.out);
+    assert!(of_inputs[0].contains("B in.v q⁻¹ "), "{}", told.out);
+}
+
+#[test]
+fn a_stack_keeps_a_voter_that_always_says_the_same() {
+    let node = format!(
+        "type = \"stack\"\ninputs.voters = [\"a\", \"b\"]\n\
+         [nodes.a]\ntype = \"linear\"\n{FEATURES}\ninputs.truth = \"out.y\"\nahead = \"0 samples\"\n\
+         [nodes.b]\ntype = \"zero\"\ninputs.truth = \"out.y\"\nahead = \"0 samples\""
+    );
+    let told = fit("stack", &node, &explained(90), &["--format", "json"]).ended(0);
+    let told = told.json();
+    let fits = told["estimators"].as_array().unwrap();
+    let stack = fits.iter().find(|fit| fit["node"] == "m").unwrap();
+    assert!(stack["figures"].get("constant").is_none(), "{stack:#}");
+    let weights = stack["figures"]["weights"].as_object().unwrap();
+    assert_eq!(weights["b.y"], 0.0);
+    assert!(weights["a.y"].as_f64().unwrap() > 0.9);
+}
+
+#[test]
 fn the_square_of_what_is_on_or_off_is_no_term() {
     let scratch = Scratch::new("doubtful-square");
     let row = |row: usize| {
@@ -273,6 +315,20 @@ fn a_truth_without_a_value_is_not_blamed_on_the_features() {
     let limited = format!("{node}\ntrain.abs_truth = {{ above = \"100 nm\" }}");
     let outside = fit("truth", &limited, &explained(50), &[]).ended(1);
     outside.tells(&["no value within the limits of `train.abs_truth`, and 50 outside"]);
+}
+
+#[test]
+fn a_truth_that_is_never_whole_names_what_it_lacks() {
+    let slope = "type = \"linear\"\ninputs.features = \"in\"\n\
+                 [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"out\"\nwindows = [\"100s\"]";
+    let text = graph(slope).replace("inputs.truth = \"out.y\"", "inputs.truth = \"drift.y\"");
+    let short = fit_graph("whole", &text, &explained(60), &[]).ended(1);
+    short.tells(&[
+        "`drift.y` has no value in the data, though `out.y` has some: it looks back 100s, and nowhere do they fill that",
+    ]);
+    let none = data(200, |_, _, _| f64::NAN).replace("NaN", "");
+    let none = fit_graph("whole", &text, &none, &[]).ended(1);
+    none.tells(&["`drift.y` has no value in the data, since `out.y` has none"]);
 }
 
 #[test]

@@ -174,7 +174,7 @@ pub fn tell(
             };
             let lie = if *rows == 1 { "lies" } else { "lie" };
             terminal.warning(format_args!(
-                "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so what both have counts twice"
+                "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so windows begin afresh in it and what both have counts twice"
             ));
         }
         let counted = [

@@ -257,6 +257,11 @@ impl Collector {
         }
     }
 
+    /// Whether a measured channel has had no value; unknown of one that is read at a lag.
+    pub(super) fn is_silent(&self, slot: usize) -> bool {
+        self.silent.contains(&slot)
+    }
+
     /// The regressors that an estimator waits for, and the measured channels behind them without a value, where it never ran.
     pub(super) fn waited_for(&self, plan: &Plan, trainee: &Trainee) -> Option<TrainingError> {
         if trainee.taps.iter().any(|&tap| self.taps[tap].ran) {

@@ -185,11 +185,7 @@ pub(super) fn end(
         .collect();
     let truths = making.truths;
     let trained = if trainee.validity.knows_nothing() {
-        let no_truth = || TrainingError::NoTruth {
-            truth: truth.name.clone(),
-            outside_limits: dropped.outside_limits,
-            too_early: dropped.without_run,
-        };
+        let no_truth = || no_truth(plan, collector, trainee);
         let came = dropped.without_run > 0;
         let never_ran = came.then(|| collector.waited_for(plan, trainee));
         Err(never_ran.flatten().unwrap_or_else(no_truth))
@@ -239,6 +235,37 @@ pub(super) fn end(
         outcome,
     };
     (fit, predictor)
+}
+
+/// Why there is no truth to learn from.
+fn no_truth(plan: &Plan, collector: &Collector, trainee: &Trainee) -> TrainingError {
+    let (slot, dropped) = (trainee.link.slot, trainee.dropped);
+    let truth = plan.channels[slot].name.clone();
+    let none_came = dropped.outside_limits == 0 && dropped.without_run == 0;
+    let behind = plan.behind([slot].into_iter());
+    let measured = (0..plan.channels.len()).filter(|&slot| behind.contains(slot));
+    let measured = measured.filter(|&slot| plan.channels[slot].node.is_none());
+    let measured: Vec<usize> = measured.collect();
+    let is_known = measured
+        .iter()
+        .all(|&slot| plan.channels[slot].history.is_none());
+    if !none_came || !is_known || plan.channels[slot].node.is_none() {
+        return TrainingError::NoTruth {
+            truth,
+            outside_limits: dropped.outside_limits,
+            too_early: dropped.without_run,
+        };
+    }
+    let names = |slots: &mut dyn Iterator<Item = &usize>| {
+        let names = slots.map(|&slot| plan.channels[slot].name.clone());
+        names.collect::<Vec<String>>()
+    };
+    TrainingError::TruthNeverWhole {
+        truth,
+        silent: names(&mut measured.iter().filter(|&&slot| collector.is_silent(slot))),
+        measured: names(&mut measured.iter()),
+        span: plan.channels[slot].channel.span,
+    }
 }
 
 /// Fits all estimators from the examples kept, on several threads; the result does not depend on how many.

@@ -31,25 +31,28 @@ impl Staged {
         &self.seated.revision
     }
 
-    /// How much of the past there was to warm it by, where some of it was and that is less than it looks back: beside that, how long
-    /// what it gives may depend on what came before.
+    /// How much of the past there was to warm it by, and how far it looks back, where something of it was warmed by less than that.
     #[must_use]
     pub fn too_short_a_past(&self) -> Option<(Duration, Duration)> {
-        let is_warmed = |node: &NodeCarry| matches!(node.outcome, Carry::Warmed { .. });
         let wanted = self.seated.engine.plan().warm_up;
-        let short = self.past < wanted && self.carry.iter().any(is_warmed);
+        let short = self.past < wanted && self.is_warmed();
         short.then_some((self.past, wanted))
     }
 
-    /// How much of the past there was to warm it by, where that is as much as it looks back, and the outputs that had no value
+    /// How much of the past there was to warm it by, and where that is as much as it looks back, the outputs that had no value
     /// anywhere in it: they are not likely to have any.
     #[must_use]
     pub fn silent(&self) -> (Duration, Vec<&str>) {
         let plan = self.seated.engine.plan();
-        let enough = self.past >= plan.warm_up && self.past > Duration::ZERO;
+        let enough = self.past >= plan.warm_up && self.is_warmed();
         let outputs = plan.outputs.iter().zip(&self.gave);
         let silent = outputs.filter(|(_, gave)| enough && !**gave);
         (self.past, silent.map(|(output, _)| &*output.name).collect())
+    }
+
+    fn is_warmed(&self) -> bool {
+        let is_warmed = |node: &NodeCarry| matches!(node.outcome, Carry::Warmed { .. });
+        self.carry.iter().any(is_warmed)
     }
 }
 

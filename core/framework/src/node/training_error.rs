@@ -1,6 +1,7 @@
 //! Decides in which words a fit that gave nothing is told; whether it gave nothing is decided by who fits.
 
 use crate::diagnostic::{count, counted};
+use crate::time::Duration;
 
 /// Why a fit gave nothing.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +21,17 @@ pub enum TrainingError {
         outside_limits: u64,
         /// How many came before the estimator had run at the right time.
         too_early: u64,
+    },
+    /// What the truth is made of never gave one.
+    TruthNeverWhole {
+        /// What is to be predicted.
+        truth: String,
+        /// The measured channels behind it.
+        measured: Vec<String>,
+        /// Those of them that have no value in the data.
+        silent: Vec<String>,
+        /// How far it looks back.
+        span: Duration,
     },
     /// The estimator never ran: nothing that it waits for ever had a value.
     NeverRan {
@@ -69,6 +81,23 @@ impl std::fmt::Display for TrainingError {
                      before it could first be predicted; there is no other"
                 ),
             },
+            Self::TruthNeverWhole {
+                truth,
+                measured,
+                silent,
+                span,
+            } => {
+                write!(f, "`{truth}` has no value in the data, ")?;
+                let have = |of: &[String]| if of.len() == 1 { "has" } else { "have" };
+                if !silent.is_empty() {
+                    return write!(f, "since {} {} none", names(silent), have(silent));
+                }
+                write!(f, "though {} {} some", names(measured), have(measured))?;
+                if *span > Duration::ZERO {
+                    write!(f, ": it looks back {span}, and nowhere do they fill that")?;
+                }
+                Ok(())
+            }
             Self::NeverRan { regressors, silent } => {
                 let (never, none) = (names(regressors), names(silent));
                 let have = |of: &[String]| if of.len() == 1 { "has" } else { "have" };
