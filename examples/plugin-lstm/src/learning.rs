@@ -109,7 +109,8 @@ impl Trainer for Learning {
         }
         if self.layout.channels == 0 {
             return Err(TrainingError::Unsolvable {
-                reason: "no channel that changes has a value at every step of the sequence".to_owned(),
+                reason: "no channel that changes has a value at every step of the sequence"
+                    .to_owned(),
             });
         }
         if self.layout.channels > MOST_CHANNELS {
