@@ -1,7 +1,7 @@
 """The same work by this project and by scikit-learn, numpy, river and statsmodels: the same rows, one run, in turn, one thread.
 
     pip install -r benches/peers/requirements.txt
-    cargo build --release --example peers
+    cargo build --profile bench --example peers
     python benches/peers/peers.py target/release/examples/peers
 
 Checks that both sides find the same, and writes the table of README.md beside this file."""
