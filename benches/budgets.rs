@@ -46,7 +46,9 @@ fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: Option<ByHand
     let mut engine = model.engine().expect("the fit belongs to the graph");
     for tick in &warm {
         engine.step(tick.0, &tick.1).expect("ticks are in order");
-        by_hand.as_mut().map(|step| step(tick));
+        if let Some(step) = &mut by_hand {
+            step(tick);
+        }
     }
     let start = Clock::now();
     let engine = times(&measured, |tick| {
