@@ -70,7 +70,7 @@ impl Lacking {
             .map(|(name, rows)| format!("{name} ({})", count(*rows)))
             .collect();
         if sources.len() > NAMED {
-            told.push(format!("and {} more", sources.len() - NAMED));
+            told.push("and others".to_owned());
         }
         report.notes.push(format!(
             "many rows are incomplete for want of a value from {}",

@@ -1,5 +1,6 @@
 //! Decides how rows become the evenly spaced samples that a model is identified from, and which of its orders is taken.
 
+use athermal_core::diagnostic::count;
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
@@ -344,7 +345,9 @@ fn tell_missing(samples: &Samples, report: &mut TrainingReport) {
     report.figure("missing_truths", missing);
     report.figure("samples", all);
     report.notes.push(format!(
-        "at {missing} of its samples the truth is missing, {all} in all: the model is followed through them, as while it runs"
+        "at {} of its samples the truth is missing, {} in all: the model is followed through them, as while it runs",
+        count(missing),
+        count(all)
     ));
 }
 
