@@ -27,11 +27,11 @@ pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
 pub(crate) use keys::EstimatorKeys;
-pub(crate) use plan::Rows;
 pub use plan::{
     Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
     PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
 };
+pub(crate) use plan::{Rows, admits};
 pub(crate) use port_channels::PortChannels;
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;

@@ -50,9 +50,14 @@ impl SourceChannel {
     /// Whether a sample, in the signal's unit, counts: it is finite and within the range. NaN, which is no sample, does not.
     #[must_use]
     pub fn admits(&self, sample: f64) -> bool {
-        let (lowest, highest) = self.range;
-        sample.is_finite() && sample >= lowest && sample <= highest
+        admits(self.range, sample)
     }
+}
+
+/// Whether a sample is finite and within a range.
+#[inline]
+pub(crate) fn admits((lowest, highest): (f64, f64), sample: f64) -> bool {
+    sample.is_finite() && sample >= lowest && sample <= highest
 }
 
 /// A slot.

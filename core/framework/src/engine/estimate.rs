@@ -52,27 +52,76 @@ pub(super) fn fit_of(
 #[derive(Debug)]
 struct Part {
     gather: usize,
-    /// Their places within it.
-    places: Vec<usize>,
-    /// The same where they lie side by side.
-    side_by_side: Option<Range<usize>>,
+    places: Places,
+}
+
+/// Where regressors are within their gather.
+#[derive(Debug)]
+enum Places {
+    SideBySide(Range<usize>),
+    Apart(Box<[usize]>),
 }
 
 impl Part {
-    fn new(gather: usize, places: Vec<usize>) -> Self {
+    fn new(gather: usize, places: &[usize]) -> Self {
         let first = places.first().copied().unwrap_or(0);
         let range = first..first + places.len();
+        let side_by_side = range.clone().eq(places.iter().copied());
         Self {
             gather,
-            side_by_side: range.clone().eq(places.iter().copied()).then_some(range),
-            places,
+            places: if side_by_side {
+                Places::SideBySide(range)
+            } else {
+                Places::Apart(places.into())
+            },
+        }
+    }
+
+    fn len(&self) -> usize {
+        match &self.places {
+            Places::SideBySide(range) => range.len(),
+            Places::Apart(places) => places.len(),
         }
     }
 
     /// What its regressors are.
-    fn entries<'a>(&'a self, gathers: &'a [Gather]) -> impl Iterator<Item = Entry> + 'a {
+    fn entries(&self, gathers: &[Gather]) -> Vec<Entry> {
         let entries = &gathers[self.gather].entries;
-        self.places.iter().map(|&place| entries[place])
+        match &self.places {
+            Places::SideBySide(range) => entries[range.clone()].to_vec(),
+            Places::Apart(places) => places.iter().map(|&place| entries[place]).collect(),
+        }
+    }
+
+    /// Reads its piece of a row: whether all of it is there, and the oldest stamp of what is.
+    #[inline]
+    fn read(&self, gathered: &[Gathered], piece: &mut [f64]) -> (bool, Instant) {
+        let from = &gathered[self.gather];
+        match &self.places {
+            Places::SideBySide(range) => piece.copy_from_slice(&from.values[range.clone()]),
+            Places::Apart(places) => {
+                for (value, &place) in piece.iter_mut().zip(places) {
+                    *value = from.values[place];
+                }
+            }
+        }
+        match from.stamp_of(piece.len()) {
+            Some(stamp) => (true, stamp),
+            None => self.look_at_each(piece, &from.stamps),
+        }
+    }
+
+    #[inline(never)]
+    fn look_at_each(&self, piece: &[f64], stamps: &[Instant]) -> (bool, Instant) {
+        let of_each = |nth: usize| match &self.places {
+            Places::SideBySide(range) => stamps[range.start + nth],
+            Places::Apart(places) => stamps[places[nth]],
+        };
+        let there = (0..piece.len()).filter(|&nth| !piece[nth].is_nan());
+        let (count, oldest) = there.fold((0, Instant::MAX), |(count, oldest), nth| {
+            (count + 1, oldest.min(of_each(nth)))
+        });
+        (count == piece.len(), oldest)
     }
 }
 
@@ -92,10 +141,11 @@ fn given(prediction: f64, oldest: Instant, now: Instant) -> (f64, Instant) {
 pub(crate) struct Estimate {
     predictor: Arc<dyn Predictor>,
     /// Where the regressors that it uses are, in their order.
-    parts: Vec<Part>,
-    row: Vec<f64>,
-    /// Whether somebody asks about the row after the prediction from it.
-    asked_again: bool,
+    parts: Box<[Part]>,
+    /// How many they are.
+    width: usize,
+    /// Whether nothing is to be done but to predict by the fit.
+    plain: bool,
     takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
     pub(super) learning: Option<Box<Learning>>,
@@ -134,9 +184,10 @@ impl Estimate {
         let used = places_of(node, regressors, &*predictor)?;
         let used_of_gathers: Vec<_> = used.iter().map(|&index| places[index]).collect();
         let same_gather = |one: &(usize, usize), other: &(usize, usize)| one.0 == other.0;
-        let parts = used_of_gathers
-            .chunk_by(same_gather)
-            .map(|part| Part::new(part[0].0, part.iter().map(|&(_, place)| place).collect()));
+        let parts = used_of_gathers.chunk_by(same_gather).map(|part| {
+            let places: Vec<_> = part.iter().map(|&(_, place)| place).collect();
+            Part::new(part[0].0, &places)
+        });
         let parts = parts.collect();
         let learning = match learning {
             None => None,
@@ -152,8 +203,8 @@ impl Estimate {
             }
         };
         Ok(Self {
-            row: vec![0.0; used.len()],
-            asked_again: deviation.is_some() || learning.is_some(),
+            width: used.len(),
+            plain: deviation.is_none() && learning.is_none(),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
@@ -169,9 +220,15 @@ impl Estimate {
             Mode::OneStep => None,
             mode => Feedback::new(mode, link, &entries.collect::<Vec<_>>()).map(Box::new),
         };
+        self.plain &= self.feedback.is_none();
         if let Some(learning) = &mut self.learning {
             learning.predict_in(mode);
         }
+    }
+
+    /// How many regressors it reads.
+    pub(crate) fn width(&self) -> usize {
+        self.width
     }
 
     /// What is read in place of measured past truths.
@@ -179,130 +236,118 @@ impl Estimate {
         self.feedback.as_deref_mut()
     }
 
-    /// The prediction and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.
+    /// Whether nothing is to be done but to [predict](Self::predict): it does not learn, nothing is fed back, and nobody asks for
+    /// its deviation.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.plain
+    }
+
+    /// The prediction of the fit and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.
     ///
-    /// `on` says whether learning goes on.
+    /// `row` is room for the regressors.
     #[inline]
-    pub(crate) fn run(&mut self, gathered: &[Gathered], now: Instant, on: bool) -> (f64, Instant) {
+    pub(crate) fn predict(
+        &self,
+        gathered: &[Gathered],
+        row: &mut [f64],
+        now: Instant,
+    ) -> (f64, Instant) {
         if let Some((row, stamp)) = self.in_place(gathered) {
             return given(self.predictor.predict(row), stamp, now);
         }
-        let (mut whole, mut oldest) = self.read(gathered);
-        if self.parts.is_empty() {
-            oldest = now;
-        }
-        if self.learning.is_some() || self.feedback.is_some() {
-            return self.run_beyond_the_fit(whole, oldest, gathered, now, on);
-        }
-        whole |= self.takes_absent;
+        let row = &mut row[..self.width];
+        let (whole, oldest) = self.read(gathered, row, now);
         // Where none of several regressors is there, none had a stamp.
-        whole &= oldest < Instant::MAX;
-        if !whole {
-            return (f64::NAN, now);
+        if (whole || self.takes_absent) && oldest < Instant::MAX {
+            given(self.predictor.predict(row), oldest, now)
+        } else {
+            (f64::NAN, now)
         }
-        given(self.predictor.predict(&self.row), oldest, now)
     }
 
-    /// The same for an estimator that goes on learning, or reads predictions in place of past truths.
+    /// The same where more is to be done; all regressors are left in `row`, and `on` says whether learning goes on.
     #[inline(never)]
-    fn run_beyond_the_fit(
+    pub(crate) fn run(
         &mut self,
-        mut whole: bool,
-        mut oldest: Instant,
         gathered: &[Gathered],
+        row: &mut [f64],
         now: Instant,
         on: bool,
     ) -> (f64, Instant) {
+        let (mut whole, mut oldest) = self.read(gathered, row, now);
         whole |= self.takes_absent;
         whole &= oldest < Instant::MAX;
         if let Some(learning) = &mut self.learning {
             // What is learned from was measured, whatever stands in for it in a prediction.
-            learning.run(whole.then_some(&*self.row), now, gathered, on);
+            learning.run(whole.then_some(&*row), now, gathered, on);
         }
         if let Some(feedback) = &mut self.feedback {
             let (learning, predictor) = (&self.learning, &self.predictor);
-            feedback.replace(&mut self.row, now, |row, at| match learning {
+            feedback.replace(row, now, |row, at| match learning {
                 Some(learning) => learning.predict(row, at),
                 None => predictor.predict(row),
             });
-            whole = self.takes_absent || self.row.iter().all(|value| !value.is_nan());
+            whole = self.takes_absent || row.iter().all(|value| !value.is_nan());
             oldest = oldest.min(now);
         }
         let prediction = match &self.learning {
             _ if !whole => f64::NAN,
-            Some(learning) => learning.predict(&self.row, now),
-            None => self.predictor.predict(&self.row),
+            Some(learning) => learning.predict(row, now),
+            None => self.predictor.predict(row),
         };
         if self.feedback.is_some() {
-            self.feed_back(prediction, now);
+            self.feed_back(row, prediction, now);
         }
         given(prediction, oldest, now)
     }
 
     /// Writes a run down for those that read its prediction in place of the truth.
-    fn feed_back(&mut self, prediction: f64, now: Instant) {
-        let deviation = self.deviation_of_one(now);
+    fn feed_back(&mut self, row: &[f64], prediction: f64, now: Instant) {
+        let deviation = self.deviation_of_one(row, now);
         let (learning, predictor) = (&self.learning, &self.predictor);
         let predict = |row: &[f64], at: Instant| match learning {
             Some(learning) => learning.predict(row, at),
             None => predictor.predict(row),
         };
         if let Some(feedback) = &mut self.feedback {
-            feedback.ran(&self.row, prediction, deviation, now, predict);
+            feedback.ran(row, prediction, deviation, now, predict);
         }
     }
 
-    /// The row where it lies and the stamp of all of it, where it lies in one piece and is needed for nothing but a prediction.
+    /// The row where it lies and the stamp of all of it, where it lies in one piece.
     #[inline]
     fn in_place<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
         let [part] = &self.parts[..] else { return None };
-        if self.asked_again || self.feedback.is_some() {
+        let Places::SideBySide(range) = &part.places else {
             return None;
-        }
+        };
         let from = &gathered[part.gather];
-        let range = part.side_by_side.as_ref()?;
-        Some((&from.values[range.clone()], from.together?))
+        Some((&from.values[range.clone()], from.stamp_of(range.len())?))
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.
     #[inline]
-    fn read(&mut self, gathered: &[Gathered]) -> (bool, Instant) {
-        let (mut whole, mut oldest) = (true, Instant::MAX);
-        let mut row = &mut self.row[..];
+    fn read(&self, gathered: &[Gathered], mut row: &mut [f64], now: Instant) -> (bool, Instant) {
+        let nothing_needed = if self.parts.is_empty() {
+            now
+        } else {
+            Instant::MAX
+        };
+        let (mut whole, mut oldest) = (true, nothing_needed);
         for part in &self.parts {
-            let from = &gathered[part.gather];
-            let (values, rest) = row.split_at_mut(part.places.len());
+            let (piece, rest) = row.split_at_mut(part.len());
             row = rest;
-            let there = &from.values[..];
-            if let Some(stamp) = from.together {
-                match &part.side_by_side {
-                    Some(range) => values.copy_from_slice(&there[range.clone()]),
-                    None => {
-                        for (value, &place) in values.iter_mut().zip(&part.places) {
-                            *value = there[place];
-                        }
-                    }
-                }
-                oldest = oldest.min(stamp);
-                continue;
-            }
-            let stamps = &from.stamps[..];
-            for (value, &place) in values.iter_mut().zip(&part.places) {
-                *value = there[place];
-                if value.is_nan() {
-                    whole = false;
-                } else {
-                    oldest = oldest.min(stamps[place]);
-                }
-            }
+            let (all, stamp) = part.read(gathered, piece);
+            whole &= all;
+            oldest = oldest.min(stamp);
         }
         (whole, oldest)
     }
 
-    /// The standard deviation of the truth about the prediction that was made at this tick.
-    pub(crate) fn deviation(&self, now: Instant) -> f64 {
+    /// The standard deviation of the truth about the prediction that was made at this tick from a row.
+    pub(crate) fn deviation(&self, row: &[f64], now: Instant) -> f64 {
         let widened = self.feedback.as_ref().map_or(1.0, |of| of.widened());
-        let deviation = widened * self.deviation_of_one(now);
+        let deviation = widened * self.deviation_of_one(row, now);
         if deviation.is_finite() {
             deviation
         } else {
@@ -311,10 +356,10 @@ impl Estimate {
     }
 
     /// The same from past truths that were all measured.
-    fn deviation_of_one(&self, now: Instant) -> f64 {
+    fn deviation_of_one(&self, row: &[f64], now: Instant) -> f64 {
         match &self.learning {
-            Some(learning) => learning.deviation(&self.row, now),
-            None => self.predictor.deviation(&self.row),
+            Some(learning) => learning.deviation(row, now),
+            None => self.predictor.deviation(row),
         }
     }
 
@@ -343,7 +388,7 @@ impl Estimate {
     /// Asks for the prediction from any values.
     #[cfg(feature = "testkit")]
     pub(crate) fn ask_idly(&self, value: &mut dyn FnMut() -> f64) {
-        let row: Vec<f64> = self.row.iter().map(|_| value()).collect();
+        let row: Vec<f64> = (0..self.width).map(|_| value()).collect();
         self.predictor.predict(&row);
         if let Some(learning) = &self.learning {
             learning.predict(&row, Instant::from_ns(0));

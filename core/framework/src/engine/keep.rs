@@ -71,9 +71,9 @@ impl Engine {
     /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
     /// each follows, and what is frozen on command stays so.
     pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
-        for ((_, blending), from) in self.blending.iter_mut().zip(from) {
-            if let Some((_, last)) = from.and_then(|from| before.blending.get(from)) {
-                blending.hand_over(last);
+        for (shown, from) in self.shown.iter_mut().zip(from) {
+            if let Some(last) = from.and_then(|from| before.shown.get(from)) {
+                shown.blending.hand_over(&last.blending);
             }
         }
         self.refused = before.refused;
@@ -85,7 +85,7 @@ impl Engine {
     #[must_use]
     pub fn state(&self) -> EngineState {
         let name = |slot: usize| self.plan.channels[slot].name.clone();
-        let outputs = self.plan.outputs.iter().zip(&self.blending);
+        let outputs = self.plan.outputs.iter().zip(&self.shown);
         let sources = self.plan.sources.iter().zip(&self.rejected);
         EngineState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -109,7 +109,7 @@ impl Engine {
                 .collect(),
             nodes: self.node_states(),
             blending: outputs
-                .map(|(output, (_, blending))| (output.name.clone(), *blending))
+                .map(|(output, shown)| (output.name.clone(), shown.blending))
                 .collect(),
         }
     }
@@ -232,7 +232,7 @@ impl Engine {
             if let Some(was) = state.blending.get(&output.name)
                 && heritage.outputs[index]
             {
-                self.blending[index].1 = *was;
+                self.shown[index].blending = *was;
             }
         }
         self.slots.tick = state.tick;
@@ -248,8 +248,7 @@ impl Engine {
             } = &node.role
                 && let Some(freeze) = learning.freeze
             {
-                let gather = &self.plan.gathers[freeze];
-                self.gathered[freeze].read(gather, &self.slots, &self.histories, self.last);
+                self.gathered[freeze].read(&self.slots, &self.histories, self.last);
             }
         }
     }

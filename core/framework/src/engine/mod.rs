@@ -38,7 +38,7 @@ pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
 pub(crate) use slots::{Given, Slots};
 
-use crate::compile::{Plan, Step};
+use crate::compile::{Plan, Step, admits};
 use crate::node::{Evidence, Predictor, Tick};
 use crate::time::{Duration, Instant};
 use blend::Blending;
@@ -75,9 +75,20 @@ pub struct Engine {
     fed_back: Vec<(usize, usize)>,
     /// Whether learning has been frozen on command.
     frozen: bool,
+    /// Room for the regressors of any estimator.
+    row: Vec<f64>,
+    /// The lowest and highest sample that count, of each source.
+    ranges: Vec<(f64, f64)>,
     outputs: Vec<f64>,
-    /// For each output its rate of passing over, in its unit per second, and how far it has.
-    blending: Vec<(Option<f64>, Blending)>,
+    shown: Vec<Shown>,
+}
+
+/// Where an output is from, and how it passes from an old graph's value to a new one's.
+struct Shown {
+    slot: usize,
+    /// In its unit per second.
+    rate: Option<f64>,
+    blending: Blending,
 }
 
 impl Engine {
@@ -102,6 +113,7 @@ impl Engine {
                 .iter()
                 .map(|channel| channel.history.map(History::new))
                 .collect(),
+            row: vec![0.0; nodes.iter().map(Running::width).max().unwrap_or(0)],
             nodes,
             last: Instant::MIN,
             before_break: None,
@@ -110,16 +122,16 @@ impl Engine {
             fed_back: Vec::new(),
             frozen: false,
             outputs: vec![f64::NAN; plan.outputs.len()],
-            blending: plan
+            shown: plan
                 .outputs
                 .iter()
-                .map(|output| {
-                    (
-                        blend::rate(output, &plan.channels[output.slot].channel.unit),
-                        Blending::default(),
-                    )
+                .map(|output| Shown {
+                    slot: output.slot,
+                    rate: blend::rate(output, &plan.channels[output.slot].channel.unit),
+                    blending: Blending::default(),
                 })
                 .collect(),
+            ranges: plan.sources.iter().map(|source| source.range).collect(),
             fitted: fitted.clone(),
             revision: OnceLock::new(),
             plan,
@@ -171,22 +183,24 @@ impl Engine {
             gathered,
             histories,
             nodes,
+            row,
             frozen,
             ..
         } = self;
         for step in &plan.steps {
             match *step {
                 Step::Gather(gather) => {
-                    gathered[gather].read(&plan.gathers[gather], slots, histories, time);
+                    gathered[gather].read(slots, histories, time);
                 }
                 Step::Run(node) => {
-                    let turn = Turn {
+                    let mut turn = Turn {
                         now: time,
                         slots,
                         gathered,
+                        row,
                         frozen: *frozen,
                     };
-                    turn.of(&mut nodes[node], &plan.nodes[node]);
+                    turn.of(&mut nodes[node]);
                 }
                 Step::Capture(node) => {
                     if let Running::Operator {
@@ -355,27 +369,22 @@ impl Engine {
     }
 
     fn put_out(&mut self, now: Instant) {
-        let shown = self
-            .outputs
-            .iter_mut()
-            .zip(&self.plan.outputs)
-            .zip(&mut self.blending);
-        for ((shown, output), (rate, blending)) in shown {
-            let value = self.slots.now(output.slot);
-            *shown = if value.is_nan() {
+        for (output, shown) in self.outputs.iter_mut().zip(&mut self.shown) {
+            let value = self.slots.now(shown.slot);
+            *output = if value.is_nan() {
                 value
             } else {
-                blending.pass(now, value, *rate)
+                shown.blending.pass(now, value, shown.rate)
             };
         }
     }
 
     fn take_in(&mut self, time: Instant, samples: &[f64]) {
-        for (slot, (&sample, source)) in samples.iter().zip(&self.plan.sources).enumerate() {
+        for (slot, (&sample, &range)) in samples.iter().zip(&self.ranges).enumerate() {
             if sample.is_nan() {
                 continue;
             }
-            if source.admits(sample) {
+            if admits(range, sample) {
                 self.slots.set(slot, sample, time);
             } else {
                 self.rejected[slot] += 1;

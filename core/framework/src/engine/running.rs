@@ -1,28 +1,45 @@
 //! Decides what runs each node of a plan, given what was fitted.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::estimate::{Estimate, fit_of};
-use super::vote::Vote;
+use super::vote::{Vote, Wires};
 use super::{EngineError, Fitted};
-use crate::compile::{Plan, PlannedNode, PlannedRole};
+use crate::compile::{Beside, Plan, PlannedNode, PlannedRole};
 use crate::node::{Inputs, Operator, Role};
 
+/// What runs a node, with all that a tick needs of its plan.
 pub(super) enum Running {
     Operator {
         operator: Box<dyn Operator>,
-        gathers: Vec<usize>,
+        gathers: Box<[usize]>,
         every_tick: bool,
         closes_loops: bool,
+        slots: Range<usize>,
     },
     Estimate {
         estimate: Option<Estimate>,
         trigger: Option<usize>,
+        slot: usize,
+        /// The slot of the standard deviation, where somebody reads it.
+        deviation: Option<usize>,
     },
-    Vote(Vote),
+    Vote(Box<Vote>),
 }
 
 impl Running {
+    /// How many regressors it reads as an estimator.
+    pub(super) fn width(&self) -> usize {
+        match self {
+            Self::Estimate {
+                estimate: Some(estimate),
+                ..
+            } => estimate.width(),
+            _ => 0,
+        }
+    }
+
     /// The slot of the truth that it is told after all outputs.
     pub(super) fn truth(&self) -> Option<usize> {
         match self {
@@ -76,15 +93,17 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                 };
                 Running::Operator {
                     operator,
-                    gathers: gathers.clone(),
+                    gathers: gathers.clone().into(),
                     every_tick: *every_tick,
                     closes_loops: *closes_loops,
+                    slots: node.slots.clone(),
                 }
             }
             (
                 PlannedRole::Estimator {
                     gathers,
                     every_tick,
+                    deviation,
                     ..
                 },
                 Role::Estimator(_),
@@ -101,10 +120,27 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                     } else {
                         gathers.first().copied()
                     },
+                    slot: node.slots.start,
+                    deviation: *deviation,
                 }
             }
-            (PlannedRole::Combiner { voters, truth, .. }, Role::Combiner(spec)) => {
-                Running::Vote(Vote::new(spec, widths[*voters], *truth))
+            (
+                PlannedRole::Combiner {
+                    voters,
+                    state,
+                    truth,
+                    beside,
+                },
+                Role::Combiner(spec),
+            ) => {
+                let wires = Wires {
+                    voters: *voters,
+                    state: *state,
+                    slot: node.slots.start,
+                    beside: (*beside != Beside::default()).then(|| Box::new(*beside)),
+                };
+                let vote = Vote::new(spec, wires, widths[*voters], *truth);
+                Running::Vote(Box::new(vote))
             }
             _ => unreachable!("a plan gives each node the role of its specification"),
         });

@@ -1,12 +1,13 @@
 //! Decides what one node does at a tick: whether it runs, what it reads and where its outputs go; not in which order nodes do.
 
+use std::ops::Range;
+
 use super::estimate::Estimate;
 use super::gather::Gathered;
 use super::running::Running;
 use super::slots::Slots;
 use super::vote::Vote;
 use crate::channel::unless_infinite;
-use crate::compile::{PlannedNode, PlannedRole};
 use crate::node::{Operator, Outputs, Tick};
 use crate::time::Instant;
 
@@ -15,36 +16,53 @@ pub(super) struct Turn<'a> {
     pub(super) now: Instant,
     pub(super) slots: &'a mut Slots,
     pub(super) gathered: &'a [Gathered],
+    /// Room for the regressors of any estimator.
+    pub(super) row: &'a mut [f64],
     /// Whether learning has been frozen on command.
     pub(super) frozen: bool,
 }
 
 impl Turn<'_> {
     #[inline]
-    pub(super) fn of(self, running: &mut Running, node: &PlannedNode) {
+    pub(super) fn of(&mut self, running: &mut Running) {
         match running {
             Running::Operator {
                 operator,
                 gathers,
                 every_tick,
                 closes_loops,
+                slots,
             } => {
                 let fresh = |&gather: &usize| self.gathered[gather].fresh;
                 if *every_tick || gathers.iter().any(fresh) {
-                    self.operator(&mut **operator, node, gathers, *closes_loops);
+                    self.operator(&mut **operator, slots.clone(), gathers, *closes_loops);
                 }
             }
-            Running::Estimate { estimate, trigger } => {
-                self.estimate(estimate.as_mut(), *trigger, node);
+            Running::Estimate {
+                estimate: Some(estimate),
+                trigger,
+                slot,
+                ..
+            } if estimate.is_plain() => {
+                if trigger.is_none_or(|gather| self.gathered[gather].fresh) {
+                    let (value, stamp) = estimate.predict(self.gathered, self.row, self.now);
+                    self.slots.set(*slot, value, stamp);
+                }
             }
-            Running::Vote(vote) => self.vote(vote, node),
+            Running::Estimate {
+                estimate,
+                trigger,
+                slot,
+                deviation,
+            } => self.estimate(estimate.as_mut(), *trigger, *slot, *deviation),
+            Running::Vote(vote) => self.vote(vote),
         }
     }
 
     fn operator(
-        self,
+        &mut self,
         operator: &mut dyn Operator,
-        node: &PlannedNode,
+        range: Range<usize>,
         gathers: &[usize],
         closes_loops: bool,
     ) {
@@ -54,13 +72,13 @@ impl Turn<'_> {
             gathered,
             ..
         } = self;
+        let now = *now;
         let oldest = |&gather: &usize| gathered[gather].oldest();
         let stamp = if closes_loops {
             None
         } else {
             gathers.iter().filter_map(oldest).min()
         };
-        let range = node.slots.clone();
         let mut outputs = Outputs {
             values: &mut slots.values[range.clone()],
             given: &mut slots.given[range],
@@ -75,26 +93,29 @@ impl Turn<'_> {
         operator.step(&tick, &mut outputs);
     }
 
-    #[inline]
+    /// An estimator that does more than predict by its fit, or has none.
+    #[inline(never)]
     fn estimate(
-        self,
+        &mut self,
         mut estimate: Option<&mut Estimate>,
         trigger: Option<usize>,
-        node: &PlannedNode,
+        slot: usize,
+        deviation: Option<usize>,
     ) {
         let Self {
             now,
             slots,
             gathered,
+            row,
             frozen,
         } = self;
-        let slot = node.slots.start;
+        let (now, on) = (*now, !*frozen);
         if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning()) {
             if learning.at_once() && slots.fresh(learning.truth()) {
                 let truth = slots.values[learning.truth()];
-                learning.observe(truth, now, gathered, !frozen);
+                learning.observe(truth, now, gathered, on);
             }
-            if let Some((became, arrived)) = learning.release(now, gathered, !frozen) {
+            if let Some((became, arrived)) = learning.release(now, gathered, on) {
                 slots.set(slot + 1, f64::from(became as u8), arrived);
             }
         }
@@ -108,39 +129,32 @@ impl Turn<'_> {
         if let Some(feedback) = estimate.feedback() {
             feedback.before_run(slots, now);
         }
-        let (value, stamp) = estimate.run(gathered, now, !frozen);
+        let row = &mut row[..estimate.width()];
+        let (value, stamp) = estimate.run(gathered, row, now, on);
         slots.set(slot, value, stamp);
-        if let Some(slot) = node.role.deviation() {
+        if let Some(slot) = deviation {
             let known = if value.is_nan() {
                 f64::NAN
             } else {
-                estimate.deviation(now)
+                estimate.deviation(row, now)
             };
             slots.set(slot, known, stamp);
         }
     }
 
     #[inline]
-    fn vote(self, vote: &mut Vote, node: &PlannedNode) {
+    fn vote(&mut self, vote: &mut Vote) {
         let Self {
             now,
             slots,
             gathered,
             ..
         } = self;
+        let now = *now;
         vote.release(now);
-        let PlannedRole::Combiner {
-            voters,
-            state,
-            beside,
-            ..
-        } = &node.role
-        else {
-            unreachable!("a vote is planned as a combiner")
-        };
-        let votes = &gathered[*voters];
+        let votes = &gathered[vote.wires.voters];
         let mut fresh = votes.fresh;
-        if let Some(state) = *state {
+        if let Some(state) = vote.wires.state {
             vote.go_by(gathered[state].values[0], now);
             fresh |= gathered[state].fresh;
         }
@@ -148,7 +162,10 @@ impl Turn<'_> {
             return;
         }
         let (value, stamp) = vote.run(votes, now);
-        slots.set(node.slots.start, value, stamp);
+        slots.set(vote.wires.slot, value, stamp);
+        let Some(&beside) = vote.wires.beside.as_deref() else {
+            return;
+        };
         if beside.weights.is_some() || beside.deviation.is_some() {
             let weights = vote.weigh(votes);
             if let Some(first) = beside.weights {

@@ -4,7 +4,7 @@ use super::gather::Gathered;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::channel::unless_infinite;
-use crate::compile::TruthLink;
+use crate::compile::{Beside, TruthLink};
 use crate::node::{Combine, Combiner, Evidence, Restored, Votes};
 use crate::time::{Duration, Instant};
 
@@ -18,10 +18,27 @@ pub(crate) struct Vote {
     weights: Vec<f64>,
     /// How many truths it has been told that there was a vote for.
     told: u64,
+    pub(super) wires: Wires,
+}
+
+/// What a combiner reads and where what it gives goes.
+pub(crate) struct Wires {
+    /// The gather of the votes.
+    pub(super) voters: usize,
+    /// The gather of the state that it goes by, where it goes by one.
+    pub(super) state: Option<usize>,
+    pub(super) slot: usize,
+    /// What it gives beside its prediction, where it gives anything.
+    pub(super) beside: Option<Box<Beside>>,
 }
 
 impl Vote {
-    pub(crate) fn new(spec: &dyn Combiner, voters: usize, link: Option<TruthLink>) -> Self {
+    pub(crate) fn new(
+        spec: &dyn Combiner,
+        wires: Wires,
+        voters: usize,
+        link: Option<TruthLink>,
+    ) -> Self {
         let interval = spec.covers().map(|_| [f64::NAN; 3]);
         // The interval that was given for a truth is written down with the votes for it.
         let width = voters + interval.map_or(0, |ends| ends.len());
@@ -31,6 +48,7 @@ impl Vote {
             interval,
             weights: vec![f64::NAN; voters],
             told: 0,
+            wires,
         }
     }
 
