@@ -342,3 +342,55 @@ fn the_rows_that_tell_how_well_data_determine_a_model_are_those_of_its_fit() {
         "{conditions:?}"
     );
 }
+
+#[test]
+fn answers_to_sensors_of_different_units_are_drawn_apart() {
+    let scratch = Scratch::new("diagnose-units");
+    let graph = scratch.file(
+        "graph.toml",
+        r#"schema = 1
+[time]
+column = "time_s"
+[signals.temperature]
+unit = "Cel"
+channels = ["bed"]
+max_age = "1min"
+[signals.load]
+unit = "%"
+channels = ["spindle"]
+max_age = "1min"
+[signals.position]
+unit = "um"
+channels = ["Z"]
+max_age = "1min"
+[nodes.model]
+type = "linear"
+inputs = { features = ["temperature", "load"], truth = "position.Z" }
+ahead = "0s"
+[outputs]
+predicted = "model"
+"#,
+    );
+    let mut rows = String::from("time_s,bed,spindle,Z\n");
+    for row in 0..200 {
+        let (bed, spindle) = (f64::from(row % 17), f64::from(row % 5));
+        let _ = writeln!(
+            rows,
+            "{},{bed},{spindle},{}",
+            10 * row,
+            2.0 * bed + 0.1 * spindle
+        );
+    }
+    let log = scratch.file("log.csv", rows);
+    let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    athermal_on("diagnose", &model, &log, &[&"--no-fit", &"--plots", &plots]).ended(0);
+    for (name, label, sensor, other) in [
+        ("step-model.svg", "um per K", ">bed<", ">spindle<"),
+        ("step-model-2.svg", "um per %", ">spindle<", ">bed<"),
+    ] {
+        let svg = std::fs::read_to_string(plots.join(name)).unwrap();
+        assert!(svg.contains(label) && svg.contains(sensor), "{name}: {svg}");
+        assert!(!svg.contains(other), "{name}: {svg}");
+    }
+}
