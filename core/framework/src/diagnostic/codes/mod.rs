@@ -125,7 +125,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A019",
         "nothing to remove",
-        "`nodes.NAME = false` removes an inherited node, and there is none of that name."
+        "`nodes.NAME = false` removes an inherited node and `outputs.NAME = false` an inherited output, and there is none of that name."
     ),
     code!(
         "A020",
