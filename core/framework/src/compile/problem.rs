@@ -137,8 +137,14 @@ pub enum CompileProblem {
     EndlessTruth { channel: String, node: String },
     /// A limit of a unit that is not the truth's.
     LimitUnit { found: Unit, expected: Unit },
-    /// Two channels or columns of the same name.
+    /// Two channels of the same name.
     DuplicateName { name: String, what: &'static str },
+    /// Columns of the same names as others of the output, because of one reference; with an output that it could be alone.
+    DuplicateColumns {
+        first: String,
+        more: usize,
+        alone: Option<String>,
+    },
     /// A node whose outputs nobody uses.
     UnusedNode { node: String },
     /// A signal that nobody uses.
@@ -217,7 +223,7 @@ impl Problem for CompileProblem {
             Self::NoHorizon { .. } => "A055",
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "A056",
             Self::LimitUnit { .. } => "A057",
-            Self::DuplicateName { .. } => "A058",
+            Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "A058",
             Self::UnusedNode { .. } => "A059",
             Self::UnusedSignal { .. } => "A060",
             Self::Unreachable { .. } => "A061",
@@ -268,6 +274,7 @@ impl Problem for CompileProblem {
             | Self::EndlessTruth { .. }
             | Self::LimitUnit { .. }
             | Self::DuplicateName { .. }
+            | Self::DuplicateColumns { .. }
             | Self::UnusedNode { .. }
             | Self::UnusedSignal { .. }
             | Self::Unreachable { .. }
@@ -386,6 +393,14 @@ impl Problem for CompileProblem {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
             Self::DuplicateName { name, what } => format!("there are two {what} named `{name}`"),
+            Self::DuplicateColumns { first, more, .. } => {
+                let more = match more {
+                    0 => String::new(),
+                    1 => ", and one more name comes twice".to_owned(),
+                    more => format!(", and {more} more names come twice"),
+                };
+                format!("there are two output columns named `{first}`{more}")
+            }
             Self::UnusedNode { node } => {
                 format!("nothing that comes out depends on the node `{node}`")
             }
@@ -438,7 +453,7 @@ impl Problem for CompileProblem {
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "not measured",
             Self::EndlessTruth { .. } => "of no span",
             Self::LimitUnit { .. } => "another unit",
-            Self::DuplicateName { .. } => "the name is taken",
+            Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "the name is taken",
             Self::UnusedNode { .. } | Self::UnusedSignal { .. } => "not used",
             Self::Unreachable { .. } => "nothing flows in",
             Self::NoOutputs => "no `[outputs]`",
@@ -531,7 +546,12 @@ impl Problem for CompileProblem {
                 "say how much of the past counts, such as `span = \"10min\"` on `{node}`, or use a window, such as `slope`"
             ),
             Self::LimitUnit { expected, .. } => format!("write the limit in {expected}"),
-            Self::DuplicateName { .. } => {
+            Self::DuplicateColumns {
+                alone: Some(alone), ..
+            } => {
+                format!("give it a line of its own, such as `{alone}`, or refer to fewer channels")
+            }
+            Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => {
                 "give one of them another name, or refer to fewer channels".to_owned()
             }
             Self::UnusedNode { node } if node.contains('/') => {
