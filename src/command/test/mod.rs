@@ -4,6 +4,7 @@ mod report;
 mod suite;
 mod work;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -79,6 +80,12 @@ impl Test {
             std::fs::write(path, summary.junit()).map_err(|error| {
                 Failure::Outside(format!("cannot write {}: {error}", path.display()))
             })?;
+        }
+        let mut warned = BTreeSet::new();
+        for warning in results.iter().flat_map(|ran| &ran.warnings) {
+            if warned.insert(warning) {
+                terminal.warning(warning);
+            }
         }
         if people {
             terminal.note(summary.line());
