@@ -11,6 +11,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::threads::Threads;
+use crate::output::offer;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use report::Summary;
 use work::Status;
@@ -67,11 +68,11 @@ impl Test {
             if people {
                 let suite = &suites[result.suite];
                 if told != Some(result.suite) && !terminal.quiet {
-                    println!("{}", suite.path);
+                    offer(format_args!("{}\n", suite.path));
                     told = Some(result.suite);
                 }
                 if !(terminal.quiet && matches!(result.status, Status::Passed)) {
-                    print!("{}", report::lines(suite, result));
+                    offer(format_args!("{}", report::lines(suite, result)));
                 }
             }
         });
