@@ -176,12 +176,16 @@ pub fn tell(
             counted(refused, "row")
         ));
     }
+    let rows: u64 = reports.iter().map(|(_, report)| report.rows).sum();
     for (channel, n) in rejected {
-        let are = if *n == 1 { "is" } else { "are" };
-        terminal.warning(format_args!(
-            "{channel}: {} {are} infinite or out of range, taken as missing",
-            counted(*n, "sample")
-        ));
+        let samples = counted(*n, "sample");
+        terminal.warning(match *n {
+            all if all == rows && all > 1 => format!(
+                "{channel}: all {samples} are infinite or out of range, taken as missing; is its unit that of the log?"
+            ),
+            1 => format!("{channel}: {samples} is infinite or out of range, taken as missing"),
+            _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),
+        });
     }
 }
 

@@ -170,3 +170,22 @@ fn a_model_and_the_results_of_tests_are_written_though_nobody_reads_what_is_told
             .contains("<failure")
     );
 }
+
+#[test]
+fn a_channel_whose_samples_are_all_out_of_range_makes_one_ask_for_its_unit() {
+    let (scratch, plain, counted, _) = desk("all-out-of-range");
+    let kelvins = std::fs::read_to_string(&plain).unwrap().replace(
+        "unit = \"Cel\"\nchannels = [\"room\"]\nrange = [\"-20 Cel\", \"200 Cel\"]",
+        "unit = \"K\"\nchannels = [\"room\"]\nrange = [\"250 K\", \"480 K\"]",
+    );
+    let graph = scratch.file("kelvins.toml", kelvins);
+    let told = athermal(&[&"evaluate", &graph, &"--data", &counted]).ended(0);
+    told.tells(&[
+        "temperature.room: all 60 samples are infinite or out of range",
+        "is its unit that of the log?",
+    ]);
+    let told = athermal(&[&"evaluate", &plain, &"--data", &counted])
+        .ended(0)
+        .told;
+    assert!(!told.contains("out of range"), "{told}");
+}
