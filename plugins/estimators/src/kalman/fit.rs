@@ -1,5 +1,6 @@
 //! Decides what a structural model learns from its rows; not how it is followed afterwards.
 
+use athermal_core::diagnostic::digits;
 use athermal_core::node::{
     Figure, Learner, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
@@ -235,6 +236,13 @@ impl KalmanTrainer {
             report
                 .notes
                 .push(format!("most likely are noises = {noises}"));
+            if let Some(all) = told.fades_within(self.typical_gap_s()) {
+                report.figure("observation_with_level", all);
+                report.notes.push(format!(
+                    "the level is gone before the next truth, so that only what it makes with the observation is known, {} {unit}",
+                    digits(all, 3)
+                ));
+            }
             if told.is_still() {
                 report.notes.push(
                     "the level does not move: the rows are as likely without a noise of it"
@@ -242,6 +250,14 @@ impl KalmanTrainer {
                 );
             }
         }
+    }
+
+    /// The typical time from one row to the next.
+    fn typical_gap_s(&self) -> f64 {
+        let pairs = self.kept.windows(2).filter(|pair| !pair[1].begins);
+        let mut gaps: Vec<Duration> = pairs.map(|pair| pair[1].at - pair[0].at).collect();
+        gaps.sort_unstable();
+        gaps.get(gaps.len() / 2).map_or(f64::NAN, |gap| gap.secs())
     }
 
     /// All that is told of the fit is told of the rows that it goes through.
@@ -388,5 +404,22 @@ mod tests {
             Some(&Figure::names(["seldom"]))
         );
         assert!(predictor.predict(&[3.0]).is_finite());
+    }
+
+    #[test]
+    fn a_level_that_is_gone_before_the_next_truth_is_told_as_part_of_the_observation() {
+        // 6 nm in an hour that return within 4 s: a variance of 6² / 3600 · 4 / 2 = 0.02 nm², beside 0.05² nm².
+        let model = Structural {
+            observation: 0.0025,
+            level: 36.0 / 3600.0,
+            trend: None,
+            returning: 0.25,
+            passage: Passage::Continuous,
+        };
+        let told = Hourly::of(&model);
+        let all = told.fades_within(420.0).unwrap();
+        assert!((all - 0.15).abs() < 1e-12, "{all}");
+        assert_eq!(told.fades_within(10.0), None);
+        assert_eq!(told.fades_within(f64::NAN), None);
     }
 }
