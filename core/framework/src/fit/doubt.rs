@@ -219,3 +219,35 @@ impl Truths {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+
+    #[test]
+    fn a_row_counts_for_a_sensor_whichever_of_its_regressors_is_missing() {
+        let regressor = |name: &str, sensor: &str| Regressor {
+            name: name.to_owned(),
+            unit: "K".to_owned(),
+            sensors: vec![sensor.to_owned()],
+            lag: Duration::ZERO,
+            of_truth: false,
+        };
+        let regressors = [
+            regressor("a", "t.a"),
+            regressor("a lag 1min", "t.a"),
+            regressor("b", "t.b"),
+        ];
+        let mut lacking = Lacking::new(regressors.iter());
+        for row in [
+            [f64::NAN, 1.0, f64::NAN],
+            [1.0, f64::NAN, 1.0],
+            [f64::NAN; 3],
+        ] {
+            lacking.count(&row);
+        }
+        let expected = [("t.a".to_owned(), 3), ("t.b".to_owned(), 2)];
+        assert_eq!(lacking.named(), expected);
+    }
+}
