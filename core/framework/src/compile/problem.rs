@@ -149,6 +149,13 @@ pub enum CompileProblem {
     UnusedNode { node: String },
     /// A signal that nobody uses.
     UnusedSignal { signal: String },
+    /// Columns that are named for another unit than their signal's.
+    ColumnUnit {
+        signal: String,
+        column: String,
+        named: Unit,
+        unit: Unit,
+    },
     /// An output behind which there is no signal.
     Unreachable { output: String },
     /// A graph without outputs.
@@ -226,6 +233,7 @@ impl Problem for CompileProblem {
             Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "A058",
             Self::UnusedNode { .. } => "A059",
             Self::UnusedSignal { .. } => "A060",
+            Self::ColumnUnit { .. } => "A069",
             Self::Unreachable { .. } => "A061",
             Self::NoOutputs => "A062",
             Self::PointOrDifference { .. } => "A063",
@@ -241,9 +249,10 @@ impl Problem for CompileProblem {
 
     fn severity(&self) -> Severity {
         match self {
-            Self::UnusedNode { .. } | Self::UnusedSignal { .. } | Self::Doubt { .. } => {
-                Severity::Warning
-            }
+            Self::UnusedNode { .. }
+            | Self::UnusedSignal { .. }
+            | Self::ColumnUnit { .. }
+            | Self::Doubt { .. } => Severity::Warning,
             _ => Severity::Error,
         }
     }
@@ -277,6 +286,7 @@ impl Problem for CompileProblem {
             | Self::DuplicateColumns { .. }
             | Self::UnusedNode { .. }
             | Self::UnusedSignal { .. }
+            | Self::ColumnUnit { .. }
             | Self::Unreachable { .. }
             | Self::NoOutputs => true,
             Self::UnknownKind { .. }
@@ -404,6 +414,12 @@ impl Problem for CompileProblem {
             Self::UnusedNode { node } => {
                 format!("nothing that comes out depends on the node `{node}`")
             }
+            Self::ColumnUnit {
+                signal,
+                column,
+                named,
+                unit,
+            } => format!("`{signal}` is in {unit}, and its column `{column}` is named for {named}"),
             Self::UnusedSignal { signal } => {
                 format!("nothing that comes out depends on the signal `{signal}`")
             }
@@ -455,6 +471,7 @@ impl Problem for CompileProblem {
             Self::LimitUnit { .. } => "another unit",
             Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "the name is taken",
             Self::UnusedNode { .. } | Self::UnusedSignal { .. } => "not used",
+            Self::ColumnUnit { .. } => "another unit",
             Self::Unreachable { .. } => "nothing flows in",
             Self::NoOutputs => "no `[outputs]`",
             Self::PointOrDifference { .. } => "a point is no difference",
@@ -564,6 +581,9 @@ impl Problem for CompileProblem {
                 )
             }
             Self::UnusedSignal { .. } => "refer to it or remove it".to_owned(),
+            Self::ColumnUnit { named, .. } => format!(
+                "write `unit = \"{named}\"`, which converts wherever another one is needed, unless the log is at fault"
+            ),
             Self::Unreachable { .. } => "check the inputs on the way to it".to_owned(),
             Self::PointOrDifference { .. } => {
                 "Cel and [degF] are points on a scale, and K is a difference; take a slope or difference of a \

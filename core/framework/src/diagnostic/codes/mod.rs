@@ -318,6 +318,11 @@ pub const CODES: &[Code] = &[
         "Each regressor and each vote counts once: the coefficients of two that are the same cannot be told apart, and a voter that stands twice would have twice the say."
     ),
     code!(
+        "A069",
+        "columns in another unit",
+        "A table's columns are named for another unit than their signal's, which measures the same: what is read is taken as the signal says."
+    ),
+    code!(
         "A070",
         "nothing to run over",
         "A test runs over recorded or simulated data (`on`) or over made-up measurements (`inputs`): one of them."
