@@ -394,3 +394,39 @@ predicted = "model"
         assert!(!svg.contains(other), "{name}: {svg}");
     }
 }
+
+#[test]
+fn answers_of_instances_that_predict_the_same_are_told_by_the_instances() {
+    let scratch = Scratch::new("diagnose-same-truth");
+    let (head, rest) = TWO_SENSORS.split_once("[nodes.thermal]").unwrap();
+    let rest = rest.replace("\"gradients\"", "\"gradients.{sensor}@*\"");
+    let text =
+        format!("{head}[sets]\nsensor = [\"a\", \"b\"]\n[nodes.thermal]\neach = \"sensor\"{rest}");
+    let graph = scratch.file("graph.toml", text);
+    let mut rows = String::from("time_s,a,b,z\n");
+    for row in 0..800 {
+        let t = f64::from(row) * 10.0;
+        let (a, b) = ((t / 700.0).sin(), (t / 1100.0).cos());
+        let _ = writeln!(
+            rows,
+            "{t},{},{},{}",
+            20.0 + a,
+            20.0 + b,
+            50.0 * a - 30.0 * b
+        );
+    }
+    let log = scratch.file("log.csv", rows);
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let told = athermal_on(
+        "diagnose",
+        &model,
+        &log,
+        &[&"--no-fit", &"--of", &"thermal"],
+    )
+    .ended(0);
+    let (_, answers) = told.out.split_once("thermal: how far a step").unwrap();
+    let heading = answers.lines().nth(1).unwrap();
+    let columns: Vec<&str> = heading.split_whitespace().collect();
+    assert_eq!(columns, ["sensor", "a", "b"]);
+}
