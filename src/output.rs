@@ -6,9 +6,17 @@ use std::io::{ErrorKind, Write};
 
 /// Prints, or ends the program: with 0 where nobody reads any more, with 3 where it cannot be written.
 pub fn put(text: fmt::Arguments<'_>) {
+    if !offer(text) {
+        std::process::exit(0);
+    }
+}
+
+/// Prints and tells whether anybody still reads, where there is more to do than to print; ends the program with 3 where it cannot be
+/// written.
+pub fn offer(text: fmt::Arguments<'_>) -> bool {
     if let Err(error) = std::io::stdout().lock().write_fmt(text) {
         if error.kind() == ErrorKind::BrokenPipe {
-            std::process::exit(0);
+            return false;
         }
         let _ = writeln!(
             std::io::stderr(),
@@ -16,6 +24,7 @@ pub fn put(text: fmt::Arguments<'_>) {
         );
         std::process::exit(3);
     }
+    true
 }
 
 macro_rules! print {

@@ -402,3 +402,67 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
     assert!(scored > 150, "{scored}");
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
+
+#[test]
+fn several_predictions_of_a_node_for_one_truth_have_a_row_each() {
+    let scratch = Scratch::new("compare-several");
+    let log = simulated(&scratch, "log.csv", "die-tester", 0.5, 1);
+    let text = format!(
+        r#"schema = 1
+extends = {:?}
+name = "several"
+tests = []
+nodes.motion = false
+nodes.both = false
+nodes.vote = false
+[sets]
+sensor = ["room", "chuck"]
+[nodes.side]
+type = "linear"
+each = ["sensor", "axis"]
+inputs.features = "gradients.{{sensor}}@*"
+inputs.truth = "drift.{{axis}}"
+ahead = "5min"
+[outputs]
+thermal = "thermal"
+predicted = "side"
+"#,
+        graph("die-tester")
+    );
+    let graph = scratch.file("several.toml", text);
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph, &"--data", &log, &"-o", &model]).ended(0);
+    let scores = athermal(&[&"evaluate", &model, &"--data", &log, &"--format", &"json"]);
+    let scores = scores.ended(0).json();
+    let compared = |format: &str| {
+        let of = ["compare", "--data", "--on", "--format"];
+        athermal(&[&of[0], &graph, &of[1], &log, &of[2], &log, &of[3], &format]).ended(0)
+    };
+    let table = compared("json").json()["comparisons"][0].clone();
+    let rows = table["rows"].as_array().unwrap();
+    let of: Vec<_> = rows
+        .iter()
+        .map(|row| (row["node"].as_str(), row["channel"].as_str()))
+        .collect();
+    assert_eq!(
+        of,
+        [
+            (Some("thermal"), None),
+            (Some("side"), Some("room-*")),
+            (Some("side"), Some("chuck-*"))
+        ]
+    );
+    for (nth, truth) in table["truths"].as_array().unwrap().iter().enumerate() {
+        for row in rows {
+            let name = truth["name"].as_str().unwrap();
+            let channel = row["channel"].as_str().unwrap_or("*").replace('*', name);
+            let mut scores = scores["scores"].as_array().unwrap().iter();
+            let output = format!("{}.{channel}", row["node"].as_str().unwrap());
+            let score = scores.find(|of| of["output"] == *output);
+            let (found, expected) = (&row["rmse"][nth], &score.unwrap()["rmse"]);
+            assert!((found.as_f64().unwrap() / expected.as_f64().unwrap() - 1.0).abs() < 1e-12);
+        }
+    }
+    let told = compared("table").out;
+    assert!(told.contains("side.chuck-* (linear)"), "{told}");
+}

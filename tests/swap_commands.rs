@@ -174,7 +174,7 @@ fn a_worse_graph_is_refused_with_figures_and_a_margin_lets_it_pass() {
     let refused = run(&scratch, &[&at, "--shadow", "2min"]).ended(0);
     refused.tells(&[
         "in the shadow:\n  predicted.Z: RMSE ",
-        " over 9 instants\n  new to running: ",
+        " new, in nm/min, over 9 instants\n  new to running: ",
         "still.toml does not take over: its error is larger",
     ]);
     let revisions = |finished: &Finished| {

@@ -212,7 +212,7 @@ fn describe(comparison: &Comparison, several: bool) -> String {
         let truths = comparison.truths.iter().enumerate();
         let cells = truths.map(|(column, truth)| cell(comparison, nth, column, truth));
         let indent = if several { "  " } else { "" };
-        let label = format!("{indent}{} ({})", row.node, row.kind);
+        let label = format!("{indent}{} ({})", row.label(), row.kind);
         rows.push((label, cells.collect()));
     }
     heading(comparison) + &matrix("", &columns, &rows)
@@ -296,6 +296,7 @@ mod tests {
                 otherwise: Vec::new(),
             }],
             rows: vec![athermal::diagnosis::comparison::Row {
+                channel: None,
                 graph: "a".to_owned(),
                 node: "vote".to_owned(),
                 kind: "mean",

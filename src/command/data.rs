@@ -130,21 +130,23 @@ pub fn check_ending(output: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Tells of files that are given more than once, whose rows count as often.
-fn tell_repeated(terminal: &Terminal, files: impl Iterator<Item = impl AsRef<str>>) {
+/// Files that are given more than once, whose rows count as often.
+fn repeated(files: impl Iterator<Item = impl AsRef<str>>) -> Vec<String> {
     let mut known: BTreeMap<PathBuf, u64> = BTreeMap::new();
+    let mut told = Vec::new();
     for file in files {
         if let Ok(path) = std::fs::canonicalize(file.as_ref()) {
             let times = known.entry(path).or_default();
             *times += 1;
             if *times == 2 {
-                terminal.warning(format_args!(
+                told.push(format!(
                     "{}: this file is given more than once, and so often its rows count",
                     file.as_ref()
                 ));
             }
         }
     }
+    told
 }
 
 /// Notes, once however many files there are, that times do not say how far they are from UTC.
@@ -164,7 +166,33 @@ pub fn tell(
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    tell_repeated(terminal, reports.iter().map(|(file, _)| file));
+    for told in of_files(reports) {
+        terminal.warning(told);
+    }
+    if refused > 0 {
+        let were = if refused == 1 { "was" } else { "were" };
+        terminal.warning(format_args!(
+            "{} {were} refused for a time that is not after the one before",
+            counted(refused, "row")
+        ));
+    }
+    let rows: u64 = reports.iter().map(|(_, report)| report.rows).sum();
+    for (channel, n) in rejected {
+        let samples = counted(*n, "sample");
+        terminal.warning(match *n {
+            all if all == rows && all > 1 => format!(
+                "{channel}: all {samples} are infinite or out of range, taken as missing; is its unit that of the log?"
+            ),
+            1 => format!("{channel}: {samples} is infinite or out of range, taken as missing"),
+            _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),
+        });
+    }
+}
+
+/// What is told of files after reading: rows and cells that were not taken, and files that count more than once.
+#[must_use]
+pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
+    let mut told = repeated(reports.iter().map(|(file, _)| file));
     for (file, report) in reports {
         for (other, rows) in &report.overlaps {
             let all = counted(report.rows, "row");
@@ -173,7 +201,7 @@ pub fn tell(
                 rows => count(rows),
             };
             let lie = if *rows == 1 { "lies" } else { "lie" };
-            terminal.warning(format_args!(
+            told.push(format!(
                 "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so windows begin afresh in it and what both have counts twice"
             ));
         }
@@ -189,31 +217,16 @@ pub fn tell(
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
                 let n = count(found.count);
-                terminal.warning(format_args!(
-                    "{file}: {n} × {what}, {then}; the first: {first}"
-                ));
+                told.push(format!("{file}: {n} × {what}, {then}; the first: {first}"));
             }
         }
         if let Some(place) = &report.truncated {
-            terminal.warning(format_args!(
+            told.push(format!(
                 "{place}: the last line is cut off and was left out"
             ));
         }
     }
-    if refused > 0 {
-        let were = if refused == 1 { "was" } else { "were" };
-        terminal.warning(format_args!(
-            "{} {were} refused for a time that is not after the one before",
-            counted(refused, "row")
-        ));
-    }
-    for (channel, n) in rejected {
-        let are = if *n == 1 { "is" } else { "are" };
-        terminal.warning(format_args!(
-            "{channel}: {} {are} infinite or out of range, taken as missing",
-            counted(*n, "sample")
-        ));
-    }
+    told
 }
 
 /// What is told to programs, with the files whose periods overlap, where there are any, under `overlaps`.

@@ -87,20 +87,22 @@ impl Fit {
         let text = model.to_text().map_err(|error| {
             Failure::Outside(format!("the model cannot be written as JSON: {error}"))
         })?;
+        let to_stdout = self.output.as_os_str() == "-";
+        // First, or a reader that has seen enough, as `head` has, would end the program without a model.
+        if !to_stdout {
+            write_aside(&self.output, &text)?;
+        }
         self.tell(terminal, &dataset, &report);
         let fits = report.estimators.iter();
         let failed = fits
             .filter(|fit| matches!(fit.outcome, Outcome::Failed(_)))
             .count();
-        if self.output.as_os_str() == "-" {
+        if to_stdout {
             print!("{text}");
-        } else {
-            write_aside(&self.output, &text)?;
-            if terminal.format == Format::Table {
-                terminal.note(format_args!("wrote {}", self.output.display()));
-                if report.estimators.is_empty() || failed < report.estimators.len() {
-                    terminal.note(self.next(&model));
-                }
+        } else if terminal.format == Format::Table {
+            terminal.note(format_args!("wrote {}", self.output.display()));
+            if report.estimators.is_empty() || failed < report.estimators.len() {
+                terminal.note(self.next(&model));
             }
         }
         Ok(if failed > 0 { Answer::No } else { Answer::Fine })

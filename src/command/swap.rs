@@ -458,10 +458,11 @@ fn figures(verdict: &Verdict) -> String {
     for output in &verdict.outputs {
         let _ = write!(
             text,
-            "\n  {}: RMSE {} running, {} new, over {}",
+            "\n  {}: RMSE {} running, {} new, in {}, over {}",
             output.output,
             number(output.running_rmse),
             number(output.candidate_rmse),
+            output.unit,
             counted(output.n as u64, "instant")
         );
     }

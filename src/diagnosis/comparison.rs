@@ -1,7 +1,7 @@
 //! Decides how the predictions of several graphs are set against each other: the same truths, on the instants at which all of them
 //! are valid.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use athermal_core::compile::Plan;
@@ -41,7 +41,7 @@ pub struct Comparison {
     pub unit: String,
     /// The truths: a column each.
     pub truths: Vec<Column>,
-    /// A row for each node of each graph.
+    /// A row for each node of each graph, or for each of its predictions where it has several of one truth.
     pub rows: Vec<Row>,
 }
 
@@ -71,6 +71,9 @@ pub struct Row {
     pub graph: String,
     /// The node.
     pub node: String,
+    /// Which of its predictions, where it has several of one truth: the channel, with `*` for the name of the truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<String>,
     /// Its type.
     #[serde(rename = "type")]
     pub kind: &'static str,
@@ -115,13 +118,55 @@ impl Entry<'_> {
         &self.contender.plan.channels[self.truth.slot].name
     }
 
-    fn row(&self) -> (String, String, &'static str) {
+    /// The graph and the node.
+    fn node(&self) -> (&str, &str) {
         let node = &self.contender.plan.nodes[self.of.node];
-        (
-            self.contender.name.clone(),
-            node.name.clone(),
-            node.kind.name,
-        )
+        (&self.contender.name, &node.name)
+    }
+
+    /// The channel, with `*` for the name of the truth: `*-front` of `X-front`, where `X` is predicted.
+    fn channel(&self) -> String {
+        let channels = &self.contender.plan.channels;
+        let own = &channels[self.of.slot].name;
+        let own = own.split_once('.').map_or(&**own, |(_, channel)| channel);
+        let truth = &channels[self.truth.slot].channel.name;
+        let mut parts: Vec<&str> = own.split('-').collect();
+        if let Some(part) = parts.iter_mut().find(|part| **part == truth) {
+            *part = "*";
+        }
+        parts.join("-")
+    }
+
+    /// Its row, yet empty.
+    fn row(&self, several: bool) -> Row {
+        let (graph, node) = self.node();
+        Row {
+            graph: graph.to_owned(),
+            node: node.to_owned(),
+            channel: several.then(|| self.channel()),
+            kind: self.contender.plan.nodes[self.of.node].kind.name,
+            rmse: Vec::new(),
+            own: Vec::new(),
+            difference_error: Vec::new(),
+            valid: Vec::new(),
+        }
+    }
+}
+
+impl Row {
+    fn is_of(&self, entry: &Entry<'_>) -> bool {
+        let channel = self.channel.as_ref();
+        (&*self.graph, &*self.node) == entry.node()
+            && channel.is_none_or(|of| *of == entry.channel())
+    }
+
+    /// What it is called: `thermal`, or `thermal.*-front` of several.
+    #[must_use]
+    pub fn label(&self) -> String {
+        match &self.channel {
+            Some(channel) => format!("{}.{channel}", self.node),
+            None => self.node.clone(),
+        }
     }
 }
 
@@ -154,20 +199,11 @@ fn table(key: Key, entries: &[Entry<'_>], below: Option<&Quantity>) -> Compariso
         if !truths.contains(&entry.truth_name()) {
             truths.push(entry.truth_name());
         }
-        let (graph, node, kind) = entry.row();
-        if !rows
-            .iter()
-            .any(|row| row.graph == graph && row.node == node)
-        {
-            rows.push(Row {
-                graph,
-                node,
-                kind,
-                rmse: Vec::new(),
-                own: Vec::new(),
-                difference_error: Vec::new(),
-                valid: Vec::new(),
-            });
+        if !rows.iter().any(|row| row.is_of(entry)) {
+            let mut of_node = entries.iter().filter(|other| other.node() == entry.node());
+            let mut predicted = BTreeSet::new();
+            let several = !of_node.all(|other| predicted.insert(other.truth_name()));
+            rows.push(entry.row(several));
         }
     }
     for row in &mut rows {
@@ -236,9 +272,7 @@ fn column(
     let truth = |places: &[usize]| first.truth.values[places[0]];
     let mut errors: Vec<(usize, Vec<f64>)> = Vec::new();
     for (entry, of) in entries.iter().enumerate() {
-        let (graph, node, _) = of.row();
-        let mut all = rows.iter();
-        let Some(row) = all.position(|row| row.graph == graph && row.node == node) else {
+        let Some(row) = rows.iter().position(|row| row.is_of(of)) else {
             continue;
         };
         rows[row].valid[nth] = (!counted.is_empty()).then_some(valid[entry]);

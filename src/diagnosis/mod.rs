@@ -18,7 +18,7 @@ pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
 pub use plot::plots;
-pub(crate) use plot::{Picture, response as response_picture, with_truth as truth_picture};
+pub(crate) use plot::{Picture, responses as response_pictures, with_truth as truth_picture};
 pub use rest::Untold;
 
 use athermal_core::compile::Plan;

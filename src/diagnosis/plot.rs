@@ -121,8 +121,11 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
         .iter()
         .filter(|of| is_asked(&of.node, asked))
     {
-        add(format!("impulse-{}", of.node), response(of, true));
-        add(format!("step-{}", of.node), response(of, false));
+        for (kind, impulse) in [("impulse", true), ("step", false)] {
+            for (ending, picture) in responses(of, impulse) {
+                add(format!("{kind}-{}{ending}", of.node), picture);
+            }
+        }
     }
     if let Some(days) = diagnosis.days.as_ref().filter(|of| of.curve.len() > 1) {
         add("days".to_owned(), learning(&main, days));
@@ -312,9 +315,28 @@ fn short(name: &str) -> &str {
     name.split_once('.').map_or(name, |(_, channel)| channel)
 }
 
-/// How an estimator answers the sensors that it answers most: a step of one unit, or one unit for one minute.
-pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
-    let mut largest: Vec<&Response> = of.sensors.iter().collect();
+/// How an estimator answers the sensors that it answers most: a step of one unit, or one unit for one minute. What a kelvin moves
+/// cannot stand beside what a per cent moves, so that each unit has a picture, with what its name ends in.
+pub(crate) fn responses(of: &Responses, impulse: bool) -> Vec<(String, Picture)> {
+    let mut units: Vec<&str> = Vec::new();
+    for sensor in &of.sensors {
+        if !units.contains(&&*sensor.sensor_unit) {
+            units.push(&sensor.sensor_unit);
+        }
+    }
+    let pictures = units.into_iter().enumerate().map(|(nth, unit)| {
+        let ending = match nth {
+            0 => String::new(),
+            nth => format!("-{}", nth + 1),
+        };
+        (ending, response(of, unit, impulse))
+    });
+    pictures.collect()
+}
+
+fn response(of: &Responses, of_unit: &str, impulse: bool) -> Picture {
+    let alike = of.sensors.iter().filter(|of| of.sensor_unit == of_unit);
+    let mut largest: Vec<&Response> = alike.collect();
     largest.sort_by(|a, b| b.peak.abs().total_cmp(&a.peak.abs()));
     largest.truncate(LINES.len());
     let times = largest.iter().flat_map(|of| &of.time_s).copied();
@@ -330,7 +352,6 @@ pub(crate) fn response(of: &Responses, impulse: bool) -> Picture {
         Points::line(nth, short(&sensor.sensor), x, y)
     });
     let lines: Vec<Points> = lines.collect();
-    let of_unit = of.sensors.first().map_or("", |of| of.sensor_unit.as_str());
     let (what, unit) = if impulse {
         (
             "Impulse",

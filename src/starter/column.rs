@@ -48,7 +48,7 @@ enum Guess {
 }
 
 /// Endings of names, and the units that they mean; the case counts for single letters.
-const UNITS: [(&str, &str); 27] = [
+const UNITS: [(&str, &str); 29] = [
     ("degC", "Cel"),
     ("°C", "Cel"),
     ("celsius", "Cel"),
@@ -76,6 +76,8 @@ const UNITS: [(&str, &str); 27] = [
     ("Pa", "Pa"),
     ("bar", "bar"),
     ("%", "%"),
+    ("pct", "%"),
+    ("percent", "%"),
 ];
 
 const SET_POINTS: [&str; 5] = ["target", "setpoint", "set", "sp", "goal"];
@@ -377,6 +379,10 @@ mod tests {
             (
                 "time_s,heater_voltage_V,t_outlet_air_V\n",
                 [(Kind::Drive, "V"), (Kind::Drifting, "V")],
+            ),
+            (
+                "time_s,spindle_load_pct,z_um\n",
+                [(Kind::Drive, "%"), (Kind::Drifting, "um")],
             ),
             (
                 "time_s,temp1,z\n",

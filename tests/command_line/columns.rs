@@ -1,5 +1,6 @@
 //! What the program tells fits the 80 columns of a terminal, and every help teaches by examples.
 
+use crate::mistakes::SOUND;
 use crate::workbench::{Scratch, athermal};
 
 #[track_caller]
@@ -73,5 +74,33 @@ fn what_is_told_of_node_types_fits_80_columns() {
         let page = athermal(&[&"nodes", &kind]).ended(0).out;
         // A table stays as it is: a formula in it cannot be broken.
         assert_fits(page.lines().filter(|line| !line.starts_with('|')));
+    }
+}
+
+#[test]
+fn a_reference_whose_columns_have_names_that_are_taken_is_one_mistake() {
+    let text = SOUND.replace(
+        "predicted = \"thermal\"",
+        "drift = [\"drift\", \"last\", \"first\"]",
+    ) + r#"[nodes.last]
+type = "persistence"
+each = "axis"
+inputs.truth = "drift.{axis}"
+ahead = "5min"
+[nodes.first]
+type = "persistence"
+each = "axis"
+inputs.truth = "drift.{axis}"
+ahead = "5min"
+"#;
+    let scratch = Scratch::new("command-line-columns-taken");
+    let graph = scratch.file("graph.toml", text);
+    let told = athermal(&[&"check", &graph]).ended(2).told;
+    for part in [
+        "there are two output columns named `drift.X`, and one more name comes twice",
+        "such as `last = \"last\"`, or refer to fewer channels",
+        "2 errors",
+    ] {
+        assert!(told.contains(part), "{told}");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::workbench::{Scratch, athermal};
+use super::workbench::{Scratch, athermal, athermal_unread};
 use super::{csv, desk, rows};
 
 #[test]
@@ -147,4 +147,45 @@ fn times_without_a_zone_are_told_once_and_those_with_one_are_not() {
             );
         }
     }
+}
+
+#[test]
+fn a_model_and_the_results_of_tests_are_written_though_nobody_reads_what_is_told() {
+    let (scratch, plain, counted, _) = desk("unread");
+    let (graph, model) = (scratch.path("fitted.toml"), scratch.path("unread.json"));
+    let told = athermal_unread(&[&"fit", &graph, &"--data", &counted, &"-o", &model]);
+    assert_eq!(told, 0);
+    athermal(&[&"evaluate", &model, &"--data", &counted]).ended(0);
+    let test = format!(
+        "[[tests]]\nname = \"far off\"\non = {counted:?}\n\
+         expect = [{{ of = \"drift.Z\", at = \"5min\", equals = \"123456 nm/min\", within = 0.1 }}]\n"
+    );
+    let text = std::fs::read_to_string(&plain).unwrap() + &test;
+    let graph = scratch.file("tested.toml", text);
+    let results = scratch.path("tests.xml");
+    assert_eq!(athermal_unread(&[&"test", &graph, &"--junit", &results]), 1);
+    assert!(
+        std::fs::read_to_string(results)
+            .unwrap()
+            .contains("<failure")
+    );
+}
+
+#[test]
+fn a_channel_whose_samples_are_all_out_of_range_makes_one_ask_for_its_unit() {
+    let (scratch, plain, counted, _) = desk("all-out-of-range");
+    let kelvins = std::fs::read_to_string(&plain).unwrap().replace(
+        "unit = \"Cel\"\nchannels = [\"room\"]\nrange = [\"-20 Cel\", \"200 Cel\"]",
+        "unit = \"K\"\nchannels = [\"room\"]\nrange = [\"250 K\", \"480 K\"]",
+    );
+    let graph = scratch.file("kelvins.toml", kelvins);
+    let told = athermal(&[&"evaluate", &graph, &"--data", &counted]).ended(0);
+    told.tells(&[
+        "temperature.room: all 60 samples are infinite or out of range",
+        "is its unit that of the log?",
+    ]);
+    let told = athermal(&[&"evaluate", &plain, &"--data", &counted])
+        .ended(0)
+        .told;
+    assert!(!told.contains("out of range"), "{told}");
 }

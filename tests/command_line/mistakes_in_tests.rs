@@ -2,6 +2,7 @@
 
 use crate::mistakes::{SOUND, assert_told};
 use crate::workbench::{Scratch, athermal};
+use crate::{csv, desk, rows};
 
 #[test]
 fn mistakes_in_tests_are_told_together_with_those_of_the_graph() {
@@ -121,4 +122,35 @@ fn an_inherited_test_of_a_node_that_was_removed_names_the_way_out() {
     let own = scratch.file("own.toml", wrong);
     let own = athermal(&[&"check", &own]).ended(2).told;
     assert!(!own.contains("inherits"), "{own}");
+}
+
+#[test]
+fn files_of_tests_that_overlap_are_told_once_beside_the_results() {
+    let (scratch, plain, _, _) = desk("tests-overlap");
+    // Seconds since 1970.
+    let since = 1_700_000_000;
+    scratch.file("one.csv", csv(&rows(since, 60)));
+    scratch.file("two.csv", csv(&rows(since + 400, 60)));
+    let of = |name: &str, on: &str| {
+        format!(
+            "[[tests]]\nname = \"{name}\"\nfit = [\"one.csv\", \"two.csv\"]\non = {on}\n\
+             expect = [{{ of = \"drift.Z\", given_above = 0.1 }}]\n"
+        )
+    };
+    let tests = of("a", "\"two.csv\"") + &of("b", "[\"two.csv\", \"two.csv\"]");
+    let text = std::fs::read_to_string(&plain).unwrap() + &tests;
+    let graph = scratch.file("tested.toml", text);
+    let tested = athermal(&[&"test", &graph]).ended(0);
+    let told = tested.told.split_whitespace().collect::<Vec<_>>().join(" ");
+    let overlaps = "20 of its 60 rows lie in the period of";
+    assert_eq!(told.matches(overlaps).count(), 1, "{told}");
+    assert!(
+        told.contains("two.csv: this file is given more than once"),
+        "{told}"
+    );
+    let json = athermal(&[&"test", &graph, &"--format", &"json"])
+        .ended(0)
+        .json();
+    let warnings = json["tests"][0]["warnings"].as_array().unwrap();
+    assert!(warnings[0].as_str().unwrap().contains(overlaps), "{json}");
 }

@@ -2,7 +2,7 @@
 
 use crate::desk;
 use crate::mistakes::{SOUND, assert_told};
-use crate::workbench::athermal;
+use crate::workbench::{Scratch, athermal};
 
 #[test]
 fn the_error_of_a_truth_is_told_as_what_it_is() {
@@ -69,4 +69,58 @@ expect = [{ of = "thermal", beats = ["thermal:deviation"] }]
         (49, "`thermal:deviation` does not predict `drift.X`"),
     ];
     assert_told("command-line-truth-of-prediction", &text, &expected);
+}
+
+#[test]
+fn a_fit_with_too_few_complete_rows_says_what_the_others_lack() {
+    let sensors: Vec<String> = (0..12).map(|nth| format!("c{nth}")).collect();
+    let quoted: Vec<String> = sensors.iter().map(|name| format!("\"{name}\"")).collect();
+    let graph = format!(
+        r#"schema = 1
+[time]
+column = "s"
+[signals.in]
+unit = "V"
+channels = [{}]
+max_age = "1s"
+[signals.out]
+unit = "nm"
+channels = ["y"]
+max_age = "1s"
+[nodes.m]
+type = "linear"
+inputs = {{ features = "in", truth = "out.y" }}
+ahead = "0s"
+[outputs]
+p = "m"
+"#,
+        quoted.join(", ")
+    );
+    // Each row lacks another sensor, none of which is dead.
+    let mut rows = format!("s,{},y\n", sensors.join(","));
+    for row in 0..12 {
+        let cell = |nth: usize| match nth == row {
+            true => String::new(),
+            false => ((row * nth) % 7).to_string(),
+        };
+        let cells: Vec<String> = (0..12).map(cell).collect();
+        rows += &format!("{},{},{row}\n", 10 * row, cells.join(","));
+    }
+    let scratch = Scratch::new("command-line-too-few");
+    let graph = scratch.file("graph.toml", graph);
+    let rows = scratch.file("rows.csv", rows);
+    let fit = |rows| {
+        athermal(&[
+            &"fit",
+            &graph,
+            &"--data",
+            rows,
+            &"-o",
+            &scratch.path("model.json"),
+        ])
+    };
+    let told = fit(&rows).ended(1).told;
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    let said = "0 complete rows, and at least 2 are needed; 12 lack a value from in.c0 (1), in.c1 (1), in.c2 (1), and others";
+    assert!(told.contains(said), "{told}");
 }

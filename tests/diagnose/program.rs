@@ -342,3 +342,91 @@ fn the_rows_that_tell_how_well_data_determine_a_model_are_those_of_its_fit() {
         "{conditions:?}"
     );
 }
+
+#[test]
+fn answers_to_sensors_of_different_units_are_drawn_apart() {
+    let scratch = Scratch::new("diagnose-units");
+    let graph = scratch.file(
+        "graph.toml",
+        r#"schema = 1
+[time]
+column = "time_s"
+[signals.temperature]
+unit = "Cel"
+channels = ["bed"]
+max_age = "1min"
+[signals.load]
+unit = "%"
+channels = ["spindle"]
+max_age = "1min"
+[signals.position]
+unit = "um"
+channels = ["Z"]
+max_age = "1min"
+[nodes.model]
+type = "linear"
+inputs = { features = ["temperature", "load"], truth = "position.Z" }
+ahead = "0s"
+[outputs]
+predicted = "model"
+"#,
+    );
+    let mut rows = String::from("time_s,bed,spindle,Z\n");
+    for row in 0..200 {
+        let (bed, spindle) = (f64::from(row % 17), f64::from(row % 5));
+        let _ = writeln!(
+            rows,
+            "{},{bed},{spindle},{}",
+            10 * row,
+            2.0 * bed + 0.1 * spindle
+        );
+    }
+    let log = scratch.file("log.csv", rows);
+    let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    athermal_on("diagnose", &model, &log, &[&"--no-fit", &"--plots", &plots]).ended(0);
+    for (name, label, sensor, other) in [
+        ("step-model.svg", "um per K", ">bed<", ">spindle<"),
+        ("step-model-2.svg", "um per %", ">spindle<", ">bed<"),
+    ] {
+        let svg = std::fs::read_to_string(plots.join(name)).unwrap();
+        assert!(svg.contains(label) && svg.contains(sensor), "{name}: {svg}");
+        assert!(!svg.contains(other), "{name}: {svg}");
+    }
+}
+
+#[test]
+fn answers_of_instances_that_predict_the_same_are_told_by_the_instances() {
+    let scratch = Scratch::new("diagnose-same-truth");
+    let (head, rest) = TWO_SENSORS.split_once("[nodes.thermal]").unwrap();
+    let rest = rest.replace("\"gradients\"", "\"gradients.{sensor}@*\"");
+    let text =
+        format!("{head}[sets]\nsensor = [\"a\", \"b\"]\n[nodes.thermal]\neach = \"sensor\"{rest}");
+    let graph = scratch.file("graph.toml", text);
+    let mut rows = String::from("time_s,a,b,z\n");
+    for row in 0..800 {
+        let t = f64::from(row) * 10.0;
+        let (a, b) = ((t / 700.0).sin(), (t / 1100.0).cos());
+        let _ = writeln!(
+            rows,
+            "{t},{},{},{}",
+            20.0 + a,
+            20.0 + b,
+            50.0 * a - 30.0 * b
+        );
+    }
+    let log = scratch.file("log.csv", rows);
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let told = athermal_on(
+        "diagnose",
+        &model,
+        &log,
+        &[&"--no-fit", &"--of", &"thermal"],
+    )
+    .ended(0);
+    let (_, answers) = told.out.split_once("thermal: how far a step").unwrap();
+    let heading = answers.lines().nth(1).unwrap();
+    let columns: Vec<&str> = heading.split_whitespace().collect();
+    assert_eq!(columns, ["sensor", "a", "b"]);
+}

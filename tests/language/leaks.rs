@@ -134,6 +134,30 @@ out = "second"
 }
 
 #[test]
+fn a_plain_sample_of_the_tick_before_is_none_of_what_is_predicted_now() {
+    let text = |feature: &str| {
+        format!(
+            r#"{SAMPLES}{SLOPES}
+[nodes.late]
+type = "delay"
+inputs.signal = "position"
+delay = "1 tick"
+[nodes.warm]
+type = "linear"
+inputs.features = {{ from = "{feature}", max_age = "1min" }}
+inputs.truth = "position.Z"
+ahead = "0s"
+[outputs]
+out = "warm"
+"#
+        )
+    };
+    let told = problems(&text("position"));
+    assert!(told.contains("contains part of the answer"), "{told}");
+    plan(&text("late"));
+}
+
+#[test]
 fn a_leak_through_a_loop_is_found() {
     // One tick later the position is still within the window of the truth.
     let text = |delay: &str| {

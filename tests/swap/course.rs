@@ -132,7 +132,7 @@ fn a_better_graph_passes_the_shadow_and_a_worse_one_does_not_and_figures_say_why
         assert!(verdict.over);
         assert_eq!(verdict.passes, Some(passes));
         let output = &verdict.outputs[0];
-        assert_eq!(output.output, "predicted.z");
+        assert_eq!((&*output.output, &*output.unit), ("predicted.z", "nm/min"));
         // The first prediction in the shadow is of the truth a minute later.
         assert_eq!(output.n, 60 - 6);
         assert!((output.running_rmse - 2.0).abs() < 1e-9, "{output:?}");

@@ -9,7 +9,9 @@ mod regression;
 mod simulated;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
-pub use program::{Finished, Folder, Scratch, athermal, athermal_fed, athermal_on};
+pub use program::{
+    Finished, Folder, Scratch, athermal, athermal_fed, athermal_on, athermal_unread,
+};
 pub use regression::{coefficients, fitted, numbers, regression};
 pub use simulated::simulated;
 

@@ -87,6 +87,17 @@ pub fn athermal_fed(arguments: &[&dyn AsRef<OsStr>], input: &[u8]) -> Finished {
     }
 }
 
+/// Calls the program where nobody reads what it prints, as behind `| head -0`, and gives its status.
+pub fn athermal_unread(arguments: &[&dyn AsRef<OsStr>]) -> i32 {
+    let mut child = command(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    child.wait().unwrap().code().unwrap()
+}
+
 /// A folder for one test, empty at first.
 pub struct Scratch(PathBuf);
 

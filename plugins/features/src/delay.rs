@@ -154,7 +154,9 @@ impl Feature for Delay {
     }
 
     fn reach(&self, _port: &str) -> Reach {
-        Reach::Delayed(vec![self.memory()])
+        // Ticks are apart, nobody knows how far: a value of an earlier one is never that of the present one.
+        let least = Duration::from_ns(1);
+        Reach::Delayed(vec![self.memory().max(least)])
     }
 
     fn memory(&self) -> Duration {

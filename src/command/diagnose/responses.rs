@@ -1,5 +1,6 @@
 //! Decides how the answers of estimators to their sensors look as text.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use athermal::diagnosis::response::{Response, Responses};
@@ -15,6 +16,17 @@ pub(super) fn text(shown: &[&Responses]) -> String {
     let nodes = grouped(shown.iter().copied(), |of| name_of(&of.node).to_owned());
     let nodes = nodes.into_iter().filter_map(Node::of);
     nodes.map(|node| node.text()).collect()
+}
+
+/// What the columns of instances are called: by what they predict, or by the instances where several predict the same.
+fn columns(instances: &[&Responses]) -> Vec<String> {
+    let by = |name: fn(&Responses) -> &str| instances.iter().map(move |of| axis_of(name(of)));
+    let truths: BTreeSet<String> = by(|of| &of.truth).collect();
+    if truths.len() == instances.len() {
+        by(|of| &of.truth).collect()
+    } else {
+        by(|of| &of.node).collect()
+    }
 }
 
 /// The instances of a node, each a column.
@@ -37,7 +49,7 @@ impl<'a> Node<'a> {
         }
         Some(Self {
             name: name_of(&sensors.first().and(instances.first())?.node),
-            columns: instances.iter().map(|of| axis_of(&of.truth)).collect(),
+            columns: columns(&instances),
             instances,
             sensors,
         })

@@ -4,12 +4,14 @@ mod report;
 mod suite;
 mod work;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 
 use super::threads::Threads;
+use crate::output::offer;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use report::Summary;
 use work::Status;
@@ -66,11 +68,11 @@ impl Test {
             if people {
                 let suite = &suites[result.suite];
                 if told != Some(result.suite) && !terminal.quiet {
-                    println!("{}", suite.path);
+                    offer(format_args!("{}\n", suite.path));
                     told = Some(result.suite);
                 }
                 if !(terminal.quiet && matches!(result.status, Status::Passed)) {
-                    print!("{}", report::lines(suite, result));
+                    offer(format_args!("{}", report::lines(suite, result)));
                 }
             }
         });
@@ -79,6 +81,12 @@ impl Test {
             std::fs::write(path, summary.junit()).map_err(|error| {
                 Failure::Outside(format!("cannot write {}: {error}", path.display()))
             })?;
+        }
+        let mut warned = BTreeSet::new();
+        for warning in results.iter().flat_map(|ran| &ran.warnings) {
+            if warned.insert(warning) {
+                terminal.warning(warning);
+            }
         }
         if people {
             terminal.note(summary.line());

@@ -135,6 +135,7 @@ impl<'a> Summary<'a> {
             "seconds": ran.took.as_secs_f64(),
             "findings": findings,
             "notes": ran.notes,
+            "warnings": ran.warnings,
         })
     }
 

@@ -1,7 +1,6 @@
 //! Decides which thread fits what and runs which test, and that results come in the order of the files; a fit that several tests
 //! of a graph share is made once.
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{OnceLock, mpsc};
 use std::time::{Duration, Instant};
@@ -13,6 +12,7 @@ use athermal::core::trial::{self, DataSet, Finding, On};
 use athermal::files::{Dataset, Options};
 
 use super::suite::Suite;
+use crate::command::data::of_files;
 use crate::terminal::Failure;
 
 /// What came of a test.
@@ -27,6 +27,8 @@ pub(super) struct Ran {
     pub(super) findings: Vec<Finding>,
     /// What else there is to know, e.g. of the fit.
     pub(super) notes: Vec<String>,
+    /// What is wrong with the files that were read, those of the fit first.
+    pub(super) warnings: Vec<String>,
     /// How long it took, without the fit.
     pub(super) took: Duration,
 }
@@ -68,7 +70,15 @@ impl Broken {
 struct Fit<'a> {
     suite: usize,
     data: &'a DataSet,
-    made: OnceLock<Result<(Fitted, Vec<String>), Broken>>,
+    made: OnceLock<Result<Made, Broken>>,
+}
+
+/// What came of a fit.
+#[derive(Clone, Default)]
+struct Made {
+    fitted: Fitted,
+    notes: Vec<String>,
+    warnings: Vec<String>,
 }
 
 /// Runs all tests; `tell` is called for each as soon as it and all before it are done.
@@ -133,23 +143,48 @@ pub(super) fn run(suites: &[Suite], threads: usize, tell: &mut dyn FnMut(&Ran)) 
     waiting.into_iter().flatten().collect()
 }
 
-fn files(paths: &[PathBuf]) -> Box<dyn Recording> {
-    Box::new(Dataset::new(paths.to_vec(), Options::default()))
+/// Data that a test names.
+enum Opened {
+    Files(Dataset),
+    Simulated(Box<dyn Recording>),
 }
 
-fn open(data: &DataSet) -> Result<Box<dyn Recording>, Broken> {
-    let recording = data.recording(files);
-    recording.map_err(|error| Broken::of(Failure::Request(error.to_string())))
+impl Opened {
+    fn of(data: &DataSet) -> Result<Self, Broken> {
+        match data {
+            DataSet::Files(paths) => {
+                let dataset = Dataset::new(paths.clone(), Options::default());
+                Ok(Self::Files(dataset))
+            }
+            DataSet::Simulated(simulation) => {
+                let simulated = simulation.recording();
+                let simulated =
+                    simulated.map_err(|error| Broken::of(Failure::Request(error.to_string())))?;
+                Ok(Self::Simulated(simulated))
+            }
+        }
+    }
+
+    fn recording(&self) -> &dyn Recording {
+        match self {
+            Self::Files(dataset) => dataset,
+            Self::Simulated(simulated) => &**simulated,
+        }
+    }
+
+    /// What is wrong with the files, once they have been read.
+    fn warnings(&self) -> Vec<String> {
+        match self {
+            Self::Files(dataset) => of_files(&dataset.reports()),
+            Self::Simulated(_) => Vec::new(),
+        }
+    }
 }
 
-fn make(
-    suite: &Suite,
-    data: &DataSet,
-    options: &FitOptions,
-) -> Result<(Fitted, Vec<String>), Broken> {
-    let recording = open(data)?;
+fn make(suite: &Suite, data: &DataSet, options: &FitOptions) -> Result<Made, Broken> {
+    let opened = Opened::of(data)?;
     let (fitted, report) =
-        fit(&suite.plan, &*recording, options, &mut |_| {}).map_err(Broken::of)?;
+        fit(&suite.plan, opened.recording(), options, &mut |_| {}).map_err(Broken::of)?;
     let failed = report
         .estimators
         .iter()
@@ -157,35 +192,45 @@ fn make(
             Outcome::Failed(error) => Some(format!("{} could not be fitted: {error}", fit.node)),
             Outcome::Fitted(_) => None,
         });
-    Ok((fitted, failed.collect()))
+    Ok(Made {
+        fitted,
+        notes: failed.collect(),
+        warnings: opened.warnings(),
+    })
 }
 
 fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
     let of = &suites[suite];
     let declared = &of.trials[trial];
-    let none = (Fitted::new(), Vec::new());
+    let none = Made::default();
     let fit = declared.fit.as_ref().and_then(|data| {
         let same = |fit: &&Fit<'_>| fit.suite == suite && fit.data == data;
         fits.iter().find(same)
     });
     let made = fit.map_or(Ok(&none), |fit| fit.made.wait().as_ref());
     let began = Instant::now();
-    let verdict = made.map_err(Clone::clone).and_then(|(fitted, notes)| {
-        let data;
-        let recording: &dyn Recording = match &declared.on {
+    let verdict = made.map_err(Clone::clone).and_then(|made| {
+        let mut warnings = made.warnings.clone();
+        let verdict = match &declared.on {
             On::Data(set) => {
-                data = open(set)?;
-                &*data
+                let opened = Opened::of(set)?;
+                let verdict = trial::run(&of.plan, declared, &made.fitted, opened.recording());
+                warnings.extend(opened.warnings());
+                verdict
             }
-            On::Synthetic(synthetic) => synthetic,
+            On::Synthetic(synthetic) => trial::run(&of.plan, declared, &made.fitted, synthetic),
         };
-        let verdict = trial::run(&of.plan, declared, fitted, recording).map_err(Broken::of)?;
-        Ok((verdict, notes.clone()))
+        Ok((verdict.map_err(Broken::of)?, made.notes.clone(), warnings))
     });
-    let (status, findings, notes) = match verdict {
-        Err(broken) => (Status::Broken(broken), Vec::new(), Vec::new()),
-        Ok((verdict, notes)) if verdict.passes() => (Status::Passed, verdict.findings, notes),
-        Ok((verdict, notes)) => (Status::Failed, verdict.findings, notes),
+    let (status, findings, notes, warnings) = match verdict {
+        Err(broken) => (Status::Broken(broken), Vec::new(), Vec::new(), Vec::new()),
+        Ok((verdict, notes, warnings)) => {
+            let status = match verdict.passes() {
+                true => Status::Passed,
+                false => Status::Failed,
+            };
+            (status, verdict.findings, notes, warnings)
+        }
     };
     Ran {
         suite,
@@ -193,6 +238,7 @@ fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
         status,
         findings,
         notes,
+        warnings,
         took: began.elapsed(),
     }
 }

@@ -3,12 +3,12 @@
 use super::super::verdict::is_channel;
 use super::super::{Axis, Facts};
 use crate::chart::Chart;
-use crate::diagnosis::{Picture, response_picture, truth_picture};
+use crate::diagnosis::{Picture, response_pictures, truth_picture};
 
 /// A picture of an axis.
 pub(super) struct Curves {
     /// What it shows, as part of a file's name.
-    pub(super) kind: &'static str,
+    pub(super) kind: String,
     picture: Picture,
 }
 
@@ -28,7 +28,7 @@ impl Curves {
 pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
     let lags = facts.lags.iter();
     let lags = lags.filter(|of| is_channel(&of.truth, &axis.name)).take(1);
-    let lags = lags.map(|of| ("lags", truth_picture(of)));
+    let lags = lags.map(|of| ("lags".to_owned(), truth_picture(of)));
     let of_axis = || {
         let all = facts.responses.iter();
         all.filter(|of| is_channel(&of.truth, &axis.name))
@@ -37,10 +37,12 @@ pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
     let answers = of_axis().find(|of| of.node == main);
     let answers = answers.or_else(|| of_axis().next()).into_iter();
     let responses = answers.flat_map(|of| {
-        [("steps", false), ("impulses", true)]
-            .map(|(kind, impulse)| (kind, response_picture(of, impulse)))
+        [("steps", false), ("impulses", true)].map(|(kind, impulse)| {
+            let pictures = response_pictures(of, impulse).into_iter();
+            pictures.map(move |(ending, picture)| (format!("{kind}{ending}"), picture))
+        })
     });
-    lags.chain(responses)
+    lags.chain(responses.flatten())
         .map(|(kind, picture)| Curves { kind, picture })
         .collect()
 }

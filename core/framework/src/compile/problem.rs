@@ -137,12 +137,25 @@ pub enum CompileProblem {
     EndlessTruth { channel: String, node: String },
     /// A limit of a unit that is not the truth's.
     LimitUnit { found: Unit, expected: Unit },
-    /// Two channels or columns of the same name.
+    /// Two channels of the same name.
     DuplicateName { name: String, what: &'static str },
+    /// Columns of the same names as others of the output, because of one reference; with an output that it could be alone.
+    DuplicateColumns {
+        first: String,
+        more: usize,
+        alone: Option<String>,
+    },
     /// A node whose outputs nobody uses.
     UnusedNode { node: String },
     /// A signal that nobody uses.
     UnusedSignal { signal: String },
+    /// Columns that are named for another unit than their signal's.
+    ColumnUnit {
+        signal: String,
+        column: String,
+        named: Unit,
+        unit: Unit,
+    },
     /// An output behind which there is no signal.
     Unreachable { output: String },
     /// A graph without outputs.
@@ -217,9 +230,10 @@ impl Problem for CompileProblem {
             Self::NoHorizon { .. } => "A055",
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "A056",
             Self::LimitUnit { .. } => "A057",
-            Self::DuplicateName { .. } => "A058",
+            Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "A058",
             Self::UnusedNode { .. } => "A059",
             Self::UnusedSignal { .. } => "A060",
+            Self::ColumnUnit { .. } => "A069",
             Self::Unreachable { .. } => "A061",
             Self::NoOutputs => "A062",
             Self::PointOrDifference { .. } => "A063",
@@ -235,9 +249,10 @@ impl Problem for CompileProblem {
 
     fn severity(&self) -> Severity {
         match self {
-            Self::UnusedNode { .. } | Self::UnusedSignal { .. } | Self::Doubt { .. } => {
-                Severity::Warning
-            }
+            Self::UnusedNode { .. }
+            | Self::UnusedSignal { .. }
+            | Self::ColumnUnit { .. }
+            | Self::Doubt { .. } => Severity::Warning,
             _ => Severity::Error,
         }
     }
@@ -268,8 +283,10 @@ impl Problem for CompileProblem {
             | Self::EndlessTruth { .. }
             | Self::LimitUnit { .. }
             | Self::DuplicateName { .. }
+            | Self::DuplicateColumns { .. }
             | Self::UnusedNode { .. }
             | Self::UnusedSignal { .. }
+            | Self::ColumnUnit { .. }
             | Self::Unreachable { .. }
             | Self::NoOutputs => true,
             Self::UnknownKind { .. }
@@ -386,9 +403,23 @@ impl Problem for CompileProblem {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
             Self::DuplicateName { name, what } => format!("there are two {what} named `{name}`"),
+            Self::DuplicateColumns { first, more, .. } => {
+                let more = match more {
+                    0 => String::new(),
+                    1 => ", and one more name comes twice".to_owned(),
+                    more => format!(", and {more} more names come twice"),
+                };
+                format!("there are two output columns named `{first}`{more}")
+            }
             Self::UnusedNode { node } => {
                 format!("nothing that comes out depends on the node `{node}`")
             }
+            Self::ColumnUnit {
+                signal,
+                column,
+                named,
+                unit,
+            } => format!("`{signal}` is in {unit}, and its column `{column}` is named for {named}"),
             Self::UnusedSignal { signal } => {
                 format!("nothing that comes out depends on the signal `{signal}`")
             }
@@ -438,8 +469,9 @@ impl Problem for CompileProblem {
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "not measured",
             Self::EndlessTruth { .. } => "of no span",
             Self::LimitUnit { .. } => "another unit",
-            Self::DuplicateName { .. } => "the name is taken",
+            Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "the name is taken",
             Self::UnusedNode { .. } | Self::UnusedSignal { .. } => "not used",
+            Self::ColumnUnit { .. } => "another unit",
             Self::Unreachable { .. } => "nothing flows in",
             Self::NoOutputs => "no `[outputs]`",
             Self::PointOrDifference { .. } => "a point is no difference",
@@ -531,7 +563,12 @@ impl Problem for CompileProblem {
                 "say how much of the past counts, such as `span = \"10min\"` on `{node}`, or use a window, such as `slope`"
             ),
             Self::LimitUnit { expected, .. } => format!("write the limit in {expected}"),
-            Self::DuplicateName { .. } => {
+            Self::DuplicateColumns {
+                alone: Some(alone), ..
+            } => {
+                format!("give it a line of its own, such as `{alone}`, or refer to fewer channels")
+            }
+            Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => {
                 "give one of them another name, or refer to fewer channels".to_owned()
             }
             Self::UnusedNode { node } if node.contains('/') => {
@@ -544,6 +581,9 @@ impl Problem for CompileProblem {
                 )
             }
             Self::UnusedSignal { .. } => "refer to it or remove it".to_owned(),
+            Self::ColumnUnit { named, .. } => format!(
+                "write `unit = \"{named}\"`, which converts wherever another one is needed, unless the log is at fault"
+            ),
             Self::Unreachable { .. } => "check the inputs on the way to it".to_owned(),
             Self::PointOrDifference { .. } => {
                 "Cel and [degF] are points on a scale, and K is a difference; take a slope or difference of a \

@@ -311,6 +311,7 @@ impl<'g> Resolver<'g> {
         let mut names = HashSet::new();
         for output in &graph.outputs {
             for (text, place) in &output.from {
+                let mut taken = Vec::new();
                 for slot in self.look_up(text, *place).unwrap_or_default() {
                     let channel = self.channels[slot]
                         .name
@@ -318,17 +319,23 @@ impl<'g> Resolver<'g> {
                         .map_or("", |(_, channel)| channel);
                     let name = format!("{}.{channel}", output.name);
                     if !names.insert(name.clone()) {
-                        let problem = CompileProblem::DuplicateName {
-                            name: name.clone(),
-                            what: "output columns",
-                        };
-                        self.diagnostics.report(*place, problem);
+                        taken.push(name.clone());
                     }
                     outputs.push(PlannedOutput {
                         name,
                         slot,
                         blend: output.blend.clone(),
                     });
+                }
+                if let [first, more @ ..] = &taken[..] {
+                    let node = text.split(['.', ':']).next().unwrap_or_default();
+                    let is_free = graph.outputs.iter().all(|other| other.name != node);
+                    let problem = CompileProblem::DuplicateColumns {
+                        first: first.clone(),
+                        more: more.len(),
+                        alone: is_free.then(|| format!("{node} = \"{text}\"")),
+                    };
+                    self.diagnostics.report(*place, problem);
                 }
             }
         }

@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::Wanted;
+use super::column_unit;
 use super::plan::{Plan, PlannedNode, PlannedRole, Step};
 use super::problem::CompileProblem;
 use super::slot_set::SlotSet;
@@ -166,6 +167,15 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
         .map(|slot| owner(&plan.channels[slot].name))
         .collect();
     for signal in &graph.signals {
+        if let Some(named) = column_unit::other_than(&signal.unit, &signal.column) {
+            let problem = CompileProblem::ColumnUnit {
+                signal: signal.name.clone(),
+                column: signal.column.clone(),
+                named,
+                unit: signal.unit.clone(),
+            };
+            diagnostics.report(signal.unit_place, problem);
+        }
         if !used_signals.contains(&signal.name) {
             diagnostics.report(
                 signal.place,

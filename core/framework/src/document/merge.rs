@@ -9,11 +9,12 @@ use crate::diagnostic::{Diagnostics, Names};
 /// Lays `over` on `base`: tables merge key by key, all else replaces.
 ///
 /// Under `nodes`, `false` removes an inherited node, and a node of another `type` (or `module`) replaces the inherited one whole.
+/// Under `outputs`, `false` removes an inherited output.
 pub(super) fn merge(base: Option<Table>, over: Table, diagnostics: &mut Diagnostics) -> Table {
     let mut merged = base.unwrap_or_default();
     for (key, entry) in over {
-        if key == "nodes" {
-            merge_nodes(&mut merged, key, entry, diagnostics);
+        if key == "nodes" || key == "outputs" {
+            merge_named(&mut merged, key, entry, diagnostics);
         } else if key == "modules" {
             merge_modules(&mut merged, key, entry, diagnostics);
         } else {
@@ -50,12 +51,14 @@ fn merge_modules(merged: &mut Table, key: String, entry: Entry, diagnostics: &mu
     }
 }
 
-fn merge_nodes(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
+/// Nodes, or outputs.
+fn merge_named(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
+    let role = if key == "nodes" { "node" } else { "output" };
     let Entry {
         key: key_place,
         value: Value {
             place,
-            data: Data::Table(nodes),
+            data: Data::Table(named),
         },
     } = entry
     else {
@@ -79,24 +82,26 @@ fn merge_nodes(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut 
         }
     };
     let names: Arc<Names> = Arc::new(inherited.keys().map(str::to_owned).collect());
-    for (name, node) in nodes {
-        if node.value.as_bool() == Some(false) {
+    for (name, over) in named {
+        if over.value.as_bool() == Some(false) {
             if inherited.remove(&name).is_none() {
                 diagnostics.report(
-                    node.key,
+                    over.key,
                     DocumentProblem::NothingToRemove {
-                        node: name,
+                        role,
+                        name,
                         inherited: Arc::clone(&names),
                     },
                 );
             }
-        } else if inherited
-            .get(&name)
-            .is_some_and(|old| is_another_kind(old, &node.value))
+        } else if role == "node"
+            && inherited
+                .get(&name)
+                .is_some_and(|old| is_another_kind(old, &over.value))
         {
-            inherited.insert(name, node);
+            inherited.insert(name, over);
         } else {
-            lay(inherited, name, node);
+            lay(inherited, name, over);
         }
     }
 }

@@ -180,11 +180,13 @@ pub enum DocumentProblem {
     Duration(DurationError),
     /// A text that is no quantity.
     Quantity(QuantityError),
-    /// `nodes.NAME = false` without an inherited node of that name.
+    /// `nodes.NAME = false` or `outputs.NAME = false` without one of that name that is inherited.
     NothingToRemove {
-        /// The node.
-        node: String,
-        /// The nodes that are inherited.
+        /// `node` or `output`.
+        role: &'static str,
+        /// Its name.
+        name: String,
+        /// The names of those that are inherited.
         inherited: Arc<Names>,
     },
     /// A number of samples where time is not counted in samples.

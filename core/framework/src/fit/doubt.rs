@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 
 use crate::channel::is_cold;
 use crate::diagnostic::{count, counted};
-use crate::node::{Figure, Noise, Of, Predictor, Regressor, Term, TrainingReport};
+use crate::node::{Figure, Noise, Of, Predictor, Regressor, Term, TrainingError, TrainingReport};
 
 /// A fit whose error is larger than that of the mean by this factor is no better than none.
 const WORSE_THAN_MEAN: f64 = 1.1;
@@ -16,69 +16,97 @@ const MANY_INCOMPLETE: f64 = 0.01;
 /// So many of what they lack are named.
 const NAMED: usize = 3;
 
-/// What incomplete rows lack, but for windows that were still cold.
+/// What incomplete rows lack, but for windows that were still cold; by sensor, since what is made of one often lacks a value with
+/// the others.
 #[derive(Debug, Clone)]
 pub(super) struct Lacking {
     rows: u64,
-    /// The rows that lack each regressor.
-    each: Vec<u64>,
+    /// The rows that lack a value from each sensor, or of each regressor that is made of several.
+    sources: IndexMap<String, u64>,
+    /// The source of each regressor.
+    of: Vec<usize>,
+    /// Whether each source is lacking in a row.
+    row: Vec<bool>,
 }
 
 impl Lacking {
-    /// Nothing yet, of so many regressors.
-    pub(super) fn new(regressors: usize) -> Self {
+    /// Nothing yet, of these regressors.
+    pub(super) fn new<'a>(regressors: impl Iterator<Item = &'a Regressor>) -> Self {
+        let mut sources = IndexMap::new();
+        let source = |regressor: &Regressor| {
+            let source = match &regressor.sensors[..] {
+                [sensor] => sensor,
+                _ => &regressor.name,
+            };
+            sources.insert_full(source.clone(), 0).0
+        };
+        let of = regressors.map(source).collect();
         Self {
             rows: 0,
-            each: vec![0; regressors],
+            row: vec![false; sources.len()],
+            sources,
+            of,
         }
     }
 
     /// An incomplete row.
     pub(super) fn count(&mut self, row: &[f64]) {
-        let lacks = |value: &f64| value.is_nan() && !is_cold(*value);
-        self.rows += u64::from(row.iter().any(lacks));
-        for (count, value) in self.each.iter_mut().zip(row) {
-            *count += u64::from(lacks(value));
+        self.row.fill(false);
+        for (&source, value) in self.of.iter().zip(row) {
+            self.row[source] |= value.is_nan() && !is_cold(*value);
+        }
+        self.rows += u64::from(self.row.contains(&true));
+        for (count, &lacks) in self.sources.values_mut().zip(&self.row) {
+            *count += u64::from(lacks);
         }
     }
 
-    /// Tells where values were missing that cost a fit many of its rows, of which so many are complete; by sensor, since what is
-    /// made of one lacks a value with the others.
-    pub(super) fn tell<'a>(
-        &self,
-        regressors: impl Iterator<Item = &'a Regressor>,
-        complete: u64,
-        report: &mut TrainingReport,
-    ) {
+    /// The sources that are lacking, the one that is most often first, with the rows that it costs.
+    pub(super) fn named(&self) -> Vec<(String, u64)> {
+        let sources = self.sources.iter().filter(|(_, rows)| **rows > 0);
+        let mut named: Vec<_> = sources.map(|(name, rows)| (name.clone(), *rows)).collect();
+        named.sort_by_key(|(_, rows)| std::cmp::Reverse(*rows));
+        named
+    }
+
+    /// Tells where values were missing that cost a fit many of its rows, of which so many are complete.
+    pub(super) fn tell(&self, complete: u64, report: &mut TrainingReport) {
         let many = MANY_INCOMPLETE * (complete + self.rows) as f64;
         if self.rows == 0 || (self.rows as f64) < many {
             return;
         }
-        let mut sources = IndexMap::<&str, u64>::new();
-        for (regressor, &count) in regressors.zip(&self.each) {
-            let source = match &regressor.sensors[..] {
-                [sensor] => sensor,
-                _ => &regressor.name,
-            };
-            let most = sources.entry(source).or_default();
-            *most = count.max(*most);
-        }
-        sources.retain(|_, count| *count > 0);
-        sources.sort_by(|_, one, _, other| other.cmp(one));
-        let named = sources.iter().take(NAMED);
-        let mut told: Vec<String> = named
-            .map(|(name, rows)| format!("{name} ({})", count(*rows)))
-            .collect();
-        if sources.len() > NAMED {
-            told.push("and others".to_owned());
-        }
+        let named = self.named();
         report.notes.push(format!(
             "many rows are incomplete for want of a value from {}",
-            told.join(", ")
+            in_words(&named)
         ));
-        let each = sources.iter().map(|(&name, &rows)| (name, rows as f64));
+        let each = named.iter().map(|(name, rows)| (&**name, *rows as f64));
         report.figure("lacking", Figure::named(each));
     }
+
+    /// Fewer rows than are needed, told with what others lack.
+    pub(super) fn too_few(&self, error: TrainingError, incomplete: u64) -> TrainingError {
+        match error {
+            TrainingError::TooFewRows { rows, needed } if incomplete > 0 => {
+                let named = self.named();
+                TrainingError::TooFewComplete {
+                    rows,
+                    needed,
+                    cold: incomplete - self.rows,
+                    lacking: (self.rows > 0).then(|| (self.rows, in_words(&named))),
+                }
+            }
+            other => other,
+        }
+    }
+}
+
+/// The first of them, with their rows.
+fn in_words(named: &[(String, u64)]) -> String {
+    let told = named.iter().take(NAMED);
+    let told = told.map(|(name, rows)| format!("{name} ({})", count(*rows)));
+    let others = (named.len() > NAMED).then(|| "and others".to_owned());
+    told.chain(others).collect::<Vec<_>>().join(", ")
 }
 
 /// Tells of the regressors that were left out since they stay the same.
@@ -189,5 +217,37 @@ impl Truths {
                 "the error on the rows of the fit is {times} times that of predicting their mean, so this fit is of no use"
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+
+    #[test]
+    fn a_row_counts_for_a_sensor_whichever_of_its_regressors_is_missing() {
+        let regressor = |name: &str, sensor: &str| Regressor {
+            name: name.to_owned(),
+            unit: "K".to_owned(),
+            sensors: vec![sensor.to_owned()],
+            lag: Duration::ZERO,
+            of_truth: false,
+        };
+        let regressors = [
+            regressor("a", "t.a"),
+            regressor("a lag 1min", "t.a"),
+            regressor("b", "t.b"),
+        ];
+        let mut lacking = Lacking::new(regressors.iter());
+        for row in [
+            [f64::NAN, 1.0, f64::NAN],
+            [1.0, f64::NAN, 1.0],
+            [f64::NAN; 3],
+        ] {
+            lacking.count(&row);
+        }
+        let expected = [("t.a".to_owned(), 3), ("t.b".to_owned(), 2)];
+        assert_eq!(lacking.named(), expected);
     }
 }

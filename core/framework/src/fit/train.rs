@@ -148,7 +148,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
         row: Vec::with_capacity(kept.len()),
         ranges: vec![Range::NONE; kept.len() + 1],
         all: Vec::new(),
-        lacking: Lacking::new(kept.len()),
+        lacking: Lacking::new(kept.iter().map(|&candidate| &regressors[candidate])),
         kept,
         truths: Truths::default(),
         incomplete: 0,
@@ -215,13 +215,15 @@ pub(super) fn end(
         }) => {
             let constant = making.constant.iter();
             tell_constant(constant.map(|&nth| &*regressors[nth].name), &mut report);
-            let kept = making.kept.iter().map(|&nth| &regressors[nth]);
-            making.lacking.tell(kept, truths.rows, &mut report);
+            making.lacking.tell(truths.rows, &mut report);
             let asked = (regressors.len(), making.learns);
             truths.doubt(predictor.as_ref(), asked, &mut report);
             (Outcome::Fitted(report), Some(predictor))
         }
-        Err(error) => (Outcome::Failed(error), None),
+        Err(error) => {
+            let error = making.lacking.too_few(error, making.incomplete);
+            (Outcome::Failed(error), None)
+        }
     };
     let fit = EstimatorFit {
         node: node.instance(),

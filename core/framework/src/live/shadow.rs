@@ -32,6 +32,8 @@ pub struct Verdict {
 pub struct Compared {
     /// The output: `predicted.Z1`.
     pub output: String,
+    /// The unit of errors: that of the truth, or K where that is a temperature.
+    pub unit: String,
     /// Instants with a truth and both predictions.
     pub n: usize,
     /// Root mean square error of what runs.
@@ -44,6 +46,7 @@ pub struct Compared {
 #[derive(Debug)]
 struct Pair {
     output: String,
+    unit: String,
     truth: usize,
     running: Predicted,
     candidate: Predicted,
@@ -167,6 +170,7 @@ fn pairs(running: &Plan, candidate: &Plan) -> Vec<Pair> {
         };
         Some(Pair {
             output: output.name.clone(),
+            unit: truth.channel.unit.difference().to_string(),
             truth: link.slot,
             running: predicted(output.slot),
             candidate: predicted(other.slot),
@@ -181,6 +185,7 @@ impl Pair {
         let rmse = |squares: f64| (squares / self.n as f64).sqrt();
         Compared {
             output: self.output.clone(),
+            unit: self.unit.clone(),
             n: self.n,
             running_rmse: rmse(self.running.squares),
             candidate_rmse: rmse(self.candidate.squares),

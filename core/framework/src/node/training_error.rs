@@ -13,6 +13,17 @@ pub enum TrainingError {
         /// Rows that are needed.
         needed: usize,
     },
+    /// Fewer complete rows than are needed, while others are incomplete.
+    TooFewComplete {
+        /// Rows that were complete.
+        rows: usize,
+        /// Rows that are needed.
+        needed: usize,
+        /// How many of the others lack nothing but windows that were still cold.
+        cold: u64,
+        /// How many lack something else, and from which sensors, in words.
+        lacking: Option<(u64, String)>,
+    },
     /// There is no truth to learn from.
     NoTruth {
         /// What is to be predicted.
@@ -60,6 +71,23 @@ impl std::fmt::Display for TrainingError {
             Self::TooFewRows { rows, needed } => {
                 let rows = counted(*rows, "complete row");
                 write!(f, "{rows}, and at least {} are needed", count(needed))
+            }
+            Self::TooFewComplete {
+                rows,
+                needed,
+                cold,
+                lacking,
+            } => {
+                let rows = counted(*rows, "complete row");
+                write!(f, "{rows}, and at least {} are needed", count(needed))?;
+                if let Some((rows, sensors)) = lacking {
+                    let lack = if *rows == 1 { "lacks" } else { "lack" };
+                    write!(f, "; {} {lack} a value from {sensors}", count(*rows))?;
+                }
+                if *cold > 0 {
+                    write!(f, "; {} came while windows were still cold", count(*cold))?;
+                }
+                Ok(())
             }
             Self::NoTruth {
                 truth,

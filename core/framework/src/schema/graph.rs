@@ -430,7 +430,11 @@ fn output(quantity: &Value) -> Value {
             "required": ["from"],
             "additionalProperties": false
         },
-        "else": { "$ref": "#/definitions/References" }
+        "else": {
+            "if": { "type": "boolean" },
+            "then": { "description": "False removes an inherited output.", "const": false },
+            "else": { "$ref": "#/definitions/References" }
+        }
     })
 }
 

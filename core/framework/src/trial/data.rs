@@ -27,25 +27,18 @@ pub struct Simulation {
     pub schedule: Option<Schedule>,
 }
 
-impl DataSet {
-    /// The data as a recording; `files` reads files.
+impl Simulation {
+    /// Its recording.
     ///
     /// # Errors
     /// There is no such machine, which declaring a test has made sure of.
-    pub fn recording(
-        &self,
-        files: impl FnOnce(&[PathBuf]) -> Box<dyn Recording>,
-    ) -> Result<Box<dyn Recording>, UnknownMachine> {
-        Ok(match self {
-            Self::Files(paths) => files(paths),
-            Self::Simulated(simulation) => {
-                let setup = Setup {
-                    days: simulation.days,
-                    seed: simulation.seed,
-                    schedule: simulation.schedule.clone(),
-                };
-                Box::new(Simulated::new(machine(simulation.machine)?.machine, setup))
-            }
-        })
+    pub fn recording(&self) -> Result<Box<dyn Recording>, UnknownMachine> {
+        let setup = Setup {
+            days: self.days,
+            seed: self.seed,
+            schedule: self.schedule.clone(),
+        };
+        let machine = machine(self.machine)?.machine;
+        Ok(Box::new(Simulated::new(machine, setup)))
     }
 }

@@ -2,6 +2,7 @@
 
 mod follow;
 mod per_input;
+mod rehearse;
 mod rows;
 mod told;
 mod train;

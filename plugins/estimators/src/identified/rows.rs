@@ -30,6 +30,18 @@ struct Row {
     runs: usize,
 }
 
+/// A run of the estimator in the fit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen<'a> {
+    /// The instant that it predicts.
+    pub(super) of: Instant,
+    pub(super) inputs: &'a [f64],
+    /// What was measured there, of a row.
+    pub(super) truth: Option<f64>,
+    /// Whether a segment begins with it.
+    pub(super) begins: bool,
+}
+
 /// How gaps between truths are bridged.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bridges {
@@ -169,8 +181,32 @@ impl Rows {
         samples
     }
 
+    /// All rows and runs, in order.
+    pub(super) fn all(&self) -> impl Iterator<Item = Seen<'_>> {
+        let before = std::iter::once(0).chain(self.rows.iter().map(|row| row.runs));
+        let rows = self.rows.iter().zip(before).enumerate();
+        rows.flat_map(|(nth, (row, from))| {
+            let runs = (from..row.runs).map(|run| Seen {
+                of: self.runs[run],
+                inputs: self.of_run(run),
+                truth: None,
+                begins: false,
+            });
+            runs.chain([Seen {
+                of: row.at,
+                inputs: self.of_row(nth),
+                truth: Some(row.truth),
+                begins: row.begins,
+            }])
+        })
+    }
+
     fn of_row(&self, nth: usize) -> &[f64] {
         &self.regressors[nth * self.width..(nth + 1) * self.width]
+    }
+
+    fn of_run(&self, run: usize) -> &[f64] {
+        &self.inputs[run * self.width..(run + 1) * self.width]
     }
 
     /// The inputs of the last run that predicts this instant or one before, between two rows of a segment.
@@ -180,7 +216,7 @@ impl Rows {
         let run = runs.start + self.runs[runs.clone()].partition_point(|&of| of <= at);
         match run.checked_sub(1) {
             Some(run) if runs.contains(&run) && self.runs[run] > self.rows[row].at => {
-                &self.inputs[run * self.width..(run + 1) * self.width]
+                self.of_run(run)
             }
             _ => self.of_row(row),
         }

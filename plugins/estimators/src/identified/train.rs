@@ -1,6 +1,6 @@
 //! Decides how rows become the evenly spaced samples that a model is identified from, and which of its orders is taken.
 
-use athermal_core::diagnostic::count;
+use athermal_core::diagnostic::{count, digits};
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
@@ -8,7 +8,8 @@ use athermal_numerics::{
     PredictionErrorFit, Samples, Standardizer,
 };
 
-use super::follow::{Identified, UNSEEN};
+use super::follow::{Identified, UNSEEN, steps};
+use super::rehearse::{self, Reach};
 use super::rows::{Bridges, Pace, Rows};
 use super::{Asked, Differences};
 use crate::conditioning::tell_rows;
@@ -67,6 +68,8 @@ pub(crate) struct IdentifiedTrainer<Kind> {
     asked: Kind,
     names: Vec<String>,
     span: Duration,
+    unit: String,
+    reach: Reach,
     memory: usize,
     rows: Rows,
     count: usize,
@@ -84,6 +87,12 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             asked,
             names: names.collect(),
             span: setup.span,
+            unit: setup.error_unit.clone(),
+            reach: Reach {
+                ahead: setup.ahead,
+                earlier: setup.span.max(setup.ahead).max(Duration::from_ns(1)),
+                follows: setup.learns,
+            },
             memory: setup.memory,
             rows: Rows::new(setup.regressors.len()),
             count: 0,
@@ -149,10 +158,10 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             report,
         );
         pace.tell(report);
-        report.in_sample_rmse = Some((found.squared_errors / found.rows as f64).sqrt());
+        let one_step = (found.squared_errors / found.rows as f64).sqrt();
         let variance = found.variance;
         let variances = found.model.variances(STEPS_AHEAD);
-        Ok(Identified {
+        let identified = Identified {
             regressors: self.names.clone(),
             scaling: Scaling {
                 means: standard.means,
@@ -168,7 +177,35 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             errors: found.errors,
             step: pace.step,
             series: pace.series,
-        })
+        };
+        self.tell_error(one_step, &identified, report);
+        Ok(identified)
+    }
+
+    /// A model is found by its errors one step ahead, and may know less than that when it predicts.
+    fn tell_error(&self, one_step: f64, of: &Identified, report: &mut TrainingReport) {
+        let Reach {
+            earlier, follows, ..
+        } = self.reach;
+        let ahead = steps(earlier, of.step);
+        let error = match !follows || of.model.follows() && ahead > 1 {
+            true => rehearse::error(&self.rows, of, self.reach),
+            false => None,
+        };
+        report.in_sample_rmse = Some(error.unwrap_or(one_step));
+        if error.is_none() {
+            return;
+        }
+        report.figure("rmse_one_step_ahead", one_step);
+        let predicts = match follows {
+            true => format!("it predicts {ahead} steps after the newest truth"),
+            false => "it will not follow truths".to_owned(),
+        };
+        report.notes.push(format!(
+            "it was found by its errors one step ahead, which are {} {}; {predicts}, and the in-sample RMSE is that of this",
+            digits(one_step, 3),
+            self.unit
+        ));
     }
 }
 

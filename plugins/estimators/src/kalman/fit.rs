@@ -1,7 +1,8 @@
 //! Decides what a structural model learns from its rows; not how it is followed afterwards.
 
+use athermal_core::diagnostic::digits;
 use athermal_core::node::{
-    Learner, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Figure, Learner, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -89,6 +90,36 @@ impl KalmanTrainer {
         (self.kept, self.regressors) = (kept, regressors);
         self.segment_pending |= begins;
         self.stride *= 2;
+    }
+
+    /// Lets go of regressors that stay the same in the rows that are followed, though not in all: nothing is learned of them, and
+    /// without one of their values there would be no prediction.
+    fn leave_out_constant(&mut self, report: &mut TrainingReport) {
+        let width = self.names.len();
+        if self.stride == 1 || width == 0 {
+            return;
+        }
+        let varies = |nth: usize| {
+            let mut values = self.regressors.iter().skip(nth).step_by(width);
+            let first = values.next();
+            first.is_some_and(|first| values.any(|value| !is_rounding(value - first, *first)))
+        };
+        let varying: Vec<bool> = (0..width).map(varies).collect();
+        if !varying.contains(&false) {
+            return;
+        }
+        let mut places = varying.iter().cycle();
+        self.regressors.retain(|_| places.next() == Some(&true));
+        let names = std::mem::take(&mut self.names).into_iter().zip(&varying);
+        let (left, constant): (Vec<_>, Vec<_>) = names.partition(|(_, varies)| **varies);
+        self.names = left.into_iter().map(|(name, _)| name).collect();
+        let constant: Vec<String> = constant.into_iter().map(|(name, _)| name).collect();
+        report.notes.push(format!(
+            "the same in the rows that are followed, though not in all, so left out: {}",
+            constant.join(", ")
+        ));
+        let constant = constant.iter().map(String::as_str);
+        report.figure("constant_in_rows_followed", Figure::names(constant));
     }
 
     fn solve(&self, report: &mut TrainingReport) -> Result<KalmanPredictor, TrainingError> {
@@ -205,6 +236,13 @@ impl KalmanTrainer {
             report
                 .notes
                 .push(format!("most likely are noises = {noises}"));
+            if let Some(all) = told.fades_within(self.typical_gap_s()) {
+                report.figure("observation_with_level", all);
+                report.notes.push(format!(
+                    "the level is gone before the next truth, so that only what it makes with the observation is known, {} {unit}",
+                    digits(all, 3)
+                ));
+            }
             if told.is_still() {
                 report.notes.push(
                     "the level does not move: the rows are as likely without a noise of it"
@@ -212,6 +250,14 @@ impl KalmanTrainer {
                 );
             }
         }
+    }
+
+    /// The typical time from one row to the next.
+    fn typical_gap_s(&self) -> f64 {
+        let pairs = self.kept.windows(2).filter(|pair| !pair[1].begins);
+        let mut gaps: Vec<Duration> = pairs.map(|pair| pair[1].at - pair[0].at).collect();
+        gaps.sort_unstable();
+        gaps.get(gaps.len() / 2).map_or(f64::NAN, |gap| gap.secs())
     }
 
     /// All that is told of the fit is told of the rows that it goes through.
@@ -265,14 +311,20 @@ impl Trainer for KalmanTrainer {
         self.last = None;
     }
 
-    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+    fn finish(mut self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
+        self.leave_out_constant(&mut report);
         let predictor = self.solve(&mut report)?;
         Ok(Trained {
             predictor: Box::new(predictor),
             report,
         })
     }
+}
+
+/// Whether values of this size that differ by so much are told apart by rounding alone.
+fn is_rounding(difference: f64, size: f64) -> bool {
+    difference.abs() <= 4.0 * f64::EPSILON * size.abs()
 }
 
 fn unsolvable(reason: &str) -> TrainingError {
@@ -303,5 +355,71 @@ impl Noises {
             returning: self.returns.map_or(0.0, |returns| 1.0 / returns.secs()),
             passage: Passage::Continuous,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use athermal_core::node::{Estimator, Regressor};
+
+    use super::*;
+
+    #[test]
+    fn what_is_the_same_in_the_rows_that_are_kept_is_not_needed_to_predict() {
+        let parameters = Kalman {
+            trend: false,
+            noises: None,
+            penalty: 1.0,
+            every: None,
+        };
+        let regressor = |name: &str| Regressor {
+            name: name.to_owned(),
+            unit: "K".to_owned(),
+            sensors: vec![name.to_owned()],
+            lag: Duration::ZERO,
+            of_truth: false,
+        };
+        let setup = TrainingSetup {
+            regressors: ["a", "seldom"].map(regressor).to_vec(),
+            places: vec![0, 1],
+            error_unit: "nm".to_owned(),
+            memory: 0,
+            ahead: Duration::ZERO,
+            span: Duration::ZERO,
+            learns: true,
+        };
+        let mut trainer = parameters.trainer(&setup);
+        for nth in 0..100_i32 {
+            let a = f64::from(nth * 37 % 11);
+            // Rows with an odd number are the first to go.
+            let seldom = f64::from(nth % 2);
+            let noise = f64::from(nth * 7919 % 23) / 23.0;
+            let at = Instant::from_ns(i64::from(nth) * 1_000_000_000);
+            trainer.row_at(at, &[a, seldom], 2.0 * a + noise);
+        }
+        let Trained { predictor, report } = trainer.finish().unwrap();
+        assert_eq!(predictor.uses(), ["a"]);
+        assert_eq!(
+            report.figures.get("constant_in_rows_followed"),
+            Some(&Figure::names(["seldom"]))
+        );
+        assert!(predictor.predict(&[3.0]).is_finite());
+    }
+
+    #[test]
+    fn a_level_that_is_gone_before_the_next_truth_is_told_as_part_of_the_observation() {
+        // 6 nm in an hour that return within 4 s: a variance of 6² / 3600 · 4 / 2 = 0.02 nm², beside 0.05² nm².
+        let model = Structural {
+            observation: 0.0025,
+            level: 36.0 / 3600.0,
+            trend: None,
+            returning: 0.25,
+            passage: Passage::Continuous,
+        };
+        let told = Hourly::of(&model);
+        let all = told.fades_within(420.0).unwrap();
+        assert!((all - 0.15).abs() < 1e-12, "{all}");
+        assert_eq!(told.fades_within(10.0), None);
+        assert_eq!(told.fades_within(f64::NAN), None);
     }
 }

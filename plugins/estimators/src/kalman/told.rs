@@ -9,6 +9,9 @@ use super::KalmanPredictor;
 /// The time over which noises are told, in s.
 const PER_S: f64 = 3600.0;
 
+/// After so many times in which it returns, 2 % of a level are left, and less than a thousandth of its variance.
+const LASTS: f64 = 4.0;
+
 /// Noises as a graph file gives them, over an hour, in the unit of the truth.
 pub(super) struct Hourly {
     observation: f64,
@@ -30,6 +33,14 @@ impl Hourly {
     /// Whether nothing moves the level; the time in which it would return then means nothing.
     pub(super) fn is_still(&self) -> bool {
         self.level == 0.0 && self.trend.is_none_or(|trend| trend == 0.0)
+    }
+
+    /// The standard deviation of a level that is gone before the next truth, and of the observation with it, so that nothing tells
+    /// one from the other; truths are so many seconds apart.
+    pub(super) fn fades_within(&self, apart_s: f64) -> Option<f64> {
+        let returns_s = self.returns_s.filter(|returns| LASTS * returns < apart_s)?;
+        let level = self.level * self.level / PER_S * returns_s / 2.0;
+        Some((self.observation * self.observation + level).sqrt())
     }
 
     /// For programs.

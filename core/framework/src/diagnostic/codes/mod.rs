@@ -125,7 +125,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A019",
         "nothing to remove",
-        "`nodes.NAME = false` removes an inherited node, and there is none of that name."
+        "`nodes.NAME = false` removes an inherited node and `outputs.NAME = false` an inherited output, and there is none of that name."
     ),
     code!(
         "A020",
@@ -316,6 +316,11 @@ pub const CODES: &[Code] = &[
         "A068",
         "a channel that counts twice",
         "Each regressor and each vote counts once: the coefficients of two that are the same cannot be told apart, and a voter that stands twice would have twice the say."
+    ),
+    code!(
+        "A069",
+        "columns in another unit",
+        "A table's columns are named for another unit than their signal's, which measures the same: what is read is taken as the signal says."
     ),
     code!(
         "A070",

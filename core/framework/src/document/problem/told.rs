@@ -153,8 +153,8 @@ impl Problem for DocumentProblem {
             Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error.reason(),
             Self::Duration(error) => error.to_string(),
             Self::Quantity(error) => error.to_string(),
-            Self::NothingToRemove { node, .. } => {
-                format!("there is no inherited node \"{node}\" to remove")
+            Self::NothingToRemove { role, name, .. } => {
+                format!("there is no inherited {role} \"{name}\" to remove")
             }
             Self::SamplesWithoutClock { text } => {
                 format!("\"{text}\" counts samples, and the time of this graph does not")
@@ -309,8 +309,13 @@ impl Problem for DocumentProblem {
             Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error
                 .advice()
                 .map(|advice| format!("write the unit as \"{advice}\"")),
-            Self::NothingToRemove { node, inherited } => {
-                one_of(node, inherited, "the inherited nodes are")
+            Self::NothingToRemove {
+                role,
+                name,
+                inherited,
+            } => {
+                let which = format!("the inherited {role}s are");
+                one_of(name, inherited, &which)
                     .or_else(|| Some("leave it out; nothing is inherited here".to_owned()))
             }
             Self::SamplesWithoutClock { .. } => Some(

@@ -99,6 +99,15 @@ fn false_removes_an_inherited_node() {
 }
 
 #[test]
+fn false_removes_an_inherited_output() {
+    let base = format!("{BASE}\n[outputs]\na = \"thermal\"\nb = \"motion\"\n");
+    let over = "schema = 1\nextends = \"base.toml\"\nnodes.motion = false\noutputs.b = false\noutputs.c = \"thermal\"";
+    let graph = graph(&[("over.toml", over), ("base.toml", &base)]);
+    let outputs = graph.outputs.iter().map(|output| output.name.as_str());
+    assert_eq!(outputs.collect::<Vec<_>>(), ["a", "c"]);
+}
+
+#[test]
 fn a_path_starts_at_the_file_in_which_it_stands() {
     let base = "schema = 1\nsource = { path = \"data.csv\" }";
     let middle = "schema = 1\nextends = \"types/base.toml\"";

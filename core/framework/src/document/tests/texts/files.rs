@@ -265,13 +265,14 @@ error[A010]: the number 1e999 is too large
 }
 
 #[test]
-fn there_must_be_a_node_to_remove() {
+fn there_must_be_a_node_or_an_output_to_remove() {
     let files = [
         (
             "a.toml",
             r#"schema = 1
 extends = "b.toml"
 nodes.themal = false
+outputs.predictd = false
 "#,
         ),
         (
@@ -279,6 +280,8 @@ nodes.themal = false
             r#"schema = 1
 [nodes.thermal]
 type = "linear"
+[outputs]
+predicted = "thermal"
 "#,
         ),
     ];
@@ -292,6 +295,14 @@ error[A019]: there is no inherited node "themal" to remove
   |       ^^^^^^
   |
   = help: did you mean "thermal"?
+
+error[A019]: there is no inherited output "predictd" to remove
+ --> a.toml:4:9
+  |
+4 | outputs.predictd = false
+  |         ^^^^^^^^
+  |
+  = help: did you mean "predicted"?
 "#
     );
 }

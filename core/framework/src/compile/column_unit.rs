@@ -1,0 +1,62 @@
+//! Decides whether the columns of a signal are named for another unit than the signal's; what a log holds is not looked at.
+
+use crate::unit::Unit;
+
+/// The unit at the end of a column pattern, as in `{channel}_degC` or `Z [mm]`. A single letter is none but for `K` and `%`: `_m` may as
+/// well stand for measured.
+fn of_name(column: &str) -> Option<Unit> {
+    let ending = match column.rsplit_once('}') {
+        Some((_, ending)) => ending,
+        None => column.rsplit_once(['_', ' ', '[', '('])?.1,
+    };
+    let ending = ending.trim_matches(['_', ' ', '-', '.', '[', ']', '(', ')']);
+    if ending.chars().count() < 2 && !["K", "%"].contains(&ending) {
+        return None;
+    }
+    Unit::parse(ending).ok()
+}
+
+/// The unit that columns are named for, where it measures the same as the signal's and is another one.
+pub(super) fn other_than(unit: &Unit, column: &str) -> Option<Unit> {
+    let named = of_name(column)?;
+    let same = [0.0, 1.0].iter().all(|&value| {
+        let converted = named.convert(value, unit);
+        converted.is_none_or(|converted| (converted - value).abs() < 1e-9)
+    });
+    (!same).then_some(named)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::other_than;
+    use crate::unit::Unit;
+
+    fn told(unit: &str, column: &str) -> Option<String> {
+        let unit = Unit::parse(unit).expect("a unit");
+        other_than(&unit, column).map(|named| named.to_string())
+    }
+
+    #[test]
+    fn columns_that_are_named_for_another_unit_of_the_same_kind_are_told() {
+        assert_eq!(told("nm", "{channel}_um").as_deref(), Some("um"));
+        assert_eq!(told("K", "T_{channel}_degC").as_deref(), Some("Cel"));
+        assert_eq!(told("Cel", "{channel}_K").as_deref(), Some("K"));
+        assert_eq!(told("um", "Z [mm]").as_deref(), Some("mm"));
+        assert_eq!(told("1", "{channel} (%)").as_deref(), Some("%"));
+    }
+
+    #[test]
+    fn columns_that_are_named_for_the_same_unit_or_for_none_are_not() {
+        for (unit, column) in [
+            ("um", "{channel}_µm"),
+            ("Cel", "{channel}_degC"),
+            ("um", "{channel}_m"),
+            ("um", "{channel}"),
+            ("um", "{channel}_pos"),
+            ("V", "heater_degC"),
+            ("nm", "position"),
+        ] {
+            assert_eq!(told(unit, column), None, "{column} in {unit}");
+        }
+    }
+}
