@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use athermal::Model;
+use athermal::core::engine::SampleRange;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
 use athermal::core::score::{Lack, trace};
@@ -11,6 +12,7 @@ use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, com
 use clap::Args;
 use serde_json::json;
 
+use super::beyond;
 use super::data::{self, Data};
 use super::evaluate::check_limit;
 use super::fit::fit_without_card;
@@ -76,6 +78,7 @@ impl Compare {
         let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
         let on = self.data.others(self.on.clone());
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
+        let mut in_fits = Vec::new();
         for ((path, mut model), name) in models.into_iter().zip(names) {
             let began = Instant::now();
             let options = FitOptions::default();
@@ -92,6 +95,10 @@ impl Compare {
             })?;
             drop(progress);
             data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+            let new = |range: &&SampleRange| beyond::usual(&in_fits, &range.channel).is_none();
+            let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
+            beyond::tell(terminal, &new, &trace.ranges);
+            in_fits.extend(new);
             fits.push(Fitted {
                 graph: name.clone(),
                 path,

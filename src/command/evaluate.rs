@@ -11,6 +11,7 @@ use athermal::core::score::{Lack, Mode, Score, ScoreOptions, Scores, score};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
+use super::beyond;
 use super::data::{self, Data};
 use super::numbers;
 use crate::figures::{counted, number, or_dash, table};
@@ -131,6 +132,7 @@ impl Evaluate {
                 "period": period,
                 "scores": scores.scores,
                 "lacks": scores.lacks,
+                "outside_fit": beyond::beyond(model.sample_ranges(), &scores.ranges),
             });
             println!("{:#}", data::with_overlaps(told, &dataset.reports()));
         } else {
@@ -142,6 +144,7 @@ impl Evaluate {
             scores.refused,
             &scores.rejected,
         );
+        beyond::tell(terminal, model.sample_ranges(), &scores.ranges);
         data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);

@@ -192,6 +192,7 @@ pub fn fit_on(
             to_s: seconds(to),
         }),
         ticks: report.ticks,
+        ranges: report.ranges.clone(),
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
     Ok((dataset, report))

@@ -1,6 +1,7 @@
 //! Decides which commands there are; each says in a file of its own what it does.
 
 mod aside;
+mod beyond;
 mod build;
 mod check;
 mod compare;

@@ -1,31 +1,44 @@
-//! Decides when a sample that does not count is told of while rows still come; which samples count is decided by the graph.
+//! Decides when a sample that does not count, or lies far outside of what the fit saw, is told of while rows still come; which
+//! samples count is decided by the graph.
 
 use athermal::core::compile::SourceChannel;
+use athermal::core::engine::SampleRange;
 use athermal::core::live::{Samples, Source, SourceError};
 use athermal::core::recording::Event;
 
+use super::beyond;
 use crate::figures::number;
 use crate::terminal::Terminal;
 
-/// Rows as they are read. Where they may never end, the first sample of each channel that does not count is told at once.
+/// Rows as they are read. Where they may never end, the first sample of each channel that does not count, and the first far outside
+/// of what the fit saw, are told at once.
 pub struct Ranged<'a> {
     source: &'a mut dyn Source,
     terminal: Terminal,
     /// The channels of which none has been told yet, with their places in a row.
     untold: Vec<(usize, SourceChannel)>,
+    /// The same for samples that count and are far outside of what the fit saw, with where they lay there.
+    untold_beyond: Vec<(usize, SourceChannel, SampleRange)>,
 }
 
 impl<'a> Ranged<'a> {
-    /// Watches these channels, in the order of a row's values; none where all is told at the end.
+    /// Watches these channels, in the order of a row's values; none where all is told at the end. `usual` is where samples lay in the
+    /// fit.
     pub fn new(
         terminal: &Terminal,
         source: &'a mut dyn Source,
         channels: &[SourceChannel],
+        usual: &[SampleRange],
     ) -> Self {
+        let beyond = channels.iter().enumerate().filter_map(|(place, channel)| {
+            let usual = beyond::usual(usual, &channel.name)?;
+            Some((place, channel.clone(), usual.clone()))
+        });
         Self {
             source,
             terminal: *terminal,
             untold: channels.iter().cloned().enumerate().collect(),
+            untold_beyond: beyond.collect(),
         }
     }
 }
@@ -46,6 +59,10 @@ impl Source for Ranged<'_> {
                     ));
                 }
                 counts
+            });
+            self.untold_beyond.retain(|(place, channel, usual)| {
+                let value = values[*place];
+                !(channel.admits(value) && beyond::tell_first(&terminal, usual, time, value))
             });
         }
         Ok(event)

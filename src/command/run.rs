@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::document::TimeBase;
+use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
 use athermal::files::{FileError, Flush, Layout, Options, Reader, WithRevision, Writer, layout};
@@ -11,11 +12,11 @@ use athermal::{Engine, Model};
 use clap::Args;
 
 use super::aside::check_apart;
-use super::data;
 use super::evaluate::check_fitted;
 use super::kept::Kept;
 use super::rejected::Ranged;
 use super::swap;
+use super::{beyond, data};
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
 /// Run a model: rows in, predictions out
@@ -106,11 +107,12 @@ impl Run {
             .collect();
         let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
         let mut rest = kept.rest(terminal, &mut reader);
-        let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan));
+        let usual = model.sample_ranges();
+        let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
         let mut keep = |engine: &Engine| kept.after_tick(engine);
         live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
         kept.write(&engine).map_err(outside)?;
-        self.tell(terminal, &engine, &reader);
+        self.tell(terminal, &engine, &reader, usual);
         Ok(Answer::Fine)
     }
 
@@ -127,7 +129,8 @@ impl Run {
         let mut engine = model.engine()?;
         let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
         let mut rest = kept.rest(terminal, &mut reader);
-        let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read));
+        let usual = model.sample_ranges().to_vec();
+        let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read), &usual);
         let live = LiveOptions {
             channels: feed,
             ..LiveOptions::default()
@@ -189,7 +192,7 @@ impl Run {
         kept.write(stepper.engine()).map_err(outside)?;
         course.end(&mut control);
         let engine = stepper.engine();
-        self.tell(terminal, engine, &reader);
+        self.tell(terminal, engine, &reader, &usual);
         Ok(Answer::Fine)
     }
 
@@ -247,9 +250,12 @@ impl Run {
         }
     }
 
-    fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader) {
+    fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader, usual: &[SampleRange]) {
         let reports = [(self.input.display().to_string(), reader.report().clone())];
         let rejected = engine.rejected_channels();
         data::tell(terminal, &reports, engine.refused(), &rejected);
+        if self.ends() {
+            beyond::tell(terminal, usual, &engine.sample_ranges());
+        }
     }
 }

@@ -17,6 +17,7 @@ use athermal::diagnosis::{
 use clap::Args;
 use serde_json::json;
 
+use super::beyond;
 use super::data::{self, Data};
 use super::evaluate::load_fitted;
 use super::report::write_plots;
@@ -105,6 +106,7 @@ impl Diagnose {
         }
         let trace = &observation.trace;
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+        beyond::tell(terminal, model.sample_ranges(), &trace.ranges);
         for told in Lack::told(&diagnosis.lacks) {
             terminal.warning(told);
         }

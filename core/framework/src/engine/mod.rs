@@ -17,6 +17,7 @@ mod pairing;
 mod recent_error;
 mod revision;
 mod running;
+mod sample_range;
 mod slots;
 mod state;
 mod turn;
@@ -31,6 +32,7 @@ pub use error::EngineError;
 pub use mode::Mode;
 pub use pairing::{Paired, Pairing};
 pub use revision::{fnv_1a, revision};
+pub use sample_range::SampleRange;
 pub use state::{EngineState, RestoreError};
 
 pub(crate) use carry::Heritage;
@@ -70,6 +72,8 @@ pub struct Engine {
     /// Set between a segment break and the first tick after it: the last instant before the break.
     before_break: Option<Instant>,
     rejected: Vec<u64>,
+    /// The lowest and the highest sample that counted, of each source.
+    extremes: Vec<(f64, f64)>,
     refused: u64,
     /// Estimators whose predictions are fed back, and the slots of their truths.
     fed_back: Vec<(usize, usize)>,
@@ -118,6 +122,7 @@ impl Engine {
             last: Instant::MIN,
             before_break: None,
             rejected: vec![0; plan.sources.len()],
+            extremes: vec![sample_range::UNSEEN; plan.sources.len()],
             refused: 0,
             fed_back: Vec::new(),
             frozen: false,
@@ -330,9 +335,10 @@ impl Engine {
         self.refused
     }
 
-    /// Counts rejected samples and refused ticks from here on: those before are another run's.
+    /// Counts rejected samples and refused ticks, and takes the ranges of samples, from here on: those before are another run's.
     pub fn count_afresh(&mut self) {
         self.rejected.fill(0);
+        self.extremes.fill(sample_range::UNSEEN);
         self.refused = 0;
     }
 
@@ -386,6 +392,8 @@ impl Engine {
             }
             if admits(range, sample) {
                 self.slots.set(slot, sample, time);
+                let (lowest, highest) = &mut self.extremes[slot];
+                (*lowest, *highest) = (lowest.min(sample), highest.max(sample));
             } else {
                 self.rejected[slot] += 1;
             }

@@ -310,6 +310,7 @@ impl<'a> Fitting<'a> {
         self.report.period = passed.period;
         self.report.refused = engine.refused();
         self.report.rejected = engine.rejected_channels();
+        self.report.ranges = engine.sample_ranges();
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::EngineError;
+use crate::engine::{EngineError, SampleRange};
 use crate::node::{TrainingError, TrainingReport};
 use crate::recording::RecordingError;
 use crate::time::Instant;
@@ -54,6 +54,8 @@ pub struct FitReport {
     pub refused: u64,
     /// Samples rejected as infinite or out of range, by measured channel.
     pub rejected: Vec<(String, u64)>,
+    /// Between which values the samples of each measured channel lay.
+    pub ranges: Vec<SampleRange>,
     /// How the fit of each estimator, and of each feature that is fitted, went; in the order of the plan.
     pub estimators: Vec<EstimatorFit>,
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::engine::SampleRange;
 use crate::fit::Dropped;
 use crate::node::TrainingReport;
 
@@ -20,6 +21,9 @@ pub struct Card {
     pub period: Option<Period>,
     /// The number of ticks.
     pub ticks: u64,
+    /// Between which values the samples of each measured channel lay.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<SampleRange>,
     /// How the fit of each estimator went.
     pub estimators: Vec<EstimatorCard>,
 }

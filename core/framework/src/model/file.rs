@@ -10,7 +10,7 @@ use super::{Card, ModelError};
 use crate::compile::{Change, Plan, PlannedNode, Wanted, compile, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
-use crate::engine::{Engine, Fitted};
+use crate::engine::{Engine, Fitted, SampleRange};
 use crate::node::{Mistake, Predictor};
 
 /// The format that this version writes.
@@ -188,6 +188,12 @@ impl Model {
                 sources: Box::new(std::mem::take(sources)),
             }),
         }
+    }
+
+    /// Between which values the samples of each measured channel lay in the data of the fit, as far as the card tells.
+    #[must_use]
+    pub fn sample_ranges(&self) -> &[SampleRange] {
+        self.card.as_ref().map_or(&[], |card| &card.ranges)
     }
 
     /// The nodes that need a fit and have none.

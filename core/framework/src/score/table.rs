@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::watch::{Truth, Watch};
 use super::{IntervalScore, Lack, Mode, ScoreOptions};
 use crate::compile::Plan;
-use crate::engine::Engine;
+use crate::engine::{Engine, SampleRange};
 use crate::time::Instant;
 
 /// The share of instants below which a prediction does not restrict those on which the others are scored.
@@ -24,6 +24,8 @@ pub struct Scores {
     pub refused: u64,
     /// Samples rejected as infinite or out of range, by measured channel.
     pub rejected: Vec<(String, u64)>,
+    /// Between which values the samples of each measured channel lay.
+    pub ranges: Vec<SampleRange>,
     /// A row for each prediction, those of one truth together, in the order of the plan.
     pub scores: Vec<Score>,
     /// Combiners that went by fewer truths than they take.
@@ -97,6 +99,7 @@ pub(super) fn table(
         ticks,
         refused: engine.refused(),
         rejected: engine.rejected_channels(),
+        ranges: engine.sample_ranges(),
         scores: watch
             .truths
             .iter()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Lack, Mode, Watch, evidence};
 use crate::compile::Plan;
-use crate::engine::{Engine, Fitted};
+use crate::engine::{Engine, Fitted, SampleRange};
 use crate::fit::{FitError, drive};
 use crate::recording::{Event, Recording};
 use crate::time::{Duration, Instant};
@@ -21,6 +21,8 @@ pub struct Trace {
     pub refused: u64,
     /// Samples rejected as infinite or out of range, by measured channel.
     pub rejected: Vec<(String, u64)>,
+    /// Between which values the samples of each measured channel lay.
+    pub ranges: Vec<SampleRange>,
     /// Combiners that went by fewer truths than they take.
     pub lacks: Vec<Lack>,
 }
@@ -112,6 +114,7 @@ pub fn trace(
         ticks: passed.ticks,
         refused: engine.refused(),
         rejected: engine.rejected_channels(),
+        ranges: engine.sample_ranges(),
         lacks,
     })
 }

@@ -254,7 +254,7 @@ impl Identify for Asked {
         report.figure("steps_of_search", fit.steps);
         if !fit.converged {
             report.notes.push(format!(
-                "the search had not ended after {} steps",
+                "the search had not ended after {} steps: the data hardly tell some coefficients from others, which fewer features or lower orders would settle",
                 fit.steps
             ));
         }

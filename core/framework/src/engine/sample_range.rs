@@ -1,0 +1,76 @@
+//! Decides between which values samples have lain, and when others lie far outside; not what follows from it.
+
+use serde::{Deserialize, Serialize};
+
+use super::Engine;
+
+/// The lowest and the highest sample of a measured channel that counted, in the unit of its signal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SampleRange {
+    /// The channel: `temperature.plate1`.
+    pub channel: String,
+    /// The lowest sample.
+    pub lowest: f64,
+    /// The highest sample.
+    pub highest: f64,
+}
+
+impl SampleRange {
+    /// By how many of its own widths samples from `lowest` to `highest` reach beyond it, on the side where they do more; 0 where they
+    /// lie within, and where it has no width, so that nothing is known of what is usual.
+    #[must_use]
+    pub fn exceeded_by(&self, lowest: f64, highest: f64) -> f64 {
+        let width = self.highest - self.lowest;
+        if width <= 0.0 {
+            return 0.0;
+        }
+        let beyond = (highest - self.highest).max(self.lowest - lowest);
+        beyond.max(0.0) / width
+    }
+}
+
+/// The extremes of a channel of which no sample has been seen.
+pub(super) const UNSEEN: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
+impl Engine {
+    /// Between which values the samples of each measured channel lay that counted, in the order of the plan; without those of which
+    /// none has come.
+    #[must_use]
+    pub fn sample_ranges(&self) -> Vec<SampleRange> {
+        let extremes = self.plan.sources.iter().zip(&self.extremes);
+        extremes
+            .filter(|(_, (lowest, highest))| lowest <= highest)
+            .map(|(source, &(lowest, highest))| SampleRange {
+                channel: source.name.clone(),
+                lowest,
+                highest,
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SampleRange;
+
+    fn range(lowest: f64, highest: f64) -> SampleRange {
+        SampleRange {
+            channel: "temperature.plate".to_owned(),
+            lowest,
+            highest,
+        }
+    }
+
+    #[test]
+    fn a_range_is_exceeded_by_as_many_widths_as_another_lies_outside() {
+        let usual = range(20.0, 25.0);
+        assert_eq!(usual.exceeded_by(21.0, 24.0), 0.0);
+        assert_eq!(usual.exceeded_by(10.0, 26.0), 2.0);
+        assert_eq!(usual.exceeded_by(295.0, 300.0), 55.0);
+    }
+
+    #[test]
+    fn what_never_changed_tells_nothing_of_what_is_usual() {
+        assert_eq!(range(20.0, 20.0).exceeded_by(300.0, 301.0), 0.0);
+    }
+}

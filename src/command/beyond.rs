@@ -1,0 +1,86 @@
+//! Decides when data lie so far from those of a fit that predictions of them mean little; how well they do is told by their scores.
+
+use athermal::core::engine::SampleRange;
+use serde::Serialize;
+
+use crate::figures::number;
+use crate::terminal::Terminal;
+
+/// Data that reach farther beyond those of the fit than the range of these is wide are told of.
+const FAR: f64 = 1.0;
+/// So many widths beyond, another unit is more likely than another day.
+const ANOTHER_UNIT: f64 = 10.0;
+
+/// A channel whose samples lie far outside of what a fit saw.
+#[derive(Debug, Serialize)]
+pub struct Beyond<'a> {
+    channel: &'a str,
+    lowest: f64,
+    highest: f64,
+    lowest_in_fit: f64,
+    highest_in_fit: f64,
+    #[serde(skip)]
+    doubt: &'static str,
+}
+
+/// The channels whose samples lie far outside of what a fit saw.
+pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a>> {
+    let of = |seen: &'a SampleRange| {
+        let usual = usual(fit, &seen.channel)?;
+        Some(Beyond {
+            channel: &seen.channel,
+            lowest: seen.lowest,
+            highest: seen.highest,
+            lowest_in_fit: usual.lowest,
+            highest_in_fit: usual.highest,
+            doubt: doubt(usual, seen.lowest, seen.highest)?,
+        })
+    };
+    seen.iter().filter_map(of).collect()
+}
+
+/// Tells of them.
+pub fn tell(terminal: &Terminal, fit: &[SampleRange], seen: &[SampleRange]) {
+    for of in beyond(fit, seen) {
+        terminal.warning(format_args!(
+            "{} is between {} and {}, and was between {} and {} in the data of the fit: {}",
+            of.channel,
+            number(of.lowest),
+            number(of.highest),
+            number(of.lowest_in_fit),
+            number(of.highest_in_fit),
+            of.doubt
+        ));
+    }
+}
+
+/// Tells of the first such sample of a channel; whether there is one.
+pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) -> bool {
+    let doubt = doubt(usual, sample, sample);
+    if let Some(doubt) = doubt {
+        terminal.warning(format_args!(
+            "{} at {time}: {}, and was between {} and {} in the data of the fit: {doubt}",
+            usual.channel,
+            number(sample),
+            number(usual.lowest),
+            number(usual.highest),
+        ));
+    }
+    doubt.is_some()
+}
+
+/// Where the samples of a channel lay in a fit.
+pub fn usual<'a>(fit: &'a [SampleRange], channel: &str) -> Option<&'a SampleRange> {
+    fit.iter().find(|usual| usual.channel == channel)
+}
+
+/// What to think of samples that lie far outside; none where they do not.
+fn doubt(usual: &SampleRange, lowest: f64, highest: f64) -> Option<&'static str> {
+    match usual.exceeded_by(lowest, highest) {
+        widths if widths > ANOTHER_UNIT => {
+            Some("is it in the unit of the fit? Nothing was learned of values so far outside")
+        }
+        widths if widths > FAR => Some("nothing was learned of values so far outside"),
+        _ => None,
+    }
+}
