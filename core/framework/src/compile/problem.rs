@@ -23,6 +23,8 @@ pub enum CompileProblem {
     },
     /// A reference to a node or signal that is not there.
     UnknownNode { node: String, known: Arc<Names> },
+    /// A reference to an inherited node that the file removes.
+    RemovedNode { node: String },
     /// A reference to a port that the node does not have.
     UnknownPort {
         node: String,
@@ -214,7 +216,7 @@ impl Problem for CompileProblem {
         match self {
             Self::UnknownKind { .. } => "A040",
             Self::KindTwice { .. } => "A041",
-            Self::UnknownNode { .. } => "A042",
+            Self::UnknownNode { .. } | Self::RemovedNode { .. } => "A042",
             Self::UnknownPort { .. } => "A043",
             Self::UnknownChannel { .. } => "A044",
             Self::UnknownInput { .. } => "A045",
@@ -260,6 +262,7 @@ impl Problem for CompileProblem {
     fn may_follow_from_a_gap(&self) -> bool {
         match self {
             Self::UnknownNode { .. }
+            | Self::RemovedNode { .. }
             | Self::UnknownPort { .. }
             | Self::UnknownChannel { .. }
             | Self::MissingInput { .. }
@@ -306,6 +309,9 @@ impl Problem for CompileProblem {
                 )
             }
             Self::UnknownNode { node, .. } => format!("there is no node or signal `{node}`"),
+            Self::RemovedNode { node } => {
+                format!("`{node}` is referred to, and `nodes.{node} = false` removes it")
+            }
             Self::UnknownPort { node, port, .. } => format!("`{node}` has no output port `{port}`"),
             Self::UnknownChannel { node, channel, .. } => {
                 format!("`{node}` has no channel that matches `{channel}`")
@@ -449,6 +455,7 @@ impl Problem for CompileProblem {
             Self::UnknownKind { .. } => "no such type",
             Self::KindTwice { .. } => "which of them?",
             Self::UnknownNode { .. } => "not found",
+            Self::RemovedNode { .. } => "removed",
             Self::UnknownPort { .. } => "no such port",
             Self::UnknownChannel { .. } => "matches nothing",
             Self::UnknownInput { .. } => "no such input",
@@ -487,6 +494,7 @@ impl Problem for CompileProblem {
                 "leave one of the crates out when the program is built".to_owned()
             }
             Self::UnknownNode { node, known } => or_one_of(node, known, "the graph has"),
+            Self::RemovedNode { .. } => "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`".to_owned(),
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
             Self::UnknownChannel {
                 node,

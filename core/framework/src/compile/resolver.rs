@@ -88,6 +88,7 @@ impl<'g> Resolver<'g> {
         for node in &self.graph.nodes {
             self.scopes.declare(&node.name);
         }
+        self.scopes.removed.clone_from(&self.graph.removed);
         for name in &self.graph.broken {
             self.scopes.get_mut(name).broken = true;
         }

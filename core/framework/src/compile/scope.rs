@@ -17,6 +17,8 @@ pub(crate) struct Scopes {
     scopes: IndexMap<String, Scope>,
     /// What there is to refer to, once somebody refers to what there is not.
     known: OnceCell<Arc<Names>>,
+    /// Nodes that a file inherits and removes.
+    pub(crate) removed: Vec<String>,
 }
 
 /// The output ports of a node or signal, as the rest of the graph sees them.
@@ -102,6 +104,11 @@ impl Scopes {
             let outer = reference.node.split(['/', '[']).next().unwrap_or_default();
             if self.scopes.get(outer).is_some_and(|outer| outer.broken) {
                 return Ok(Found::Broken);
+            }
+            if self.removed.iter().any(|removed| removed == outer) {
+                return Err(Box::new(CompileProblem::RemovedNode {
+                    node: outer.to_owned(),
+                }));
             }
             return Err(Box::new(CompileProblem::UnknownNode {
                 node: reference.node.to_owned(),

@@ -29,6 +29,8 @@ pub struct GraphFile {
     pub broken: Vec<String>,
     /// The same of what stands in a section that there is not.
     pub elsewhere: Vec<String>,
+    /// Inherited nodes that were removed.
+    pub removed: Vec<String>,
     /// What comes out, in the order of the file.
     pub outputs: Vec<OutputDecl>,
     /// The list under `[[tests]]`, as it stands.

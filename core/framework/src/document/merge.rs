@@ -9,12 +9,17 @@ use crate::diagnostic::{Diagnostics, Names};
 /// Lays `over` on `base`: tables merge key by key, all else replaces.
 ///
 /// Under `nodes`, `false` removes an inherited node, and a node of another `type` (or `module`) replaces the inherited one whole.
-/// Under `outputs`, `false` removes an inherited output.
-pub(super) fn merge(base: Option<Table>, over: Table, diagnostics: &mut Diagnostics) -> Table {
+/// Under `outputs`, `false` removes an inherited output. The names of nodes that are removed are added to `removed`.
+pub(super) fn merge(
+    base: Option<Table>,
+    over: Table,
+    removed: &mut Vec<String>,
+    diagnostics: &mut Diagnostics,
+) -> Table {
     let mut merged = base.unwrap_or_default();
     for (key, entry) in over {
         if key == "nodes" || key == "outputs" {
-            merge_named(&mut merged, key, entry, diagnostics);
+            merge_named(&mut merged, key, entry, removed, diagnostics);
         } else if key == "modules" {
             merge_modules(&mut merged, key, entry, diagnostics);
         } else {
@@ -37,7 +42,9 @@ fn merge_modules(merged: &mut Table, key: String, entry: Entry, diagnostics: &mu
         let inherited = below.get(&name).and_then(Value::as_table).cloned();
         match (inherited, entry.value.data) {
             (Some(inherited), Data::Table(over)) => {
-                let laid = Data::Table(merge(Some(inherited), over, diagnostics));
+                // What is inside of a module has no name outside of it.
+                let laid = merge(Some(inherited), over, &mut Vec::new(), diagnostics);
+                let laid = Data::Table(laid);
                 let value = Value::new(entry.value.place, laid);
                 let key = entry.key;
                 below.insert(name, Entry { key, value });
@@ -52,7 +59,13 @@ fn merge_modules(merged: &mut Table, key: String, entry: Entry, diagnostics: &mu
 }
 
 /// Nodes, or outputs.
-fn merge_named(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
+fn merge_named(
+    merged: &mut Table,
+    key: String,
+    entry: Entry,
+    removed: &mut Vec<String>,
+    diagnostics: &mut Diagnostics,
+) {
     let role = if key == "nodes" { "node" } else { "output" };
     let Entry {
         key: key_place,
@@ -93,6 +106,8 @@ fn merge_named(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut 
                         inherited: Arc::clone(&names),
                     },
                 );
+            } else if role == "node" {
+                removed.push(name);
             }
         } else if role == "node"
             && inherited

@@ -80,13 +80,19 @@ pub struct Document {
     pub tree: Value,
     /// What mistakes in reading have left open.
     pub(super) gaps: Gaps,
+    /// Inherited nodes that were removed.
+    pub(super) removed: Vec<String>,
 }
 
 impl Document {
     /// A tree that comes from elsewhere than files, e.g. from a model.
     pub fn new(root: SourceId, tree: Value) -> Self {
-        let gaps = Gaps::default();
-        Document { root, tree, gaps }
+        Document {
+            root,
+            tree,
+            gaps: Gaps::default(),
+            removed: Vec::new(),
+        }
     }
 }
 
@@ -133,10 +139,11 @@ pub fn load_text(
         lent: HashMap::new(),
         hopeless: false,
         gaps: Gaps::default(),
+        removed: Vec::new(),
     };
     let root = SourceId(chain.sources.count());
     let table = chain.read(name.as_ref(), text.into());
-    let (mut gaps, hopeless) = (chain.gaps, chain.hopeless);
+    let (mut gaps, hopeless, removed) = (chain.gaps, chain.hopeless, chain.removed);
     let mut table = table.filter(|_| !hopeless)?;
     gaps.spread(&table);
     if gaps.anywhere {
@@ -145,7 +152,12 @@ pub fn load_text(
     }
     diagnostics.leave_open(gaps.anywhere, &gaps.places);
     let tree = Value::new(Place::new(root, 0, 0), Data::Table(table));
-    Some(Document { root, tree, gaps })
+    Some(Document {
+        root,
+        tree,
+        gaps,
+        removed,
+    })
 }
 
 struct Chain<'a> {
@@ -158,6 +170,7 @@ struct Chain<'a> {
     /// A file says of itself that it may mean anything.
     hopeless: bool,
     gaps: Gaps,
+    removed: Vec<String>,
 }
 
 impl Chain<'_> {
@@ -212,7 +225,7 @@ impl Chain<'_> {
         };
         self.borrow_modules(&mut table);
         self.diagnostics.leave_open(self.gaps.anywhere, &[]);
-        Some(merge(base, table, self.diagnostics))
+        Some(merge(base, table, &mut self.removed, self.diagnostics))
     }
 
     /// Puts the modules of other files (`modules.NAME.from`) in the place of their names.

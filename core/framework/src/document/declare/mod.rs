@@ -46,7 +46,12 @@ const NAMING: [&str; 4] = ["sets", "signals", "modules", "nodes"];
 /// Checks names, expands sets and `each`, and gives what the file declares. All mistakes are reported; `None` where they leave open
 /// which names there are.
 pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<GraphFile> {
-    let Document { mut tree, gaps, .. } = document;
+    let Document {
+        mut tree,
+        gaps,
+        removed,
+        ..
+    } = document;
     if let Data::Table(root) = &mut tree.data {
         misspelt::right_inputs(root, diagnostics);
     }
@@ -124,6 +129,7 @@ pub fn declare(document: Document, diagnostics: &mut Diagnostics) -> Option<Grap
         nodes,
         broken,
         elsewhere,
+        removed,
         outputs,
         tests,
         deployment,
