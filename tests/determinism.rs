@@ -32,7 +32,9 @@ struct Fitted {
 fn fitted() -> &'static Fitted {
     static FITTED: OnceLock<Fitted> = OnceLock::new();
     FITTED.get_or_init(|| {
-        let scratch = Scratch::new("determinism");
+        // A runner that gives each test a process of its own runs this in several at once.
+        let thread = std::thread::current();
+        let scratch = Scratch::new(thread.name().unwrap_or("determinism"));
         let train = simulated(&scratch, "train.csv", "die-tester", 1.5, 1);
         let test = simulated(&scratch, "test.csv", "die-tester", 0.4, 2);
         let model = scratch.path("model.json");
