@@ -105,3 +105,19 @@ out = "plain"
     let told = athermal(&[&"diff", &fitted, &unfitted]).ended(1);
     assert_eq!(told.out, "fitted parameters\n  ~ plain\n");
 }
+
+#[test]
+fn who_writes_a_number_for_a_table_is_told_the_table_that_is_the_default() {
+    let scratch = Scratch::new("language-commands-table");
+    let text = std::fs::read_to_string(graph("die-tester")).unwrap();
+    let wrong = text.replace(
+        "[outputs]",
+        "[nodes.online]\ntype = \"rls\"\neach = \"axis\"\ninputs.features = \"gradients\"\n\
+         inputs.truth = \"drift.{axis}\"\nahead = \"5min\"\nforgetting = 0.99\n[outputs]",
+    );
+    let wrong = scratch.file("wrong.toml", wrong);
+    athermal(&[&"check", &wrong]).ended(2).tells(&[
+        "expected a table for \"forgetting\", found the number 0.99",
+        "the default is { type = \"constant\", factor = 0.999 }",
+    ]);
+}

@@ -1,7 +1,7 @@
 //! Explains the parameters of a node type from their schema. Decides how forms and choices are laid out; what they are called
 //! and mean stands beside them in the source.
 
-use athermal::core::node::first_paragraph;
+use athermal::core::node::{first_paragraph, inline_toml};
 use serde_json::{Map, Value};
 
 use crate::figures::paragraph;
@@ -48,7 +48,7 @@ impl<'a> Page<'a> {
             let default = match &property["default"] {
                 Value::Null if required.contains(&name.as_str()) => "; required".to_owned(),
                 Value::Null => String::new(),
-                default => format!("; default {default}"),
+                default => format!("; default {}", inline_toml(default)),
             };
             let description = described(property);
             self.line(depth, &format!("{name} – {description}{default}"));

@@ -1,7 +1,8 @@
-//! What a machine file says and `run` does not read yet is told, since whoever wrote it expects it to work.
+//! What a machine's own file says and `run` does not read yet is told, since whoever wrote it expects it to work; and what it removes
+//! of the file that it extends.
 
-use crate::desk;
-use crate::workbench::athermal;
+use crate::workbench::{Scratch, athermal};
+use crate::{PLAIN, desk};
 
 const TOLD: &str = "does not yet read";
 
@@ -34,4 +35,24 @@ fn run_tells_that_it_does_not_read_model_before_it_asks_for_a_fit() {
             "does not yet read `model`: name the fitted model in place of the graph",
             "some nodes need a fit",
         ]);
+}
+
+#[test]
+fn what_refers_to_a_node_that_is_removed_is_told_so_and_how_to_remove_it_too() {
+    let scratch = Scratch::new("command-line-removed");
+    scratch.file("base.toml", PLAIN);
+    let variant = |more: &str| {
+        let text = format!("schema = 1\nextends = \"base.toml\"\nnodes.same = false\n{more}");
+        scratch.file("variant.toml", text)
+    };
+    athermal(&[&"check", &variant("")]).ended(2).tells(&[
+        "error[A042]: `same` is referred to, and `nodes.same = false` removes it",
+        "predicted = \"same\"",
+        "`outputs.NAME = false`",
+    ]);
+    athermal(&[&"check", &variant("outputs.predicted = false")]).ended(0);
+    let again = variant("outputs.predicted = \"some\"");
+    athermal(&[&"check", &again])
+        .ended(2)
+        .tells(&["there is no node or signal `some`"]);
 }

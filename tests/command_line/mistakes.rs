@@ -580,23 +580,3 @@ predicted = "sum"
     ];
     assert_told("too-large", text, &expected);
 }
-
-#[test]
-fn what_refers_to_a_node_that_is_removed_is_told_so_and_how_to_remove_it_too() {
-    let scratch = Scratch::new("command-line-removed");
-    scratch.file("base.toml", super::PLAIN);
-    let variant = |more: &str| {
-        let text = format!("schema = 1\nextends = \"base.toml\"\nnodes.same = false\n{more}");
-        scratch.file("variant.toml", text)
-    };
-    athermal(&[&"check", &variant("")]).ended(2).tells(&[
-        "error[A042]: `same` is referred to, and `nodes.same = false` removes it",
-        "predicted = \"same\"",
-        "`outputs.NAME = false`",
-    ]);
-    athermal(&[&"check", &variant("outputs.predicted = false")]).ended(0);
-    let again = variant("outputs.predicted = \"some\"");
-    athermal(&[&"check", &again])
-        .ended(2)
-        .tells(&["there is no node or signal `some`"]);
-}

@@ -14,6 +14,11 @@ pub enum Lacks {
         /// What stands in them.
         around: String,
     },
+    /// Braces with keys in them.
+    Table {
+        /// A table that stands there by default.
+        example: String,
+    },
 }
 
 impl Lacks {
@@ -51,6 +56,7 @@ impl Lacks {
             Self::Brackets { around } => {
                 format!("a list stands in brackets, e.g. [{around}]")
             }
+            Self::Table { example } => format!("the default is {example}"),
         }
     }
 }

@@ -39,6 +39,8 @@ pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
 pub use reach::Reach;
 #[doc(hidden)]
 pub use registry::read;
-pub use registry::{Kind, NodeSpec, ReadSpec, Role, RoleName, first_paragraph, kind, kinds};
+pub use registry::{
+    Kind, NodeSpec, ReadSpec, Role, RoleName, first_paragraph, inline_toml, kind, kinds,
+};
 pub use state::{Restored, State};
 pub use training_error::TrainingError;

@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Combiner, Estimator, Feature, InputPort, Read};
 use crate::diagnostic::Diagnostics;
-use crate::document::{Decoded, Value, decode_rest};
+use crate::document::{Decoded, Value, Wanted, decode_rest};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -124,13 +124,28 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
     elsewhere: &[&str],
     diagnostics: &mut Diagnostics,
 ) -> ReadSpec {
-    let advice = |key: &str| {
+    let advice = |wanted: Wanted<'_>| {
         let schema = serde_json::Value::from(schemars::schema_for!(T));
-        let description = schema["properties"][key]["description"].as_str()?;
-        Some(format!("add `{key}`: {}", first_paragraph(description)))
+        match wanted {
+            Wanted::Key(key) => {
+                let description = schema["properties"][key]["description"].as_str()?;
+                Some(format!("add `{key}`: {}", first_paragraph(description)))
+            }
+            Wanted::TableOf(key) => {
+                let default = &schema["properties"][key]["default"];
+                default.is_object().then(|| inline_toml(default))
+            }
+        }
     };
     let read = decode_rest::<T>(value, "the node", elsewhere, &advice, diagnostics)?;
     Some(read.map(|spec| Box::new(spec) as Box<dyn NodeSpec>))
+}
+
+/// A value as a graph file has it.
+#[must_use]
+pub fn inline_toml(value: &serde_json::Value) -> String {
+    let toml = toml::Value::try_from(value);
+    toml.map_or_else(|_| value.to_string(), |value| value.to_string())
 }
 
 /// The first paragraph of a documentation, on one line.

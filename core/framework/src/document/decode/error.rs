@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::de::{self, Expected, Unexpected};
 
+use super::{Advice, Wanted};
 use crate::diagnostic::{Diagnostics, Place, Problem, counted, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
@@ -11,6 +12,9 @@ use crate::document::tree::{Data, Value};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
+
+/// What is expected where there must be keys.
+const A_TABLE: &str = "a table";
 
 /// One step from a value into it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -83,13 +87,23 @@ impl Mistake {
         })
     }
 
-    /// The same, with what to write where a key of the whole table is missing.
-    pub(super) fn advised(mut self, of: &dyn Fn(&str) -> Option<String>) -> Self {
-        if self.path.is_empty()
-            && let DocumentProblem::MissingKey { key, advice, .. } = &mut self.problem
-            && let Some(of_key) = of(key)
-        {
-            *advice = Some(of_key);
+    /// The same, with what to write where a key of the whole table is missing, or no table.
+    pub(super) fn advised(mut self, of: Advice<'_>) -> Self {
+        match (&self.path[..], &mut self.problem) {
+            ([], DocumentProblem::MissingKey { key, advice, .. }) => {
+                *advice = of(Wanted::Key(key)).or(advice.take());
+            }
+            (
+                [Step::Key(key)],
+                DocumentProblem::WrongType {
+                    expected,
+                    lacks: lacks @ None,
+                    ..
+                },
+            ) if expected == A_TABLE => {
+                *lacks = of(Wanted::TableOf(key)).map(|example| Lacks::Table { example });
+            }
+            _ => {}
         }
         self
     }
@@ -377,7 +391,7 @@ fn found_text(found: Unexpected<'_>) -> String {
     match found {
         Unexpected::Unsigned(number) => format!("the number {number}"),
         Unexpected::Seq => "a list".to_owned(),
-        Unexpected::Map | Unexpected::StructVariant => "a table".to_owned(),
+        Unexpected::Map | Unexpected::StructVariant => A_TABLE.to_owned(),
         Unexpected::UnitVariant => "a name alone".to_owned(),
         other => other.to_string(),
     }
@@ -394,12 +408,12 @@ fn plain(expected: &str) -> String {
         "a string" | "string" | "a character" => "a text in quotes",
         "a boolean" => "true or false",
         "a sequence" => "a list",
-        "a map" => "a table",
+        "a map" => A_TABLE,
         "variant identifier" | "string or map" | "variant of enum" => "one of its choices",
         "unit" => "nothing",
         _ => {
             return match expected.split_once(' ') {
-                Some(("struct" | "internally" | "adjacently", _)) => "a table".to_owned(),
+                Some(("struct" | "internally" | "adjacently", _)) => A_TABLE.to_owned(),
                 Some(("enum", _)) => "one of its choices".to_owned(),
                 Some(("a", rest)) if rest.starts_with("nonzero") => {
                     "a whole number other than 0".to_owned()

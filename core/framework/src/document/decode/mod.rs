@@ -31,13 +31,25 @@ pub fn decode<T: DeserializeOwned>(
     decode_rest(value, what, &[], &|_| None, diagnostics)?.whole()
 }
 
+/// What to write under a key of the table that is decoded, where the table's owner knows it.
+pub(crate) type Advice<'a> = &'a dyn Fn(Wanted<'_>) -> Option<String>;
+
+/// What advice is wanted on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Wanted<'a> {
+    /// A key that is missing.
+    Key(&'a str),
+    /// A key under which something else stands in the place of a table.
+    TableOf(&'a str),
+}
+
 /// As [`decode`], with keys of the table that are read elsewhere and may be meant by an unknown one, with what to write where one of
-/// its own is missing, and with what could be read beside mistakes.
+/// its own is missing or no table, and with what could be read beside mistakes.
 pub(crate) fn decode_rest<T: DeserializeOwned>(
     value: &Value,
     what: &str,
     elsewhere: &[&str],
-    advice: &dyn Fn(&str) -> Option<String>,
+    advice: Advice<'_>,
     diagnostics: &mut Diagnostics,
 ) -> Option<Decoded<T>> {
     let last = RefCell::new(None);
@@ -65,7 +77,7 @@ fn mend(
     value: &Value,
     what: &str,
     elsewhere: &[&str],
-    advice: &dyn Fn(&str) -> Option<String>,
+    advice: Advice<'_>,
     read: Read<'_>,
     diagnostics: &mut Diagnostics,
 ) -> Option<(Vec<Value>, LeftOut)> {
