@@ -40,8 +40,8 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
 }
 
 /// Tells of them.
-pub fn tell(terminal: &Terminal, fit: &[SampleRange], seen: &[SampleRange]) {
-    for of in beyond(fit, seen) {
+pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
+    for of in all {
         terminal.warning(format_args!(
             "{} is between {} and {}, and was between {} and {} in the data of the fit: {}",
             of.channel,

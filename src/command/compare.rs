@@ -97,7 +97,7 @@ impl Compare {
             data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
             let new = |range: &&SampleRange| beyond::usual(&in_fits, &range.channel).is_none();
             let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
-            beyond::tell(terminal, &new, &trace.ranges);
+            beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));
             in_fits.extend(new);
             fits.push(Fitted {
                 graph: name.clone(),

@@ -116,6 +116,7 @@ impl Evaluate {
             &mut |ticks| progress.tell(ticks),
         )?;
         drop(progress);
+        let outside_fit = beyond::beyond(model.sample_ranges(), &scores.ranges);
         if terminal.format == Format::Json {
             let files: Vec<_> = dataset
                 .paths()
@@ -132,7 +133,7 @@ impl Evaluate {
                 "period": period,
                 "scores": scores.scores,
                 "lacks": scores.lacks,
-                "outside_fit": beyond::beyond(model.sample_ranges(), &scores.ranges),
+                "outside_fit": outside_fit,
             });
             println!("{:#}", data::with_overlaps(told, &dataset.reports()));
         } else {
@@ -144,7 +145,7 @@ impl Evaluate {
             scores.refused,
             &scores.rejected,
         );
-        beyond::tell(terminal, model.sample_ranges(), &scores.ranges);
+        beyond::tell(terminal, &outside_fit);
         data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);

@@ -255,7 +255,7 @@ impl Run {
         let rejected = engine.rejected_channels();
         data::tell(terminal, &reports, engine.refused(), &rejected);
         if self.ends() {
-            beyond::tell(terminal, usual, &engine.sample_ranges());
+            beyond::tell(terminal, &beyond::beyond(usual, &engine.sample_ranges()));
         }
     }
 }

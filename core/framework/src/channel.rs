@@ -64,6 +64,44 @@ impl Channel {
     }
 }
 
+/// Between which values something lay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extremes {
+    pub(crate) lowest: f64,
+    pub(crate) highest: f64,
+}
+
+/// How far apart values are, as a share of their size, that only rounding tells apart.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+impl Extremes {
+    /// Those of no value.
+    pub const NONE: Self = Self {
+        lowest: f64::INFINITY,
+        highest: f64::NEG_INFINITY,
+    };
+
+    /// Takes a value in; NaN changes nothing.
+    #[inline]
+    pub fn include(&mut self, value: f64) {
+        self.lowest = self.lowest.min(value);
+        self.highest = self.highest.max(value);
+    }
+
+    /// The largest value, in size; 0 without any.
+    #[must_use]
+    pub fn largest(self) -> f64 {
+        self.highest.max(-self.lowest).max(0.0)
+    }
+
+    /// Whether there were values, and all of them are the same but for rounding.
+    #[must_use]
+    pub fn is_one_value(self) -> bool {
+        let width = self.highest - self.lowest;
+        width.is_finite() && (0.0..=ROUNDING * self.largest()).contains(&width)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,5 +110,24 @@ mod tests {
     fn cold_and_absent_are_both_no_value_but_differ() {
         assert!(ABSENT.is_nan() && COLD.is_nan());
         assert!(is_cold(COLD) && !is_cold(ABSENT) && !is_cold(0.0));
+    }
+
+    #[test]
+    fn values_that_only_rounding_tells_apart_are_one() {
+        let range = |values: &[f64]| {
+            let mut range = Extremes::NONE;
+            values.iter().for_each(|&value| range.include(value));
+            range
+        };
+        let next = 20.5_f64.next_up();
+        for values in [&[0.0, -0.0][..], &[-20.5], &[20.5, next], &[-20.5, -next]] {
+            assert!(range(values).is_one_value(), "{values:?}");
+        }
+        for values in [&[][..], &[0.0, 1e-300], &[-20.5, 20.5], &[20.5, 20.500_001]] {
+            assert!(!range(values).is_one_value(), "{values:?}");
+        }
+        assert!(!range(&[1.0, f64::INFINITY]).is_one_value());
+        assert_eq!(range(&[-3.0, 2.0]).largest(), 3.0);
+        assert_eq!(range(&[]).largest(), 0.0);
     }
 }

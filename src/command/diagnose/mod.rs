@@ -106,7 +106,8 @@ impl Diagnose {
         }
         let trace = &observation.trace;
         data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
-        beyond::tell(terminal, model.sample_ranges(), &trace.ranges);
+        let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
+        beyond::tell(terminal, &outside_fit);
         for told in Lack::told(&diagnosis.lacks) {
             terminal.warning(told);
         }

@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 
 /// A bundle of slots as read at the present tick, side by side.
 ///
-/// What a tick needs of the plan is copied here, so that all that it touches fits into the processor's nearest cache.
+/// What a tick needs of the plan is copied here, so that it touches little memory.
 #[derive(Debug, Clone)]
 pub(crate) struct Gathered {
     /// The values; NaN where there is none.
@@ -23,21 +23,15 @@ pub(crate) struct Gathered {
     /// Whether any of the slots, read without a lag, has a new value at this tick.
     pub(crate) fresh: bool,
     read: Read,
-    present: Present,
+    /// The first slot, where all lie side by side and are read without a lag.
+    side_by_side: Option<usize>,
+    /// Otherwise places and slots of what is read without a lag.
+    present: Box<[(usize, usize)]>,
     past: Option<Box<AllPast>>,
     conversions: Box<[Conversion]>,
     /// How long each of them counts, and how long any does at least.
     ages: Box<[Duration]>,
     shortest: Duration,
-}
-
-/// What is read without a lag.
-#[derive(Debug, Clone)]
-enum Present {
-    /// All of a gather, from slots that lie side by side from this one on.
-    SideBySide(usize),
-    /// Places and slots.
-    Apart(Box<[(usize, usize)]>),
 }
 
 /// What is read with a lag.
@@ -74,6 +68,7 @@ impl Gathered {
             })
             .collect();
         let present = placed().filter(|(_, entry)| entry.lag.is_zero());
+        let side_by_side = side_by_side(&gather.entries);
         Self {
             values: vec![ABSENT; width].into(),
             stamps: vec![Instant::MIN; width].into(),
@@ -81,9 +76,10 @@ impl Gathered {
             together: false,
             fresh: false,
             read: gather.read,
-            present: match side_by_side(&gather.entries) {
-                Some(first) => Present::SideBySide(first),
-                None => Present::Apart(present.map(|(place, entry)| (place, entry.slot)).collect()),
+            side_by_side,
+            present: match side_by_side {
+                Some(_) => Box::default(),
+                None => present.map(|(place, entry)| (place, entry.slot)).collect(),
             },
             past: (!past.is_empty()).then(|| Box::new(AllPast::new(past))),
             conversions: gather.conversions.clone().into(),
@@ -95,9 +91,9 @@ impl Gathered {
     /// Reads the slots as they stand now.
     #[inline]
     pub(crate) fn read(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
-        match self.present {
-            Present::SideBySide(first) => self.read_range(slots, first, now),
-            Present::Apart(_) => self.read_apart(slots, histories, now),
+        match self.side_by_side {
+            Some(first) => self.read_range(slots, first, now),
+            None => self.read_apart(slots, histories, now),
         }
         for conversion in &self.conversions {
             let value = &mut self.values[conversion.entry];
@@ -155,9 +151,7 @@ impl Gathered {
             }
             whole = past.whole;
         }
-        let Present::Apart(present) = &self.present else {
-            return;
-        };
+        let present = &self.present;
         // Said once that both are of one length, each place is checked once.
         let (all, width) = (slots.values.len(), self.values.len());
         let (from, given) = (&slots.values[..all], &slots.given[..all]);

@@ -40,6 +40,7 @@ pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
 pub(crate) use slots::{Given, Slots};
 
+use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};
 use crate::node::{Evidence, Predictor, Tick};
 use crate::time::{Duration, Instant};
@@ -73,7 +74,7 @@ pub struct Engine {
     before_break: Option<Instant>,
     rejected: Vec<u64>,
     /// The lowest and the highest sample that counted, of each source.
-    extremes: Vec<(f64, f64)>,
+    extremes: Vec<Extremes>,
     refused: u64,
     /// Estimators whose predictions are fed back, and the slots of their truths.
     fed_back: Vec<(usize, usize)>,
@@ -122,7 +123,7 @@ impl Engine {
             last: Instant::MIN,
             before_break: None,
             rejected: vec![0; plan.sources.len()],
-            extremes: vec![sample_range::UNSEEN; plan.sources.len()],
+            extremes: vec![Extremes::NONE; plan.sources.len()],
             refused: 0,
             fed_back: Vec::new(),
             frozen: false,
@@ -338,7 +339,7 @@ impl Engine {
     /// Counts rejected samples and refused ticks, and takes the ranges of samples, from here on: those before are another run's.
     pub fn count_afresh(&mut self) {
         self.rejected.fill(0);
-        self.extremes.fill(sample_range::UNSEEN);
+        self.extremes.fill(Extremes::NONE);
         self.refused = 0;
     }
 
@@ -392,8 +393,7 @@ impl Engine {
             }
             if admits(range, sample) {
                 self.slots.set(slot, sample, time);
-                let (lowest, highest) = &mut self.extremes[slot];
-                (*lowest, *highest) = (lowest.min(sample), highest.max(sample));
+                self.extremes[slot].include(sample);
             } else {
                 self.rejected[slot] += 1;
             }

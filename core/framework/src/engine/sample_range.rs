@@ -29,9 +29,6 @@ impl SampleRange {
     }
 }
 
-/// The extremes of a channel of which no sample has been seen.
-pub(super) const UNSEEN: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
-
 impl Engine {
     /// Between which values the samples of each measured channel lay that counted, in the order of the plan; without those of which
     /// none has come.
@@ -39,11 +36,11 @@ impl Engine {
     pub fn sample_ranges(&self) -> Vec<SampleRange> {
         let extremes = self.plan.sources.iter().zip(&self.extremes);
         extremes
-            .filter(|(_, (lowest, highest))| lowest <= highest)
-            .map(|(source, &(lowest, highest))| SampleRange {
+            .filter(|(_, of)| of.lowest <= of.highest)
+            .map(|(source, of)| SampleRange {
                 channel: source.name.clone(),
-                lowest,
-                highest,
+                lowest: of.lowest,
+                highest: of.highest,
             })
             .collect()
     }

@@ -55,39 +55,6 @@ impl Validity {
     }
 }
 
-/// Between which values a candidate was.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Range {
-    lowest: f64,
-    highest: f64,
-}
-
-/// How far apart values are, as a share of their size, that only rounding tells apart.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
-
-impl Range {
-    pub(super) const NONE: Self = Self {
-        lowest: f64::INFINITY,
-        highest: f64::NEG_INFINITY,
-    };
-
-    pub(super) fn include(&mut self, value: f64) {
-        self.lowest = self.lowest.min(value);
-        self.highest = self.highest.max(value);
-    }
-
-    /// The largest value, in size; 0 without any.
-    pub(super) fn largest(self) -> f64 {
-        self.highest.max(-self.lowest).max(0.0)
-    }
-
-    /// Whether it had values, and all of them are the same but for rounding.
-    pub(super) fn is_one_value(self) -> bool {
-        let width = self.highest - self.lowest;
-        width.is_finite() && (0.0..=ROUNDING * self.largest()).contains(&width)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,25 +69,6 @@ mod tests {
         }
         assert_eq!(validity.kept(), [0, 1]);
         assert!((validity.share(2) - 0.8).abs() < 1e-12);
-    }
-
-    #[test]
-    fn values_that_only_rounding_tells_apart_are_one() {
-        let range = |values: &[f64]| {
-            let mut range = Range::NONE;
-            values.iter().for_each(|&value| range.include(value));
-            range
-        };
-        let next = 20.5_f64.next_up();
-        for values in [&[0.0, -0.0][..], &[-20.5], &[20.5, next], &[-20.5, -next]] {
-            assert!(range(values).is_one_value(), "{values:?}");
-        }
-        for values in [&[][..], &[0.0, 1e-300], &[-20.5, 20.5], &[20.5, 20.500_001]] {
-            assert!(!range(values).is_one_value(), "{values:?}");
-        }
-        assert!(!range(&[1.0, f64::INFINITY]).is_one_value());
-        assert_eq!(range(&[-3.0, 2.0]).largest(), 3.0);
-        assert_eq!(range(&[]).largest(), 0.0);
     }
 
     #[test]

@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::FitOptions;
-use super::candidates::Range;
 use super::collect::{Collector, Sink, Trainee};
 use super::doubt::{Lacking, Truths, tell_constant};
 use super::report::{EstimatorFit, Outcome};
+use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedRole};
 use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
 use crate::time::Instant;
@@ -24,7 +24,7 @@ pub(super) struct Making {
     all: Vec<f64>,
     truths: Truths,
     /// The ranges of the candidates that were kept and of the truth.
-    ranges: Vec<Range>,
+    ranges: Vec<Extremes>,
     incomplete: u64,
     lacking: Lacking,
 }
@@ -146,7 +146,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
         may_leave_out,
         learns,
         row: Vec::with_capacity(kept.len()),
-        ranges: vec![Range::NONE; kept.len() + 1],
+        ranges: vec![Extremes::NONE; kept.len() + 1],
         all: Vec::new(),
         lacking: Lacking::new(kept.iter().map(|&candidate| &regressors[candidate])),
         kept,

@@ -37,6 +37,8 @@ pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
 pub use reach::Reach;
+#[cfg(feature = "testkit")]
+pub(crate) use registry::as_toml;
 #[doc(hidden)]
 pub use registry::read;
 pub use registry::{

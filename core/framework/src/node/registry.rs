@@ -144,8 +144,29 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
 /// A value as a graph file has it.
 #[must_use]
 pub fn inline_toml(value: &serde_json::Value) -> String {
-    let toml = toml::Value::try_from(value);
-    toml.map_or_else(|_| value.to_string(), |value| value.to_string())
+    as_toml(value).map_or_else(String::new, |value| value.to_string())
+}
+
+/// Data as TOML has it, where nothing is not written.
+pub(crate) fn as_toml(json: &serde_json::Value) -> Option<toml::Value> {
+    Some(match json {
+        serde_json::Value::Null => return None,
+        serde_json::Value::Bool(value) => toml::Value::Boolean(*value),
+        serde_json::Value::Number(number) => match number.as_i64() {
+            Some(integer) => toml::Value::Integer(integer),
+            None => toml::Value::Float(number.as_f64()?),
+        },
+        serde_json::Value::String(text) => toml::Value::String(text.clone()),
+        serde_json::Value::Array(list) => {
+            toml::Value::Array(list.iter().filter_map(as_toml).collect())
+        }
+        serde_json::Value::Object(object) => toml::Value::Table(
+            object
+                .iter()
+                .filter_map(|(key, value)| Some((key.clone(), as_toml(value)?)))
+                .collect(),
+        ),
+    })
 }
 
 /// The first paragraph of a documentation, on one line.

@@ -56,7 +56,7 @@ impl Bench {
     #[must_use]
     pub fn of<T: NodeSpec>(node: &T) -> Self {
         let written = node.parameters();
-        let parameters = super::rules::as_toml(&written)
+        let parameters = crate::node::as_toml(&written)
             .and_then(|parameters| parameters.as_table().cloned())
             .unwrap_or_else(|| panic!("{written} are no parameters"));
         Self {

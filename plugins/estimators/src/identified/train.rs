@@ -188,18 +188,18 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             earlier, follows, ..
         } = self.reach;
         let ahead = steps(earlier, of.step);
-        let error = match !follows || of.model.follows() && ahead > 1 {
-            true => rehearse::error(&self.rows, of, self.reach),
-            false => None,
-        };
+        let differs = !follows || of.model.follows() && ahead > 1;
+        let error = differs.then(|| rehearse::error(&self.rows, of, self.reach));
+        let error = error.flatten();
         report.in_sample_rmse = Some(error.unwrap_or(one_step));
         if error.is_none() {
             return;
         }
         report.figure("rmse_one_step_ahead", one_step);
-        let predicts = match follows {
-            true => format!("it predicts {ahead} steps after the newest truth"),
-            false => "it will not follow truths".to_owned(),
+        let predicts = if follows {
+            format!("it predicts {ahead} steps after the newest truth")
+        } else {
+            "it will not follow truths".to_owned()
         };
         report.notes.push(format!(
             "it was found by its errors one step ahead, which are {} {}; {predicts}, and the in-sample RMSE is that of this",

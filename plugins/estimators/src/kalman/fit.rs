@@ -1,5 +1,6 @@
 //! Decides what a structural model learns from its rows; not how it is followed afterwards.
 
+use athermal_core::channel::Extremes;
 use athermal_core::diagnostic::digits;
 use athermal_core::node::{
     Figure, Learner, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
@@ -100,9 +101,10 @@ impl KalmanTrainer {
             return;
         }
         let varies = |nth: usize| {
-            let mut values = self.regressors.iter().skip(nth).step_by(width);
-            let first = values.next();
-            first.is_some_and(|first| values.any(|value| !is_rounding(value - first, *first)))
+            let mut extremes = Extremes::NONE;
+            let values = self.regressors.iter().skip(nth).step_by(width);
+            values.for_each(|&value| extremes.include(value));
+            !extremes.is_one_value()
         };
         let varying: Vec<bool> = (0..width).map(varies).collect();
         if !varying.contains(&false) {
@@ -320,11 +322,6 @@ impl Trainer for KalmanTrainer {
             report,
         })
     }
-}
-
-/// Whether values of this size that differ by so much are told apart by rounding alone.
-fn is_rounding(difference: f64, size: f64) -> bool {
-    difference.abs() <= 4.0 * f64::EPSILON * size.abs()
 }
 
 fn unsolvable(reason: &str) -> TrainingError {

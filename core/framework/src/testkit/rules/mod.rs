@@ -13,7 +13,6 @@ mod traces;
 mod units;
 
 pub(super) use explained::explained;
-pub(super) use parameters::as_toml;
 
 use super::case::Given;
 use super::compared::course;

@@ -111,30 +111,12 @@ fn numbers(integer: bool, low: Bound, high: Bound) -> Vec<(Value, bool)> {
 /// The parameters with defaults filled in, and what the framework reads beside them.
 fn in_full(subject: &Subject<'_>) -> toml::Table {
     let mut table = subject.parameters.clone();
-    if let Some(Value::Table(own)) = as_toml(&subject.fixture.plan.nodes[0].spec.parameters()) {
+    if let Some(Value::Table(own)) =
+        crate::node::as_toml(&subject.fixture.plan.nodes[0].spec.parameters())
+    {
         table.extend(own);
     }
     table
-}
-
-/// Data as TOML has it, where nothing is not written.
-pub(in super::super) fn as_toml(json: &Json) -> Option<Value> {
-    Some(match json {
-        Json::Null => return None,
-        Json::Bool(value) => Value::Boolean(*value),
-        Json::Number(number) => match number.as_i64() {
-            Some(integer) => Value::Integer(integer),
-            None => Value::Float(number.as_f64()?),
-        },
-        Json::String(text) => Value::String(text.clone()),
-        Json::Array(list) => Value::Array(list.iter().filter_map(as_toml).collect()),
-        Json::Object(object) => Value::Table(
-            object
-                .iter()
-                .filter_map(|(key, value)| Some((key.clone(), as_toml(value)?)))
-                .collect(),
-        ),
-    })
 }
 
 /// Puts a value in its place; whether there is one.
