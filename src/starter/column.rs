@@ -47,39 +47,6 @@ enum Guess {
     Unused,
 }
 
-/// Endings of names, and the units that they mean; the case counts for single letters.
-const UNITS: [(&str, &str); 29] = [
-    ("degC", "Cel"),
-    ("°C", "Cel"),
-    ("celsius", "Cel"),
-    ("C", "Cel"),
-    ("degF", "[degF]"),
-    ("°F", "[degF]"),
-    ("fahrenheit", "[degF]"),
-    ("F", "[degF]"),
-    ("K", "K"),
-    ("mK", "mK"),
-    ("nm", "nm"),
-    ("um", "um"),
-    ("µm", "um"),
-    ("μm", "um"),
-    ("mm", "mm"),
-    ("m", "m"),
-    ("V", "V"),
-    ("mV", "mV"),
-    ("A", "A"),
-    ("mA", "mA"),
-    ("W", "W"),
-    ("kW", "kW"),
-    ("Wm2", "W/m2"),
-    ("W/m2", "W/m2"),
-    ("Pa", "Pa"),
-    ("bar", "bar"),
-    ("%", "%"),
-    ("pct", "%"),
-    ("percent", "%"),
-];
-
 const SET_POINTS: [&str; 5] = ["target", "setpoint", "set", "sp", "goal"];
 const TEMPERATURES: [&str; 4] = ["t", "temp", "temperature", "tc"];
 const POSITIONS: [&str; 10] = [
@@ -103,7 +70,7 @@ const DRIVES: [&str; 11] = [
 pub fn ends_in_unit(name: &str) -> bool {
     let words = words(name);
     let unit = words.split_first().and_then(|(_, rest)| rest.last());
-    unit.is_some_and(|unit| UNITS.iter().any(|(ending, _)| ending == unit))
+    unit.is_some_and(|unit| Unit::in_name(unit).is_some())
 }
 
 impl Column {
@@ -158,23 +125,17 @@ pub fn columns(described: &Description, time: &str) -> Vec<Column> {
 
 fn guess(name: &str) -> Column {
     let parts = words(name);
-    let unit = parts.iter().skip(1).rev().find_map(|word| {
-        let same = |known: &str| {
-            known == *word || known.len() > 1 && known.eq_ignore_ascii_case(word) && *word != "MK"
-        };
-        UNITS.iter().find(|(known, _)| same(known))
-    });
+    let unit = parts.iter().skip(1).rev().find_map(|word| Unit::in_name(word));
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
     let has = |known: &[&str]| {
         lower
             .iter()
             .any(|word| known.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit())))
     };
-    let parsed = unit.and_then(|(_, unit)| Unit::parse(unit).ok());
     let measures = |what: &str| {
         Unit::parse(what)
             .ok()
-            .zip(parsed.as_ref())
+            .zip(unit.as_ref())
             .is_some_and(|(what, unit)| unit.measures_same(&what))
     };
     let temp_named = has(&TEMPERATURES) || lower.iter().any(|word| word.contains("temp"));
@@ -203,7 +164,7 @@ fn guess(name: &str) -> Column {
     };
     Column {
         name: name.to_owned(),
-        unit: unit.map_or(fallback, |(_, unit)| unit).to_owned(),
+        unit: unit.as_ref().map_or(fallback, Unit::text).to_owned(),
         kind: Kind::Unused,
         why: why.to_owned(),
         warning: None,

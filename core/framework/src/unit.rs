@@ -9,6 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::diagnostic::nearest;
 
+mod in_names;
 mod ratio;
 mod spelling;
 

@@ -13,7 +13,7 @@ fn of_name(column: &str) -> Option<Unit> {
     if ending.chars().count() < 2 && !["K", "%"].contains(&ending) {
         return None;
     }
-    Unit::parse(ending).ok()
+    Unit::in_name(ending).or_else(|| Unit::parse(ending).ok())
 }
 
 /// The unit that columns are named for, where it measures the same as the signal's and is another one.
@@ -43,6 +43,7 @@ mod tests {
         assert_eq!(told("Cel", "{channel}_K").as_deref(), Some("K"));
         assert_eq!(told("um", "Z [mm]").as_deref(), Some("mm"));
         assert_eq!(told("1", "{channel} (%)").as_deref(), Some("%"));
+        assert_eq!(told("1", "{channel}_pct").as_deref(), Some("%"));
     }
 
     #[test]

@@ -1,0 +1,49 @@
+//! Decides which unit a word in the name of a column says; where in a name a unit may stand is for whoever reads the name.
+
+use super::Unit;
+
+/// Words, and the UCUM codes that they mean; the case counts for single letters.
+const WORDS: [(&str, &str); 29] = [
+    ("degC", "Cel"),
+    ("°C", "Cel"),
+    ("celsius", "Cel"),
+    ("C", "Cel"),
+    ("degF", "[degF]"),
+    ("°F", "[degF]"),
+    ("fahrenheit", "[degF]"),
+    ("F", "[degF]"),
+    ("K", "K"),
+    ("mK", "mK"),
+    ("nm", "nm"),
+    ("um", "um"),
+    ("µm", "um"),
+    ("μm", "um"),
+    ("mm", "mm"),
+    ("m", "m"),
+    ("V", "V"),
+    ("mV", "mV"),
+    ("A", "A"),
+    ("mA", "mA"),
+    ("W", "W"),
+    ("kW", "kW"),
+    ("Wm2", "W/m2"),
+    ("W/m2", "W/m2"),
+    ("Pa", "Pa"),
+    ("bar", "bar"),
+    ("%", "%"),
+    ("pct", "%"),
+    ("percent", "%"),
+];
+
+impl Unit {
+    /// The unit that a word in the name of a column says, such as `degC` in `plate_degC`; none where the word has other meanings
+    /// that are as usual, such as `min`.
+    #[must_use]
+    pub fn in_name(word: &str) -> Option<Self> {
+        let same = |known: &str| {
+            known == word || known.len() > 1 && known.eq_ignore_ascii_case(word) && word != "MK"
+        };
+        let (_, code) = WORDS.iter().find(|(known, _)| same(known))?;
+        Self::parse(code).ok()
+    }
+}
