@@ -125,7 +125,11 @@ pub fn columns(described: &Description, time: &str) -> Vec<Column> {
 
 fn guess(name: &str) -> Column {
     let parts = words(name);
-    let unit = parts.iter().skip(1).rev().find_map(|word| Unit::in_name(word));
+    let unit = parts
+        .iter()
+        .skip(1)
+        .rev()
+        .find_map(|word| Unit::in_name(word));
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
     let has = |known: &[&str]| {
         lower

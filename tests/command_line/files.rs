@@ -189,3 +189,26 @@ fn a_channel_whose_samples_are_all_out_of_range_makes_one_ask_for_its_unit() {
         .told;
     assert!(!told.contains("out of range"), "{told}");
 }
+
+/// As the editor of another system may have saved them.
+#[test]
+fn files_that_are_no_text_in_utf_8_are_told_to_be_saved_as_that() {
+    let (scratch, graph, data, model) = desk("utf-16");
+    let in_utf_16 = |name: &str, path: &PathBuf| {
+        let text = std::fs::read_to_string(path).unwrap();
+        let bytes = text.encode_utf16().flat_map(u16::to_le_bytes);
+        scratch.file(name, [&[0xff, 0xfe], &*bytes.collect::<Vec<_>>()].concat())
+    };
+    let graph = in_utf_16("other-graph.toml", &graph);
+    athermal(&[&"check", &graph])
+        .ended(2)
+        .tells(&["other-graph.toml\": it is not text in UTF-8; save it as that"]);
+    let other = in_utf_16("other-model.json", &model);
+    athermal(&[&"show", &other])
+        .ended(3)
+        .tells(&["other-model.json: it is not text in UTF-8; save it as that"]);
+    let log = in_utf_16("other-log.csv", &data);
+    athermal(&[&"evaluate", &model, &"--data", &log])
+        .ended(2)
+        .tells(&["other-log.csv:1: is not text in UTF-8"]);
+}

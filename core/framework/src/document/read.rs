@@ -366,7 +366,7 @@ pub(crate) fn unreadable(error: &io::Error) -> String {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
         io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
-        io::ErrorKind::InvalidData => "it is not a UTF-8 text".to_owned(),
+        io::ErrorKind::InvalidData => "it is not text in UTF-8; save it as that".to_owned(),
         _ => error.to_string(),
     }
 }

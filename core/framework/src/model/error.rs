@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::diagnostic::{Diagnostics, Sources};
+use crate::document::unreadable;
 use crate::engine::EngineError;
 use crate::node::Mistake;
 
@@ -60,7 +61,7 @@ impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unreadable { path, source } => {
-                write!(f, "cannot read {}: {source}", path.display())
+                write!(f, "cannot read {}: {}", path.display(), unreadable(source))
             }
             Self::NotAModel { path, source } => {
                 write!(
