@@ -32,19 +32,20 @@ pub(crate) fn rate(output: &PlannedOutput, unit: &Unit) -> Option<f64> {
 }
 
 impl Blending {
-    /// The value to show where the graph has `value`; without a rate it is that value.
+    /// Of an output that has shown a value of its own graph as it is.
+    pub(super) fn at_once(at: Instant, value: f64) -> Self {
+        Self {
+            shown: Some((at, value)),
+            own: Some((at, value)),
+            ..Self::default()
+        }
+    }
+
+    /// The value to show where the graph has `value`, the rate being in its unit per second.
     ///
     /// Between two values that are shown, the offset falls by no more than the rate times the time between them. Where time
     /// starts again, no time has passed.
-    pub(crate) fn pass(&mut self, now: Instant, value: f64, rate: Option<f64>) -> f64 {
-        let Some(rate) = rate else {
-            *self = Self {
-                shown: Some((now, value)),
-                own: Some((now, value)),
-                ..Self::default()
-            };
-            return value;
-        };
+    pub(super) fn pass(&mut self, now: Instant, value: f64, rate: f64) -> f64 {
         if std::mem::take(&mut self.begins) {
             self.offset = self.shown.map_or(0.0, |(_, shown)| shown - value);
         }
@@ -91,7 +92,7 @@ mod tests {
         Instant::from_ns(seconds * 1_000_000_000)
     }
 
-    const RATE: Option<f64> = Some(5.0);
+    const RATE: f64 = 5.0;
 
     #[test]
     fn the_difference_at_the_hand_over_falls_at_the_rate() {
@@ -155,18 +156,11 @@ mod tests {
     }
 
     #[test]
-    fn without_a_rate_an_output_steps_over_at_once() {
-        let (mut old, mut new) = (Blending::default(), Blending::default());
-        old.pass(s(0), 200.0, None);
-        new.pass(s(0), 0.0, None);
+    fn the_rate_of_the_new_graph_counts_where_the_old_one_had_none() {
+        let old = Blending::at_once(s(1), 200.0);
+        let mut new = Blending::at_once(s(1), 0.0);
         new.hand_over(&old);
-        assert_eq!(new.pass(s(1), 0.0, None), 0.0);
-        new.hand_over(&old);
-        assert_eq!(
-            new.pass(s(2), 0.0, RATE),
-            190.0,
-            "the new graph's rate counts"
-        );
+        assert_eq!(new.pass(s(3), 0.0, RATE), 190.0);
     }
 
     #[test]

@@ -71,11 +71,7 @@ impl Engine {
     /// Takes over from another engine: outputs pass over from what it put out last, where `from` says which of its outputs
     /// each follows, and what is frozen on command stays so.
     pub(crate) fn pass_over(&mut self, before: &Self, from: &[Option<usize>]) {
-        for (shown, from) in self.shown.iter_mut().zip(from) {
-            if let Some(last) = from.and_then(|from| before.shown.get(from)) {
-                shown.blending.hand_over(&last.blending);
-            }
-        }
+        self.outlets.take_over(&before.outlets, from);
         self.refused = before.refused;
         // Whoever made this engine ready may have missed the command.
         self.frozen = before.frozen;
@@ -85,7 +81,7 @@ impl Engine {
     #[must_use]
     pub fn state(&self) -> EngineState {
         let name = |slot: usize| self.plan.channels[slot].name.clone();
-        let outputs = self.plan.outputs.iter().zip(&self.shown);
+        let outputs = self.plan.outputs.iter().enumerate();
         let sources = self.plan.sources.iter().zip(&self.rejected);
         EngineState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -109,7 +105,7 @@ impl Engine {
                 .collect(),
             nodes: self.node_states(),
             blending: outputs
-                .map(|(output, shown)| (output.name.clone(), shown.blending))
+                .map(|(index, output)| (output.name.clone(), self.outlets.blending(index)))
                 .collect(),
         }
     }
@@ -232,7 +228,7 @@ impl Engine {
             if let Some(was) = state.blending.get(&output.name)
                 && heritage.outputs[index]
             {
-                self.shown[index].blending = *was;
+                self.outlets.go_on(index, *was);
             }
         }
         self.slots.tick = state.tick;

@@ -13,6 +13,7 @@ mod idle;
 mod keep;
 mod learning;
 pub(crate) mod mode;
+mod outlets;
 mod pairing;
 mod recent_error;
 mod revision;
@@ -44,8 +45,8 @@ use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};
 use crate::node::{Evidence, Predictor, Tick};
 use crate::time::{Duration, Instant};
-use blend::Blending;
 use estimate::Estimate;
+use outlets::Outlets;
 use running::{Running, running};
 use turn::Turn;
 
@@ -84,16 +85,7 @@ pub struct Engine {
     row: Vec<f64>,
     /// The lowest and highest sample that count, of each source.
     ranges: Vec<(f64, f64)>,
-    outputs: Vec<f64>,
-    shown: Vec<Shown>,
-}
-
-/// Where an output is from, and how it passes from an old graph's value to a new one's.
-struct Shown {
-    slot: usize,
-    /// In its unit per second.
-    rate: Option<f64>,
-    blending: Blending,
+    outlets: Outlets,
 }
 
 impl Engine {
@@ -127,16 +119,7 @@ impl Engine {
             refused: 0,
             fed_back: Vec::new(),
             frozen: false,
-            outputs: vec![f64::NAN; plan.outputs.len()],
-            shown: plan
-                .outputs
-                .iter()
-                .map(|output| Shown {
-                    slot: output.slot,
-                    rate: blend::rate(output, &plan.channels[output.slot].channel.unit),
-                    blending: Blending::default(),
-                })
-                .collect(),
+            outlets: Outlets::new(&plan),
             ranges: plan.sources.iter().map(|source| source.range).collect(),
             fitted: fitted.clone(),
             revision: OnceLock::new(),
@@ -147,7 +130,7 @@ impl Engine {
     /// What the last tick gave, in the order of [`Plan::outputs`].
     #[must_use]
     pub fn outputs(&self) -> &[f64] {
-        &self.outputs
+        self.outlets.values()
     }
 
     /// The plan that is stepped.
@@ -223,8 +206,8 @@ impl Engine {
             }
         }
         self.remember(time);
-        self.put_out(time);
-        Ok(&self.outputs)
+        self.outlets.put_out(&self.slots, time);
+        Ok(self.outlets.values())
     }
 
     /// The instant of the last tick; none before the first.
@@ -372,17 +355,6 @@ impl Engine {
         match &self.nodes[node] {
             Running::Vote(vote) => vote.evidence(),
             Running::Operator { .. } | Running::Estimate { .. } => None,
-        }
-    }
-
-    fn put_out(&mut self, now: Instant) {
-        for (output, shown) in self.outputs.iter_mut().zip(&mut self.shown) {
-            let value = self.slots.now(shown.slot);
-            *output = if value.is_nan() {
-                value
-            } else {
-                shown.blending.pass(now, value, shown.rate)
-            };
         }
     }
 
