@@ -413,8 +413,10 @@ mod tests {
         let noise = |i: u64| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
         // At no lag there are 125 pairs; one instant later the truth is there in the first half alone.
         let there = |is: bool, value: f64| if is { value } else { f64::NAN };
-        let x: Vec<f64> = (1..=500).map(|i| there(i % 4 == 0, noise(i))).collect();
-        let later = |i: u64| i % 4 == 0 || (i % 4 == 1 && i < 250);
+        let x: Vec<f64> = (1..=500_u64)
+            .map(|i| there(i.is_multiple_of(4), noise(i)))
+            .collect();
+        let later = |i: u64| i.is_multiple_of(4) || (i % 4 == 1 && i < 250);
         let y: Vec<f64> = (1..=500).map(|i| there(later(i), noise(i - 1))).collect();
         let lag_s: Vec<f64> = (-20..=20).map(f64::from).collect();
         let white = [1.0, 0.0, 0.0];
