@@ -529,6 +529,14 @@ fn values_whose_squares_overflow_are_told_with_their_name() {
         let told = fit("overflow", &format!("{node}\n{FEATURES}"), &text, &[]).ended(1);
         told.tells(&["values of `in.u` are as large as 1e200", "a `range`"]);
     }
+    for size in [3e153, 1e160] {
+        let rows = data(200, |row, u, v| size * (u + v + noise(row, 3)));
+        for kind in ["kalman", "oe", "armax", "huber", "linear"] {
+            let node = format!("type = \"{kind}\"\n{FEATURES}");
+            let told = fit("overflow", &node, &rows, &[]).ended(1);
+            told.tells(&["values of `out.y` are as large as", "a `range`"]);
+        }
+    }
 }
 
 #[test]

@@ -180,8 +180,9 @@ pub fn tell(
     for (channel, n) in rejected {
         let samples = counted(*n, "sample");
         terminal.warning(match *n {
-            all if all == rows && all > 1 => format!(
-                "{channel}: all {samples} are infinite or out of range, taken as missing; is its unit that of the log?"
+            most if 2 * most > rows && most > 1 => format!(
+                "{channel}: {}{samples} are infinite or out of range, taken as missing; is its unit that of the log?",
+                if most == rows { "all " } else { "" }
             ),
             1 => format!("{channel}: {samples} is infinite or out of range, taken as missing"),
             _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),

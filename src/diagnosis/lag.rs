@@ -16,12 +16,15 @@ use athermal_numerics::{
 use serde::Serialize;
 
 use super::observation::{Observation, main_prediction};
+use super::reach;
 
 /// Lags to either side, at most.
 const MOST_LAGS: i64 = 60;
 const FEWEST_LAGS: i64 = 20;
 /// Instants of the grid, at most.
 const MOST_INSTANTS: i64 = 20_000;
+/// Lags are told up to this share of a recording (Box and Jenkins 1976, section 2.1.6): beyond, too little is left to compare.
+const SHARE_OF_LENGTH: i64 = 4;
 /// A lag at which fewer than this share of the pairs of others are left is not set against them.
 const SHARE_OF_PAIRS: usize = 4;
 /// Autocorrelations reach so many times further than the lags, since bounds are sums over all of them.
@@ -59,7 +62,8 @@ pub struct FeatureLags {
 pub struct Correlogram {
     /// The correlation at each lag; NaN (null in JSON) where there is none.
     pub r: Vec<f64>,
-    /// Its standard error if the two had nothing to do with each other, their own smoothness considered.
+    /// The standard error of the largest if the two had nothing to do with each other, their own smoothness considered, from as
+    /// many pairs as there are at its lag; where there is no largest, from those at no lag.
     pub error: f64,
     /// The lag in s at which it is largest in size: of a residual, of those at which the feature was known when the prediction
     /// was made.
@@ -105,15 +109,17 @@ pub fn lags(
     let pause = Duration::from_ns(interval.as_ns().saturating_mul(FEWEST_LAGS));
     let length = observation.rows.length(pause);
     let longest = Duration::from_ns(length.as_ns() / MOST_INSTANTS);
-    let reach = Duration::from_ns(plan.warm_up.as_ns() / MOST_LAGS);
-    let step = interval.max(longest).max(reach).max(Duration::from_ns(1));
+    let told = Duration::from_ns(length.as_ns() / SHARE_OF_LENGTH);
+    let reach = reach::of_estimators(plan).min(told);
+    let widest = Duration::from_ns(reach.as_ns() / MOST_LAGS);
+    let step = interval.max(longest).max(widest).max(Duration::from_ns(1));
     let main =
         |truth: &TruthTrace| Some(truth.predictions[main_prediction(plan, truth, of)?].ahead);
     let horizons = truths.iter().filter_map(main);
     let step = horizons
         .min()
         .map_or(step, |horizon| fitted_into(horizon, step));
-    let count = (plan.warm_up.as_ns() / step.as_ns()).clamp(FEWEST_LAGS, MOST_LAGS) as usize;
+    let count = (reach.as_ns() / step.as_ns()).clamp(FEWEST_LAGS, MOST_LAGS) as usize;
     // Truths that come at a regular pace then lie on it.
     let firsts = truths.iter().filter_map(|truth| truth.times.first());
     let through = firsts.map(|&(_, at)| at).min();
@@ -192,11 +198,11 @@ fn correlogram(
     let lags = lag_s.len() / 2;
     let r = cross_correlation(x, y, lags);
     let there = cross_correlation_pairs(x, y, lags);
-    let error = cross_correlation_error(x_smooth, y_smooth, there[lags]);
     let most = there.iter().copied().max().unwrap_or(0);
     let counts = |&lag: &usize| SHARE_OF_PAIRS * there[lag] >= most && !r[lag].is_nan();
     let present = (0..r.len()).filter(|lag| counts(lag) && lag_s[*lag] >= from_s);
     let best = present.max_by(|&a, &b| r[a].abs().total_cmp(&r[b].abs()));
+    let error = cross_correlation_error(x_smooth, y_smooth, there[best.unwrap_or(lags)]);
     Correlogram {
         best_lag_s: best.map_or(f64::NAN, |best| lag_s[best]),
         best: best.map_or(f64::NAN, |best| r[best]),
@@ -205,7 +211,8 @@ fn correlogram(
     }
 }
 
-/// The channels that estimators of a truth are offered, the truth itself left out.
+/// The channels that estimators of a truth are offered, the truth itself and predictions of it left out: those of good voters go
+/// with it best, and tell nothing of what it hangs on.
 fn features(plan: &Plan, truth: usize) -> Vec<usize> {
     let mut slots = Vec::new();
     for node in &plan.nodes {
@@ -218,7 +225,8 @@ fn features(plan: &Plan, truth: usize) -> Vec<usize> {
         let entries = gathers
             .iter()
             .flat_map(|&gather| &plan.gathers[gather].entries);
-        for entry in entries.filter(|entry| of.slot == truth && entry.slot != truth) {
+        let of_it = |slot: usize| slot == truth || plan.channels[slot].predicts == Some(truth);
+        for entry in entries.filter(|entry| of.slot == truth && !of_it(entry.slot)) {
             if !slots.contains(&entry.slot) {
                 slots.push(entry.slot);
             }
@@ -398,5 +406,23 @@ mod tests {
         let later = correlogram((&x, &smooth), (&y, &smooth), &lag_s, 50.0);
         assert!(later.best_lag_s >= 50.0 && later.r == found.r);
         assert!(found.error >= 1.0 / 500.0_f64.sqrt() && found.significance() > 3.0);
+    }
+
+    #[test]
+    fn a_correlation_is_as_unsure_as_the_pairs_at_its_lag_are_few() {
+        let noise = |i: u64| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64;
+        // At no lag there are 125 pairs; one instant later the truth is there in the first half alone.
+        let there = |is: bool, value: f64| if is { value } else { f64::NAN };
+        let x: Vec<f64> = (1..=500_u64)
+            .map(|i| there(i.is_multiple_of(4), noise(i)))
+            .collect();
+        let later = |i: u64| i.is_multiple_of(4) || (i % 4 == 1 && i < 250);
+        let y: Vec<f64> = (1..=500).map(|i| there(later(i), noise(i - 1))).collect();
+        let lag_s: Vec<f64> = (-20..=20).map(f64::from).collect();
+        let white = [1.0, 0.0, 0.0];
+        let found = correlogram((&x, &white), (&y, &white), &lag_s, f64::NEG_INFINITY);
+        assert_eq!((found.best_lag_s, found.best), (1.0, 1.0));
+        let pairs = (4..250).step_by(4).filter(|i| i + 1 < 250).count();
+        assert_eq!(found.error, 1.0 / (pairs as f64).sqrt());
     }
 }

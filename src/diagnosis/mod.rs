@@ -9,6 +9,7 @@ mod gap;
 pub mod lag;
 mod observation;
 mod plot;
+mod reach;
 pub mod regressor;
 pub mod residual;
 pub mod response;

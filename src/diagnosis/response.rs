@@ -21,6 +21,7 @@ use serde::Serialize;
 
 use super::observation::Observation;
 use super::of_truths;
+use super::reach;
 use super::rest::{Rest, Untold, silent};
 
 /// Instants of a response, at most.
@@ -211,10 +212,10 @@ impl<'a> Probe<'a> {
         let Some(interval) = intervals.min() else {
             return Ok(None);
         };
-        let warm_up = model.plan.warm_up;
-        let widest = Duration::from_ns(warm_up.as_ns() / MOST_INSTANTS);
+        let reach = reach::of_estimators(&model.plan);
+        let widest = Duration::from_ns(reach.as_ns() / MOST_INSTANTS);
         let step = interval.max(widest).max(Duration::from_ns(1));
-        let ticks = (warm_up.as_ns() / step.as_ns() + 2).min(MOST_INSTANTS);
+        let ticks = (reach.as_ns() / step.as_ns() + 2).min(MOST_INSTANTS);
         let rest = sources
             .iter()
             .map(|of| if of.samples > 0 { of.mean } else { f64::NAN });

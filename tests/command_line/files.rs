@@ -172,7 +172,7 @@ fn a_model_and_the_results_of_tests_are_written_though_nobody_reads_what_is_told
 }
 
 #[test]
-fn a_channel_whose_samples_are_all_out_of_range_makes_one_ask_for_its_unit() {
+fn a_channel_whose_samples_are_mostly_out_of_range_makes_one_ask_for_its_unit() {
     let (scratch, plain, counted, _) = desk("all-out-of-range");
     let kelvins = std::fs::read_to_string(&plain).unwrap().replace(
         "unit = \"Cel\"\nchannels = [\"room\"]\nrange = [\"-20 Cel\", \"200 Cel\"]",
@@ -182,6 +182,15 @@ fn a_channel_whose_samples_are_all_out_of_range_makes_one_ask_for_its_unit() {
     let told = athermal(&[&"evaluate", &graph, &"--data", &counted]).ended(0);
     told.tells(&[
         "temperature.room: all 60 samples are infinite or out of range",
+        "is its unit that of the log?",
+    ]);
+    let mut gappy = rows(0, 60);
+    let cells: Vec<&str> = gappy[7].split(',').collect();
+    gappy[7] = format!("{},,{}", cells[0], cells[2]);
+    let gappy = scratch.file("gappy.csv", csv(&gappy));
+    let told = athermal(&[&"evaluate", &graph, &"--data", &gappy]).ended(0);
+    told.tells(&[
+        "temperature.room: 59 samples are infinite or out of range",
         "is its unit that of the log?",
     ]);
     let told = athermal(&[&"evaluate", &plain, &"--data", &counted])

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod program;
+mod reach;
 #[path = "../workbench/mod.rs"]
 mod workbench;
 

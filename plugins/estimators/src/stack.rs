@@ -6,15 +6,16 @@ use athermal_core::node::{
     Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::time::Duration;
-use athermal_numerics::{GramBlocks, NumericsError, non_negative_least_squares};
+use athermal_numerics::{Gram, GramBlocks, NumericsError, non_negative_least_squares};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Stacked regression: the sum of several predictions, by weights that are not negative and found by least squares in the fit.
 ///
 /// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson 1974), without an
-/// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Predictions of the rows that
-/// an estimator was itself fitted on would flatter the one that fits them closest, so that weights are found on out-of-fold
+/// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Only where the truth is a
+/// thousand times as large as it varies, such as a position that is counted from far away, do they add up to one, which they nearly do
+/// there anyway. Predictions of the rows that an estimator was itself fitted on would flatter the one that fits them closest, so that weights are found on out-of-fold
 /// predictions: each third of the data, with as many instants at which there is a truth, is predicted by voters fitted on the
 /// rest. So voters are fitted four times, and those of a voter that is a stack itself 13 times.
 ///
@@ -25,6 +26,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stack {}
+
+/// Squares of the truth that are so many times those of its distances from the mean leave nothing of the voters' errors in sums of
+/// products; the weights then follow from the errors.
+const FAR: f64 = 1e6;
+/// The least squared error of a voter, as a share of the largest: one without any would have no weight that is finite.
+const LEAST_ERROR: f64 = 1e-12;
 
 /// The most voters: there are weights for any of them being absent.
 const MOST: usize = 10;
@@ -78,12 +85,13 @@ impl Trainer for Stacking {
             });
         }
         let total = self.blocks.total();
-        let moments = total.moments_about(&vec![0.0; voters + 1]);
+        let sums = Sums::of(&total);
         let products = (0..voters).flat_map(|i| (0..voters).map(move |j| (i, j)));
         let saved = Saved {
             regressors: self.names,
-            products: products.map(|place| moments[place]).collect(),
-            with_truth: (0..voters).map(|i| moments[(i, voters)]).collect(),
+            products: products.map(|(i, j)| sums.product(i, j)).collect(),
+            with_truth: (0..voters).map(|i| sums.with_truth(i)).collect(),
+            adds_to_one: sums.of_errors,
         };
         let stacked = Stacked::try_from(saved).map_err(|error| TrainingError::Unsolvable {
             reason: error.to_string(),
@@ -95,13 +103,7 @@ impl Trainer for Stacking {
                     .to_owned(),
             });
         }
-        let explained: f64 = (0..voters)
-            .map(|i| {
-                let mixed: f64 = (0..voters).map(|j| weights[j] * moments[(i, j)]).sum();
-                weights[i] * (2.0 * moments[(i, voters)] - mixed)
-            })
-            .sum();
-        let squares = (moments[(voters, voters)] - explained).max(0.0);
+        let squares = sums.left(weights);
         let named = stacked.saved.regressors.iter().zip(weights.iter().copied());
         let told: Vec<String> = named
             .clone()
@@ -120,6 +122,89 @@ impl Trainer for Stacking {
     }
 }
 
+/// Sums over the rows, from which weights follow.
+struct Sums {
+    /// Of products of votes and, last, the truth; or, where it is `of_errors`, of their distances from the mean truth.
+    /// Row by row, symmetric.
+    moments: Vec<f64>,
+    voters: usize,
+    of_errors: bool,
+}
+
+impl Sums {
+    fn of(rows: &Gram) -> Self {
+        let voters = rows.width();
+        let about = |centre: f64| -> Vec<f64> {
+            let moments = rows.moments_about(&vec![centre; voters + 1]);
+            let row = |i: usize| (0..=voters).map(move |j| (i, j));
+            (0..=voters).flat_map(row).map(|at| moments[at]).collect()
+        };
+        let (plain, apart) = (about(0.0), about(rows.means()[voters]));
+        let squares = |moments: &[f64]| moments[moments.len() - 1];
+        let of_errors = squares(&plain) > FAR * squares(&apart);
+        Self {
+            moments: if of_errors { apart } else { plain },
+            voters,
+            of_errors,
+        }
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        self.moments[i * (self.voters + 1) + j]
+    }
+
+    /// The sum of the products of two votes, or of their errors.
+    fn product(&self, i: usize, j: usize) -> f64 {
+        if !self.of_errors {
+            return self.at(i, j);
+        }
+        let least = (0..self.voters)
+            .map(|i| self.error(i, i))
+            .fold(0.0, f64::max)
+            * LEAST_ERROR;
+        let least = if least > 0.0 { least } else { 1.0 };
+        self.error(i, j) + if i == j { least } else { 0.0 }
+    }
+
+    /// The sum of the products of the errors of two voters.
+    fn error(&self, i: usize, j: usize) -> f64 {
+        let y = self.voters;
+        (self.at(i, j) - self.at(i, y)) - (self.at(y, j) - self.at(y, y))
+    }
+
+    /// The sum of the products of a vote with the truth. Of errors, 1: the weights that add up to one and leave the least squares
+    /// are those of this right side, scaled.
+    fn with_truth(&self, i: usize) -> f64 {
+        if self.of_errors {
+            1.0
+        } else {
+            self.at(i, self.voters)
+        }
+    }
+
+    /// The sum of squares that weights leave.
+    fn left(&self, weights: &[f64]) -> f64 {
+        let y = self.voters;
+        let mixed = |i: usize| -> f64 {
+            let product = |j: usize| {
+                if self.of_errors {
+                    self.error(i, j)
+                } else {
+                    self.at(i, j)
+                }
+            };
+            (0..y).map(|j| weights[j] * product(j)).sum()
+        };
+        let squares: f64 = if self.of_errors {
+            (0..y).map(|i| weights[i] * mixed(i)).sum()
+        } else {
+            let explained = |i: usize| weights[i] * (2.0 * self.at(i, y) - mixed(i));
+            self.at(y, y) - (0..y).map(explained).sum::<f64>()
+        };
+        squares.max(0.0)
+    }
+}
+
 /// A fitted stack: the sums that weights follow from, whichever voters are there.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(try_from = "Saved", into = "Saved")]
@@ -134,12 +219,15 @@ struct Stacked {
 struct Saved {
     /// The voters.
     regressors: Vec<String>,
-    /// Sums of the products of their predictions, row by row.
+    /// Sums of the products of their predictions, or of their errors, row by row.
     #[serde(with = "numbers")]
     products: Vec<f64>,
     /// Sums of the products of each with the truth.
     #[serde(with = "numbers")]
     with_truth: Vec<f64>,
+    /// Whether the products are those of their errors, and weights are scaled to add up to one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    adds_to_one: bool,
 }
 
 impl From<Stacked> for Saved {
@@ -177,7 +265,11 @@ impl TryFrom<Saved> for Stacked {
                 .flat_map(|i| there.iter().map(move |j| i * voters + j));
             let products: Vec<f64> = own.map(|place| saved.products[place]).collect();
             let with_truth: Vec<f64> = there.iter().map(|&i| saved.with_truth[i]).collect();
-            let solution = non_negative_least_squares(&products, &with_truth)?;
+            let mut solution = non_negative_least_squares(&products, &with_truth)?;
+            let sum: f64 = solution.iter().sum();
+            if saved.adds_to_one && sum > 0.0 {
+                solution.iter_mut().for_each(|weight| *weight /= sum);
+            }
             for (voter, weight) in there.into_iter().zip(solution) {
                 weights[voter] = weight;
             }
@@ -319,6 +411,46 @@ mod tests {
             .collect();
         let error = stack(&alone).unwrap_err().to_string();
         assert!(error.starts_with("every weight is 0"), "{error}");
+    }
+
+    #[test]
+    fn weights_are_those_of_the_errors_however_far_away_a_position_is_counted_from() {
+        let wave = |i: i32, step: f64| (step * f64::from(i)).sin();
+        let error = |i: i32| [0.1 * wave(i, 1.7), 0.2 * wave(i, 2.9), 3.0 * wave(i, 0.7)];
+        let mixed =
+            |a: usize, b: usize| -> f64 { (0..500).map(|i| error(i)[a] * error(i)[b]).sum() };
+        // Of two voters the weights that add up to one; the third has nothing to give.
+        let apart = mixed(0, 0) + mixed(1, 1) - 2.0 * mixed(0, 1);
+        let expected = (mixed(1, 1) - mixed(0, 1)) / apart;
+        for level in [1e4, 5e5, 1e8, -1e8] {
+            let row = |i: i32| {
+                let truth = level + wave(i, 0.3);
+                (error(i).map(|error| truth + error), truth)
+            };
+            let rows: Vec<([f64; 3], f64)> = (0..500).map(row).collect();
+            let rows: Vec<(&[f64], f64)> = rows.iter().map(|(x, y)| (&x[..], *y)).collect();
+            let Trained { predictor, report } = stack(&rows).unwrap();
+            let weight = predictor.predict(&[level + 1.0, level, level]) - level;
+            assert!(
+                (weight - expected).abs() < 1e-3,
+                "{level}: {weight} {expected}"
+            );
+            let without = predictor.predict(&[f64::NAN, level + 1.0, f64::NAN]) - level;
+            assert!((without - 1.0).abs() < 1e-6, "{without}");
+            let left = mixed(0, 0) * mixed(1, 1) - mixed(0, 1) * mixed(0, 1);
+            let rmse = (left / apart / 500.0).sqrt();
+            let told = report.in_sample_rmse.unwrap();
+            assert!((told - rmse).abs() < 1e-3 * rmse, "{told} {rmse}");
+            let text = serde_json::to_string(&predictor).unwrap();
+            let back: Box<dyn Predictor> = serde_json::from_str(&text).unwrap();
+            let votes = [level + 0.3, level - 0.2, level];
+            assert_eq!(predictor.predict(&votes), back.predict(&votes));
+        }
+        // One that is never wrong has all weight.
+        let right: Vec<[f64; 2]> = (0..9).map(|i| [1e8 + f64::from(i), 1e8]).collect();
+        let rows: Vec<(&[f64], f64)> = right.iter().map(|x| (&x[..], x[0])).collect();
+        let told = stack(&rows).unwrap().predictor.predict(&[1.0, 0.0]);
+        assert!((told - 1.0).abs() < 1e-9, "{told}");
     }
 
     #[test]

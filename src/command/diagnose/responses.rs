@@ -58,9 +58,11 @@ impl<'a> Node<'a> {
     fn text(&self) -> String {
         let mut text = String::new();
         for alike in grouped(self.sensors.iter().copied(), |of| of.sensor_unit.clone()) {
-            let (come_back, last): (Vec<_>, Vec<_>) = alike.into_iter().partition(|of| {
-                self.any(of, |of| of.total.is_some()) || !self.any(of, |of| of.gain.is_some())
-            });
+            // One instance may answer for good what comes back to nothing in another: that sensor is in both tables.
+            let lasts = |of: &&&Response| self.any(of, |of| of.gain.is_some());
+            let ends = |of: &&&Response| self.any(of, |of| of.total.is_some()) || !lasts(of);
+            let come_back: Vec<_> = alike.iter().filter(ends).copied().collect();
+            let last: Vec<_> = alike.iter().filter(lasts).copied().collect();
             text.push_str(&self.totals(&come_back));
             text.push_str(&self.gains(&last));
         }
@@ -125,7 +127,7 @@ impl<'a> Node<'a> {
         let Some(first) = sensors.first() else {
             return String::new();
         };
-        let rows = self.rows(sensors, |of| or_no_end(of.gain));
+        let rows = self.rows(sensors, |of| or_no_end(of.gain.or(of.total.map(|_| 0.0))));
         format!(
             "{}: how far a step of {} moves what it predicts for good, in {}\n{}",
             self.name,
@@ -261,6 +263,26 @@ mod tests {
         let cells: Vec<&str> = cells.into_iter().map(str::trim).collect();
         let cells: Vec<&str> = cells.into_iter().filter(|cell| !cell.is_empty()).collect();
         assert_eq!(cells, ["all together", "3.00", "-", "no end"], "{told}");
+    }
+
+    #[test]
+    fn a_sensor_that_one_instance_answers_for_good_and_another_does_not_is_in_both_tables() {
+        let stays = Response {
+            gain: Some(3.0),
+            ..answer("a", None, 60.0)
+        };
+        let of = [
+            instance("X", "nm", vec![stays]),
+            instance("Z", "nm", vec![answer("a", Some(2.0), 60.0)]),
+        ];
+        let told = text(&of.iter().collect::<Vec<_>>());
+        let lines = told.lines().filter(|line| line.contains("temperature.a"));
+        let cells = lines.map(|line| line.split_once("temperature.a").map(|of| of.1.trim()));
+        let cells: Vec<Vec<&str>> = cells
+            .map(|row| row.unwrap_or_default().split("  ").map(str::trim).collect())
+            .map(|row: Vec<&str>| row.into_iter().filter(|cell| !cell.is_empty()).collect())
+            .collect();
+        assert_eq!(cells[..2], [["no end", "2.00"], ["3.00", "0"]], "{told}");
     }
 
     #[test]

@@ -204,9 +204,11 @@ pub(super) fn end(
             },
             largest: making.ranges[nth].largest(),
         });
-        let trained = making.trainer.finish();
-        // What a trainer says of sums that overflowed is not their cause.
-        trained.map_err(|error| too_large.unwrap_or(error))
+        // Some trainers would make a model of sums that overflowed.
+        match too_large {
+            Some(error) => Err(error),
+            None => making.trainer.finish(),
+        }
     };
     let (outcome, predictor) = match trained {
         Ok(Trained {
