@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 /// `ŷ = Σ w_i ŷ_i` with the `w ≥ 0` that minimise `Σ (y − Σ w_i ŷ_i)²` (Breiman 1996; solved as Lawson and Hanson 1974), without an
 /// intercept and without making the weights add up to one: voters that all promise too much are scaled down. Only where the truth is a
 /// thousand times as large as it varies, such as a position that is counted from far away, do they add up to one, which they nearly do
-/// there anyway. Predictions of the rows that an estimator was itself fitted on would flatter the one that fits them closest, so that weights are found on out-of-fold
-/// predictions: each third of the data, with as many instants at which there is a truth, is predicted by voters fitted on the
-/// rest. So voters are fitted four times, and those of a voter that is a stack itself 13 times.
+/// there anyway. Predictions of the rows that an estimator was itself fitted on would flatter the one that fits them closest, so that
+/// weights are found on out-of-fold predictions: each third of the data, with as many instants at which there is a truth, is predicted
+/// by voters fitted on the rest. So voters are fitted four times, and those of a voter that is a stack itself 13 times.
 ///
 /// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the others go by the
 /// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over.

@@ -357,7 +357,7 @@ impl<'g> Resolver<'g> {
         };
         steps::mark_wanted(&mut plan, &self.read, wanted);
         plan.steps = steps::steps(&plan);
-        plan.warm_up = steps::warm_up(&plan);
+        plan.warm_up = plan.warm_ups().into_iter().max().unwrap_or_default();
         if !self.diagnostics.has_errors() {
             steps::warn(self.graph, &plan, self.diagnostics);
         }

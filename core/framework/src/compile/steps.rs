@@ -54,17 +54,21 @@ pub(super) fn steps(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// The longest time that a node needs to know all that it would know had it always run.
-pub(super) fn warm_up(plan: &Plan) -> Duration {
-    let mut of_slot = vec![Duration::ZERO; plan.channels.len()];
-    for node in &plan.nodes {
-        let warm_up = warm_up_of(plan, &of_slot, node);
-        of_slot[node.slots.clone()].fill(warm_up);
+impl Plan {
+    /// By node, the time after which it, started cold, knows all that it would know had it always run.
+    #[must_use]
+    pub fn warm_ups(&self) -> Vec<Duration> {
+        let mut of_slot = vec![Duration::ZERO; self.channels.len()];
+        let mut warm_ups = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let warm_up = warm_up_of(self, &of_slot, node);
+            of_slot[node.slots.clone()].fill(warm_up);
+            warm_ups.push(warm_up);
+        }
+        warm_ups
     }
-    of_slot.into_iter().max().unwrap_or(Duration::ZERO)
 }
 
-/// The time after which a node, started cold, knows all that it would know had it always run.
 fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Duration {
     let entries = |gather: usize| &plan.gathers[gather].entries;
     let before = || {
