@@ -242,9 +242,12 @@ impl<'a> Course<'a> {
     /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
     fn look(&mut self, control: &mut Control) {
         self.looked = std::time::Instant::now();
-        let Some(watched) = self.watched.as_mut().filter(|watched| watched.changed()) else {
+        let Some(watched) = &mut self.watched else {
             return;
         };
+        if !watched.changed() {
+            return;
+        }
         let path = watched.path.clone();
         *watched = Watched::of(&path);
         let model = match load(&path, std::iter::once(&self.running)) {
