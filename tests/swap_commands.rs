@@ -234,6 +234,27 @@ fn what_cannot_be_swapped_is_told_before_the_first_row() {
 }
 
 #[test]
+fn a_graph_that_gives_a_column_in_another_unit_is_refused() {
+    let scratch = desk("unit");
+    let other = "schema = 1\nextends = \"graph.toml\"\nname = \"other\"\nnodes.drift = { unit = \"um/min\" }\n";
+    scratch.file("other.toml", other);
+    let finished = run(&scratch, &[&swap(&scratch, "1200", "other.toml")]).ended(2);
+    finished.tells(&["it gives the output `predicted.Z` in um/min, and the column is in nm/min"]);
+    let mut live = Live::new(&scratch.path("graph.toml"));
+    let before = live.revision();
+    let graph = GRAPH.replace("nm/min", "um/min");
+    scratch.file("graph.toml", graph.replace("\"shown\"", "\"other\""));
+    for _ in 0..50 {
+        assert_eq!(live.revision(), before);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(
+        live.told()
+            .contains("in um/min, and the column is in nm/min: ")
+    );
+}
+
+#[test]
 fn a_time_after_the_data_is_told_at_the_end() {
     let scratch = desk("never");
     let finished = run(&scratch, &[&swap(&scratch, "9000", "still.toml")]).ended(0);

@@ -82,8 +82,12 @@ fn put(
     aside.push(".");
     aside.push(ending);
     let aside = PathBuf::from(aside);
-    make(&aside)?;
-    fs::rename(&aside, path)
+    make(&aside)
+        .and_then(|()| fs::rename(&aside, path))
+        .inspect_err(|_| {
+            // Half a file is of no use, and on a disk that is full it takes the room of the next. What went wrong is told already.
+            let _ = fs::remove_file(&aside);
+        })
 }
 
 #[cfg(test)]

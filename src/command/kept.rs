@@ -15,6 +15,7 @@ const KEEP_EVERY: Duration = Duration::from_secs(60);
 
 /// What a run knows, in a file from one run to the next.
 pub struct Kept {
+    terminal: Terminal,
     path: Option<PathBuf>,
     written: Clock,
     /// The last instant that the run before had seen.
@@ -32,6 +33,7 @@ impl Kept {
         engine: &mut Engine,
     ) -> Result<Self, Failure> {
         let mut kept = Self {
+            terminal: *terminal,
             path: path.map(Path::to_owned),
             written: Clock::now(),
             seen: None,
@@ -74,15 +76,17 @@ impl Kept {
         }
     }
 
-    /// Keeps what is known now and then.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn after_tick(&mut self, engine: &Engine) -> Result<(), SinkError> {
+    /// Keeps what is known now and then. Where that fails, as on a disk that is full, it is told and tried again: a machine goes
+    /// without what it would know after a restart rather than without its predictions.
+    pub fn after_tick(&mut self, engine: &Engine) {
         if self.path.is_none() || self.written.elapsed() < KEEP_EVERY {
-            return Ok(());
+            return;
         }
-        self.write(engine)
+        if let Err(error) = self.write(engine) {
+            self.terminal.warning(format_args!(
+                "{error}; the run goes on, and tries again in a minute"
+            ));
+        }
     }
 
     /// Keeps what is known.
@@ -155,11 +159,16 @@ mod tests {
         let mut kept = Kept::begin(&terminal, Some(&path), &mut engine).unwrap();
         let begun = std::fs::read(&path).unwrap();
         engine.step(Instant::from_ns(1), &[20.0]).unwrap();
-        kept.after_tick(&engine).unwrap();
+        kept.after_tick(&engine);
         assert_eq!(std::fs::read(&path).unwrap(), begun);
         kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
-        kept.after_tick(&engine).unwrap();
+        kept.after_tick(&engine);
         assert_eq!(std::fs::read(&path).unwrap(), engine.snapshot());
         std::fs::remove_dir_all(&folder).unwrap();
+        // The run goes on without its folder too, and tells at the end that nothing is kept.
+        kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
+        kept.after_tick(&engine);
+        assert!(kept.written.elapsed() < KEEP_EVERY, "it was tried");
+        assert!(kept.write(&engine).is_err());
     }
 }

@@ -109,7 +109,10 @@ impl Run {
         let mut rest = kept.rest(terminal, &mut reader);
         let usual = model.sample_ranges();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
-        let mut keep = |engine: &Engine| kept.after_tick(engine);
+        let mut keep = |engine: &Engine| {
+            kept.after_tick(engine);
+            Ok(())
+        };
         live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
         kept.write(&engine).map_err(outside)?;
         self.tell(terminal, &engine, &reader, usual);
@@ -186,7 +189,7 @@ impl Run {
                 outputs: &shown,
             };
             writer.put(&frame).map_err(outside)?;
-            kept.after_tick(stepper.engine()).map_err(outside)?;
+            kept.after_tick(stepper.engine());
         }
         writer.finish().map_err(outside)?;
         kept.write(stepper.engine()).map_err(outside)?;
@@ -226,6 +229,7 @@ impl Run {
                 FileError::MissingColumns { .. } => {
                     terminal.warning(format_args!("{first} (missing until a line has it)"));
                 }
+                FileError::TimeStaysBehind { .. } => terminal.warning(format_args!("{first}")),
                 _ => terminal.warning(format_args!("{first}; others like it are counted")),
             });
         }

@@ -84,6 +84,10 @@ impl Options {
                 };
                 return Err(Failure::Request(format!("{path}: {refused}")));
             }
+            let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
+            if let Some(other) = known.filter_map(|known| other_unit(known, &model)).next() {
+                return Err(Failure::Request(format!("{path}: {other}")));
+            }
             swaps.push(Swap {
                 at,
                 path: path.into(),
@@ -124,6 +128,23 @@ fn load<'a>(path: &Path, known: impl Iterator<Item = &'a Model>) -> Result<Model
         return Err(error.into());
     }
     Ok(model)
+}
+
+/// What a new graph gives in another unit than the one whose columns it would fill: whoever reads a column goes by one.
+fn other_unit(running: &Model, new: &Model) -> Option<String> {
+    let unit = |model: &Model, slot: usize| model.plan.channels[slot].channel.unit.clone();
+    let before = |name: &str| {
+        let mut outputs = running.plan.outputs.iter();
+        let output = outputs.find(|output| output.name == name)?;
+        Some(unit(running, output.slot))
+    };
+    new.plan.outputs.iter().find_map(|output| {
+        let (was, is) = (before(&output.name)?, unit(new, output.slot));
+        (was != is).then(|| {
+            let name = &output.name;
+            format!("it gives the output `{name}` in {is}, and the column is in {was}: give it in that, or another name")
+        })
+    })
 }
 
 impl When {
@@ -242,9 +263,12 @@ impl<'a> Course<'a> {
     /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
     fn look(&mut self, control: &mut Control) {
         self.looked = std::time::Instant::now();
-        let Some(watched) = self.watched.as_mut().filter(|watched| watched.changed()) else {
+        let Some(watched) = &mut self.watched else {
             return;
         };
+        if !watched.changed() {
+            return;
+        }
         let path = watched.path.clone();
         *watched = Watched::of(&path);
         let model = match load(&path, std::iter::once(&self.running)) {
@@ -267,6 +291,11 @@ impl<'a> Course<'a> {
                 "{} has the output `{}`, for which there is no column; what runs goes on",
                 path.display(),
                 new.name
+            ));
+        } else if let Some(other) = other_unit(&self.running, &model) {
+            self.terminal.warning(format_args!(
+                "{}: {other}; what runs goes on",
+                path.display()
             ));
         } else if let Err(failure) = self.stage(control, model, path) {
             self.terminal.error(&failure);

@@ -16,6 +16,8 @@ pub(super) struct Watched {
     /// Its own file.
     pub(super) path: PathBuf,
     files: Vec<(PathBuf, Written)>,
+    /// How files that have changed were at the last look.
+    changing: Option<Vec<Written>>,
 }
 
 impl Watched {
@@ -35,15 +37,22 @@ impl Watched {
         Self {
             path: path.to_owned(),
             files: noting.files.into_inner(),
+            changing: None,
         }
     }
 
-    /// Whether a file has been written since. One that is gone is about to be written again.
-    pub(super) fn changed(&self) -> bool {
-        self.files.iter().any(|(path, seen)| {
-            let now = written(path);
-            now.is_some() && now != *seen
-        })
+    /// Whether a file has been written since, and none is being written: they are as they were at the last look. Half of a graph
+    /// may be a graph too. A file that is gone is about to be written again.
+    pub(super) fn changed(&mut self) -> bool {
+        let now: Vec<Written> = self.files.iter().map(|(path, _)| written(path)).collect();
+        let mut pairs = now.iter().zip(&self.files);
+        if !pairs.any(|(now, (_, seen))| now.is_some() && now != seen) {
+            self.changing = None;
+            return false;
+        }
+        let is_done = self.changing.as_ref() == Some(&now);
+        self.changing = Some(now);
+        is_done
     }
 }
 
@@ -71,4 +80,25 @@ impl FileReader for Noting {
 fn written(path: &Path) -> Written {
     let facts = std::fs::metadata(path).ok()?;
     Some((facts.modified().ok()?, facts.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_still_being_written_has_not_changed_yet() {
+        let name = format!("athermal-watched-{}.toml", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, "schema = 1\n").unwrap();
+        let mut watched = Watched::of(&path);
+        assert!(!watched.changed());
+        std::fs::write(&path, "schema = 1\nname = \"half").unwrap();
+        assert!(!watched.changed(), "it may be half of it");
+        std::fs::write(&path, "schema = 1\nname = \"half of it\"\n").unwrap();
+        assert!(!watched.changed(), "it was");
+        assert!(watched.changed());
+        std::fs::remove_file(&path).unwrap();
+        assert!(!watched.changed());
+    }
 }

@@ -12,5 +12,6 @@ mod model;
 mod properties;
 mod random_graph;
 mod snapshots;
+mod standing;
 mod threads;
 mod versions;

@@ -26,7 +26,8 @@ use crate::stability::StabilityState;
 ///
 /// The correction stops in the states named by `stop_in` of a `stability` node, and where the predicted rate stays
 /// below `stop.below` until it exceeds `stop.above`. A fresh value of `realigned` other than 0 says that the machine has measured and
-/// removed the drift itself: the correction starts again from 0 at once, which is no motion but a new reference.
+/// removed the drift itself: the correction starts again from 0 at once, which is no motion but a new reference. When the graph is
+/// replaced, the correction goes on from where it stands, whatever predicts the rate then.
 ///
 /// The port `why` says what held it back: 0 nothing, 1 no valid prediction, 2 stable, 3 below the deadband, 4 rate cut,
 /// 5 at the end of the range, 6 slewing. Runs at every tick.
@@ -278,6 +279,7 @@ impl Feature for Compensate {
             max_gap: self.max_gap,
             known: Known {
                 last: None,
+                unit: Some(self.range.unit.clone()),
                 axes: vec![Axis::default(); rate.len()],
             },
         })
@@ -299,6 +301,9 @@ struct Compensating {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
     last: Option<Instant>,
+    /// The unit of the correction; none in a state that was written before it was told.
+    #[serde(default)]
+    unit: Option<Unit>,
     axes: Vec<Axis>,
 }
 
@@ -315,6 +320,21 @@ struct Axis {
 }
 
 impl Axis {
+    /// The same in another unit.
+    fn brought(self, from: Option<&Unit>, to: &Unit) -> Option<Self> {
+        let brought = |value| limit::brought(value, from, to);
+        let rate = match self.rate {
+            Some(rate) => Some(brought(rate)?),
+            None => None,
+        };
+        Some(Self {
+            target: brought(self.target)?,
+            given: brought(self.given)?,
+            rate,
+            stopped: self.stopped,
+        })
+    }
+
     /// Goes on by `dt` seconds to a tick with this rate, and says what held it back.
     fn follow(&mut self, limits: &Limits, rate: f64, dt: f64, stable: bool) -> f64 {
         if rate.is_nan() {
@@ -403,12 +423,26 @@ impl Operator for Compensating {
             Ok(_) => return Restored::cold("the number of axes differs"),
             Err(cold) => return cold,
         };
-        // Limits may be tighter than those under which the state arose; the output then comes back by its slew.
         for (axis, limits) in known.axes.iter_mut().zip(&self.limits) {
+            let brought = self
+                .known
+                .unit
+                .as_ref()
+                .map_or(Some(*axis), |unit| axis.brought(known.unit.as_ref(), unit));
+            let Some(brought) = brought else {
+                return Restored::cold("the correction is of another quantity");
+            };
+            *axis = brought;
+            // Limits may be tighter than those under which the state arose; the output then comes back by its slew.
             axis.target = axis.target.clamp(-limits.range, limits.range);
         }
+        known.unit.clone_from(&self.known.unit);
         self.known = known;
         Restored::Accepted
+    }
+
+    fn outlives_changes(&self) -> bool {
+        true
     }
 }
 

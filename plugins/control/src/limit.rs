@@ -41,6 +41,14 @@ pub(crate) fn per_second(unit: &Unit) -> Unit {
     unit.difference().per(&Unit::second())
 }
 
+/// A value that a state holds in one unit, in another; a state of an older form does not say in which.
+pub(crate) fn brought(value: f64, from: Option<&Unit>, to: &Unit) -> Option<f64> {
+    match from {
+        Some(from) if from != to => from.convert(value, to),
+        _ => Some(value),
+    }
+}
+
 /// A channel of numbered states or reasons beside another channel.
 pub(crate) fn numbered(of: &Channel) -> Channel {
     Channel {

@@ -7,6 +7,7 @@ use athermal_core::node::{
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Instant;
+use athermal_core::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ use crate::limit;
 /// reasons of a `health` node). For up to `after` ticks the last value is kept; then the output goes to its refuge, `hold`, `zero`
 /// or a stated value, by at most `max_slew`, and comes back by the same when trust returns. It always has a value; before the first trusted one it is the
 /// refuge, or 0. The port `why` says: 0 trusted, 1 absent, 2 distrusted, 3 and 4 the same and past `after`, 5 on
-/// the way back. Runs at every tick.
+/// the way back. When the graph is replaced, it goes on from what it put out. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SafeState {
@@ -160,6 +161,7 @@ impl Feature for SafeState {
             limits,
             known: Known {
                 last: None,
+                units: signal.iter().map(|channel| channel.unit.clone()).collect(),
                 channels,
             },
         })
@@ -180,6 +182,9 @@ struct Guarding {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
     last: Option<Instant>,
+    /// The unit of each channel; none in a state that was written before they were told.
+    #[serde(default)]
+    units: Vec<Unit>,
     channels: Vec<Output>,
 }
 
@@ -274,14 +279,24 @@ impl Operator for Guarding {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Known>() {
-            Ok(known) if known.channels.len() == self.known.channels.len() => {
-                self.known = known;
-                Restored::Accepted
-            }
-            Ok(_) => Restored::cold("the number of channels differs"),
-            Err(cold) => cold,
+        let mut known = match state.known::<Known>() {
+            Ok(known) if known.channels.len() == self.known.channels.len() => known,
+            Ok(_) => return Restored::cold("the number of channels differs"),
+            Err(cold) => return cold,
+        };
+        for (i, (channel, unit)) in known.channels.iter_mut().zip(&self.known.units).enumerate() {
+            let Some(given) = limit::brought(channel.given, known.units.get(i), unit) else {
+                return Restored::cold("the signal is of another quantity");
+            };
+            channel.given = given;
         }
+        known.units.clone_from(&self.known.units);
+        self.known = known;
+        Restored::Accepted
+    }
+
+    fn outlives_changes(&self) -> bool {
+        true
     }
 }
 

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// The weighted sum of its inputs: `Σ w_i x_i`, such as the mean of two sensors or what one has more than another.
 ///
-/// It exists while all inputs do; each is held up to its maximum age. Of temperatures in Cel or \[degF\] the weights must add up
-/// to 1, which gives a temperature, or to 0, which gives a difference, in K of Cel and in \[degR\] of \[degF\]; other sums hang
+/// It exists while all inputs do; each is held up to its maximum age. Of temperatures in Cel or `[degF]` the weights must add up
+/// to 1, which gives a temperature, or to 0, which gives a difference, in K of Cel and in `[degR]` of `[degF]`; other sums hang
 /// on where the scale has its zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -35,7 +35,7 @@ pub struct Product {
 /// Each channel times a factor plus an offset: `y = factor · x + offset`.
 ///
 /// Where `unit` measures the same as the input, `x` is first converted to it: a factor of 1 makes micrometres of nanometres. To
-/// and from temperature scales points are converted: 20 Cel are 68 \[degF\] and 293.15 K. A unit that measures something else is
+/// and from temperature scales points are converted: 20 Cel are 68 `[degF]` and 293.15 K. A unit that measures something else is
 /// that of the result, and `x` a plain number in its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -17,7 +17,7 @@ use crate::past::{LookingBack, max_age, max_age_mistake};
 /// one must not have been older than `max_age` at that instant: by default as old as a held value of the channel may be. Without
 /// `over`, what has a span may be older by the signal's `max_age`, since the value before of a slow clock is a whole period old; a
 /// sample may not. A difference of two samples has the noise of both, and that of a `slope` over the same time is smaller; over
-/// one sample it is the differencing of Box and Jenkins (1976). Differences of temperatures in Cel or K are in K, of those in \[degF\] in \[degR\].
+/// one sample it is the differencing of Box and Jenkins (1976). Differences of temperatures in Cel or K are in K, of those in `[degF]` in `[degR]`.
 ///
 /// Two differences share a sample where one ends as the other begins, so that a value summarises `over` and `max_age`: where it
 /// is a truth, the embargo goes by that.

@@ -21,7 +21,7 @@ use crate::windows::{Cold, Windows, half, over, three, window_mistakes};
 /// Over the samples with time in `(t − T, t]`, each counted once however far apart they lie: `mean` (the default port),
 /// `std` (standard deviation by n − 1), `min`, `max`, `range` (largest less smallest), `median` and `count`. So
 /// `inputs.features = ["calm", "calm:range"]` reads the means and ranges of a node `calm`. Of temperatures `std` and `range` are in
-/// the unit of their differences: K of Cel and K, \[degR\] of \[degF\]. Sums are never subtracted from, so that a spike leaves
+/// the unit of their differences: K of Cel and K, `[degR]` of `[degF]`. Sums are never subtracted from, so that a spike leaves
 /// no trace once it has left the window (Chan, Golub and LeVeque 1983).
 ///
 /// A value exists, as that of a `slope` does, once the window reaches back no further than the channel's first value, holds

@@ -149,6 +149,17 @@ pub enum FileError {
         /// The newest time before it.
         previous: String,
     },
+    /// Rows one after the other, none of them after the one before them; told only while the recording is read.
+    TimeStaysBehind {
+        /// The newest of them.
+        place: Place,
+        /// Its time, as the file gives it.
+        time: String,
+        /// How many they are.
+        rows: u64,
+        /// The newest time before them.
+        previous: String,
+    },
     /// A row with more or fewer cells than the header.
     CellCount {
         /// The row.
@@ -297,6 +308,16 @@ impl fmt::Display for FileError {
             } => write!(
                 f,
                 "{place}: the time `{time}` is not after `{previous}`; the row was left out"
+            ),
+            Self::TimeStaysBehind {
+                place,
+                time,
+                rows,
+                previous,
+            } => write!(
+                f,
+                "{place}: the last {rows} rows were all left out, up to the time `{time}`, since `{previous}` came before them: has the \
+                 clock been set back, or was that time wrong? Rows are taken again once they are after it"
             ),
             Self::CellCount {
                 place,

@@ -43,17 +43,22 @@ impl TimeForm {
     }
 }
 
-/// Whether a date and time says how far it is from UTC.
+/// Whether a date and time says how far it is from UTC. The name of a region in brackets does not: twice a year it says two things.
 #[must_use]
 pub fn has_zone(text: &[u8]) -> bool {
-    let mut behind_date = text.iter().skip(DATE_LENGTH);
-    behind_date.any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'))
+    let behind_date = text.iter().skip(DATE_LENGTH);
+    let mut clock = behind_date.take_while(|b| **b != b'[');
+    clock.any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'))
 }
 
 fn timestamp(text: &[u8]) -> Option<Timestamp> {
     static PARSER: DateTimeParser = DateTimeParser::new();
     if has_zone(text) {
         return PARSER.parse_timestamp(text).ok();
+    }
+    if text.contains(&b'[') {
+        // The parser passes over the name, and the time is not the one of UTC.
+        return None;
     }
     let civil = PARSER.parse_datetime(text).ok()?;
     Offset::UTC.to_timestamp(civil).ok()
@@ -89,6 +94,14 @@ mod tests {
             TimeForm::Rfc3339.read(b"2013-07-04 00:00:00-02:00"),
             Some(DAY + two_hours)
         );
+    }
+
+    #[test]
+    fn a_region_without_an_offset_is_no_instant_and_is_not_taken_for_utc() {
+        let read = |text: &str| TimeForm::Rfc3339.read(text.as_bytes());
+        assert_eq!(read("2013-07-04T00:00:00[Europe/Berlin]"), None);
+        assert_eq!(read("2013-07-04T00:00:00[America/Port-au-Prince]"), None);
+        assert_eq!(read("2013-07-04T02:00:00+02:00[Europe/Berlin]"), Some(DAY));
     }
 
     #[test]

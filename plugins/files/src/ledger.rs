@@ -56,12 +56,20 @@ fn other_mark(known: &mut Mark, number: &[u8], line: impl FnOnce() -> u64) -> Ma
 /// Who is told at once of what is met for the first time.
 pub(crate) type Tell = Box<dyn FnMut(&FileError) + Send>;
 
+/// Whether so many rows, one after the other, that are not after the one before are worth another word: nothing comes of the data
+/// while it goes on. That is at 10, 100 and so on.
+fn stays_behind(rows: u64) -> bool {
+    rows >= 10 && 10_u64.pow(rows.ilog10()) == rows
+}
+
 /// The account that a reader keeps.
 pub(crate) struct Ledger {
     pub report: Report,
     pub tell: Option<Tell>,
     lenient: bool,
     last_ns: Option<i64>,
+    /// How many rows one after the other were not after it.
+    behind: u64,
     /// The time cell of the row at that instant.
     last_time: Vec<u8>,
     /// The decimal mark of the first time that has one, with its line.
@@ -77,6 +85,7 @@ impl Ledger {
             tell: None,
             lenient,
             last_ns: None,
+            behind: 0,
             last_time: Vec::new(),
             time_mark: None,
             value_mark: None,
@@ -87,6 +96,19 @@ impl Ledger {
     pub fn accepts(&mut self, time_ns: i64, cell: &[u8], place: impl FnOnce() -> Place) -> bool {
         match self.last_ns {
             Some(previous_ns) if time_ns <= previous_ns => {
+                self.behind += 1;
+                if let Some(tell) = &mut self.tell
+                    && stays_behind(self.behind)
+                {
+                    tell(&FileError::TimeStaysBehind {
+                        place: place(),
+                        time: excerpt(cell),
+                        rows: self.behind,
+                        previous: excerpt(&self.last_time),
+                    });
+                    self.report.refused_time.count += 1;
+                    return false;
+                }
                 let error = || FileError::TimeNotAfter {
                     place: place(),
                     time: excerpt(cell),
@@ -97,6 +119,7 @@ impl Ledger {
             }
             _ => {
                 self.last_ns = Some(time_ns);
+                self.behind = 0;
                 self.last_time.clear();
                 self.last_time.extend_from_slice(cell);
                 self.report.rows += 1;
@@ -149,5 +172,47 @@ impl Ledger {
         }
         self.report.refused_rows.add(error, &mut self.tell);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use crate::{Layout, Options, Reader, Row, TimeForm};
+
+    #[test]
+    fn a_clock_that_was_set_back_is_told_again_and_again_while_nothing_comes_of_the_rows() {
+        let rows = |from: u32, to: u32| (from..to).map(|t| format!("{t},1\n"));
+        let text: String = std::iter::once("t,a\n0,1\n0,1\n5000,1\n".to_owned())
+            .chain(rows(1, 151))
+            .chain(rows(5001, 5003))
+            .collect();
+        let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
+        let text = std::io::Cursor::new(text.into_bytes());
+        let mut reader = Reader::from_read("pipe", text, layout, Options::default()).unwrap();
+        let told = Arc::new(Mutex::new(Vec::new()));
+        reader.tell_first({
+            let told = Arc::clone(&told);
+            move |error| told.lock().unwrap().push(error.to_string())
+        });
+        let mut row = Row::default();
+        while reader.next_into(&mut row).unwrap() {}
+        let behind = |line: u32, rows: u32| {
+            format!(
+                "pipe:{line}: the last {rows} rows were all left out, up to the time `{rows}`, since `5000` came before them: has the \
+                 clock been set back, or was that time wrong? Rows are taken again once they are after it"
+            )
+        };
+        assert_eq!(
+            *told.lock().unwrap(),
+            [
+                "pipe:3: the time `0` is not after `0`; the row was left out".to_owned(),
+                behind(14, 10),
+                behind(104, 100),
+            ]
+        );
+        assert_eq!(reader.report().refused_time.count, 151);
+        assert_eq!(reader.report().rows, 4);
     }
 }

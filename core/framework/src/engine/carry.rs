@@ -98,11 +98,11 @@ impl Heritage {
             .iter()
             .map(|instance| !same_fit(old.fitted(), new.fitted(), instance))
             .collect();
-        let own: Vec<Option<Own>> = instances
-            .iter()
-            .zip(&refitted)
-            .map(|(instance, refitted)| {
+        let before = Before::of(was);
+        let own: Vec<Option<Own>> = (plan.nodes.iter().zip(&instances).zip(&refitted))
+            .map(|((node, instance), refitted)| {
                 Own::of(changes.get(instance.as_str()).copied())
+                    .or_else(|| before.other_units(plan, node).then_some(Own::Unit))
                     .or_else(|| refitted.then_some(Own::Fit))
             })
             .collect();
@@ -128,9 +128,14 @@ impl Heritage {
                 }
                 (None, None) => unreachable!("a node is touched by itself or by what it reads"),
             };
-            let retuned = own[index] == Some(Own::Parameters) && read.is_none();
+            let retuned = matches!(own[index], Some(Own::Parameters | Own::Unit)) && read.is_none();
+            let stands = new.nodes[index].outlives_changes()
+                && !matches!(own[index], Some(Own::New | Own::Type))
+                && before.same_channels(plan, node);
             // A new fit replaces what was learned, also where it was made for other parameters.
-            if (retuned && (learned || !refitted[index])) || (learned && !but_for_fits.nodes[index])
+            if (retuned && (learned || !refitted[index]))
+                || (learned && !but_for_fits.nodes[index])
+                || stands
             {
                 Begin::Offered { reason }
             } else {
@@ -152,6 +157,47 @@ impl Heritage {
     }
 }
 
+/// The channels of an old plan, by what a new one calls them.
+struct Before<'a> {
+    plan: &'a Plan,
+    slots: HashMap<&'a str, usize>,
+}
+
+impl<'a> Before<'a> {
+    fn of(plan: &'a Plan) -> Self {
+        let named = plan.channels.iter().enumerate();
+        let slots = named.map(|(slot, channel)| (channel.name.as_str(), slot));
+        Self {
+            plan,
+            slots: slots.collect(),
+        }
+    }
+
+    /// Whether a node gives a channel in another unit than before, be it for a quantity that is the same.
+    fn other_units(&self, plan: &Plan, node: &PlannedNode) -> bool {
+        let mut channels = plan.channels[node.slots.clone()].iter();
+        channels.any(|now| {
+            let slot = self.slots.get(now.name.as_str());
+            slot.is_some_and(|&slot| self.plan.channels[slot].channel.unit != now.channel.unit)
+        })
+    }
+
+    /// Whether what a node gives first are the channels that it gave, in the same order. One is that one, whatever its name.
+    fn same_channels(&self, plan: &Plan, node: &PlannedNode) -> bool {
+        let instance = node.instance();
+        let mut nodes = self.plan.nodes.iter();
+        let Some(was) = nodes.find(|was| was.instance() == instance) else {
+            return false;
+        };
+        let first =
+            |node: &PlannedNode| node.ports.first().map_or(0..0, |(_, slots)| slots.clone());
+        let was = &self.plan.channels[first(was)];
+        let now = &plan.channels[first(node)];
+        let mut pairs = was.iter().zip(now);
+        was.len() == now.len() && (now.len() == 1 || pairs.all(|(was, now)| was.name == now.name))
+    }
+}
+
 /// What changed about a node itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Own {
@@ -159,6 +205,7 @@ enum Own {
     Type,
     Inputs,
     Parameters,
+    Unit,
     Fit,
 }
 
@@ -188,6 +235,7 @@ impl Own {
             Self::Type => "its type changed",
             Self::Inputs => "its inputs changed",
             Self::Parameters => "its parameters changed",
+            Self::Unit => "the unit of its outputs changed",
             Self::Fit => "it was fitted anew",
         }
     }

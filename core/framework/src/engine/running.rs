@@ -40,6 +40,11 @@ impl Running {
         }
     }
 
+    /// Whether what it knows stays true whatever becomes of what it reads.
+    pub(super) fn outlives_changes(&self) -> bool {
+        matches!(self, Self::Operator { operator, .. } if operator.outlives_changes())
+    }
+
     /// The slot of the truth that it is told after all outputs.
     pub(super) fn truth(&self) -> Option<usize> {
         match self {

@@ -147,6 +147,12 @@ pub trait Operator: Send {
     fn restore(&mut self, _state: Box<dyn State>) -> Restored {
         Restored::cold("the node keeps no state")
     }
+
+    /// Whether what it knows stays true when what it reads has changed, such as where an axis stands. Where a graph is replaced
+    /// the state is then offered also under other inputs or a new fit further up, and in a unit that may have changed.
+    fn outlives_changes(&self) -> bool {
+        false
+    }
 }
 
 /// What an operator sees of the present tick.

@@ -76,7 +76,8 @@ impl Rule {
                  and sizes as `Quantity`, so that the unit stands in the graph file"
             }
             Self::Answers => {
-                "give the case parameters and inputs with which the node has something to say (`Case::input`, `Case::between`)"
+                "give the case what a graph file needs too, such as `ahead = \"5min\"` in `Case::new`, and inputs with which the node has \
+                 something to say (`Case::input`, `Case::between`)"
             }
             Self::ReadsBack => {
                 "let `Serialize` and `Deserialize` of the parameters be each other's inverse, defaults included"
