@@ -77,16 +77,10 @@ impl Options {
             let at = When::read(time, &running.plan.time)?;
             let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
             let model = load(Path::new(path), known)?;
-            if model.plan.time != running.plan.time {
-                let refused = StageError::OtherTime {
-                    running: running.plan.time.clone(),
-                    new: model.plan.time.clone(),
-                };
-                return Err(Failure::Request(format!("{path}: {refused}")));
-            }
             let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
-            if let Some(other) = known.filter_map(|known| other_unit(known, &model)).next() {
-                return Err(Failure::Request(format!("{path}: {other}")));
+            let refused = |known: &Model| StageError::between(&known.plan, &model.plan);
+            if let Some(refused) = known.filter_map(refused).next() {
+                return Err(Failure::Request(format!("{path}: {refused}")));
             }
             swaps.push(Swap {
                 at,
@@ -128,23 +122,6 @@ fn load<'a>(path: &Path, known: impl Iterator<Item = &'a Model>) -> Result<Model
         return Err(error.into());
     }
     Ok(model)
-}
-
-/// What a new graph gives in another unit than the one whose columns it would fill: whoever reads a column goes by one.
-fn other_unit(running: &Model, new: &Model) -> Option<String> {
-    let unit = |model: &Model, slot: usize| model.plan.channels[slot].channel.unit.clone();
-    let before = |name: &str| {
-        let mut outputs = running.plan.outputs.iter();
-        let output = outputs.find(|output| output.name == name)?;
-        Some(unit(running, output.slot))
-    };
-    new.plan.outputs.iter().find_map(|output| {
-        let (was, is) = (before(&output.name)?, unit(new, output.slot));
-        (was != is).then(|| {
-            let name = &output.name;
-            format!("it gives the output `{name}` in {is}, and the column is in {was}: give it in that, or another name")
-        })
-    })
 }
 
 impl When {
@@ -291,11 +268,6 @@ impl<'a> Course<'a> {
                 "{} has the output `{}`, for which there is no column; what runs goes on",
                 path.display(),
                 new.name
-            ));
-        } else if let Some(other) = other_unit(&self.running, &model) {
-            self.terminal.warning(format_args!(
-                "{}: {other}; what runs goes on",
-                path.display()
             ));
         } else if let Err(failure) = self.stage(control, model, path) {
             self.terminal.error(&failure);

@@ -107,10 +107,28 @@ fn a_correction_goes_on_from_where_it_stands_when_it_follows_another_rate() {
 
 #[test]
 fn a_correction_that_is_told_in_another_unit_stands_where_it_stood() {
-    let (before, after, told) = swapped(&model(&GRAPH.replace("50 um", "50000 nm"), "0"));
+    let other = GRAPH
+        .replace("50 um", "50000 nm")
+        .replace("correction = ", "correction_nm = ")
+        .replace("safe = ", "safe_nm = ");
+    let (before, after, told) = swapped(&model(&other, "0"));
     for (before, after) in before.iter().zip(&after) {
         assert!((after - before).abs() <= 500.0, "{before} to {after} nm");
     }
     let reason = "the unit of its outputs changed".to_owned();
     assert_eq!(told, Carry::Adopted { reason });
+}
+
+#[test]
+fn an_output_does_not_change_its_unit_under_its_name() {
+    let options = LiveOptions::default();
+    let (_, mut control) = pair(&model(GRAPH, "0"), options).unwrap();
+    let other = model(&GRAPH.replace("50 um", "50000 nm"), "0");
+    let refused = control.stage(&other, false).unwrap_err();
+    assert!(
+        refused.to_string().contains(
+            "the output `correction.Z` in nm and what runs in um: give it in that, or another name"
+        ),
+        "{refused}"
+    );
 }

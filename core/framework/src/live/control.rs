@@ -9,10 +9,9 @@ use super::handover::{Feed, Happening, Mark, Seated};
 use super::retained::Retained;
 use super::shadow::{Shadow, Verdict};
 use super::staged::{Staged, cold};
-use super::{LiveOptions, Stepper};
+use super::{LiveOptions, StageError, Stepper};
 use crate::compile::Plan;
-use crate::document::TimeBase;
-use crate::engine::{Engine, EngineError, Heritage, NodeCarry, RestoreError};
+use crate::engine::{Engine, Heritage, NodeCarry};
 use crate::model::Model;
 use crate::time::{Duration, Instant};
 
@@ -94,68 +93,6 @@ pub enum Notice {
     },
 }
 
-/// Why a graph cannot take over.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum StageError {
-    /// It reads channels that no samples are given for.
-    MissingChannels {
-        /// The channels.
-        channels: Vec<String>,
-    },
-    /// It reads time in another way.
-    OtherTime {
-        /// How what runs does.
-        running: TimeBase,
-        /// How the new graph does.
-        new: TimeBase,
-    },
-    /// What was fitted does not belong to it.
-    Engine(EngineError),
-    /// Nothing is staged.
-    NothingStaged,
-    /// There is no graph before, or it is no longer warm.
-    NothingToTakeBack,
-    /// Ticks were missed, so that what runs is not known here.
-    NotMirrored,
-    /// A node does not take its own state back, so that the graph cannot be copied to the engine thread.
-    NotCopied(RestoreError),
-    /// Another graph has been committed and not yet taken over.
-    Busy,
-}
-
-impl fmt::Display for StageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::MissingChannels { channels } => write!(
-                f,
-                "the new graph reads {}, for which no samples are given: name all graphs at the start, or add the channels",
-                channels.join(", ")
-            ),
-            Self::OtherTime { running, new } => write!(
-                f,
-                "the new graph reads time from {new} and what runs from {running}: let both have the same [time]"
-            ),
-            Self::Engine(error) => write!(f, "{error}"),
-            Self::NothingStaged => write!(f, "no graph is staged: stage one first"),
-            Self::NothingToTakeBack => write!(
-                f,
-                "there is no graph to go back to: none was replaced, or too long ago"
-            ),
-            Self::NotMirrored => write!(
-                f,
-                "ticks were missed, so that there is nothing to compare with: commit without a comparison"
-            ),
-            Self::NotCopied(error) => write!(f, "the new graph cannot be handed over: {error}"),
-            Self::Busy => write!(
-                f,
-                "a committed graph has not been taken over yet: wait for the next tick"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for StageError {}
-
 /// The two ends of an engine of which there is a replica.
 pub(super) fn pair(engine: Engine, replica: Engine, options: LiveOptions) -> (Stepper, Control) {
     let running = Arc::clone(engine.plan());
@@ -224,12 +161,7 @@ impl Control {
         if self.committed.is_some() {
             return Err(StageError::Busy);
         }
-        if model.plan.time != self.running.time {
-            return Err(StageError::OtherTime {
-                running: self.running.time.clone(),
-                new: model.plan.time.clone(),
-            });
-        }
+        StageError::between(&self.running, &model.plan).map_or(Ok(()), Err)?;
         let engine =
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;
         let mut seated = Seated::new(engine, &self.feed, 0)

@@ -22,16 +22,18 @@ mod run;
 mod shadow;
 mod sink;
 mod source;
+mod stage_error;
 mod staged;
 mod stepper;
 
-pub use control::{Control, Notice, StageError};
+pub use control::{Control, Notice};
 pub use handover::Feed;
 pub use refit::Refit;
 pub use run::{RunError, run, run_keeping};
 pub use shadow::{Compared, Shadow, Verdict};
 pub use sink::{Frame, Sink, SinkError};
 pub use source::{Samples, Source, SourceError};
+pub use stage_error::StageError;
 pub use staged::Staged;
 pub use stepper::{Stepped, Stepper};
 
