@@ -371,7 +371,7 @@ fn its_fit_stands_in_the_model_and_comes_back_to_the_last_bit() {
 fn a_model_of_a_node_type_that_this_program_lacks_is_told_by_the_name_of_the_type() {
     let mut model = model("lacking");
     model.fitted = fitted(&model.plan).0;
-    let text = model.to_text().unwrap().replace("test_along", "test_gone");
+    let text = model.to_text().unwrap().replace("test_along", "bellows");
     let told = match Model::from_text("model.json", text) {
         Err(athermal::core::model::ModelError::Graph {
             diagnostics,
@@ -379,7 +379,13 @@ fn a_model_of_a_node_type_that_this_program_lacks_is_told_by_the_name_of_the_typ
         }) => diagnostics.render(&sources, false, 200),
         other => panic!("{other:?}"),
     };
-    assert!(told.contains("there is no node type `test_gone`"), "{told}");
+    assert!(told.contains("there is no node type `bellows`"), "{told}");
+    assert!(
+        told.contains(
+            "`athermal build --with CRATE` makes one that has those of a plugin crate too"
+        ),
+        "{told}"
+    );
 }
 
 #[test]

@@ -330,7 +330,13 @@ impl Problem for CompileProblem {
 
     fn help(&self) -> Option<String> {
         Some(match self {
-            Self::UnknownKind { kind, known } => or_known(kind, known, "types in this program:"),
+            Self::UnknownKind { kind, known } => match nearest(kind, known.iter().map(AsRef::as_ref)) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!(
+                    "types in this program: {}; `athermal build --with CRATE` makes one that has those of a plugin crate too",
+                    names(known)
+                ),
+            },
             Self::KindTwice { .. } => {
                 "leave one of the crates out when the program is built".to_owned()
             }
