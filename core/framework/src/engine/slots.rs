@@ -77,14 +77,14 @@ impl Slots {
     pub(crate) fn given_together(&self, range: Range<usize>) -> Option<Given> {
         let first = *self.given.get(range.start)?;
         // Loops without a way out take several values at once.
-        let mut apart = [0; 2];
+        let (mut apart, mut late) = (0, 0);
         for given in &self.given[range.clone()] {
-            apart[0] |= (given.stamp.as_ns() ^ first.stamp.as_ns()) as u64;
-            apart[1] |= given.tick ^ first.tick;
+            apart |= given.stamp.as_ns() ^ first.stamp.as_ns();
+            late |= given.tick ^ first.tick;
         }
         let lacks = self.values[range].iter();
         let lacks = lacks.fold(0, |lacks, value| lacks | u64::from(value.is_nan()));
-        (apart == [0; 2] && lacks == 0).then_some(first)
+        (late == 0 && apart == 0 && lacks == 0).then_some(first)
     }
 
     /// Nothing is held over into another segment.
