@@ -12,12 +12,13 @@ pub(super) struct Outlets {
     slots: Box<[usize]>,
     /// What the last tick gave.
     values: Box<[f64]>,
-    /// What the graph itself gave last, and when; nothing since it took over at [`Instant::MIN`].
+    /// What those that step over at once were last, and when; of the others, and before a graph has given anything of its own, at
+    /// [`Instant::MIN`].
     last: Box<[f64]>,
     at: Box<[Instant]>,
     /// Those that do not step over at once, and how fast they pass over, in their units per second.
     passing: Box<[(usize, f64)]>,
-    /// How each passes over. Of one that steps over at once, as it was before its last value.
+    /// How each passes over, unless it has stepped over.
     blendings: Box<[Blending]>,
 }
 
@@ -57,6 +58,7 @@ impl Outlets {
             }
         }
         for &(index, rate) in &self.passing {
+            self.at[index] = Instant::MIN;
             let value = &mut self.values[index];
             if !value.is_nan() {
                 *value = self.blendings[index].pass(now, *value, rate);
@@ -66,8 +68,7 @@ impl Outlets {
 
     /// How an output passes over, and what it was last.
     pub(super) fn blending(&self, index: usize) -> Blending {
-        let passes = self.passing.iter().any(|&(passing, _)| passing == index);
-        if passes || self.at[index] == Instant::MIN {
+        if self.at[index] == Instant::MIN {
             self.blendings[index]
         } else {
             Blending::at_once(self.at[index], self.last[index])
