@@ -321,7 +321,7 @@ struct Axis {
 
 impl Axis {
     /// The same in another unit.
-    fn brought(self, from: Option<&Unit>, to: &Unit) -> Option<Self> {
+    fn brought(self, from: Option<&Unit>, to: Option<&Unit>) -> Option<Self> {
         let brought = |value| limit::brought(value, from, to);
         let rate = match self.rate {
             Some(rate) => Some(brought(rate)?),
@@ -424,12 +424,7 @@ impl Operator for Compensating {
             Err(cold) => return cold,
         };
         for (axis, limits) in known.axes.iter_mut().zip(&self.limits) {
-            let brought = self
-                .known
-                .unit
-                .as_ref()
-                .map_or(Some(*axis), |unit| axis.brought(known.unit.as_ref(), unit));
-            let Some(brought) = brought else {
+            let Some(brought) = axis.brought(known.unit.as_ref(), self.known.unit.as_ref()) else {
                 return Restored::cold("the correction is of another quantity");
             };
             *axis = brought;

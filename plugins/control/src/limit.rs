@@ -42,9 +42,9 @@ pub(crate) fn per_second(unit: &Unit) -> Unit {
 }
 
 /// A value that a state holds in one unit, in another; a state of an older form does not say in which.
-pub(crate) fn brought(value: f64, from: Option<&Unit>, to: &Unit) -> Option<f64> {
-    match from {
-        Some(from) if from != to => from.convert(value, to),
+pub(crate) fn brought(value: f64, from: Option<&Unit>, to: Option<&Unit>) -> Option<f64> {
+    match (from, to) {
+        (Some(from), Some(to)) if from != to => from.convert(value, to),
         _ => Some(value),
     }
 }

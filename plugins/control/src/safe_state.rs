@@ -285,7 +285,7 @@ impl Operator for Guarding {
             Err(cold) => return cold,
         };
         for (i, (channel, unit)) in known.channels.iter_mut().zip(&self.known.units).enumerate() {
-            let Some(given) = limit::brought(channel.given, known.units.get(i), unit) else {
+            let Some(given) = limit::brought(channel.given, known.units.get(i), Some(unit)) else {
                 return Restored::cold("the signal is of another quantity");
             };
             channel.given = given;

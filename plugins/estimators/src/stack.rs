@@ -86,13 +86,7 @@ impl Trainer for Stacking {
         }
         let total = self.blocks.total();
         let sums = Sums::of(&total);
-        let products = (0..voters).flat_map(|i| (0..voters).map(move |j| (i, j)));
-        let saved = Saved {
-            regressors: self.names,
-            products: products.map(|(i, j)| sums.product(i, j)).collect(),
-            with_truth: (0..voters).map(|i| sums.with_truth(i)).collect(),
-            adds_to_one: sums.of_errors,
-        };
+        let saved = sums.saved(self.names);
         let stacked = Stacked::try_from(saved).map_err(|error| TrainingError::Unsolvable {
             reason: error.to_string(),
         })?;
@@ -122,86 +116,71 @@ impl Trainer for Stacking {
     }
 }
 
-/// Sums over the rows, from which weights follow.
+/// Sums over the rows of products of votes and the truth; or, where they are `of_errors`, of the votes' errors, whose truth is 0.
 struct Sums {
-    /// Of products of votes and, last, the truth; or, where it is `of_errors`, of their distances from the mean truth.
-    /// Row by row, symmetric.
-    moments: Vec<f64>,
-    voters: usize,
+    /// Of two votes, row by row.
+    products: Vec<f64>,
+    /// Of each with the truth.
+    with_truth: Vec<f64>,
+    /// Of the truth with itself.
+    of_truth: f64,
     of_errors: bool,
 }
 
 impl Sums {
     fn of(rows: &Gram) -> Self {
-        let voters = rows.width();
-        let about = |centre: f64| -> Vec<f64> {
-            let moments = rows.moments_about(&vec![centre; voters + 1]);
-            let row = |i: usize| (0..=voters).map(move |j| (i, j));
-            (0..=voters).flat_map(row).map(|at| moments[at]).collect()
+        let y = rows.width();
+        let about = |centre: f64| rows.moments_about(&vec![centre; y + 1]);
+        let (plain, apart) = (about(0.0), about(rows.means()[y]));
+        let pairs = (0..y).flat_map(|i| (0..y).map(move |j| (i, j)));
+        if plain[(y, y)] <= FAR * apart[(y, y)] {
+            return Self {
+                products: pairs.map(|at| plain[at]).collect(),
+                with_truth: (0..y).map(|i| plain[(i, y)]).collect(),
+                of_truth: plain[(y, y)],
+                of_errors: false,
+            };
+        }
+        let of_errors = |(i, j): (usize, usize)| {
+            (apart[(i, j)] - apart[(i, y)]) - (apart[(y, j)] - apart[(y, y)])
         };
-        let (plain, apart) = (about(0.0), about(rows.means()[voters]));
-        let squares = |moments: &[f64]| moments[moments.len() - 1];
-        let of_errors = squares(&plain) > FAR * squares(&apart);
         Self {
-            moments: if of_errors { apart } else { plain },
-            voters,
-            of_errors,
+            products: pairs.map(of_errors).collect(),
+            with_truth: vec![0.0; y],
+            of_truth: 0.0,
+            of_errors: true,
         }
     }
 
-    fn at(&self, i: usize, j: usize) -> f64 {
-        self.moments[i * (self.voters + 1) + j]
-    }
-
-    /// The sum of the products of two votes, or of their errors.
-    fn product(&self, i: usize, j: usize) -> f64 {
-        if !self.of_errors {
-            return self.at(i, j);
-        }
-        let least = (0..self.voters)
-            .map(|i| self.error(i, i))
-            .fold(0.0, f64::max)
-            * LEAST_ERROR;
-        let least = if least > 0.0 { least } else { 1.0 };
-        self.error(i, j) + if i == j { least } else { 0.0 }
-    }
-
-    /// The sum of the products of the errors of two voters.
-    fn error(&self, i: usize, j: usize) -> f64 {
-        let y = self.voters;
-        (self.at(i, j) - self.at(i, y)) - (self.at(y, j) - self.at(y, y))
-    }
-
-    /// The sum of the products of a vote with the truth. Of errors, 1: the weights that add up to one and leave the least squares
-    /// are those of this right side, scaled.
-    fn with_truth(&self, i: usize) -> f64 {
+    /// What weights follow from.
+    fn saved(&self, regressors: Vec<String>) -> Saved {
+        let voters = regressors.len();
+        let (mut products, mut with_truth) = (self.products.clone(), self.with_truth.clone());
         if self.of_errors {
-            1.0
-        } else {
-            self.at(i, self.voters)
+            let own = products.iter().step_by(voters + 1).copied();
+            let most = own.fold(0.0, f64::max);
+            let least = if most > 0.0 { LEAST_ERROR * most } else { 1.0 };
+            let own = products.iter_mut().step_by(voters + 1);
+            own.for_each(|own| *own += least);
+            // The weights that add up to one and leave the least squares are those of this right side, scaled.
+            with_truth.fill(1.0);
+        }
+        Saved {
+            regressors,
+            products,
+            with_truth,
+            adds_to_one: self.of_errors,
         }
     }
 
     /// The sum of squares that weights leave.
     fn left(&self, weights: &[f64]) -> f64 {
-        let y = self.voters;
-        let mixed = |i: usize| -> f64 {
-            let product = |j: usize| {
-                if self.of_errors {
-                    self.error(i, j)
-                } else {
-                    self.at(i, j)
-                }
-            };
-            (0..y).map(|j| weights[j] * product(j)).sum()
-        };
-        let squares: f64 = if self.of_errors {
-            (0..y).map(|i| weights[i] * mixed(i)).sum()
-        } else {
-            let explained = |i: usize| weights[i] * (2.0 * self.at(i, y) - mixed(i));
-            self.at(y, y) - (0..y).map(explained).sum::<f64>()
-        };
-        squares.max(0.0)
+        let explained = self.products.chunks(weights.len()).enumerate();
+        let explained = explained.map(|(i, products)| {
+            let mixed: f64 = weights.iter().zip(products).map(|(w, p)| w * p).sum();
+            weights[i] * (2.0 * self.with_truth[i] - mixed)
+        });
+        (self.of_truth - explained.sum::<f64>()).max(0.0)
     }
 }
 

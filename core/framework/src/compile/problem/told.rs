@@ -330,13 +330,10 @@ impl Problem for CompileProblem {
 
     fn help(&self) -> Option<String> {
         Some(match self {
-            Self::UnknownKind { kind, known } => match nearest(kind, known.iter().map(AsRef::as_ref)) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => format!(
-                    "types in this program: {}; `athermal build --with CRATE` makes one that has those of a plugin crate too",
-                    names(known)
-                ),
-            },
+            Self::UnknownKind { kind, known } => {
+                let what = "`athermal build --with CRATE` brings those of a plugin crate; types in this program:";
+                or_known(kind, known, what)
+            }
             Self::KindTwice { .. } => {
                 "leave one of the crates out when the program is built".to_owned()
             }
