@@ -5,13 +5,15 @@
 //! blocks after it and the current one: three sums (`kernel/sums.rs`) that are kept for all windows at once, added up for each
 //! (`kernel/parts.rs`). Nothing is ever subtracted from a sum, so that a sample of 1e9 leaves no trace when it leaves a window.
 //! Times are measured from an instant within the window and values from one near them, so that no precision is lost to the
-//! epoch or an offset.
+//! epoch or an offset. What is done with every row is compiled for the vectors of several processors (`kernel/vectors.rs`).
 
 mod blocks;
 mod parts;
 mod rows;
 mod saved;
 mod sums;
+mod told;
+mod vectors;
 
 #[cfg(test)]
 mod tests;
@@ -25,6 +27,7 @@ use blocks::Blocks;
 use parts::{ABREAST, Least, Line, Parts, Weights};
 use rows::Rows;
 use sums::{LANES, Lanes, Values};
+use vectors::Vectors;
 
 /// Samples of this size or above count as absent, like infinities: their squares would overflow.
 pub(crate) const LIMIT: f64 = 1e100;
@@ -78,6 +81,7 @@ pub struct RollingSlope {
     longest_needed_open: i64,
     /// By window: the results of the channels of a group.
     results: Vec<Lanes>,
+    vectors: Vectors,
 }
 
 /// One trailing window over the rows.
@@ -218,6 +222,7 @@ impl RollingSlope {
             weights: vec![Weights::NONE; windows.len().div_ceil(ABREAST)],
             longest_needed_open: windows.iter().map(|w| w.needed_open).max().unwrap_or(0),
             results: vec![[0.0; LANES]; windows.len()],
+            vectors: Vectors::new(),
             windows,
         }
     }
@@ -251,6 +256,11 @@ impl RollingSlope {
     /// Adds a row: one sample per channel at time `t_ns`, NaN where absent (missing ones at the end are absent too).
     /// A time that is not later than the last one is refused: the answer is false and nothing has changed.
     pub fn push(&mut self, t_ns: i64, y: &[f64]) -> bool {
+        self.vectors.push(self, t_ns, y)
+    }
+
+    #[inline(always)]
+    fn push_here(&mut self, t_ns: i64, y: &[f64]) -> bool {
         match self.last_time() {
             Some(last) if t_ns <= last => return false,
             Some(_) => {}
@@ -278,6 +288,7 @@ impl RollingSlope {
     }
 
     /// Closes the current block and forgets those that no window needs any more when the next row, at `t_ns`, has come.
+    #[inline(always)]
     fn close_block(&mut self, t_ns: i64) {
         self.blocks.cut(&self.rows);
         let mut oldest_block = self.blocks.starts().len() - 1;
@@ -294,6 +305,7 @@ impl RollingSlope {
     }
 
     /// Lets the windows end with the last row, which is at `t_ns`, and finds their parts and weights.
+    #[inline(always)]
     fn advance(&mut self, t_ns: i64) {
         let (rows, blocks) = (&self.rows, &mut self.blocks);
         let current = blocks.current_start();
@@ -329,6 +341,7 @@ impl RollingSlope {
     }
 
     /// Finds the weights of all windows, whose parts are known.
+    #[inline(always)]
     fn weigh(&mut self) {
         let (windows, blocks) = (&self.windows, &self.blocks);
         for weights in &mut self.weights {
@@ -361,29 +374,36 @@ impl RollingSlope {
     /// Slopes at the last row, per second: `out[channel * W + window]`, with one of the two NaNs where there is no value.
     /// An `out` of any other length than `C * W` is filled with absence.
     pub fn slopes(&mut self, out: &mut [f64]) {
-        self.give(out, Self::slopes_of);
+        self.vectors.slopes(self, out);
     }
 
-    /// Gives what `of` finds in each window at the last row for each group of channels.
     #[inline(always)]
-    fn give(&mut self, out: &mut [f64], of: impl Fn(&Self, usize, &mut [Lanes])) {
-        let wide = self.windows.len();
-        let fits = out.len() == self.channels * wide;
-        let Some(t_ns) = self.last_time().filter(|_| fits) else {
-            out.fill(self.no_value.absent);
+    fn slopes_here(&mut self, out: &mut [f64]) {
+        let Some(mut results) = self.room(out) else {
             return;
         };
-        let mut results = std::mem::take(&mut self.results);
-        for (group, out) in out.chunks_mut((LANES * wide).max(1)).enumerate() {
-            of(self, group, &mut results);
+        for (group, out) in out.chunks_mut(LANES * results.len()).enumerate() {
+            self.slopes_of(group, &mut results);
             transpose(&results, out);
         }
         self.results = results;
-        self.mark_cold(t_ns, out);
+        self.mark_cold(out);
+    }
+
+    /// Room for the results of a group of channels, where there are rows and `out` has as much as is given; else it is filled with
+    /// absence.
+    #[inline(always)]
+    fn room(&mut self, out: &mut [f64]) -> Option<Vec<Lanes>> {
+        let wide = self.windows.len();
+        if self.last_time().is_some() && wide > 0 && out.len() == self.channels * wide {
+            return Some(std::mem::take(&mut self.results));
+        }
+        out.fill(self.no_value.absent);
+        None
     }
 
     /// Slopes of the channels of a group in each window.
-    #[inline]
+    #[inline(always)]
     fn slopes_of(&self, group: usize, slopes: &mut [Lanes]) {
         if !self.all_gaps {
             let [head, rest, now] = self.blocks.groups(group).map(|group| &*group.values);
@@ -395,6 +415,7 @@ impl RollingSlope {
     }
 
     /// The same in the windows that have gaps or too few rows.
+    #[inline(always)]
     fn slopes_of_incomplete(&self, group: usize, slopes: &mut [Lanes]) {
         let groups = self.blocks.groups(group);
         let silent = &self.rows.silent()[group];
@@ -456,7 +477,10 @@ impl RollingSlope {
 
     /// Marks the windows within which their channel began.
     #[inline]
-    fn mark_cold(&self, t_ns: i64, out: &mut [f64]) {
+    fn mark_cold(&self, out: &mut [f64]) {
+        let Some(t_ns) = self.last_time() else {
+            return;
+        };
         let open = |first: i64| t_ns.saturating_sub(first);
         let latest = self.rows.latest_first().map(open);
         if latest.is_none_or(|open| open >= self.longest_needed_open) {
@@ -487,60 +511,11 @@ impl RollingSlope {
         let end = self.rows.time(self.rows.next() - 1).saturating_sub(head_ns) as f64;
         Line::through(samples.filter(|(_, y)| !y.is_nan()), end)
     }
-
-    /// Standard errors of the slopes at the last row, per second, laid out as in [`slopes`](Self::slopes): `sqrt(SSR / (n − 2) / Σ(x − x̄)²)`,
-    /// SSR the residual sum of squares of the same fit. Absent for fewer than three samples and unless the kernel keeps squares.
-    ///
-    /// `SSR = Σ(y − ȳ)² − slope·Σ(x − x̄)(y − ȳ)` loses digits as `r²` approaches 1: its relative error is about 1e-15 / (1 − r²).
-    pub fn stderr(&mut self, out: &mut [f64]) {
-        self.tell(out, |line, _| line.stderr());
-    }
-
-    /// The values of the lines at the last row's time, laid out as in [`slopes`](Self::slopes). Absent unless the kernel keeps squares.
-    pub fn ends(&mut self, out: &mut [f64]) {
-        self.tell(out, |line, origin| Some(origin + line.end()));
-    }
-
-    /// The coefficients of determination `1 − SSR / Σ(y − ȳ)²` of the lines, laid out as in [`slopes`](Self::slopes). Absent where
-    /// all samples are the same and unless the kernel keeps squares.
-    pub fn r_squared(&mut self, out: &mut [f64]) {
-        self.tell(out, |line, _| line.r_squared());
-    }
-
-    /// Something about the line of each channel and window, given with the origin of the channel's values.
-    fn tell(&mut self, out: &mut [f64], of: impl Fn(&Line, f64) -> Option<f64>) {
-        if !self.squares {
-            out.fill(self.no_value.absent);
-            return;
-        }
-        self.give(out, |kernel, group, values| {
-            let (groups, origins) = (kernel.blocks.groups(group), &kernel.blocks.origins()[group]);
-            let end_ns = kernel.last_time().unwrap_or(0);
-            for (index, (window, values)) in kernel.windows.iter().zip(values).enumerate() {
-                let times = kernel.weights[index / ABREAST].times(index % ABREAST);
-                let moments = match window.kind {
-                    Kind::Gaps => window.parts.moments(groups),
-                    _ => window.parts.moments_with(groups, &times),
-                };
-                let origin = kernel.blocks.now(window.parts.places[2]).origin;
-                let end = end_ns.wrapping_sub(origin) as f64;
-                *values = from_fn(|i| {
-                    let line = window.parts.line(groups, i, &moments, end);
-                    let line = match moments.thin(i) || line.is_flat() {
-                        true => kernel.line(window, LANES * group + i),
-                        false => line,
-                    };
-                    of(&line, origins[i]).unwrap_or(kernel.no_value.absent)
-                });
-                kernel.mark_absent(window, group, &moments.n, values);
-            }
-        });
-    }
 }
 
-/// Slopes of the channels of a group in the windows in which each is present in every row. Not inlined, and the tables given one by
-/// one, so that the compiler knows how the sums are aligned.
-#[inline(never)]
+/// Slopes of the channels of a group in the windows in which each is present in every row. The tables are given one by one, so that
+/// the compiler knows how the sums are aligned.
+#[inline(always)]
 fn slopes_of_complete(
     windows: &[Window],
     weights: &[Weights],
@@ -560,9 +535,8 @@ fn slopes_of_complete(
     }
 }
 
-/// Puts results of the channels of a group by window into those of windows by channel. Not inlined, so that the compiler knows that
-/// the two do not overlap.
-#[inline(never)]
+/// Puts results of the channels of a group by window into those of windows by channel.
+#[inline(always)]
 fn transpose(results: &[Lanes], out: &mut [f64]) {
     let wide = results.len();
     if out.len() != LANES * wide {

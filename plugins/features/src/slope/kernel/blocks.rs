@@ -120,6 +120,7 @@ impl Blocks {
     }
 
     /// Forgets the first `forgotten` blocks and sums the one that was closed; the next row, the first of the current one, is at `t_ns`.
+    #[inline(always)]
     pub(super) fn close(&mut self, rows: &Rows, t_ns: i64, forgotten: usize) {
         self.starts.drain(..forgotten);
         self.gaps &= rows.complete_from() > self.oldest();
@@ -144,6 +145,7 @@ impl Blocks {
     }
 
     /// Adds the row that was just appended to the current block; `begun` if it holds a channel's first sample.
+    #[inline(always)]
     pub(super) fn add_newest(&mut self, rows: &Rows, begun: bool) {
         let row = rows.next() - 1;
         self.until_rebase = self.until_rebase.saturating_sub(1);
@@ -225,11 +227,13 @@ impl Blocks {
     }
 
     /// Newest row first: whatever an older row of the block holds is not in the sums of the later ones.
+    #[inline(always)]
     fn sum_tails(&mut self, rows: &Rows, block: usize) {
         let numbers = self.starts[block]..self.starts[block + 1];
         self.tails.sum_tails(rows, numbers, &self.origins);
     }
 
+    #[inline(always)]
     fn sum_rest(&mut self, rows: &Rows, origin: i64) {
         let current = self.starts.len() - 1;
         if current >= self.rest.slots() {

@@ -55,9 +55,8 @@ impl Weights {
         self.heads[i] = place;
     }
 
-    /// Finds the weights of windows that end with the current block. Not inlined, as the compiler would take several of these at once,
-    /// which lie too far apart.
-    #[inline(never)]
+    /// Finds the weights of windows that end with the current block.
+    #[inline(always)]
     pub(super) fn weigh(&mut self, heads: &[Common], now: &Common) {
         let heads = self.heads.map(|place| &heads[place].rows);
         let head = Times {
@@ -194,8 +193,8 @@ impl Parts {
     }
 }
 
-/// Not inlined, so that the compiler knows that nothing overlaps and takes several channels at once.
-#[inline(never)]
+/// Of each number all channels before the next, so that the compiler takes several channels at once.
+#[inline(always)]
 fn slopes_with_gaps(
     by: f64,
     (head_times, head): (&TimesOfLanes, &Values),
@@ -204,21 +203,19 @@ fn slopes_with_gaps(
     slopes: &mut Lanes,
     least: &mut Least,
 ) {
-    for (i, slope) in slopes.iter_mut().enumerate() {
-        let [h, r, w] = [head_times, rest_times, now_times].map(|times| times.0.only(i));
-        let times = r.plus(&w).plus(&h.shifted(&[by]));
-        let Times {
-            n: [n],
-            t: [t],
-            tt: [tt],
-        } = times;
-        least.n[i] = lesser(least.n[i], n);
-        least.above_thin[i] = lesser(least.above_thin[i], (n * tt - t * t) - THIN * (n * tt));
-        let [[of_ty], [of_y], [of_head_y]] = weights(&times, &[by]);
-        *slope = of_ty * (head.ty[i] + (rest.ty[i] + now.ty[i]))
-            - of_y * (rest.y[i] + now.y[i])
-            - of_head_y * head.y[i];
-    }
+    let times = (rest_times.0.plus(&now_times.0)).plus(&head_times.0.shifted(&[by; LANES]));
+    let Times { n, t, tt } = &times;
+    least.n = from_fn(|i| lesser(least.n[i], n[i]));
+    least.above_thin = from_fn(|i| {
+        let n_tt = n[i] * tt[i];
+        lesser(least.above_thin[i], (n_tt - t[i] * t[i]) - THIN * n_tt)
+    });
+    let [of_ty, of_y, of_head_y] = weights(&times, &[by; LANES]);
+    *slopes = from_fn(|i| {
+        of_ty[i] * (head.ty[i] + (rest.ty[i] + now.ty[i]))
+            - of_y[i] * (rest.y[i] + now.y[i])
+            - of_head_y[i] * head.y[i]
+    });
 }
 
 /// The least over windows, for each channel of a group.
@@ -239,12 +236,10 @@ impl Least {
     };
 
     /// Notes what the samples span where the window spans `beyond` what it must, its last samples have been silent for so long and its
-    /// first ones awaited. Not inlined, so that the compiler knows that nothing overlaps.
-    #[inline(never)]
+    /// first ones awaited.
+    #[inline(always)]
     pub(super) fn add_span(&mut self, beyond: f64, silent: &Lanes, wait: &Lanes) {
-        for i in 0..LANES {
-            self.span[i] = lesser(self.span[i], beyond - silent[i] - wait[i]);
-        }
+        self.span = from_fn(|i| lesser(self.span[i], beyond - silent[i] - wait[i]));
     }
 
     /// Whether each channel has at least `min_samples`, which span enough, and sums that have kept their digits, in every window.

@@ -166,6 +166,7 @@ impl Rows {
 
     /// Appends a row where room has been made; `y` is one sample per channel, absent where it ends early or is `limit` or more.
     /// Says whether some channel has its first sample.
+    #[inline(always)]
     pub(super) fn append(&mut self, t_ns: i64, y: &[f64], limit: f64, oldest: u64) -> bool {
         let passed = self.last_time().map_or(0, |last| t_ns.saturating_sub(last)) as f64;
         let slot = self.slot(self.next);

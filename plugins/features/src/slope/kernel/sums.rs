@@ -249,7 +249,7 @@ impl Table {
     }
 
     /// Adds a row to a run: its time, its samples less the origins of the channels.
-    #[inline]
+    #[inline(always)]
     pub(super) fn add_row(&mut self, slot: usize, t_ns: i64, row: &[Lanes], origins: &[Lanes]) {
         let common = &mut self.common[slot];
         let t = common.add_time(t_ns);
@@ -268,6 +268,7 @@ impl Table {
     }
 
     /// Sets the run of each of these rows to the rows from it on, about the time of the last.
+    #[inline(always)]
     pub(super) fn sum_tails(&mut self, rows: &Rows, numbers: Range<u64>, origins: &[Lanes]) {
         let origin = rows.time(numbers.end - 1);
         let mut common = Common {
@@ -308,6 +309,7 @@ impl Table {
 
     /// Sets runs 0 on to the sums of the runs of another table from the one with the same place in `slots` on, about an origin;
     /// the run after them is an empty one.
+    #[inline(always)]
     pub(super) fn sum_from_end(
         &mut self,
         origin: i64,
