@@ -23,18 +23,38 @@ pub(crate) struct Gathered {
     /// Whether any of the slots, read without a lag, has a new value at this tick.
     pub(crate) fresh: bool,
     read: Read,
-    /// The first slot, where all lie side by side and are read without a lag.
-    side_by_side: Option<usize>,
-    /// Otherwise places and slots of what is read without a lag.
-    present: Box<[(usize, usize)]>,
-    past: Option<Box<AllPast>>,
+    from: From,
     conversions: Box<[Conversion]>,
     /// How long each of them counts, and how long any does at least.
     ages: Box<[Duration]>,
     shortest: Duration,
 }
 
-/// What is read with a lag.
+/// Where the values of a gather are from.
+#[derive(Debug, Clone)]
+enum From {
+    /// Slots side by side, of which this is the first, without a lag.
+    SideBySide(usize),
+    /// Slots without a lag.
+    Apart(Box<[usize]>),
+    /// Slots of which some are read with a lag.
+    Past(Box<AllPast>),
+}
+
+impl From {
+    fn new(entries: &[Entry]) -> Self {
+        if let Some(first) = side_by_side(entries) {
+            return Self::SideBySide(first);
+        }
+        let slots = entries.iter().map(|entry| entry.slot);
+        if entries.iter().all(|entry| entry.lag.is_zero()) {
+            return Self::Apart(slots.collect());
+        }
+        Self::Past(Box::new(AllPast::new(entries)))
+    }
+}
+
+/// What is read with a lag, and what beside it.
 #[derive(Debug, Clone)]
 struct AllPast {
     of: Box<[Past]>,
@@ -42,6 +62,8 @@ struct AllPast {
     until: Instant,
     /// The oldest stamp, where all of it is there.
     whole: Option<Instant>,
+    /// Places and slots of what is read without a lag.
+    present: Box<[(usize, usize)]>,
 }
 
 /// A value that is read with a lag.
@@ -54,21 +76,40 @@ struct Past {
     until: Instant,
 }
 
+/// What is known of values that have been looked at.
+struct Glance {
+    /// Whether one was given at the present tick, and whether one was not even run.
+    fresh: bool,
+    late: bool,
+    /// Whether one is not there.
+    lacks: bool,
+    oldest: Instant,
+    newest: Instant,
+}
+
+impl Glance {
+    const NOTHING: Self = Self {
+        fresh: false,
+        late: false,
+        lacks: false,
+        oldest: Instant::MAX,
+        newest: Instant::MIN,
+    };
+
+    #[inline(always)]
+    fn add(&mut self, value: f64, given: &Given, tick: u64) {
+        let (ran, there) = (given.tick == tick, !value.is_nan());
+        self.fresh |= ran & there;
+        self.late |= !ran;
+        self.lacks |= !there;
+        self.oldest = self.oldest.min(given.stamp);
+        self.newest = self.newest.max(given.stamp);
+    }
+}
+
 impl Gathered {
     pub(crate) fn new(gather: &Gather) -> Self {
         let width = gather.entries.len();
-        let placed = || gather.entries.iter().copied().enumerate();
-        let past: Box<[_]> = placed()
-            .filter(|(_, entry)| !entry.lag.is_zero())
-            .map(|(place, entry)| Past {
-                place,
-                entry,
-                cursor: 0,
-                until: Instant::MIN,
-            })
-            .collect();
-        let present = placed().filter(|(_, entry)| entry.lag.is_zero());
-        let side_by_side = side_by_side(&gather.entries);
         Self {
             values: vec![ABSENT; width].into(),
             stamps: vec![Instant::MIN; width].into(),
@@ -76,14 +117,9 @@ impl Gathered {
             together: false,
             fresh: false,
             read: gather.read,
-            side_by_side,
-            present: match side_by_side {
-                Some(_) => Box::default(),
-                None => present.map(|(place, entry)| (place, entry.slot)).collect(),
-            },
-            past: (!past.is_empty()).then(|| Box::new(AllPast::new(past))),
+            from: From::new(&gather.entries),
             conversions: gather.conversions.clone().into(),
-            ages: placed().map(|(_, entry)| entry.max_age).collect(),
+            ages: gather.entries.iter().map(|entry| entry.max_age).collect(),
             shortest: shortest(&gather.entries),
         }
     }
@@ -91,10 +127,18 @@ impl Gathered {
     /// Reads the slots as they stand now.
     #[inline]
     pub(crate) fn read(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
-        match self.side_by_side {
-            Some(first) => self.read_range(slots, first, now),
-            None => self.read_apart(slots, histories, now),
+        match self.from {
+            From::SideBySide(first) => self.read_side_by_side(slots, first, now),
+            From::Apart(_) => self.read_apart(slots, now),
+            From::Past(_) => self.read_past(slots, histories, now),
         }
+        if !self.conversions.is_empty() {
+            self.convert();
+        }
+    }
+
+    #[inline(never)]
+    fn convert(&mut self) {
         for conversion in &self.conversions {
             let value = &mut self.values[conversion.entry];
             // A NaN says why there is no value, and must stay as it is.
@@ -107,7 +151,7 @@ impl Gathered {
     /// A whole port, as it is most often read. What nearly always holds of all its values is looked at first, since a port may
     /// be wide.
     #[inline(never)]
-    fn read_range(&mut self, slots: &Slots, first: usize, now: Instant) {
+    fn read_side_by_side(&mut self, slots: &Slots, first: usize, now: Instant) {
         let range = first..first + self.values.len();
         let hides = |given: &Given| match self.read {
             Read::Fresh => given.tick < slots.tick,
@@ -135,60 +179,70 @@ impl Gathered {
         }
     }
 
-    #[inline]
-    fn read_apart(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
-        let mut whole = (!self.values.is_empty()).then_some(Instant::MAX);
-        if let Some(past) = &mut self.past {
-            if now >= past.until {
-                let converted = !self.conversions.is_empty();
-                past.read(
-                    &mut self.values,
-                    &mut self.stamps,
-                    histories,
-                    now,
-                    converted,
-                );
-            }
-            whole = past.whole;
-        }
-        let present = &self.present;
-        // Said once that both are of one length, each place is checked once.
-        let (all, width) = (slots.values.len(), self.values.len());
-        let (from, given) = (&slots.values[..all], &slots.given[..all]);
-        let (values, stamps) = (&mut self.values[..width], &mut self.stamps[..width]);
-        let (mut fresh, mut hidden, mut lacks, mut apart) = (false, false, false, 0);
-        let oldest = match self.read {
-            Read::Fresh => Instant::MIN,
-            Read::Held | Read::Truth => now - self.shortest,
+    #[inline(never)]
+    fn read_apart(&mut self, slots: &Slots, now: Instant) {
+        let From::Apart(places) = &self.from else {
+            return;
         };
-        let first = present
-            .first()
-            .map_or(Instant::MAX, |&(_, slot)| given[slot].stamp);
-        for &(place, slot) in present {
-            let (value, given) = (from[slot], given[slot]);
-            let (ran, there) = (given.tick == slots.tick, !value.is_nan());
-            values[place] = value;
-            stamps[place] = given.stamp;
-            fresh |= ran & there;
-            lacks |= !there;
-            hidden |= (given.stamp < oldest) | (!ran & (self.read == Read::Fresh));
-            apart |= given.stamp.as_ns() ^ first.as_ns();
+        let mut glance = Glance::NOTHING;
+        let to = self.values.iter_mut().zip(&mut self.stamps);
+        for ((value, stamp), &slot) in to.zip(places) {
+            let given = &slots.given[slot];
+            (*value, *stamp) = (slots.values[slot], given.stamp);
+            glance.add(*value, given, slots.tick);
         }
-        self.fresh = fresh;
-        self.together = self.past.is_none() && apart == 0;
-        if lacks || hidden {
-            self.whole = None;
-        } else if apart == 0 {
-            self.whole = whole.map(|of_past| of_past.min(first));
-        } else {
-            let stamps = present.iter().map(|&(place, _)| stamps[place]);
-            self.whole = whole.map(|of_past| stamps.fold(of_past, Instant::min));
+        self.together = glance.oldest == glance.newest;
+        let nothing = places.is_empty();
+        self.take(&glance, (!nothing).then_some(Instant::MAX), slots, now);
+    }
+
+    #[inline(never)]
+    fn read_past(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
+        let From::Past(past) = &mut self.from else {
+            return;
+        };
+        let (values, stamps) = (&mut *self.values, &mut *self.stamps);
+        if now >= past.until {
+            let converted = !self.conversions.is_empty();
+            past.read(values, stamps, histories, now, converted);
         }
-        if hidden {
-            for &(place, slot) in present {
-                let (value, age) = (&mut values[place], now - stamps[place]);
-                *value = seen(*value, self.read, slots.ran(slot), age, self.ages[place]);
-            }
+        let mut glance = Glance::NOTHING;
+        for &(place, slot) in &past.present {
+            let (value, given) = (slots.values[slot], &slots.given[slot]);
+            (values[place], stamps[place]) = (value, given.stamp);
+            glance.add(value, given, slots.tick);
+        }
+        let whole = past.whole;
+        self.take(&glance, whole, slots, now);
+    }
+
+    /// Takes what is known of the values that are read without a lag, and hides those that a reader does not see. `of_past` is the
+    /// oldest stamp of those that are read with one, where all of these are there.
+    #[inline(always)]
+    fn take(&mut self, glance: &Glance, of_past: Option<Instant>, slots: &Slots, now: Instant) {
+        let hides = match self.read {
+            Read::Fresh => glance.late,
+            Read::Held | Read::Truth => glance.oldest < now - self.shortest,
+        };
+        self.fresh = glance.fresh;
+        let whole = of_past.filter(|_| !(glance.lacks | hides));
+        self.whole = whole.map(|of_past| of_past.min(glance.oldest));
+        if hides {
+            self.hide(slots, now);
+        }
+    }
+
+    #[inline(never)]
+    fn hide(&mut self, slots: &Slots, now: Instant) {
+        let (values, stamps, ages, read) = (&mut self.values, &self.stamps, &self.ages, self.read);
+        let mut hide = |place: usize, slot: usize| {
+            let (value, age) = (&mut values[place], now - stamps[place]);
+            *value = seen(*value, read, slots.ran(slot), age, ages[place]);
+        };
+        match &self.from {
+            From::SideBySide(_) => {}
+            From::Apart(of) => of.iter().enumerate().for_each(|(at, &slot)| hide(at, slot)),
+            From::Past(past) => past.present.iter().for_each(|&(at, slot)| hide(at, slot)),
         }
     }
 
@@ -216,7 +270,7 @@ impl Gathered {
 
     /// Looks its places in histories up anew: they are not those that it read from before.
     pub(crate) fn forget_places(&mut self) {
-        if let Some(past) = &mut self.past {
+        if let From::Past(past) = &mut self.from {
             past.forget_places();
         }
     }
@@ -231,11 +285,21 @@ impl Gathered {
 }
 
 impl AllPast {
-    fn new(of: Box<[Past]>) -> Self {
+    fn new(entries: &[Entry]) -> Self {
+        let placed = || entries.iter().copied().enumerate();
+        let past = placed().filter(|(_, entry)| !entry.lag.is_zero());
+        let present = placed().filter(|(_, entry)| entry.lag.is_zero());
+        let past = past.map(|(place, entry)| Past {
+            place,
+            entry,
+            cursor: 0,
+            until: Instant::MIN,
+        });
         Self {
-            of,
+            of: past.collect(),
             until: Instant::MIN,
             whole: None,
+            present: present.map(|(place, entry)| (place, entry.slot)).collect(),
         }
     }
 
@@ -256,16 +320,13 @@ impl AllPast {
                 let history = histories[entry.slot]
                     .as_ref()
                     .expect("a slot that is read with a lag has a history");
-                let (at, cursor) = (now - entry.lag, &mut past.cursor);
-                let (value, stamp) = history.at(at, entry.max_age, cursor);
+                let at = now - entry.lag;
+                let (value, stamp, until) =
+                    history.at_until(at, now, entry.max_age, &mut past.cursor);
                 values[place] = value;
                 stamps[place] = stamp + entry.lag;
                 // A value that is converted is read afresh, lest it be converted twice.
-                past.until = if converted {
-                    now
-                } else {
-                    history.stays(at, now, entry.max_age, *cursor) + entry.lag
-                };
+                past.until = if converted { now } else { until + entry.lag };
             }
             self.until = self.until.min(past.until);
             let there = !values[place].is_nan();

@@ -53,18 +53,56 @@ impl History {
 
     /// The value that was held at `at`, and its stamp; NaN where there was none or it was older than `max_age`.
     pub fn at(&self, at: Instant, max_age: Duration, cursor: &mut Cursor) -> (f64, Instant) {
+        let (value, stamp, _) = self.at_until(at, at, max_age, cursor);
+        (value, stamp)
+    }
+
+    /// The same, and from which instant on the answer may be another when nothing more is written down for instants before
+    /// `unwritten`.
+    #[inline]
+    pub(super) fn at_until(
+        &self,
+        at: Instant,
+        unwritten: Instant,
+        max_age: Duration,
+        cursor: &mut Cursor,
+    ) -> (f64, Instant, Instant) {
+        let (held, next) = self.find(at, cursor);
+        let Some(held) = held else {
+            // Before the first value the stamp is the instant asked for, and what is written down first turns absent into cold.
+            let nothing = if next.is_some() { COLD } else { ABSENT };
+            return (nothing, at, Instant::MIN);
+        };
+        let next = next.map_or(unwritten, |next| next.at);
+        let last = held.stamp + max_age;
+        if held.value.is_nan() {
+            (held.value, held.stamp, next)
+        } else if at > last {
+            (ABSENT, held.stamp, next)
+        } else {
+            (
+                held.value,
+                held.stamp,
+                next.min(last + Duration::from_ns(1)),
+            )
+        }
+    }
+
+    /// What was held at `at`, and what came next.
+    #[inline]
+    fn find(&self, at: Instant, cursor: &mut Cursor) -> (Option<&Past>, Option<&Past>) {
         *cursor = (*cursor).max(self.dropped);
-        while self.entry(*cursor).is_some_and(|next| next.at <= at) {
+        let mut next = self.entry(*cursor);
+        let mut held = None;
+        while let Some(past) = next
+            && past.at <= at
+        {
+            held = next;
             *cursor += 1;
+            next = self.entry(*cursor);
         }
-        match cursor.checked_sub(1).and_then(|last| self.entry(last)) {
-            Some(past) if past.value.is_nan() || at - past.stamp <= max_age => {
-                (past.value, past.stamp)
-            }
-            Some(past) => (ABSENT, past.stamp),
-            None if self.entries.is_empty() => (ABSENT, at),
-            None => (COLD, at),
-        }
+        let held = held.or_else(|| self.entry(cursor.checked_sub(1)?));
+        (held, next)
     }
 
     /// Lets a cursor go back, so that an instant before the one asked last may be asked for.
@@ -73,28 +111,6 @@ impl History {
             && self.entry(last).is_some_and(|past| past.at > at)
         {
             *cursor = last;
-        }
-    }
-
-    /// From which instant on the answer that a cursor has just been given for `at` may be another, when nothing more is written
-    /// down for instants before `unwritten`.
-    pub(super) fn stays(
-        &self,
-        at: Instant,
-        unwritten: Instant,
-        max_age: Duration,
-        cursor: Cursor,
-    ) -> Instant {
-        let Some(past) = cursor.checked_sub(1).and_then(|last| self.entry(last)) else {
-            // Before the first value the stamp is the instant asked for, and what is written down first turns absent into cold.
-            return Instant::MIN;
-        };
-        let next = self.entry(cursor).map_or(unwritten, |next| next.at);
-        let old = past.stamp + max_age + Duration::from_ns(1);
-        if past.value.is_nan() || at >= old {
-            next
-        } else {
-            next.min(old)
         }
     }
 
@@ -178,8 +194,8 @@ mod tests {
             let now = s(t);
             let expected = past.at(now - lag, max_age, &mut always);
             if now >= until {
-                kept = past.at(now - lag, max_age, &mut seldom);
-                until = past.stays(now - lag, now, max_age, seldom) + lag;
+                let (value, stamp, stays) = past.at_until(now - lag, now, max_age, &mut seldom);
+                (kept, until) = ((value, stamp), stays + lag);
                 asked += 1;
             }
             assert_eq!(kept.0.to_bits(), expected.0.to_bits(), "at {t} s");

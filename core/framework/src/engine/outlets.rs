@@ -1,5 +1,7 @@
 //! Decides what is put out at a tick, and what the outputs of the graph that follows must know of it.
 
+use std::ops::Range;
+
 use super::blend::{Blending, rate};
 use super::slots::Slots;
 use crate::compile::Plan;
@@ -8,12 +10,16 @@ use crate::time::Instant;
 /// The outputs of a running plan, side by side in its order.
 #[derive(Debug)]
 pub(super) struct Outlets {
-    /// Where they are from.
-    slots: Box<[usize]>,
+    /// Where they are from: runs of them whose slots lie side by side, and the first slot of each.
+    runs: Box<[(Range<usize>, usize)]>,
     /// What the last tick gave.
     values: Box<[f64]>,
-    /// What those that step over at once were last, and when; of the others, and before a graph has given anything of its own, at
-    /// [`Instant::MIN`].
+    /// What the one before gave.
+    before: Box<[f64]>,
+    /// When the last one was, where it gave all of them and none passes over.
+    whole: Option<Instant>,
+    /// Otherwise what those that step over at once were last, and when; of the others, and before a graph has given anything of its
+    /// own, at [`Instant::MIN`].
     last: Box<[f64]>,
     at: Box<[Instant]>,
     /// Those that do not step over at once, and how fast they pass over, in their units per second.
@@ -25,6 +31,13 @@ pub(super) struct Outlets {
 impl Outlets {
     pub(super) fn new(plan: &Plan) -> Self {
         let count = plan.outputs.len();
+        let slots: Vec<_> = plan.outputs.iter().map(|output| output.slot).collect();
+        let mut first = 0;
+        let runs = slots.chunk_by(|slot, next| slot + 1 == *next).map(|run| {
+            let outputs = first..first + run.len();
+            first = outputs.end;
+            (outputs, run[0])
+        });
         let rates = plan
             .outputs
             .iter()
@@ -34,8 +47,10 @@ impl Outlets {
                 Some((index, rate(output, unit)?))
             });
         Self {
-            slots: plan.outputs.iter().map(|output| output.slot).collect(),
+            runs: runs.collect(),
             values: vec![f64::NAN; count].into(),
+            before: vec![f64::NAN; count].into(),
+            whole: None,
             last: vec![f64::NAN; count].into(),
             at: vec![Instant::MIN; count].into(),
             passing: rates.collect(),
@@ -50,9 +65,43 @@ impl Outlets {
 
     /// Puts out what the nodes gave at the present tick; NaN where one did not run or gave nothing.
     pub(super) fn put_out(&mut self, slots: &Slots, now: Instant) {
+        std::mem::swap(&mut self.values, &mut self.before);
+        let mut lacks = false;
+        for (outputs, first) in &self.runs {
+            let values = &mut self.values[outputs.clone()];
+            if let [value] = values {
+                *value = slots.now(*first);
+                lacks |= value.is_nan();
+                continue;
+            }
+            let slots_of_run = *first..first + values.len();
+            let given = slots.given[slots_of_run.clone()].iter();
+            let from = slots.values[slots_of_run].iter().zip(given);
+            for (value, (&last, given)) in values.iter_mut().zip(from) {
+                *value = if given.tick == slots.tick {
+                    last
+                } else {
+                    f64::NAN
+                };
+                lacks |= value.is_nan();
+            }
+        }
+        if lacks || !self.passing.is_empty() {
+            self.put_out_apart(now);
+        } else {
+            self.whole = Some(now);
+        }
+    }
+
+    /// The same where not all of them were given, or some pass over.
+    #[inline(never)]
+    fn put_out_apart(&mut self, now: Instant) {
+        if let Some(whole) = self.whole.take() {
+            self.last.copy_from_slice(&self.before);
+            self.at.fill(whole);
+        }
         let last = self.last.iter_mut().zip(&mut self.at);
-        for ((value, (last, at)), &slot) in self.values.iter_mut().zip(last).zip(&self.slots) {
-            *value = slots.now(slot);
+        for (value, (last, at)) in self.values.iter().zip(last) {
             if !value.is_nan() {
                 (*last, *at) = (*value, now);
             }
@@ -68,15 +117,19 @@ impl Outlets {
 
     /// How an output passes over, and what it was last.
     pub(super) fn blending(&self, index: usize) -> Blending {
-        if self.at[index] == Instant::MIN {
-            self.blendings[index]
-        } else {
-            Blending::at_once(self.at[index], self.last[index])
+        match self.whole {
+            Some(whole) => Blending::at_once(whole, self.values[index]),
+            None if self.at[index] == Instant::MIN => self.blendings[index],
+            None => Blending::at_once(self.at[index], self.last[index]),
         }
     }
 
     /// Lets an output go on passing over as it did.
     pub(super) fn go_on(&mut self, index: usize, blending: Blending) {
+        if let Some(whole) = self.whole.take() {
+            self.last.copy_from_slice(&self.values);
+            self.at.fill(whole);
+        }
         self.blendings[index] = blending;
         self.at[index] = Instant::MIN;
     }

@@ -77,7 +77,16 @@ impl Withheld {
     }
 
     /// Hands over every truth that arrived up to `newest`, in order.
-    pub(crate) fn release(&mut self, newest: Instant, mut tell: impl FnMut(Released<'_>)) {
+    #[inline]
+    pub(crate) fn release(&mut self, newest: Instant, tell: impl FnMut(Released<'_>)) {
+        let next = self.state.withheld.front();
+        if next.is_some_and(|&(arrived, _)| arrived <= newest) {
+            self.release_some(newest, tell);
+        }
+    }
+
+    #[inline(never)]
+    fn release_some(&mut self, newest: Instant, mut tell: impl FnMut(Released<'_>)) {
         while let Some(&(arrived, truth)) = self.state.withheld.front() {
             if arrived > newest {
                 break;
