@@ -2,12 +2,12 @@
 
 use athermal_core::model::{number, numbers};
 use athermal_core::node::{
-    Coefficients, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
+    Coefficients, LinearForm, Mistake, Predictor, Regressor, Trained, TrainedRange, Trainer,
+    TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_numerics::{
     Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
-    PredictionVariance, Sgd, SgdOptions, Standardization, dot,
+    PredictionVariance, Sgd, SgdOptions, Standardization,
 };
 use serde::{Deserialize, Serialize};
 
@@ -343,6 +343,15 @@ pub struct LinearPredictor {
     pub(crate) variance: Option<PredictionVariance>,
 }
 
+impl LinearPredictor {
+    fn form(&self) -> LinearForm<'_> {
+        LinearForm {
+            constant: self.intercept,
+            coefficients: &self.coefficients,
+        }
+    }
+}
+
 #[typetag::serde(name = "linear")]
 impl Predictor for LinearPredictor {
     fn uses(&self) -> &[String] {
@@ -362,7 +371,11 @@ impl Predictor for LinearPredictor {
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
-        self.intercept + dot(&self.coefficients, regressors)
+        self.form().at(regressors)
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        Some(self.form())
     }
 
     fn deviation(&self, regressors: &[f64]) -> f64 {

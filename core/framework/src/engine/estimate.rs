@@ -9,7 +9,7 @@ use super::learning::Learning;
 use super::state::NodeState;
 use super::{EngineError, Mode};
 use crate::compile::{Entry, Gather, PlannedNode, PlannedRole, TruthLink};
-use crate::node::{FeatureFit, Predictor, Regressor, Restored};
+use crate::node::{FeatureFit, LinearForm, Predictor, Regressor, Restored};
 use crate::time::Instant;
 
 /// Where each of the regressors that a fit uses is among those of its node.
@@ -128,7 +128,7 @@ impl Part {
 /// What comes out where something was predicted at `now` from values of which the oldest has a stamp: nothing without a
 /// finite prediction.
 #[inline]
-fn given(prediction: f64, oldest: Instant, now: Instant) -> (f64, Instant) {
+pub(super) fn given(prediction: f64, oldest: Instant, now: Instant) -> (f64, Instant) {
     if prediction.is_finite() {
         (prediction, oldest)
     } else {
@@ -240,6 +240,21 @@ impl Estimate {
     /// its deviation.
     pub(crate) fn is_plain(&self) -> bool {
         self.plain
+    }
+
+    /// What the prediction is, where nothing is to be done but to predict by a linear form.
+    pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
+        let form = self.predictor.linear().filter(|_| self.plain)?;
+        (form.coefficients.len() == self.width).then_some(form)
+    }
+
+    /// Gathers and ranges of the regressors, piece by piece, where those of each piece lie side by side.
+    pub(crate) fn pieces(&self) -> Option<Vec<(usize, Range<usize>)>> {
+        let piece = |part: &Part| match &part.places {
+            Places::SideBySide(range) => Some((part.gather, range.clone())),
+            Places::Apart(_) => None,
+        };
+        self.parts.iter().map(piece).collect()
     }
 
     /// The prediction of the fit and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.

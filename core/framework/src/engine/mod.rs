@@ -1,6 +1,7 @@
 //! Decides how a plan is stepped: what runs at a tick, in which order, and when truths are told; not where samples come
 //! from or go.
 
+mod bank;
 mod blend;
 mod carry;
 mod error;
@@ -15,6 +16,7 @@ mod learning;
 pub(crate) mod mode;
 mod outlets;
 mod pairing;
+mod products;
 mod recent_error;
 mod revision;
 mod running;
@@ -43,8 +45,9 @@ pub(crate) use slots::{Given, Slots};
 
 use crate::channel::Extremes;
 use crate::compile::{Plan, Step, admits};
-use crate::node::{Evidence, Predictor, Tick};
+use crate::node::{Evidence, Predictor};
 use crate::time::{Duration, Instant};
+use bank::{Work, work};
 use estimate::Estimate;
 use outlets::Outlets;
 use running::{Running, running};
@@ -70,6 +73,7 @@ pub struct Engine {
     /// The nodes that are told truths after all outputs, and the slots of these.
     told: Vec<(usize, usize)>,
     nodes: Vec<Running>,
+    work: Box<[Work]>,
     last: Instant,
     /// Set between a segment break and the first tick after it: the last instant before the break.
     before_break: Option<Instant>,
@@ -111,6 +115,7 @@ impl Engine {
                 .map(|channel| channel.history.map(History::new))
                 .collect(),
             row: vec![0.0; nodes.iter().map(Running::width).max().unwrap_or(0)],
+            work: work(&plan, &nodes),
             nodes,
             last: Instant::MIN,
             before_break: None,
@@ -167,42 +172,30 @@ impl Engine {
         self.slots.tick += 1;
         self.take_in(time, samples);
         let Self {
-            plan,
             slots,
             gathered,
             histories,
             nodes,
+            work,
             row,
             frozen,
             ..
         } = self;
-        for step in &plan.steps {
-            match *step {
-                Step::Gather(gather) => {
-                    gathered[gather].read(slots, histories, time);
+        let mut turn = Turn {
+            now: time,
+            slots,
+            gathered,
+            row,
+            frozen: *frozen,
+        };
+        for work in work {
+            match work {
+                Work::Step(Step::Gather(gather)) => {
+                    turn.gathered[*gather].read(turn.slots, histories, time);
                 }
-                Step::Run(node) => {
-                    let mut turn = Turn {
-                        now: time,
-                        slots,
-                        gathered,
-                        row,
-                        frozen: *frozen,
-                    };
-                    turn.of(&mut nodes[node]);
-                }
-                Step::Capture(node) => {
-                    if let Running::Operator {
-                        operator, gathers, ..
-                    } = &mut nodes[node]
-                    {
-                        operator.capture(&Tick {
-                            now: time,
-                            gathered,
-                            ports: gathers,
-                        });
-                    }
-                }
+                Work::Step(Step::Run(node)) => turn.of(&mut nodes[*node]),
+                Work::Step(Step::Capture(node)) => turn.capture(&mut nodes[*node]),
+                Work::Bank(bank) => bank.run(&mut turn, nodes),
             }
         }
         self.remember(time);
@@ -250,6 +243,7 @@ impl Engine {
                 }
             }
         }
+        self.work = work(&self.plan, &self.nodes);
     }
 
     /// Whether learning has been frozen on command.

@@ -15,7 +15,7 @@ use crate::time::Instant;
 pub(super) struct Turn<'a> {
     pub(super) now: Instant,
     pub(super) slots: &'a mut Slots,
-    pub(super) gathered: &'a [Gathered],
+    pub(super) gathered: &'a mut [Gathered],
     /// Room for the regressors of any estimator.
     pub(super) row: &'a mut [f64],
     /// Whether learning has been frozen on command.
@@ -56,6 +56,21 @@ impl Turn<'_> {
                 deviation,
             } => self.estimate(estimate.as_mut(), *trigger, *slot, *deviation),
             Running::Vote(vote) => self.vote(vote),
+        }
+    }
+
+    /// Lets a node take what it needs of values that are not yet there when it runs.
+    #[inline(never)]
+    pub(super) fn capture(&self, running: &mut Running) {
+        if let Running::Operator {
+            operator, gathers, ..
+        } = running
+        {
+            operator.capture(&Tick {
+                now: self.now,
+                gathered: self.gathered,
+                ports: gathers,
+            });
         }
     }
 

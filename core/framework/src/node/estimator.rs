@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Coefficients, Figure, Figures, InputPort, Learner, Learns, Mistake, TrainedRange, TrainingError,
+    Coefficients, Figure, Figures, InputPort, Learner, Learns, LinearForm, Mistake, TrainedRange,
+    TrainingError,
 };
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
@@ -463,6 +464,12 @@ pub trait Predictor: Any + Debug + Send + Sync {
 
     /// The prediction, from present values of the used regressors.
     fn predict(&self, regressors: &[f64]) -> f64;
+
+    /// What its prediction is, where that is a [`LinearForm`] and nothing else, to the bit: the engine then sums those of several
+    /// estimators that read the same values at once, and does not ask each for its prediction.
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        None
+    }
 
     /// Whether it predicts from the regressors that are there, NaN standing for the others, while there is any.
     fn takes_absent(&self) -> bool {

@@ -17,6 +17,7 @@ mod feature;
 mod figure;
 mod forms;
 mod learner;
+mod linear_form;
 mod port;
 mod reach;
 mod registry;
@@ -35,6 +36,8 @@ pub use feature::{Feature, Operator, Outputs, Tick};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
+pub use linear_form::LinearForm;
+pub(crate) use linear_form::Strands;
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
 pub use reach::Reach;
 #[cfg(feature = "testkit")]

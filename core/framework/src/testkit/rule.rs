@@ -38,6 +38,8 @@ pub enum Rule {
     Fits,
     /// A fitted estimator written into a model and read back predicts with the same bits.
     Models,
+    /// A fitted estimator that says to be a linear form predicts what the form does.
+    Linear,
     /// A model that was edited by hand is refused in words, or runs.
     Edited,
 }
@@ -63,6 +65,7 @@ impl Rule {
             Self::NoTrace => "no trace",
             Self::Fits => "fits",
             Self::Models => "models",
+            Self::Linear => "linear",
             Self::Edited => "edited",
         }
     }
@@ -127,6 +130,10 @@ impl Rule {
             Self::Models => {
                 "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \
                  one may be infinite or NaN"
+            }
+            Self::Linear => {
+                "let `predict` be `LinearForm::at` of what `Predictor::linear` gives, with a coefficient for each of `uses`; where a \
+                 prediction is anything else, leave `linear` out"
             }
             Self::Edited => {
                 "say in `Predictor::mistakes` what does not fit together, such as a list that is not as long as `uses`: it is asked \

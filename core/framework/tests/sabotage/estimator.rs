@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use athermal_core::node::{
-    Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError,
-    TrainingReport, TrainingSetup,
+    Estimator, InputPort, LinearForm, Mistake, Predictor, Regressors, Trained, Trainer,
+    TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::testkit::{Case, Rule};
 use athermal_core::time::Duration;
@@ -37,6 +37,8 @@ enum Fault {
     Panics,
     /// Counts on a model file that nobody has edited.
     Trusting,
+    /// Says to be a linear form that it is not.
+    Misstated,
 }
 
 impl Estimator for Ratio {
@@ -105,10 +107,12 @@ impl Trainer for Averaging {
             mean += FITS.fetch_add(1, Ordering::Relaxed) as f64;
         }
         let written = self.fault != Fault::Unwritten;
+        let width = self.regressors.len();
         let fitted = Fitted {
             regressors: self.regressors,
             means: vec![if written { mean } else { 0.0 }],
             trusting: self.fault == Fault::Trusting,
+            misstated: (self.fault == Fault::Misstated).then(|| vec![0.0; width]),
             unwritten: if written { 0.0 } else { mean },
         };
         Ok(Trained {
@@ -124,6 +128,7 @@ struct Fitted {
     /// Of the truths, the only one.
     means: Vec<f64>,
     trusting: bool,
+    misstated: Option<Vec<f64>>,
     #[serde(skip)]
     unwritten: f64,
 }
@@ -143,6 +148,14 @@ impl Predictor for Fitted {
 
     fn predict(&self, _regressors: &[f64]) -> f64 {
         self.means[0] + self.unwritten
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        let coefficients = self.misstated.as_ref()?;
+        Some(LinearForm {
+            constant: 0.0,
+            coefficients,
+        })
     }
 }
 
@@ -185,5 +198,15 @@ fn a_model_that_was_edited_is_not_trusted() {
         with("trusting"),
         Rule::Edited,
         "with the last dropped of /fitted/node/means, it panics: index out of bounds",
+    );
+}
+
+#[test]
+fn a_linear_form_is_what_is_predicted() {
+    breaks_only::<Ratio>(with("misstated"), &[Rule::Linear]);
+    breaks::<Ratio>(
+        with("misstated"),
+        Rule::Linear,
+        "of which its linear form is 0.0",
     );
 }

@@ -7,6 +7,7 @@ use crate::engine::Fitted;
 use crate::fit::{FitOptions, fit};
 use crate::model::Model;
 use crate::node::{Feature, Read, Role};
+use crate::prng::Prng;
 use crate::recording::Table;
 
 pub(super) fn fits(subject: &Subject<'_>) -> Result<(), String> {
@@ -125,6 +126,31 @@ pub(super) fn models(subject: &Subject<'_>) -> Result<(), String> {
             "read back from its model, it predicts otherwise: {difference}"
         )),
     }
+}
+
+pub(super) fn linear(subject: &Subject<'_>) -> Result<(), String> {
+    let mut random = Prng::stream(41, "rows for a linear form");
+    for predictor in subject.fitted.values() {
+        let Some(form) = predictor.linear() else {
+            continue;
+        };
+        let (found, used) = (form.coefficients.len(), predictor.uses().len());
+        if found != used {
+            return Err(format!(
+                "its linear form has {found} coefficients for {used} regressors"
+            ));
+        }
+        for _ in 0..100 {
+            let row: Vec<_> = (0..used).map(|_| random.between(-1e3, 1e3)).collect();
+            let (form, predicted) = (form.at(&row), predictor.predict(&row));
+            if form.to_bits() != predicted.to_bits() {
+                return Err(format!(
+                    "it predicts {predicted:?} from regressors of which its linear form is {form:?}"
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// What was fitted, written into a model and read back.

@@ -43,7 +43,7 @@ pub(super) struct Subject<'a> {
 type Check = fn(&Subject<'_>, others: &[Subject<'_>]) -> Result<(), String>;
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 16] = [
+pub(super) const ALL: [(Rule, Check); 17] = [
     (Rule::Answers, |subject, _| subject.answers()),
     (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
     (Rule::Ranges, |subject, _| parameters::ranges(subject)),
@@ -63,6 +63,7 @@ pub(super) const ALL: [(Rule, Check); 16] = [
     (Rule::NoTrace, |subject, _| traces::no_trace(subject)),
     (Rule::Fits, |subject, _| fitting::fits(subject)),
     (Rule::Models, |subject, _| fitting::models(subject)),
+    (Rule::Linear, |subject, _| fitting::linear(subject)),
     (Rule::Edited, |subject, _| edited::edited(subject)),
 ];
 

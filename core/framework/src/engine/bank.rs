@@ -1,0 +1,244 @@
+//! Decides which estimators are predicted at once; not what each of them predicts.
+
+use std::ops::Range;
+
+use super::estimate::given;
+use super::gather::Gathered;
+use super::products::Products;
+use super::running::Running;
+use super::turn::Turn;
+use crate::compile::{Plan, Step};
+use crate::node::LinearForm;
+use crate::time::Instant;
+
+/// What is done at a tick, in order.
+pub(super) enum Work {
+    /// As it was planned.
+    Step(Step),
+    /// Several steps of the plan that follow each other.
+    Bank(Box<Bank>),
+}
+
+/// The steps of a plan, in which linear estimators that follow each other and share their first regressors, or each have a few of
+/// their own, are one.
+pub(super) fn work(plan: &Plan, nodes: &[Running]) -> Box<[Work]> {
+    let mut work = Vec::new();
+    let mut bank: Vec<Linear<'_>> = Vec::new();
+    for step in &plan.steps {
+        let linear = match *step {
+            Step::Run(node) => Linear::of(node, &nodes[node]),
+            // What reads nothing of what is predicted may as well come before.
+            Step::Gather(gather) => {
+                let entries = &plan.gathers[gather].entries;
+                if entries
+                    .iter()
+                    .any(|entry| bank.iter().any(|of| of.slot == entry.slot))
+                {
+                    end(&mut bank, &mut work);
+                }
+                work.push(Work::Step(*step));
+                continue;
+            }
+            Step::Capture(_) => None,
+        };
+        let shared = linear.as_ref().map(|linear| &linear.shared);
+        if bank.first().is_some_and(|of| shared != Some(&of.shared)) {
+            end(&mut bank, &mut work);
+        }
+        match linear {
+            Some(linear) => bank.push(linear),
+            None => work.push(Work::Step(*step)),
+        }
+    }
+    end(&mut bank, &mut work);
+    work.into()
+}
+
+fn end(bank: &mut Vec<Linear<'_>>, work: &mut Vec<Work>) {
+    work.extend(match &std::mem::take(bank)[..] {
+        [] => None,
+        [one] => Some(Work::Step(Step::Run(one.node))),
+        members => Some(Work::Bank(Box::new(Bank::new(members)))),
+    });
+}
+
+/// Values of a gather that lie side by side.
+#[derive(Debug, Clone, PartialEq)]
+struct Piece {
+    gather: usize,
+    range: Range<usize>,
+}
+
+impl Piece {
+    /// The values and the oldest of their stamps, where all of them are known to be there.
+    #[inline]
+    fn read<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
+        let from = &gathered[self.gather];
+        let stamp = from.stamp_of(self.range.len())?;
+        Some((&from.values[self.range.clone()], stamp))
+    }
+}
+
+/// An estimator that is a linear form of regressors in at most two pieces, of which others may share the first.
+struct Linear<'a> {
+    node: usize,
+    slot: usize,
+    trigger: Option<usize>,
+    form: LinearForm<'a>,
+    shared: Option<Piece>,
+    own: Option<Piece>,
+}
+
+impl<'a> Linear<'a> {
+    /// The fewest regressors of which the products of several estimators are worth being summed at once.
+    const MANY: usize = 8;
+
+    fn of(node: usize, running: &'a Running) -> Option<Self> {
+        let Running::Estimate {
+            estimate: Some(estimate),
+            trigger,
+            slot,
+            ..
+        } = running
+        else {
+            return None;
+        };
+        let form = estimate.form()?;
+        let piece = |&(gather, ref range): &(usize, Range<usize>)| Piece {
+            gather,
+            range: range.clone(),
+        };
+        let (shared, own) = match &estimate.pieces()?[..] {
+            [few] if few.1.len() < Self::MANY => (None, Some(piece(few))),
+            [shared] => (Some(piece(shared)), None),
+            [shared, own] => (Some(piece(shared)), Some(piece(own))),
+            _ => return None,
+        };
+        Some(Self {
+            node,
+            slot: *slot,
+            trigger: *trigger,
+            form,
+            shared,
+            own,
+        })
+    }
+}
+
+/// Linear estimators that follow each other, and whose first regressors are the same values.
+pub(super) struct Bank {
+    shared: Option<Piece>,
+    /// Of as many of the shared regressors as are a multiple of four.
+    products: Products,
+    at_once: usize,
+    members: Box<[Member]>,
+    /// Room for the other regressors of a member.
+    row: Box<[f64]>,
+}
+
+/// One of the estimators of a bank.
+struct Member {
+    node: usize,
+    slot: usize,
+    /// The gather that lets it run, unless it does at every tick.
+    trigger: Option<usize>,
+    constant: f64,
+    /// Of the regressors whose products are not summed at once.
+    coefficients: Box<[f64]>,
+    /// The regressors that it does not share.
+    own: Option<Piece>,
+    /// Whether all were there when it ran last.
+    whole: bool,
+}
+
+impl Bank {
+    fn new(members: &[Linear<'_>]) -> Self {
+        let shared = members[0].shared.clone();
+        let at_once = shared.as_ref().map_or(0, |piece| piece.range.len() / 4 * 4);
+        let forms = members.iter().map(|of| &of.form.coefficients[..at_once]);
+        let products = Products::new(&forms.collect::<Vec<_>>());
+        let of_member = |of: &Linear<'_>| Member {
+            node: of.node,
+            slot: of.slot,
+            trigger: of.trigger,
+            constant: of.form.constant,
+            coefficients: of.form.coefficients[at_once..].into(),
+            own: of.own.clone(),
+            whole: true,
+        };
+        let members: Box<[_]> = members.iter().map(of_member).collect();
+        let others = members.iter().map(|member| member.coefficients.len());
+        Self {
+            row: vec![0.0; others.max().unwrap_or(0)].into(),
+            shared,
+            products,
+            at_once,
+            members,
+        }
+    }
+
+    /// Predicts those of its estimators that run at a tick.
+    pub(super) fn run(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) {
+        if !self.predict(turn) {
+            for member in self.members.iter().filter(|of| !of.whole) {
+                turn.of(&mut nodes[member.node]);
+            }
+        }
+    }
+
+    /// Predicts those all of whose regressors are known to be there; false where there are others.
+    #[inline]
+    fn predict(&mut self, turn: &mut Turn<'_>) -> bool {
+        let (gathered, now) = (&*turn.gathered, turn.now);
+        let shared = match &self.shared {
+            None => Some((&[][..], Instant::MAX)),
+            Some(piece) => piece.read(gathered),
+        };
+        let Some((shared, stamp)) = shared else {
+            self.members.iter_mut().for_each(|of| of.whole = false);
+            return false;
+        };
+        let (at_once, left) = shared.split_at(self.at_once);
+        let sums = self.products.sum(at_once);
+        let mut all = true;
+        for (member, sums) in self.members.iter_mut().zip(sums) {
+            if member.trigger.is_some_and(|gather| !gathered[gather].fresh) {
+                continue;
+            }
+            let others = member.others(left, gathered, &mut self.row);
+            member.whole = others.is_some();
+            if let Some((others, oldest)) = others {
+                let prediction = member.constant + sums.sum(&member.coefficients, others);
+                let (value, stamp) = given(prediction, stamp.min(oldest), now);
+                turn.slots.set(member.slot, value, stamp);
+            } else {
+                all = false;
+            }
+        }
+        all
+    }
+}
+
+impl Member {
+    /// The regressors whose products are not summed at once: what is left of those that it shares, and its own. And the oldest stamp
+    /// of its own; nothing where one of them is not known to be there.
+    #[inline]
+    fn others<'a>(
+        &self,
+        left: &'a [f64],
+        gathered: &'a [Gathered],
+        row: &'a mut [f64],
+    ) -> Option<(&'a [f64], Instant)> {
+        let Some(own) = &self.own else {
+            return Some((left, Instant::MAX));
+        };
+        let (own, stamp) = own.read(gathered)?;
+        if left.is_empty() {
+            return Some((own, stamp));
+        }
+        let row = &mut row[..left.len() + own.len()];
+        row[..left.len()].copy_from_slice(left);
+        row[left.len()..].copy_from_slice(own);
+        Some((row, stamp))
+    }
+}
