@@ -1,9 +1,8 @@
 //! Decides which estimators are predicted at once; not what each of them predicts.
 
-use std::ops::Range;
-
 use super::estimate::given;
 use super::gather::Gathered;
+use super::part::Part;
 use super::products::Products;
 use super::running::Running;
 use super::turn::Turn;
@@ -30,11 +29,9 @@ pub(super) fn work(plan: &Plan, nodes: &[Running]) -> Box<[Work]> {
             // What reads nothing of what is predicted may as well come before.
             Step::Gather(gather) => {
                 let entries = &plan.gathers[gather].entries;
-                if entries
-                    .iter()
-                    .any(|entry| bank.iter().any(|of| of.slot == entry.slot))
-                {
-                    end(&mut bank, &mut work);
+                let read = |of: &Linear<'_>| entries.iter().any(|entry| entry.slot == of.slot);
+                if bank.iter().any(read) {
+                    close(&mut bank, &mut work);
                 }
                 work.push(Work::Step(*step));
                 continue;
@@ -43,18 +40,18 @@ pub(super) fn work(plan: &Plan, nodes: &[Running]) -> Box<[Work]> {
         };
         let shared = linear.as_ref().map(|linear| &linear.shared);
         if bank.first().is_some_and(|of| shared != Some(&of.shared)) {
-            end(&mut bank, &mut work);
+            close(&mut bank, &mut work);
         }
         match linear {
             Some(linear) => bank.push(linear),
             None => work.push(Work::Step(*step)),
         }
     }
-    end(&mut bank, &mut work);
+    close(&mut bank, &mut work);
     work.into()
 }
 
-fn end(bank: &mut Vec<Linear<'_>>, work: &mut Vec<Work>) {
+fn close(bank: &mut Vec<Linear<'_>>, work: &mut Vec<Work>) {
     work.extend(match &std::mem::take(bank)[..] {
         [] => None,
         [one] => Some(Work::Step(Step::Run(one.node))),
@@ -62,31 +59,14 @@ fn end(bank: &mut Vec<Linear<'_>>, work: &mut Vec<Work>) {
     });
 }
 
-/// Values of a gather that lie side by side.
-#[derive(Debug, Clone, PartialEq)]
-struct Piece {
-    gather: usize,
-    range: Range<usize>,
-}
-
-impl Piece {
-    /// The values and the oldest of their stamps, where all of them are known to be there.
-    #[inline]
-    fn read<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
-        let from = &gathered[self.gather];
-        let stamp = from.stamp_of(self.range.len())?;
-        Some((&from.values[self.range.clone()], stamp))
-    }
-}
-
-/// An estimator that is a linear form of regressors in at most two pieces, of which others may share the first.
+/// An estimator that is a linear form, of which others may share the first regressors.
 struct Linear<'a> {
     node: usize,
     slot: usize,
     trigger: Option<usize>,
     form: LinearForm<'a>,
-    shared: Option<Piece>,
-    own: Option<Piece>,
+    shared: Option<&'a Part>,
+    own: &'a [Part],
 }
 
 impl<'a> Linear<'a> {
@@ -103,16 +83,15 @@ impl<'a> Linear<'a> {
         else {
             return None;
         };
-        let form = estimate.form()?;
-        let piece = |&(gather, ref range): &(usize, Range<usize>)| Piece {
-            gather,
-            range: range.clone(),
-        };
-        let (shared, own) = match &estimate.pieces()?[..] {
-            [few] if few.1.len() < Self::MANY => (None, Some(piece(few))),
-            [shared] => (Some(piece(shared)), None),
-            [shared, own] => (Some(piece(shared)), Some(piece(own))),
-            _ => return None,
+        // Without regressors there is no oldest stamp.
+        let form = estimate
+            .form()
+            .filter(|form| !form.coefficients.is_empty())?;
+        let (shared, own) = match estimate.parts() {
+            [first, own @ ..] if first.is_side_by_side() && first.len() >= Self::MANY => {
+                (Some(first), own)
+            }
+            own => (None, own),
         };
         Some(Self {
             node,
@@ -127,7 +106,7 @@ impl<'a> Linear<'a> {
 
 /// Linear estimators that follow each other, and whose first regressors are the same values.
 pub(super) struct Bank {
-    shared: Option<Piece>,
+    shared: Option<Part>,
     /// Of as many of the shared regressors as are a multiple of four.
     products: Products,
     at_once: usize,
@@ -145,16 +124,17 @@ struct Member {
     constant: f64,
     /// Of the regressors whose products are not summed at once.
     coefficients: Box<[f64]>,
-    /// The regressors that it does not share.
-    own: Option<Piece>,
+    /// The regressors that it does not share: in the first part, and in others.
+    own: Option<Part>,
+    more: Box<[Part]>,
     /// Whether all were there when it ran last.
     whole: bool,
 }
 
 impl Bank {
     fn new(members: &[Linear<'_>]) -> Self {
-        let shared = members[0].shared.clone();
-        let at_once = shared.as_ref().map_or(0, |piece| piece.range.len() / 4 * 4);
+        let shared = members[0].shared.cloned();
+        let at_once = shared.as_ref().map_or(0, |part| part.len() / 4 * 4);
         let forms = members.iter().map(|of| &of.form.coefficients[..at_once]);
         let products = Products::new(&forms.collect::<Vec<_>>());
         let of_member = |of: &Linear<'_>| Member {
@@ -163,7 +143,8 @@ impl Bank {
             trigger: of.trigger,
             constant: of.form.constant,
             coefficients: of.form.coefficients[at_once..].into(),
-            own: of.own.clone(),
+            own: of.own.first().cloned(),
+            more: of.own.iter().skip(1).cloned().collect(),
             whole: true,
         };
         let members: Box<[_]> = members.iter().map(of_member).collect();
@@ -192,7 +173,7 @@ impl Bank {
         let (gathered, now) = (&*turn.gathered, turn.now);
         let shared = match &self.shared {
             None => Some((&[][..], Instant::MAX)),
-            Some(piece) => piece.read(gathered),
+            Some(part) => part.in_place(gathered),
         };
         let Some((shared, stamp)) = shared else {
             self.members.iter_mut().for_each(|of| of.whole = false);
@@ -220,8 +201,8 @@ impl Bank {
 }
 
 impl Member {
-    /// The regressors whose products are not summed at once: what is left of those that it shares, and its own. And the oldest stamp
-    /// of its own; nothing where one of them is not known to be there.
+    /// The regressors whose products are not summed at once, what is left of those that it shares and its own, and the oldest stamp
+    /// of its own; nothing where one of them is not there.
     #[inline]
     fn others<'a>(
         &self,
@@ -232,13 +213,25 @@ impl Member {
         let Some(own) = &self.own else {
             return Some((left, Instant::MAX));
         };
-        let (own, stamp) = own.read(gathered)?;
-        if left.is_empty() {
-            return Some((own, stamp));
+        if left.is_empty()
+            && self.more.is_empty()
+            && let Some(there) = own.in_place(gathered)
+        {
+            return Some(there);
         }
-        let row = &mut row[..left.len() + own.len()];
-        row[..left.len()].copy_from_slice(left);
-        row[left.len()..].copy_from_slice(own);
-        Some((row, stamp))
+        let row = &mut row[..self.coefficients.len()];
+        let (first, mut rest) = row.split_at_mut(left.len());
+        first.copy_from_slice(left);
+        let mut oldest = Instant::MAX;
+        for part in std::iter::once(own).chain(&self.more) {
+            let (piece, others) = rest.split_at_mut(part.len());
+            rest = others;
+            let (whole, stamp) = part.read(gathered, piece);
+            if !whole {
+                return None;
+            }
+            oldest = oldest.min(stamp);
+        }
+        Some((row, oldest))
     }
 }

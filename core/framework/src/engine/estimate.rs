@@ -1,14 +1,14 @@
 //! Decides how a fitted estimator is run: which regressors it is given, and when it gives nothing.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use super::feedback::Feedback;
 use super::gather::Gathered;
 use super::learning::Learning;
+use super::part::Part;
 use super::state::NodeState;
 use super::{EngineError, Mode};
-use crate::compile::{Entry, Gather, PlannedNode, PlannedRole, TruthLink};
+use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
 use crate::node::{FeatureFit, LinearForm, Predictor, Regressor, Restored};
 use crate::time::Instant;
 
@@ -46,83 +46,6 @@ pub(super) fn fit_of(
         places: places_of(node, regressors, &**predictor)?,
         predictor: Arc::clone(predictor),
     })
-}
-
-/// Regressors that follow each other and are read by one gather.
-#[derive(Debug)]
-struct Part {
-    gather: usize,
-    places: Places,
-}
-
-/// Where regressors are within their gather.
-#[derive(Debug)]
-enum Places {
-    SideBySide(Range<usize>),
-    Apart(Box<[usize]>),
-}
-
-impl Part {
-    fn new(gather: usize, places: &[usize]) -> Self {
-        let first = places.first().copied().unwrap_or(0);
-        let range = first..first + places.len();
-        let side_by_side = range.clone().eq(places.iter().copied());
-        Self {
-            gather,
-            places: if side_by_side {
-                Places::SideBySide(range)
-            } else {
-                Places::Apart(places.into())
-            },
-        }
-    }
-
-    fn len(&self) -> usize {
-        match &self.places {
-            Places::SideBySide(range) => range.len(),
-            Places::Apart(places) => places.len(),
-        }
-    }
-
-    /// What its regressors are.
-    fn entries(&self, gathers: &[Gather]) -> Vec<Entry> {
-        let entries = &gathers[self.gather].entries;
-        match &self.places {
-            Places::SideBySide(range) => entries[range.clone()].to_vec(),
-            Places::Apart(places) => places.iter().map(|&place| entries[place]).collect(),
-        }
-    }
-
-    /// Reads its piece of a row: whether all of it is there, and the oldest stamp of what is.
-    #[inline]
-    fn read(&self, gathered: &[Gathered], piece: &mut [f64]) -> (bool, Instant) {
-        let from = &gathered[self.gather];
-        match &self.places {
-            Places::SideBySide(range) => piece.copy_from_slice(&from.values[range.clone()]),
-            Places::Apart(places) => {
-                for (value, &place) in piece.iter_mut().zip(places) {
-                    *value = from.values[place];
-                }
-            }
-        }
-        match from.stamp_of(piece.len()) {
-            Some(stamp) => (true, stamp),
-            None => self.look_at_each(piece, &from.stamps),
-        }
-    }
-
-    #[inline(never)]
-    fn look_at_each(&self, piece: &[f64], stamps: &[Instant]) -> (bool, Instant) {
-        let of_each = |nth: usize| match &self.places {
-            Places::SideBySide(range) => stamps[range.start + nth],
-            Places::Apart(places) => stamps[places[nth]],
-        };
-        let there = (0..piece.len()).filter(|&nth| !piece[nth].is_nan());
-        let (count, oldest) = there.fold((0, Instant::MAX), |(count, oldest), nth| {
-            (count + 1, oldest.min(of_each(nth)))
-        });
-        (count == piece.len(), oldest)
-    }
 }
 
 /// What comes out where something was predicted at `now` from values of which the oldest has a stamp: nothing without a
@@ -248,13 +171,9 @@ impl Estimate {
         (form.coefficients.len() == self.width).then_some(form)
     }
 
-    /// Gathers and ranges of the regressors, piece by piece, where those of each piece lie side by side.
-    pub(crate) fn pieces(&self) -> Option<Vec<(usize, Range<usize>)>> {
-        let piece = |part: &Part| match &part.places {
-            Places::SideBySide(range) => Some((part.gather, range.clone())),
-            Places::Apart(_) => None,
-        };
-        self.parts.iter().map(piece).collect()
+    /// Where the regressors are.
+    pub(crate) fn parts(&self) -> &[Part] {
+        &self.parts
     }
 
     /// The prediction of the fit and its stamp, the oldest among the values used; NaN where one of them is missing that is needed.
@@ -333,11 +252,7 @@ impl Estimate {
     #[inline]
     fn in_place<'a>(&self, gathered: &'a [Gathered]) -> Option<(&'a [f64], Instant)> {
         let [part] = &self.parts[..] else { return None };
-        let Places::SideBySide(range) = &part.places else {
-            return None;
-        };
-        let from = &gathered[part.gather];
-        Some((&from.values[range.clone()], from.stamp_of(range.len())?))
+        part.in_place(gathered)
     }
 
     /// Reads the row: whether all of it is there, and the oldest stamp of what is.

@@ -16,6 +16,7 @@ mod learning;
 pub(crate) mod mode;
 mod outlets;
 mod pairing;
+mod part;
 mod products;
 mod recent_error;
 mod revision;
