@@ -19,7 +19,7 @@ use athermal::core::fit::{FitOptions, fit};
 use athermal::core::recording::{Event, Recording, Table};
 use athermal::files::{Dataset, Options};
 use athermal::{Engine, Model};
-use workbench::{Scratch, athermal, graph, simulated};
+use workbench::{Scratch, athermal, athermal_fed, graph, simulated};
 
 /// Two days of a machine, half a day of another, and a model fitted on the former.
 struct Fitted {
@@ -202,6 +202,18 @@ fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
         told_at_once(&rows, 1),
         "warning: standard input:4: the time `0.0` is not after `10.0`; the row was left out; others like it are counted\n"
     );
+}
+
+#[test]
+fn rows_that_were_left_out_of_a_pipe_are_counted_under_the_name_by_which_the_first_was_told() {
+    let mut rows = first_rows(2);
+    rows.extend(rows[1..].to_vec());
+    let input = rows.join("\n");
+    let run = athermal_fed(&[&"run", &fitted().model, &"-i", &"-"], input.as_bytes());
+    let told = run.ended(0).told;
+    assert!(!told.contains("-:"), "{told}");
+    let of_input = told.lines().filter(|line| line.contains("standard input:"));
+    assert_eq!(of_input.count(), 2, "{told}");
 }
 
 #[test]

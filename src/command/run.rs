@@ -255,7 +255,12 @@ impl Run {
     }
 
     fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader, usual: &[SampleRange]) {
-        let reports = [(self.input.display().to_string(), reader.report().clone())];
+        let input = if self.ends() {
+            self.input.display().to_string()
+        } else {
+            "standard input".to_owned()
+        };
+        let reports = [(input, reader.report().clone())];
         let rejected = engine.rejected_channels();
         data::tell(terminal, &reports, engine.refused(), &rejected);
         if self.ends() {

@@ -187,9 +187,9 @@ impl Gathered {
         let mut glance = Glance::NOTHING;
         let to = self.values.iter_mut().zip(&mut self.stamps);
         for ((value, stamp), &slot) in to.zip(places) {
-            let given = &slots.given[slot];
-            (*value, *stamp) = (slots.values[slot], given.stamp);
-            glance.add(*value, given, slots.tick);
+            let (last, given) = (slots.values[slot], &slots.given[slot]);
+            (*value, *stamp) = (last, given.stamp);
+            glance.add(last, given, slots.tick);
         }
         self.together = glance.oldest == glance.newest;
         let nothing = places.is_empty();
