@@ -67,7 +67,7 @@ pub struct Simulate {
     /// Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
-    /// A sensor fault, CHANNEL=KIND[,from=…][,for=…][,size=…]
+    /// A fault of a sensor, or of each of a signal: CHANNEL=KIND[,from=…][,for=…][,size=…]
     #[arg(long = "fault", value_name = "SPEC")]
     faults: Vec<FaultSpec>,
 }

@@ -33,7 +33,7 @@ impl Recording for WithFaults<'_> {
             .map(|(source, planned)| (source.name.as_str(), &planned.channel.unit))
             .collect();
         let faults = self.faults.iter().map(|fault| fault.resolve(&channels));
-        let faults = faults.collect::<Result<Vec<_>, _>>()?;
+        let faults = faults.collect::<Result<Vec<_>, _>>()?.concat();
         Ok(Box::new(FaultyRows {
             rows: self.recording.open(plan)?,
             faults: Faults::new(faults, channels.len(), self.seed)?,
@@ -79,11 +79,11 @@ mod tests {
         let spec: FaultSpec = "temperature.room=missing,from=1s,for=2s".parse().unwrap();
         assert_eq!(spec.kind, FaultKind::Missing);
         let unit = Unit::parse("Cel").unwrap();
-        let fault = spec.resolve(&[("temperature.room", &unit)]).unwrap();
-        assert_eq!(Duration::from_ns(fault.for_ns), "2s".parse().unwrap());
+        let faults = spec.resolve(&[("temperature.room", &unit)]).unwrap();
+        assert_eq!(Duration::from_ns(faults[0].for_ns), "2s".parse().unwrap());
         let mut rows = FaultyRows {
             rows: Box::new(table.events().iter()),
-            faults: Faults::new(vec![fault], 1, 1).unwrap(),
+            faults: Faults::new(faults, 1, 1).unwrap(),
         };
         let mut value = [0.0];
         let mut seen = Vec::new();

@@ -18,7 +18,7 @@ use crate::unit::Unit;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSpec {
-    /// The measured channel, such as `temperature.plate1`.
+    /// The measured channel, such as `temperature.plate1`, or a signal for each of its channels.
     pub channel: String,
     /// What is wrong with it.
     pub kind: FaultKind,
@@ -38,27 +38,38 @@ fn at_once() -> Duration {
 }
 
 impl FaultSpec {
-    /// The fault of one of `channels`, given by name and unit, in the order of the rows.
+    /// The fault of one of `channels`, given by name and unit, in the order of the rows; or of each channel of the signal that is
+    /// named.
     ///
     /// # Errors
-    /// No channel has the name; the size does not fit its unit; or there is none, and no usual one.
-    pub fn resolve(&self, channels: &[(&str, &Unit)]) -> Result<Fault, FaultError> {
-        let named = channels.iter().position(|(name, _)| *name == self.channel);
-        let Some(channel) = named else {
-            let names = || channels.iter().map(|(name, _)| *name);
+    /// No channel and no signal has the name; the size does not fit a unit; or there is none, and no usual one.
+    pub fn resolve(&self, channels: &[(&str, &Unit)]) -> Result<Vec<Fault>, FaultError> {
+        let names = || channels.iter().map(|(name, _)| *name);
+        let signals = || names().map(|name| name.split_once('.').map_or("", |(signal, _)| signal));
+        let meant: Vec<_> = match names().position(|name| name == self.channel) {
+            Some(channel) => vec![channel],
+            None => {
+                let of_signal = signals().enumerate().filter(|(_, of)| *of == self.channel);
+                of_signal.map(|(channel, _)| channel).collect()
+            }
+        };
+        if meant.is_empty() {
             return Err(FaultError::UnknownChannel {
                 channel: self.channel.clone(),
-                nearest: nearest(&self.channel, names()).map(str::to_owned),
+                nearest: nearest(&self.channel, names().chain(signals())).map(str::to_owned),
                 known: names().map(str::to_owned).collect(),
             });
+        }
+        let of = |channel: usize| {
+            Ok(Fault {
+                channel,
+                kind: self.kind,
+                from_ns: self.from.as_ns(),
+                for_ns: self.lasting.map_or(i64::MAX, Duration::as_ns),
+                size: self.size_in(channels[channel].1)?,
+            })
         };
-        Ok(Fault {
-            channel,
-            kind: self.kind,
-            from_ns: self.from.as_ns(),
-            for_ns: self.lasting.map_or(i64::MAX, Duration::as_ns),
-            size: self.size_in(channels[channel].1)?,
-        })
+        meant.into_iter().map(of).collect()
     }
 
     fn size_in(&self, unit: &Unit) -> Result<f64, FaultError> {
@@ -143,14 +154,28 @@ impl FromStr for FaultSpec {
 mod tests {
     use super::*;
 
-    fn resolved(text: &str) -> Result<Fault, FaultError> {
+    fn all_resolved(text: &str) -> Result<Vec<Fault>, FaultError> {
         let (celsius, nanometre) = (Unit::parse("Cel").unwrap(), Unit::parse("nm").unwrap());
         let volt = Unit::parse("V").unwrap();
         text.parse::<FaultSpec>()?.resolve(&[
             ("temperature.room", &celsius),
+            ("position.X1", &nanometre),
             ("position.Z1", &nanometre),
             ("supply", &volt),
         ])
+    }
+
+    fn resolved(text: &str) -> Result<Fault, FaultError> {
+        let found = all_resolved(text)?;
+        assert_eq!(found.len(), 1, "{text}");
+        Ok(found[0].clone())
+    }
+
+    #[test]
+    fn a_fault_of_a_signal_is_one_of_each_of_its_channels() {
+        let found = all_resolved("position=offset,size=0.2 um").unwrap();
+        let found = found.iter().map(|fault| (fault.channel, fault.size));
+        assert_eq!(found.collect::<Vec<_>>(), [(1, 200.0), (2, 200.0)]);
     }
 
     #[test]
@@ -185,6 +210,10 @@ mod tests {
             (
                 "temperature.rom=missing",
                 "there is no channel `temperature.rom`, did you mean `temperature.room`?",
+            ),
+            (
+                "positon=missing",
+                "there is no channel `positon`, did you mean `position`?",
             ),
             (
                 "temperature.room",

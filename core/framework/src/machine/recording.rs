@@ -62,7 +62,7 @@ impl<'a> Simulated<'a> {
             .map(|(name, unit)| (name.as_str(), unit))
             .collect();
         let faults = self.faults.iter().map(|fault| fault.resolve(&channels));
-        let faults = faults.collect::<Result<Vec<_>, _>>()?;
+        let faults = faults.collect::<Result<Vec<_>, _>>()?.concat();
         let faults = Faults::new(faults, channels.len(), self.setup.seed)?;
         Ok(Box::new(Faulty::new(simulation, faults)))
     }

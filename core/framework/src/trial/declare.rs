@@ -444,16 +444,13 @@ impl Declaring<'_> {
             };
             named
                 .resolve(&[(name, unit)])
-                .and_then(|fault| {
-                    Faults::new(
-                        vec![crate::fault::Fault {
-                            from_ns: 0,
-                            for_ns: 1,
-                            ..fault
-                        }],
-                        1,
-                        1,
-                    )
+                .and_then(|faults| {
+                    let short = faults.into_iter().map(|fault| crate::fault::Fault {
+                        from_ns: 0,
+                        for_ns: 1,
+                        ..fault
+                    });
+                    Faults::new(short.collect(), 1, 1)
                 })
                 .map(|_| named)
         };
