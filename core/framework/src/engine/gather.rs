@@ -23,7 +23,7 @@ pub(crate) struct Gathered {
     /// Whether any of the slots, read without a lag, has a new value at this tick.
     pub(crate) fresh: bool,
     read: Read,
-    from: From,
+    origin: Origin,
     conversions: Box<[Conversion]>,
     /// How long each of them counts, and how long any does at least.
     ages: Box<[Duration]>,
@@ -32,7 +32,7 @@ pub(crate) struct Gathered {
 
 /// Where the values of a gather are from.
 #[derive(Debug, Clone)]
-enum From {
+enum Origin {
     /// Slots side by side, of which this is the first, without a lag.
     SideBySide(usize),
     /// Slots without a lag.
@@ -41,7 +41,7 @@ enum From {
     Past(Box<AllPast>),
 }
 
-impl From {
+impl Origin {
     fn new(entries: &[Entry]) -> Self {
         if let Some(first) = side_by_side(entries) {
             return Self::SideBySide(first);
@@ -117,7 +117,7 @@ impl Gathered {
             together: false,
             fresh: false,
             read: gather.read,
-            from: From::new(&gather.entries),
+            origin: Origin::new(&gather.entries),
             conversions: gather.conversions.clone().into(),
             ages: gather.entries.iter().map(|entry| entry.max_age).collect(),
             shortest: shortest(&gather.entries),
@@ -127,10 +127,10 @@ impl Gathered {
     /// Reads the slots as they stand now.
     #[inline]
     pub(crate) fn read(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
-        match self.from {
-            From::SideBySide(first) => self.read_side_by_side(slots, first, now),
-            From::Apart(_) => self.read_apart(slots, now),
-            From::Past(_) => self.read_past(slots, histories, now),
+        match self.origin {
+            Origin::SideBySide(first) => self.read_side_by_side(slots, first, now),
+            Origin::Apart(_) => self.read_apart(slots, now),
+            Origin::Past(_) => self.read_past(slots, histories, now),
         }
         if !self.conversions.is_empty() {
             self.convert();
@@ -181,7 +181,7 @@ impl Gathered {
 
     #[inline(never)]
     fn read_apart(&mut self, slots: &Slots, now: Instant) {
-        let From::Apart(places) = &self.from else {
+        let Origin::Apart(places) = &self.origin else {
             return;
         };
         let mut glance = Glance::NOTHING;
@@ -198,7 +198,7 @@ impl Gathered {
 
     #[inline(never)]
     fn read_past(&mut self, slots: &Slots, histories: &[Option<History>], now: Instant) {
-        let From::Past(past) = &mut self.from else {
+        let Origin::Past(past) = &mut self.origin else {
             return;
         };
         let (values, stamps) = (&mut *self.values, &mut *self.stamps);
@@ -239,10 +239,10 @@ impl Gathered {
             let (value, age) = (&mut values[place], now - stamps[place]);
             *value = seen(*value, read, slots.ran(slot), age, ages[place]);
         };
-        match &self.from {
-            From::SideBySide(_) => {}
-            From::Apart(of) => of.iter().enumerate().for_each(|(at, &slot)| hide(at, slot)),
-            From::Past(past) => past.present.iter().for_each(|&(at, slot)| hide(at, slot)),
+        match &self.origin {
+            Origin::SideBySide(_) => {}
+            Origin::Apart(of) => of.iter().enumerate().for_each(|(at, &slot)| hide(at, slot)),
+            Origin::Past(past) => past.present.iter().for_each(|&(at, slot)| hide(at, slot)),
         }
     }
 
@@ -270,7 +270,7 @@ impl Gathered {
 
     /// Looks its places in histories up anew: they are not those that it read from before.
     pub(crate) fn forget_places(&mut self) {
-        if let From::Past(past) = &mut self.from {
+        if let Origin::Past(past) = &mut self.origin {
             past.forget_places();
         }
     }
