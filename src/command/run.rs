@@ -7,7 +7,9 @@ use athermal::core::document::TimeBase;
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
-use athermal::files::{FileError, Flush, Layout, Options, Reader, WithRevision, Writer, layout};
+use athermal::files::{
+    FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, layout,
+};
 use athermal::{Engine, Model};
 use clap::Args;
 
@@ -258,7 +260,7 @@ impl Run {
         let input = if self.ends() {
             self.input.display().to_string()
         } else {
-            "standard input".to_owned()
+            STANDARD_INPUT.to_owned()
         };
         let reports = [(input, reader.report().clone())];
         let rejected = engine.rejected_channels();

@@ -60,7 +60,6 @@ pub use correlation::{
     LjungBox, NORMAL_95, autocorrelation, autocorrelation_errors, autocorrelation_pairs,
     cross_correlation, cross_correlation_error, cross_correlation_pairs, ljung_box,
 };
-pub use dot::dot;
 pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;
 pub use folds::{FoldRows, Folds, Split};

@@ -2,8 +2,9 @@
 //! how regressors are scaled (they should be standardised), nor which rows are learned from.
 
 use crate::checks::{check_length, check_parameter};
+use crate::dot::dot;
 use crate::scratch::Scratch;
-use crate::{Gram, NumericsError, dot};
+use crate::{Gram, NumericsError};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};

@@ -2,10 +2,10 @@
 
 use athermal_core::model::{number, number_or_none, numbers};
 use athermal_core::node::{
-    Coefficients, Learner, Mistake, Predictor, Restored, State, TrainedRange,
+    Coefficients, Learner, LinearForm, Mistake, Predictor, Restored, State, TrainedRange,
 };
 use athermal_core::time::Instant;
-use athermal_numerics::{Rls, Sgd, Standardization, dot};
+use athermal_numerics::{Rls, Sgd, Standardization};
 use serde::{Deserialize, Serialize};
 
 use crate::scaling::scale_mistakes;
@@ -338,6 +338,10 @@ impl Learner for OnlineLearner {
 }
 
 /// `b₀ + Σ b_j x_j`.
-fn value(coefficients: &[f64], intercept: f64, regressors: &[f64]) -> f64 {
-    intercept + dot(coefficients, regressors)
+fn value(coefficients: &[f64], constant: f64, regressors: &[f64]) -> f64 {
+    let form = LinearForm {
+        constant,
+        coefficients,
+    };
+    form.at(regressors)
 }

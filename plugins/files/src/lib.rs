@@ -48,6 +48,7 @@ pub use format::Format;
 pub use instant::has_zone;
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};
+pub use lines::STANDARD_INPUT;
 pub use reader::{Options, Reader, Row};
 pub use recording::{Event, Recording};
 pub use stream::WithRevision;

@@ -16,6 +16,9 @@ pub(crate) const LONGEST_ROW: usize = 1 << 20;
 pub(crate) const BUFFER: usize = 64 * 1024;
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
+/// What `-` is called where something is told of it.
+pub const STANDARD_INPUT: &str = "standard input";
+
 /// A stream cut into lines.
 pub(crate) struct Lines {
     pub file: Arc<str>,
@@ -39,7 +42,7 @@ impl Lines {
     /// A file, or standard input for `-`.
     pub fn open(path: &Path) -> Result<Self, FileError> {
         if path == Path::new("-") {
-            return Ok(Self::new("standard input".into(), Box::new(io::stdin())));
+            return Ok(Self::new(STANDARD_INPUT.into(), Box::new(io::stdin())));
         }
         let file: Arc<str> = path.display().to_string().into();
         match File::open(path) {

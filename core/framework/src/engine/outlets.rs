@@ -69,6 +69,7 @@ impl Outlets {
         let mut lacks = false;
         for (outputs, first) in &self.runs {
             let values = &mut self.values[outputs.clone()];
+            // Several at once are not worth their preparation for one.
             if let [value] = values {
                 *value = slots.now(*first);
                 lacks |= value.is_nan();

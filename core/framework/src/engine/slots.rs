@@ -75,31 +75,16 @@ impl Slots {
     /// When slots side by side were given their values, where all have one that was given at the same tick with the same stamp.
     #[inline]
     pub(crate) fn given_together(&self, range: Range<usize>) -> Option<Given> {
-        let given = &self.given[range.clone()];
-        let first = *given.first()?;
+        let first = *self.given.get(range.start)?;
         // Loops without a way out take several values at once.
-        let differs = |of: &Given| {
-            [
-                of.stamp.as_ns() ^ first.stamp.as_ns(),
-                (of.tick ^ first.tick) as i64,
-            ]
-        };
-        let (fours, rest) = given.as_chunks::<4>();
-        let mut apart = [[0; 2]; 4];
-        for four in fours {
-            for (apart, of) in apart.iter_mut().zip(four) {
-                let differs = differs(of);
-                *apart = [apart[0] | differs[0], apart[1] | differs[1]];
-            }
+        let (mut apart, mut late) = (0, 0);
+        for given in &self.given[range.clone()] {
+            apart |= given.stamp.as_ns() ^ first.stamp.as_ns();
+            late |= given.tick ^ first.tick;
         }
-        let apart = apart.as_flattened().iter().fold(0, |all, of| all | of);
-        let apart = rest
-            .iter()
-            .map(differs)
-            .fold(apart, |all, [stamp, tick]| all | stamp | tick);
         let lacks = self.values[range].iter();
         let lacks = lacks.fold(0, |lacks, value| lacks | u64::from(value.is_nan()));
-        (apart == 0 && lacks == 0).then_some(first)
+        (late == 0 && apart == 0 && lacks == 0).then_some(first)
     }
 
     /// Nothing is held over into another segment.

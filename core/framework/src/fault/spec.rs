@@ -45,18 +45,19 @@ impl FaultSpec {
     /// No channel and no signal has the name; the size does not fit a unit; or there is none, and no usual one.
     pub fn resolve(&self, channels: &[(&str, &Unit)]) -> Result<Vec<Fault>, FaultError> {
         let names = || channels.iter().map(|(name, _)| *name);
-        let signals = || names().map(|name| name.split_once('.').map_or("", |(signal, _)| signal));
+        let signal = |name| str::split_once(name, '.').map(|(signal, _)| signal);
         let meant: Vec<_> = match names().position(|name| name == self.channel) {
             Some(channel) => vec![channel],
             None => {
-                let of_signal = signals().enumerate().filter(|(_, of)| *of == self.channel);
-                of_signal.map(|(channel, _)| channel).collect()
+                let meant = |channel: &usize| signal(channels[*channel].0) == Some(&*self.channel);
+                (0..channels.len()).filter(meant).collect()
             }
         };
         if meant.is_empty() {
             return Err(FaultError::UnknownChannel {
                 channel: self.channel.clone(),
-                nearest: nearest(&self.channel, names().chain(signals())).map(str::to_owned),
+                nearest: nearest(&self.channel, names().chain(names().filter_map(signal)))
+                    .map(str::to_owned),
                 known: names().map(str::to_owned).collect(),
             });
         }
@@ -210,6 +211,10 @@ mod tests {
             (
                 "temperature.rom=missing",
                 "there is no channel `temperature.rom`, did you mean `temperature.room`?",
+            ),
+            (
+                "=missing",
+                "there is no channel ``; there are temperature.room, position.X1, position.Z1, supply",
             ),
             (
                 "positon=missing",

@@ -377,6 +377,7 @@ impl RollingSlope {
         self.vectors.slopes(self, out);
     }
 
+    /// Written out beside [`tell`](Self::tell), since a closure would not be compiled for wide vectors.
     #[inline(always)]
     fn slopes_here(&mut self, out: &mut [f64]) {
         let Some(mut results) = self.room(out) else {
