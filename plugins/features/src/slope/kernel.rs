@@ -140,17 +140,30 @@ impl Window {
         self.parts_until = 0;
     }
 
-    /// Drops the rows that are outside of the window that ends with the row at `t_ns`, the last one or the next.
+    /// Drops the rows that are outside of the window that ends with the next row, at `t_ns`.
     #[inline]
-    fn advance(&mut self, rows: &Rows, t_ns: i64) {
+    fn advance_to_next(&mut self, rows: &Rows, t_ns: i64) {
+        let there = |row: u64| row < rows.next();
+        self.advance(rows, t_ns, |row| if there(row) { rows.time(row) } else { t_ns });
+    }
+
+    /// The same where the row at `t_ns` is the last one.
+    #[inline(always)]
+    fn advance_to_last(&mut self, rows: &Rows, t_ns: i64) {
+        self.advance(rows, t_ns, |row| rows.time(row));
+    }
+
+    /// Where its oldest row leaves, the new one is taken to lie in the same block; if it does not, the parts are to be found anew.
+    #[inline(always)]
+    fn advance(&mut self, rows: &Rows, t_ns: i64, time: impl Fn(u64) -> i64) {
         // Without a sign no two instants are too far apart.
-        let leaves = |t: i64| t_ns.wrapping_sub(t) as u64 >= self.width_ns as u64;
-        while leaves(self.head_ns) {
-            self.head += 1;
-            self.head_ns = match self.head < rows.next() {
-                true => rows.time(self.head),
-                false => t_ns,
-            };
+        let leaves = |t: i64, width: i64| t_ns.wrapping_sub(t) as u64 >= width as u64;
+        if leaves(self.head_ns, self.width_ns) {
+            while leaves(self.head_ns, self.width_ns) {
+                self.head += 1;
+                self.head_ns = time(self.head);
+            }
+            self.parts.places[0] = rows.slot(self.head);
         }
     }
 
@@ -173,7 +186,10 @@ impl Window {
             by,
         };
         self.parts_until = match self.head.cmp(&current) {
-            Ordering::Less => blocks.starts()[self.block + 1],
+            Ordering::Less => {
+                self.parts.places[0] = rows.slot(self.head);
+                blocks.starts()[self.block + 1]
+            }
             Ordering::Equal => current + 1,
             Ordering::Greater => {
                 self.parts.places[2] = blocks.sum_short(rows, index, self.head);
@@ -187,6 +203,11 @@ impl Window {
     fn span(&self, t_ns: i64) -> i64 {
         t_ns.wrapping_sub(self.head_ns)
     }
+
+    /// Whether its rows span what a channel's samples must.
+    fn is_long(&self, t_ns: i64) -> bool {
+        self.span(t_ns) >= self.needed_span
+    }
 }
 
 impl RollingSlope {
@@ -199,13 +220,14 @@ impl RollingSlope {
         no_value: NoValue,
         squares: bool,
     ) -> RollingSlope {
-        let rows = Rows::new(channels);
-        let mut blocks = Blocks::new(channels, windows_ns.len(), squares);
-        blocks.rebuild(&rows, 0);
         let windows: Vec<Window> = windows_ns
             .iter()
             .map(|&width_ns| Window::new(width_ns.max(1), &coverage))
             .collect();
+        let spare = windows.iter().map(|w| w.width_ns - w.needed_span).min();
+        let rows = Rows::new(channels, spare.unwrap_or(0));
+        let mut blocks = Blocks::new(channels, windows_ns.len(), squares);
+        blocks.rebuild(&rows, 0);
         let shortest = (0..windows.len()).min_by_key(|&index| windows[index].width_ns);
         let longest = (0..windows.len()).max_by_key(|&index| windows[index].width_ns);
         RollingSlope {
@@ -270,7 +292,7 @@ impl RollingSlope {
                 .for_each(|window| window.begin(t_ns)),
         }
         let newest_head = self.windows.get_mut(self.shortest).map_or(0, |window| {
-            window.advance(&self.rows, t_ns);
+            window.advance_to_next(&self.rows, t_ns);
             window.head
         });
         if self.blocks.is_full(&self.rows, newest_head) {
@@ -293,7 +315,7 @@ impl RollingSlope {
         self.blocks.cut(&self.rows);
         let mut oldest_block = self.blocks.starts().len() - 1;
         for window in &mut self.windows {
-            window.advance(&self.rows, t_ns);
+            window.advance_to_next(&self.rows, t_ns);
             window.block = self.blocks.find(window.head, window.block);
             oldest_block = oldest_block.min(window.block);
         }
@@ -308,27 +330,22 @@ impl RollingSlope {
     #[inline(always)]
     fn advance(&mut self, t_ns: i64) {
         let (rows, blocks) = (&self.rows, &mut self.blocks);
-        let current = blocks.current_start();
-        let mut long_enough = true;
         let abreast = self.windows.chunks_mut(ABREAST).zip(&mut self.weights);
         for (nth, (windows, weights)) in abreast.enumerate() {
             for (i, window) in windows.iter_mut().enumerate() {
-                window.advance(rows, t_ns);
+                window.advance_to_last(rows, t_ns);
                 if window.head >= window.parts_until {
                     window.find_parts(ABREAST * nth + i, rows, blocks, weights);
                 }
-                if window.head < current {
-                    window.parts.places[0] = rows.slot(window.head);
-                }
-                weights.set_head(i, window.parts.places[0]);
-                long_enough &= window.span(t_ns) >= window.needed_span;
             }
         }
         let rows = &self.rows;
         let head_of = |index: usize| self.windows.get(index).map_or(0, |window| window.head);
-        let newest = head_of(self.shortest);
+        let (oldest, newest) = (head_of(self.longest), head_of(self.shortest));
+        // A window that has lost a row and has no wide gap spans enough.
+        let long_enough = oldest > rows.even_from() || self.windows.iter().all(|w| w.is_long(t_ns));
         let enough = long_enough && rows.next() - newest >= self.coverage.min_samples as u64;
-        let complete = enough && head_of(self.longest) >= rows.complete_from();
+        let complete = enough && oldest >= rows.complete_from();
         // Where each window has gaps the weights are those of no channel.
         self.all_gaps = enough && newest < rows.complete_from();
         if !self.all_gaps {
@@ -344,8 +361,14 @@ impl RollingSlope {
     #[inline(always)]
     fn weigh(&mut self) {
         let (windows, blocks) = (&self.windows, &self.blocks);
-        for weights in &mut self.weights {
-            weights.weigh(blocks.tails(), blocks.now(0));
+        let (abreast, others) = windows.as_chunks::<ABREAST>();
+        for (windows, weights) in abreast.iter().zip(&mut self.weights) {
+            let heads = from_fn(|i| windows[i].parts.places[0]);
+            weights.weigh(heads, blocks.tails(), blocks.now(0));
+        }
+        if let Some(weights) = self.weights.get_mut(abreast.len()) {
+            let heads = from_fn(|i| others.get(i).map_or(0, |window| window.parts.places[0]));
+            weights.weigh(heads, blocks.tails(), blocks.now(0));
         }
         let newest = windows.get(self.shortest);
         if newest.is_some_and(|window| window.head > blocks.current_start()) {
@@ -361,7 +384,7 @@ impl RollingSlope {
         let rows = &self.rows;
         for window in &mut self.windows {
             let few = rows.next() - window.head < self.coverage.min_samples as u64;
-            window.kind = if few || window.span(t_ns) < window.needed_span {
+            window.kind = if few || !window.is_long(t_ns) {
                 Kind::Absent
             } else if window.head < rows.complete_from() {
                 Kind::Gaps
@@ -525,13 +548,29 @@ fn slopes_of_complete(
     now: &[Values],
     slopes: &mut [Lanes],
 ) {
-    let abreast = windows.chunks(ABREAST).zip(weights);
-    for ((windows, weights), slopes) in abreast.zip(slopes.chunks_mut(ABREAST)) {
-        for (i, (window, slopes)) in windows.iter().zip(slopes).enumerate() {
-            if window.kind == Kind::Complete {
-                let [h, r, w] = window.parts.places;
-                *slopes = weights.slopes(i, [&head[h], &rest[r], &now[w]]);
-            }
+    let tables = [head, rest, now];
+    let (abreast, others) = windows.as_chunks::<ABREAST>();
+    let (of_abreast, of_others) = slopes.as_chunks_mut::<ABREAST>();
+    for ((windows, weights), slopes) in abreast.iter().zip(weights).zip(of_abreast) {
+        slopes_abreast(windows, weights, tables, slopes);
+    }
+    if let Some(weights) = weights.get(abreast.len()) {
+        slopes_abreast(others, weights, tables, of_others);
+    }
+}
+
+/// The same in windows that have their weights in common, at most [`ABREAST`].
+#[inline(always)]
+fn slopes_abreast(
+    windows: &[Window],
+    weights: &Weights,
+    [head, rest, now]: [&[Values]; 3],
+    slopes: &mut [Lanes],
+) {
+    for (i, (window, slopes)) in windows.iter().zip(slopes).enumerate() {
+        if window.kind == Kind::Complete {
+            let [h, r, w] = window.parts.places;
+            *slopes = weights.slopes(i, [&head[h], &rest[r], &now[w]]);
         }
     }
 }

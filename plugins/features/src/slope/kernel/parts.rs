@@ -22,8 +22,6 @@ pub(super) const ABREAST: usize = 4;
 pub(super) struct Weights {
     /// As in [`Parts`].
     by: [f64; ABREAST],
-    /// Where the sums of the first parts lie. They are not copied, as numbers just written one by one are slow to be read as vectors.
-    heads: [usize; ABREAST],
     /// Sums of the rows' times in the second parts, and in the windows.
     rest: Times<ABREAST>,
     times: Times<ABREAST>,
@@ -35,7 +33,6 @@ pub(super) struct Weights {
 impl Weights {
     pub(super) const NONE: Weights = Weights {
         by: [0.0; ABREAST],
-        heads: [0; ABREAST],
         rest: Times::NONE,
         times: Times::NONE,
         of_ty: [0.0; ABREAST],
@@ -49,16 +46,10 @@ impl Weights {
         self.rest.set(i, &rest.rows);
     }
 
-    /// Sets where the first part of window `i` lies.
+    /// Finds the weights of windows that end with the current block and whose first parts lie at these places of `tails`.
     #[inline(always)]
-    pub(super) fn set_head(&mut self, i: usize, place: usize) {
-        self.heads[i] = place;
-    }
-
-    /// Finds the weights of windows that end with the current block.
-    #[inline(always)]
-    pub(super) fn weigh(&mut self, heads: &[Common], now: &Common) {
-        let heads = self.heads.map(|place| &heads[place].rows);
+    pub(super) fn weigh(&mut self, places: [usize; ABREAST], tails: &[Common], now: &Common) {
+        let heads = places.map(|place| &tails[place].rows);
         let head = Times {
             n: heads.map(|head| head.n[0]),
             t: heads.map(|head| head.t[0]),

@@ -15,6 +15,9 @@ pub(super) struct Rows {
     next: u64,
     /// The first row after the last one from which a sample is missing.
     complete_from: u64,
+    /// A longer time between rows is a wide gap, in nanoseconds; and the first row, or the one after the last wide gap.
+    wide_ns: i64,
+    even_from: u64,
     /// Nanoseconds since each channel's newest sample, infinite before its first.
     silent: Vec<Lanes>,
     /// Time of each channel's first sample, and the latest of them.
@@ -25,7 +28,7 @@ pub(super) struct Rows {
 const INITIAL_CAPACITY: usize = 64;
 
 impl Rows {
-    pub(super) fn new(channels: usize) -> Rows {
+    pub(super) fn new(channels: usize, wide_ns: i64) -> Rows {
         let groups = group_count(channels);
         Rows {
             channels,
@@ -35,6 +38,8 @@ impl Rows {
             wait: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
             next: 0,
             complete_from: 0,
+            wide_ns,
+            even_from: 0,
             silent: vec![[f64::INFINITY; LANES]; groups],
             first: vec![None; channels],
             latest_first: None,
@@ -44,6 +49,7 @@ impl Rows {
     pub(super) fn reset(&mut self) {
         self.next = 0;
         self.complete_from = 0;
+        self.even_from = 0;
         self.silent.fill([f64::INFINITY; LANES]);
         self.first.fill(None);
         self.latest_first = None;
@@ -90,6 +96,12 @@ impl Rows {
     #[inline]
     pub(super) fn complete_from(&self) -> u64 {
         self.complete_from
+    }
+
+    /// The first row, or the one after the last wide gap.
+    #[inline]
+    pub(super) fn even_from(&self) -> u64 {
+        self.even_from
     }
 
     /// Nanoseconds from a row to the next sample of each channel of a group.
@@ -168,7 +180,10 @@ impl Rows {
     /// Says whether some channel has its first sample.
     #[inline(always)]
     pub(super) fn append(&mut self, t_ns: i64, y: &[f64], limit: f64, oldest: u64) -> bool {
-        let passed = self.last_time().map_or(0, |last| t_ns.saturating_sub(last)) as f64;
+        let passed = self.last_time().map_or(0, |last| t_ns.saturating_sub(last));
+        if passed > self.wide_ns {
+            self.even_from = self.next;
+        }
         let slot = self.slot(self.next);
         self.time[slot] = t_ns;
         let places = slot * self.groups..(slot + 1) * self.groups;
@@ -191,7 +206,7 @@ impl Rows {
         self.wait[places].fill([0.0; LANES]);
         // Where this row and the last are complete nobody is silent or awaited.
         let begun = (absent || self.complete_from == self.next) && {
-            self.follow_silence(passed);
+            self.follow_silence(passed as f64);
             self.follow_absence(oldest)
         };
         self.next += 1;
