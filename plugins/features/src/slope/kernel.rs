@@ -1,8 +1,8 @@
 //! The least-squares slope over trailing windows: exact sums for many channels and windows at once, row by row.
 //! It decides when a window has a value; it does not decide which windows there are, nor what a caller does with absence.
 //!
-//! Rows are cut into blocks of at most 32, shared by all windows (`kernel/blocks.rs`). A window is the end of one block, all
-//! blocks after it and the current one: three sums (`kernel/sums.rs`) that are kept for all windows at once, added up for each
+//! Rows are cut into blocks of at most 64, shared by all windows (`kernel/blocks.rs`). A window (`kernel/window.rs`) is the end of
+//! one block, all blocks after it and the current one: three sums (`kernel/sums.rs`) that are kept for all windows at once, added up for each
 //! (`kernel/parts.rs`). Nothing is ever subtracted from a sum, so that a sample of 1e9 leaves no trace when it leaves a window.
 //! Times are measured from an instant within the window and values from one near them, so that no precision is lost to the
 //! epoch or an offset. What is done with every row is compiled for the vectors of several processors (`kernel/vectors.rs`).
@@ -14,20 +14,21 @@ mod saved;
 mod sums;
 mod told;
 mod vectors;
+mod window;
 
 #[cfg(test)]
 mod tests;
 
 use std::array::from_fn;
-use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
 use blocks::Blocks;
-use parts::{ABREAST, Least, Line, Parts, Weights};
+use parts::{ABREAST, Least, Line, Weights};
 use rows::Rows;
 use sums::{LANES, Lanes, Values};
 use vectors::Vectors;
+use window::{Kind, Window};
 
 /// Samples of this size or above count as absent, like infinities: their squares would overflow.
 pub(crate) const LIMIT: f64 = 1e100;
@@ -82,132 +83,6 @@ pub struct RollingSlope {
     /// By window: the results of the channels of a group.
     results: Vec<Lanes>,
     vectors: Vectors,
-}
-
-/// One trailing window over the rows.
-#[derive(Clone, Debug)]
-struct Window {
-    width_ns: i64,
-    /// What its samples must span, in nanoseconds.
-    needed_span: i64,
-    /// How long ago a channel must have begun, in nanoseconds.
-    needed_open: i64,
-    /// The oldest row in it, when that was, and the block of that row or one before it.
-    head: u64,
-    head_ns: i64,
-    block: usize,
-    parts: Parts,
-    /// From this oldest row on the parts are to be found anew.
-    parts_until: u64,
-    kind: Kind,
-}
-
-/// What is known of all channels of a window at once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    /// No channel has a value.
-    Absent,
-    /// Every channel has one, and is present in every row.
-    Complete,
-    /// Each is to be looked at.
-    Gaps,
-}
-
-impl Window {
-    fn new(width_ns: i64, coverage: &Coverage) -> Window {
-        Window {
-            width_ns,
-            needed_span: (coverage.min_coverage * width_ns as f64).ceil().max(1.0) as i64,
-            needed_open: if coverage.cold_partial { 0 } else { width_ns },
-            head: 0,
-            head_ns: 0,
-            block: 0,
-            parts: Parts::NONE,
-            parts_until: 0,
-            kind: Kind::Absent,
-        }
-    }
-
-    /// Begins with the first row of all.
-    fn begin(&mut self, t_ns: i64) {
-        (self.head, self.head_ns) = (0, t_ns);
-        self.block = 0;
-        self.seek();
-    }
-
-    /// Lets the parts be found anew, which may lie elsewhere.
-    fn seek(&mut self) {
-        self.parts_until = 0;
-    }
-
-    /// Drops the rows that are outside of the window that ends with the next row, at `t_ns`.
-    #[inline]
-    fn advance_to_next(&mut self, rows: &Rows, t_ns: i64) {
-        let there = |row: u64| row < rows.next();
-        self.advance(rows, t_ns, |row| if there(row) { rows.time(row) } else { t_ns });
-    }
-
-    /// The same where the row at `t_ns` is the last one.
-    #[inline(always)]
-    fn advance_to_last(&mut self, rows: &Rows, t_ns: i64) {
-        self.advance(rows, t_ns, |row| rows.time(row));
-    }
-
-    /// Where its oldest row leaves, the new one is taken to lie in the same block; if it does not, the parts are to be found anew.
-    #[inline(always)]
-    fn advance(&mut self, rows: &Rows, t_ns: i64, time: impl Fn(u64) -> i64) {
-        // Without a sign no two instants are too far apart.
-        let leaves = |t: i64, width: i64| t_ns.wrapping_sub(t) as u64 >= width as u64;
-        if leaves(self.head_ns, self.width_ns) {
-            while leaves(self.head_ns, self.width_ns) {
-                self.head += 1;
-                self.head_ns = time(self.head);
-            }
-            self.parts.places[0] = rows.slot(self.head);
-        }
-    }
-
-    /// Finds the parts of the window with number `index`, and tells its weights what they do not learn with every row.
-    /// Not inlined, as this is seldom needed and takes registers.
-    #[inline(never)]
-    fn find_parts(
-        &mut self,
-        index: usize,
-        rows: &Rows,
-        blocks: &mut Blocks,
-        weights: &mut Weights,
-    ) {
-        self.block = blocks.find(self.head, self.block);
-        let current = blocks.current_start();
-        let (place, rest, by) = blocks.rest_of(rows, self.head, self.block);
-        weights.set_rest(index % ABREAST, rest, by);
-        self.parts = Parts {
-            places: [rows.capacity(), place, 0],
-            by,
-        };
-        self.parts_until = match self.head.cmp(&current) {
-            Ordering::Less => {
-                self.parts.places[0] = rows.slot(self.head);
-                blocks.starts()[self.block + 1]
-            }
-            Ordering::Equal => current + 1,
-            Ordering::Greater => {
-                self.parts.places[2] = blocks.sum_short(rows, index, self.head);
-                0
-            }
-        };
-    }
-
-    /// Nanoseconds from its oldest row to the newest, which is at `t_ns`; no more than its width.
-    #[inline(always)]
-    fn span(&self, t_ns: i64) -> i64 {
-        t_ns.wrapping_sub(self.head_ns)
-    }
-
-    /// Whether its rows span what a channel's samples must.
-    fn is_long(&self, t_ns: i64) -> bool {
-        self.span(t_ns) >= self.needed_span
-    }
 }
 
 impl RollingSlope {

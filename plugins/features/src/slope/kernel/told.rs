@@ -4,7 +4,8 @@ use std::array::from_fn;
 
 use super::parts::{ABREAST, Line};
 use super::sums::{LANES, Lanes};
-use super::{Kind, RollingSlope, transpose};
+use super::window::Kind;
+use super::{RollingSlope, transpose};
 
 impl RollingSlope {
     /// Standard errors of the slopes at the last row, per second, laid out as in [`slopes`](Self::slopes): `sqrt(SSR / (n − 2) / Σ(x − x̄)²)`,
