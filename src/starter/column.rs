@@ -61,6 +61,7 @@ const POSITIONS: [&str; 10] = [
     "probe",
     "deformation",
 ];
+const FACTORS: [&str; 6] = ["scale", "gain", "factor", "ratio", "coefficient", "coeff"];
 const DRIVES: [&str; 11] = [
     "drive", "voltage", "heater", "lamp", "power", "current", "duty", "pwm", "input", "speed",
     "rpm",
@@ -156,7 +157,7 @@ fn guess(name: &str) -> Column {
         (Guess::Temperature, "by its name")
     } else if has(&DRIVES) {
         (Guess::Drive, "by its name")
-    } else if unit.is_none() && has(&POSITIONS) {
+    } else if unit.is_none() && has(&POSITIONS) && !has(&FACTORS) {
         (Guess::Position, "by its name")
     } else {
         (Guess::Other, "neither a temperature nor a length")
@@ -373,6 +374,14 @@ mod tests {
     fn a_log_of_temperatures_alone_is_told_that_nothing_drifts() {
         let refused = kinds("time_s,t_machine_degF\n").unwrap_err();
         assert!(refused.starts_with("nothing in it drifts: t_machine_degF is a temperature"));
+    }
+
+    #[test]
+    fn a_factor_of_an_axis_is_no_position_of_it() {
+        for factor in ["scale_x", "gain_z", "y_factor"] {
+            assert_eq!(guess(factor).guess, Guess::Other, "{factor}");
+        }
+        assert_eq!(guess("x").guess, Guess::Position);
     }
 
     #[test]
