@@ -8,6 +8,7 @@
 //! epoch or an offset. What is done with every row is compiled for the vectors of several processors (`kernel/vectors.rs`).
 
 mod blocks;
+mod layout;
 mod parts;
 mod rows;
 mod saved;
@@ -21,6 +22,7 @@ mod tests;
 
 use std::array::from_fn;
 
+use pulp::Simd;
 use serde::{Deserialize, Serialize};
 
 use blocks::Blocks;
@@ -80,6 +82,8 @@ pub struct RollingSlope {
     /// Whether all windows have enough rows, but each has gaps.
     all_gaps: bool,
     longest_needed_open: i64,
+    /// Whether some channel may have begun within a window that must have been open for longer.
+    maybe_cold: bool,
     /// By window: the results of the channels of a group.
     results: Vec<Lanes>,
     vectors: Vectors,
@@ -118,6 +122,7 @@ impl RollingSlope {
             all_gaps: false,
             weights: vec![Weights::NONE; windows.len().div_ceil(ABREAST)],
             longest_needed_open: windows.iter().map(|w| w.needed_open).max().unwrap_or(0),
+            maybe_cold: true,
             results: vec![[0.0; LANES]; windows.len()],
             vectors: Vectors::new(),
             windows,
@@ -179,6 +184,7 @@ impl RollingSlope {
             self.windows.iter_mut().for_each(Window::seek);
         }
         let begun = self.rows.append(t_ns, y, LIMIT, oldest);
+        self.maybe_cold |= begun;
         self.blocks.add_newest(&self.rows, begun);
         self.advance(t_ns);
         true
@@ -277,13 +283,13 @@ impl RollingSlope {
 
     /// Written out beside [`tell`](Self::tell), since a closure would not be compiled for wide vectors.
     #[inline(always)]
-    fn slopes_here(&mut self, out: &mut [f64]) {
+    fn slopes_here<S: Simd>(&mut self, simd: S, out: &mut [f64]) {
         let Some(mut results) = self.room(out) else {
             return;
         };
         for (group, out) in out.chunks_mut(LANES * results.len()).enumerate() {
             self.slopes_of(group, &mut results);
-            transpose(&results, out);
+            layout::put(simd, &results, out);
         }
         self.results = results;
         self.mark_cold(out);
@@ -376,13 +382,17 @@ impl RollingSlope {
 
     /// Marks the windows within which their channel began.
     #[inline]
-    fn mark_cold(&self, out: &mut [f64]) {
+    fn mark_cold(&mut self, out: &mut [f64]) {
+        if !self.maybe_cold {
+            return;
+        }
         let Some(t_ns) = self.last_time() else {
             return;
         };
         let open = |first: i64| t_ns.saturating_sub(first);
         let latest = self.rows.latest_first().map(open);
         if latest.is_none_or(|open| open >= self.longest_needed_open) {
+            self.maybe_cold = false;
             return;
         }
         let channels = out.chunks_mut(self.windows.len().max(1));
@@ -447,39 +457,5 @@ fn slopes_abreast(
             let [h, r, w] = window.parts.places;
             *slopes = weights.slopes(i, [&head[h], &rest[r], &now[w]]);
         }
-    }
-}
-
-/// Puts results of the channels of a group by window into those of windows by channel.
-#[inline(always)]
-fn transpose(results: &[Lanes], out: &mut [f64]) {
-    let wide = results.len();
-    if out.len() != LANES * wide {
-        for (i, out) in out.chunks_mut(wide.max(1)).enumerate() {
-            for (out, result) in out.iter_mut().zip(results) {
-                *out = result[i];
-            }
-        }
-        return;
-    }
-    // One comparison for all places of a window, or of several.
-    let (abreast, others) = results.as_chunks::<ABREAST>();
-    let last = (LANES - 1) * wide;
-    let mut first = 0;
-    for results in abreast {
-        let out = &mut out[first..first + last + ABREAST];
-        for i in 0..LANES {
-            for window in 0..ABREAST {
-                out[i * wide + window] = results[window][i];
-            }
-        }
-        first += ABREAST;
-    }
-    for result in others {
-        let out = &mut out[first..first + last + 1];
-        for i in 0..LANES {
-            out[i * wide] = result[i];
-        }
-        first += 1;
     }
 }

@@ -13,6 +13,8 @@ pub(super) struct Rows {
     /// Nanoseconds from each row to the channel's next sample, 0 where it has one, infinite where none has come yet.
     wait: Vec<Lanes>,
     next: u64,
+    /// Time of the last row.
+    last: Option<i64>,
     /// The first row after the last one from which a sample is missing.
     complete_from: u64,
     /// A longer time between rows is a wide gap, in nanoseconds; and the first row, or the one after the last wide gap.
@@ -37,6 +39,7 @@ impl Rows {
             samples: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
             wait: vec![[0.0; LANES]; INITIAL_CAPACITY * groups],
             next: 0,
+            last: None,
             complete_from: 0,
             wide_ns,
             even_from: 0,
@@ -48,6 +51,7 @@ impl Rows {
 
     pub(super) fn reset(&mut self) {
         self.next = 0;
+        self.last = None;
         self.complete_from = 0;
         self.even_from = 0;
         self.silent.fill([f64::INFINITY; LANES]);
@@ -75,8 +79,9 @@ impl Rows {
         self.time[self.slot(row)]
     }
 
+    #[inline]
     pub(super) fn last_time(&self) -> Option<i64> {
-        (self.next > 0).then(|| self.time(self.next - 1))
+        self.last
     }
 
     /// The samples of a row by groups of channels, NaN where absent.
@@ -210,6 +215,7 @@ impl Rows {
             self.follow_absence(oldest)
         };
         self.next += 1;
+        self.last = Some(t_ns);
         if absent {
             self.complete_from = self.next;
         }

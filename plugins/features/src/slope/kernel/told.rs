@@ -2,10 +2,12 @@
 
 use std::array::from_fn;
 
+use pulp::Scalar;
+
 use super::parts::{ABREAST, Line};
 use super::sums::{LANES, Lanes};
 use super::window::Kind;
-use super::{RollingSlope, transpose};
+use super::{RollingSlope, layout};
 
 impl RollingSlope {
     /// Standard errors of the slopes at the last row, per second, laid out as in [`slopes`](Self::slopes): `sqrt(SSR / (n − 2) / Σ(x − x̄)²)`,
@@ -38,7 +40,7 @@ impl RollingSlope {
         };
         for (group, out) in out.chunks_mut(LANES * results.len()).enumerate() {
             self.tell_of(group, &mut results, &of);
-            transpose(&results, out);
+            layout::put(Scalar::new(), &results, out);
         }
         self.results = results;
         self.mark_cold(out);

@@ -51,8 +51,8 @@ impl WithSimd for Slopes<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        self.kernel.slopes_here(self.out);
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.kernel.slopes_here(simd, self.out);
     }
 }
 
