@@ -211,13 +211,11 @@ impl RollingSlope {
     #[inline(always)]
     fn advance(&mut self, t_ns: i64) {
         let (rows, blocks) = (&self.rows, &mut self.blocks);
-        let abreast = self.windows.chunks_mut(ABREAST).zip(&mut self.weights);
-        for (nth, (windows, weights)) in abreast.enumerate() {
-            for (i, window) in windows.iter_mut().enumerate() {
-                window.advance_to_last(rows, t_ns);
-                if window.head >= window.parts_until {
-                    window.find_parts(ABREAST * nth + i, rows, blocks, weights);
-                }
+        for (index, window) in self.windows.iter_mut().enumerate() {
+            window.advance_to_last(rows, t_ns);
+            if window.head >= window.parts_until {
+                let weights = &mut self.weights[index / ABREAST];
+                window.find_parts(index, rows, blocks, weights);
             }
         }
         let rows = &self.rows;
