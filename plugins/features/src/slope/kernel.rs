@@ -2,8 +2,8 @@
 //! It decides when a window has a value; it does not decide which windows there are, nor what a caller does with absence.
 //!
 //! Rows are cut into blocks of at most 64, shared by all windows (`kernel/blocks.rs`). A window (`kernel/window.rs`) is the end of
-//! one block, all blocks after it and the current one: three sums (`kernel/sums.rs`) that are kept for all windows at once, added up for each
-//! (`kernel/parts.rs`). Nothing is ever subtracted from a sum, so that a sample of 1e9 leaves no trace when it leaves a window.
+//! one block, all blocks after it and the current one: three sums (`kernel/sums.rs`) that are kept for all windows at once, added up
+//! for each (`kernel/parts.rs`). Nothing is ever subtracted from a sum, so that a sample of 1e9 leaves no trace when it leaves a window.
 //! Times are measured from an instant within the window and values from one near them, so that no precision is lost to the
 //! epoch or an offset. What is done with every row is compiled for the vectors of several processors (`kernel/vectors.rs`).
 
