@@ -378,10 +378,15 @@ mod tests {
 
     #[test]
     fn a_factor_of_an_axis_is_no_position_of_it() {
-        for factor in ["scale_x", "gain_z", "y_factor"] {
+        for factor in ["scale_x", "gain_x", "x_factor"] {
             assert_eq!(guess(factor).guess, Guess::Other, "{factor}");
         }
-        assert_eq!(guess("x").guess, Guess::Position);
+        let found = kinds("time_s,plate_degC,X_um,scale_x\n").unwrap();
+        assert_eq!(found[1].1, Kind::Drifting);
+        assert_eq!(found[2].1, Kind::Drive);
+        // A scale may be a glass scale too: it drifts where nothing else could.
+        let found = kinds("time_s,plate_degC,scale_x\n").unwrap();
+        assert_eq!(found[1].1, Kind::Drifting);
     }
 
     #[test]

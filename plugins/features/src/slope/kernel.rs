@@ -279,7 +279,7 @@ impl RollingSlope {
         self.vectors.slopes(self, out);
     }
 
-    /// Written out beside [`tell`](Self::tell), since a closure would not be compiled for wide vectors.
+    /// Written out beside [`tell`](Self::tell), since so long a closure would not be inlined, nor compiled for wide vectors.
     #[inline(always)]
     fn slopes_here<S: Simd>(&mut self, simd: S, out: &mut [f64]) {
         let Some(mut results) = self.room(out) else {

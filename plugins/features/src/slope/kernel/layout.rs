@@ -16,7 +16,8 @@ pub(super) fn put<S: Simd>(simd: S, results: &[Lanes], out: &mut [f64]) {
     };
     let mut first = 0;
     for results in abreast {
-        // One comparison for all places. As many vectors as each has numbers are deinterleaved by transposing them.
+        // One comparison for all places. Four vectors of four numbers are deinterleaved by transposing them; that this is so
+        // on a processor, the test of equal bits in `vectors.rs` sees.
         let out = &mut out[first..first + last + ABREAST];
         for part in 0..LANES / ABREAST {
             let [a, b, c, d] = results;

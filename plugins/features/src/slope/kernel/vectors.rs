@@ -1,7 +1,8 @@
 //! Decides for which processors the loops of the kernel are compiled, so that each takes as many numbers at once as it can.
 //!
-//! What is called with every row is inlined throughout, and given as no function or closure, which would not be. No sum is taken in another order, and no product is fused with one, so that the
-//! bits are the same on all of them.
+//! What is called with every row is inlined throughout, since what is not is compiled for the plainest processor; closures are
+//! short, so that they are inlined too. No sum is taken in another order, and no product is fused with one, so that the bits are
+//! the same on all of them.
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -17,7 +17,7 @@ pub(super) struct Window {
     pub(super) needed_open: i64,
     /// The oldest row in it, when that was, and the block of that row or one before it.
     pub(super) head: u64,
-    pub(super) head_ns: i64,
+    head_ns: i64,
     pub(super) block: usize,
     pub(super) parts: Parts,
     /// From this oldest row on the parts are to be found anew.
