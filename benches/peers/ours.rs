@@ -5,6 +5,8 @@
 use std::error::Error;
 use std::time::Instant;
 
+use athermal::core::channel::{ABSENT, COLD};
+use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use athermal_numerics::{
     Folds, Forgetting, GramBlocks, Kalman, LeastSquares, Passage, Rls, RlsOptions, Search,
     Standardization, Structural, cross_validated_penalties, logarithmic_grid,
@@ -31,14 +33,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         "least_squares" => least_squares,
         "recursive_least_squares" => recursive_least_squares,
         "local_linear_trend" => local_linear_trend,
+        "slopes" => slopes,
         other => return Err(format!("there is no task `{other}`").into()),
     };
-    let start = Instant::now();
-    let found = run(&rows, width)?;
-    let seconds = start.elapsed().as_secs_f64();
+    // Peers are timed in a process that has done the work before.
+    let mut fastest = f64::INFINITY;
+    let mut found = Vec::new();
+    for _ in 0..3 {
+        let start = Instant::now();
+        found = run(&rows, width)?;
+        fastest = fastest.min(start.elapsed().as_secs_f64());
+    }
     println!(
         "{}",
-        serde_json::json!({ "seconds": seconds, "found": found })
+        serde_json::json!({ "seconds": fastest, "found": found })
     );
     Ok(())
 }
@@ -124,4 +132,26 @@ fn local_linear_trend(rows: &[(&[f64], f64)], _width: usize) -> Found {
         filter.observe(&[], *y);
     }
     Ok(filter.state().to_vec())
+}
+
+/// The slopes of each regressor over eight windows at the last of rows one second apart; those of all rows are worked out.
+fn slopes(rows: &[(&[f64], f64)], width: usize) -> Found {
+    let coverage = Coverage {
+        min_samples: 3,
+        min_coverage: 0.5,
+        cold_partial: false,
+    };
+    let no_value = NoValue {
+        absent: ABSENT,
+        cold: COLD,
+    };
+    let second = 1_000_000_000;
+    let windows = [30, 60, 120, 240, 480, 600, 900, 1200].map(|s| s * second);
+    let mut kernel = RollingSlope::new(&windows, width, coverage, no_value, false);
+    let mut slopes = vec![0.0; width * windows.len()];
+    for (row, (x, _)) in (0..).zip(rows) {
+        kernel.push(row * second, x);
+        kernel.slopes(&mut slopes);
+    }
+    Ok(slopes)
 }

@@ -1,4 +1,4 @@
-"""The same work by this project and by scikit-learn, numpy, river and statsmodels: the same rows, one run, in turn, one thread.
+"""The same work by this project and by scikit-learn, numpy, numba, river and statsmodels: the same rows, one run, in turn, one thread.
 
     pip install -r benches/peers/requirements.txt
     cargo build --profile bench --example peers
@@ -20,6 +20,7 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
+import numba
 import numpy as np
 from river.linear_model import BayesianLinearRegression
 from sklearn.feature_selection import SequentialFeatureSelector
@@ -98,6 +99,36 @@ def trend(x, y):
     return time.perf_counter() - start, result.filtered_state[:, -1]
 
 
+WINDOWS_S = np.array([30, 60, 120, 240, 480, 600, 900, 1200])
+
+
+@numba.njit
+def all_slopes(x, windows_s):
+    """By running sums, for a regular clock and no gaps; channels lie side by side, so that they are summed as vectors."""
+    count, channels = windows_s.size, x.shape[1]
+    total, aged, slopes = np.zeros((count, channels)), np.zeros((count, channels)), np.zeros((count, channels))
+    scatter = windows_s * (windows_s**2 - 1) / 12
+    of_total, of_aged = (windows_s - 1) / 2 / scatter, 1 / scatter
+    for t in range(x.shape[0]):
+        for w in range(count):
+            n = windows_s[w]
+            if t < n:
+                for c in range(channels):
+                    aged[w, c] += total[w, c]
+                    total[w, c] += x[t, c]
+                continue
+            for c in range(channels):
+                old = x[t - n, c]
+                aged[w, c] += total[w, c] - n * old
+                total[w, c] += x[t, c] - old
+                slopes[w, c] = of_total[w] * total[w, c] - of_aged[w] * aged[w, c]
+    return slopes
+
+
+def slopes(x, y):
+    return all_slopes(x, WINDOWS_S).T.ravel()
+
+
 def alike(tolerance):
     return lambda ours, theirs: np.allclose(ours, theirs, rtol=tolerance, atol=tolerance)
 
@@ -124,6 +155,7 @@ WORK = [
         16,
         [("numpy", recursion, alike(1e-6)), ("river, Bayesian regression", bayesian, None)],
     ),
+    ("slopes of 8 channels over 8 windows, 604,800 rows", "slopes", 604_800, 8, [("numba", slopes, alike(1e-6))]),
     ("Kalman filter, local linear trend, 20,000 rows", "local_linear_trend", 20_000, 0, [("statsmodels", trend, alike(1e-6))]),
 ]
 
@@ -170,7 +202,7 @@ with tempfile.TemporaryDirectory() as folder:
             lines.append(f"| {name} | {text(mine)} | {peer} | {text(other)} | {mine / other:.2g} |")
             print(lines[-1], flush=True)
 
-packages = ", ".join(f"{package} {version(package)}" for package in ["numpy", "scikit-learn", "river", "statsmodels"])
+packages = ", ".join(f"{package} {version(package)}" for package in ["numpy", "numba", "scikit-learn", "river", "statsmodels"])
 (HERE / "README.md").write_text(
     "# Against peers\n\n"
     "The same work on the same rows in one run, the two sides in turn, one thread each; the best of "

@@ -1,6 +1,7 @@
 //! Training rows as Gram matrices of blocks, in their order. Decides how many rows make a block and when rows are no longer
 //! kept; does not decide what is fitted on them.
 
+use crate::gram::triangle;
 use crate::{FoldRows, Folds, Gram, NumericsError, Split};
 use std::ops::Range;
 
@@ -10,12 +11,12 @@ pub const BLOCK_ROWS: usize = 256;
 pub const DEFAULT_ROW_MEMORY: usize = 64 << 20;
 const MOST_BLOCKS: usize = 1024;
 const FEWEST_BLOCKS: usize = 64;
-const BLOCK_MEMORY: usize = 16 << 20;
+const BLOCK_MEMORY: usize = 8 << 20;
 
 /// Rows of regressors and a target, streamed into blocks of 256 rows.
 ///
 /// The rows themselves are kept while they fit a stated memory. Then fold edges are exact and a solver can go back to the
-/// rows. Beyond it only the blocks stay: at most 1,024 of them (fewer, but at least 64, when they would take more than 16 MB),
+/// rows. Beyond it only the blocks stay: at most 1,024 of them (fewer, but at least 64, when they would take more than 8 MB),
 /// since neighbours are merged in pairs when there are more. So memory is bounded for any number of rows.
 /// All blocks share the first row as their shift. The same rows in the same order give the same bits.
 #[derive(Debug, Clone)]
@@ -58,8 +59,7 @@ impl GramBlocks {
 
     /// No rows yet, of `width` regressors; keeps up to `row_memory` bytes of rows (0: none).
     pub fn with_row_memory(width: usize, row_memory: usize) -> Self {
-        let order = width + 1;
-        let block_bytes = order * order * size_of::<f64>();
+        let block_bytes = triangle(width + 1) * size_of::<f64>();
         Self {
             width,
             row_memory,

@@ -4,10 +4,10 @@
 use crate::NumericsError;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
-use packed::PackedGram;
 use serde::{Deserialize, Serialize};
+use stored::StoredGram;
 
-mod packed;
+mod stored;
 
 /// A sum of squares below this share of the sum about the shift is rounding, not variance.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-12;
@@ -28,7 +28,7 @@ const BATCH_VALUES: usize = 64 * 65;
 /// of rows, `Σv`, `Σv(z − c)` and `Σv(z − c)(z − c)ᵀ`. Parts with the same shift merge by plain addition; the shift keeps
 /// the cancellation in `Σv(z − z̄)(z − z̄)ᵀ` small for signals that vary little about a large value, such as temperatures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "PackedGram", into = "PackedGram")]
+#[serde(try_from = "StoredGram")]
 pub struct Gram {
     width: usize,
     count: u64,
@@ -36,7 +36,7 @@ pub struct Gram {
     /// Empty until the first row.
     shift: Vec<f64>,
     sum: Vec<f64>,
-    /// Column-major, the lower triangle; zeros above it.
+    /// The lower triangle, column after column.
     cross: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ impl Gram {
             weight: 0.0,
             shift: Vec::new(),
             sum: vec![0.0; order],
-            cross: vec![0.0; order * order],
+            cross: vec![0.0; triangle(order)],
         }
     }
 
@@ -131,10 +131,12 @@ impl Gram {
         }
         self.count += count as u64;
         let batch_rows = (BATCH_VALUES / order).max(BATCH_ROWS);
+        let needed = order * (order + count.min(batch_rows));
+        if scratch.len() < needed {
+            scratch.resize(needed, 0.0);
+        }
+        let (products, scratch) = scratch.split_at_mut(order * order);
         for (batch, rows) in rows.chunks(batch_rows * order).enumerate() {
-            if scratch.len() < rows.len() {
-                scratch.resize(rows.len(), 0.0);
-            }
             let centred = &mut scratch[..rows.len()];
             match weights {
                 None => {
@@ -145,7 +147,17 @@ impl Gram {
                     self.centre_weighted(rows, &weights[batch * batch_rows..], centred);
                 }
             }
-            self.add_products(centred);
+            let accum = match batch {
+                0 => Accum::Replace,
+                _ => Accum::Add,
+            };
+            multiply(centred, order, accum, products);
+        }
+        let mut columns = self.cross.as_mut_slice();
+        for (j, products) in products.chunks_exact(order).enumerate() {
+            let (column, rest) = columns.split_at_mut(order - j);
+            add(column, &products[j..], 1.0);
+            columns = rest;
         }
     }
 
@@ -163,32 +175,6 @@ impl Gram {
                 *sum += root * *d;
             }
             self.weight += weight;
-        }
-    }
-
-    /// Adds the products of centred rows with themselves.
-    fn add_products(&mut self, centred: &[f64]) {
-        let order = self.width + 1;
-        let centred = MatRef::from_column_major_slice(centred, order, centred.len() / order);
-        let mut start = 0;
-        while start < order {
-            let wide = match (order - start) % PANEL_COLUMNS {
-                0 => PANEL_COLUMNS,
-                left_over => left_over,
-            };
-            let cross = MatMut::from_column_major_slice_mut(&mut self.cross, order, order);
-            matmul(
-                cross.submatrix_mut(start, start, order - start, wide),
-                Accum::Add,
-                centred.subrows(start, order - start),
-                centred.subrows(start, wide).transpose(),
-                1.0,
-                Par::Seq,
-            );
-            for j in start..start + wide {
-                self.cross[j * order + start..j * order + j].fill(0.0);
-            }
-            start += wide;
         }
     }
 
@@ -258,16 +244,8 @@ impl Gram {
     fn accumulate(&mut self, other: &Self, sign: f64) {
         self.count += other.count;
         self.weight += sign * other.weight;
-        for (a, b) in self.sum.iter_mut().zip(&other.sum) {
-            *a += sign * b;
-        }
-        let order = self.width + 1;
-        let columns = self.cross.chunks_exact_mut(order);
-        for (j, (column, added)) in columns.zip(other.cross.chunks_exact(order)).enumerate() {
-            for (a, b) in column[j..].iter_mut().zip(&added[j..]) {
-                *a += sign * b;
-            }
-        }
+        add(&mut self.sum, &other.sum, sign);
+        add(&mut self.cross, &other.cross, sign);
     }
 
     fn shifted_to(&self, shift: &[f64]) -> Self {
@@ -277,7 +255,7 @@ impl Gram {
         moved.shift = shift.to_vec();
         for j in 0..order {
             for i in j..order {
-                moved.cross[j * order + i] = self.moment(i, j, delta[i], delta[j]);
+                moved.cross[place(i, j, order)] = self.moment(i, j, delta[i], delta[j]);
             }
             moved.sum[j] = self.sum[j] - self.weight * delta[j];
         }
@@ -286,7 +264,7 @@ impl Gram {
 
     /// `Σv(z_i − c_i − δ_i)(z_j − c_j − δ_j)` for `i ≥ j`.
     fn moment(&self, i: usize, j: usize, delta_i: f64, delta_j: f64) -> f64 {
-        self.cross[j * (self.width + 1) + i]
+        self.cross[place(i, j, self.width + 1)]
             - self.sum[i] * delta_j
             - delta_i * (self.sum[j] - self.weight * delta_j)
     }
@@ -348,7 +326,7 @@ impl Gram {
             .iter()
             .enumerate()
             .map(|(j, &delta)| {
-                let about_shift = self.cross[j * (self.width + 1) + j];
+                let about_shift = self.cross[place(j, j, self.width + 1)];
                 let about_mean = self.moment(j, j, delta, delta);
                 if self.weight <= 0.0 || about_mean <= ROUNDING_SHARE * about_shift {
                     0.0
@@ -382,14 +360,49 @@ impl Gram {
     }
 
     pub(crate) fn is_finite(&self) -> bool {
-        let order = self.width + 1;
-        self.weight.is_finite()
-            && self.shift.iter().chain(&self.sum).all(|v| v.is_finite())
-            && (0..order).all(|j| {
-                self.cross[j * order + j..(j + 1) * order]
-                    .iter()
-                    .all(|v| v.is_finite())
-            })
+        let mut sums = self.shift.iter().chain(&self.sum).chain(&self.cross);
+        self.weight.is_finite() && sums.all(|v| v.is_finite())
+    }
+}
+
+/// How many numbers the lower triangle of a matrix has.
+pub(crate) fn triangle(order: usize) -> usize {
+    order * (order + 1) / 2
+}
+
+/// Where row `i ≥ j` of column `j` lies in the lower triangle.
+fn place(i: usize, j: usize, order: usize) -> usize {
+    triangle(order) - triangle(order - j) + i - j
+}
+
+fn add(to: &mut [f64], added: &[f64], sign: f64) {
+    for (a, b) in to.iter_mut().zip(added) {
+        *a += sign * b;
+    }
+}
+
+/// Writes the products of centred rows with themselves, or adds them, to the lower triangle of the column-major `products`;
+/// what is above it is not told.
+fn multiply(centred: &[f64], order: usize, accum: Accum, products: &mut [f64]) {
+    let centred = MatRef::from_column_major_slice(centred, order, centred.len() / order);
+    let mut products = MatMut::from_column_major_slice_mut(products, order, order);
+    let mut start = 0;
+    while start < order {
+        let wide = match (order - start) % PANEL_COLUMNS {
+            0 => PANEL_COLUMNS,
+            left_over => left_over,
+        };
+        matmul(
+            products
+                .as_mut()
+                .submatrix_mut(start, start, order - start, wide),
+            accum,
+            centred.subrows(start, order - start),
+            centred.subrows(start, wide).transpose(),
+            1.0,
+            Par::Seq,
+        );
+        start += wide;
     }
 }
 
