@@ -2,6 +2,7 @@
 //! the order of the rows, nor how they are scaled (they should be standardised).
 
 use crate::NumericsError;
+use crate::dot::dot;
 use serde::{Deserialize, Serialize};
 
 /// The step size as a function of the number `t` of rows seen, from 1.
@@ -116,8 +117,7 @@ impl Sgd {
     /// When `x` has not one value per weight.
     pub fn predict(&self, x: &[f64]) -> f64 {
         assert_eq!(x.len(), self.weights.len(), "a row has a value per weight");
-        let products = self.weights.iter().zip(x).map(|(w, x)| w * x);
-        products.sum::<f64>() + self.intercept
+        dot(&self.weights, x) + self.intercept
     }
 
     /// Learns from one row, without allocating. A row with a value that is not finite is ignored, and so is one after which
@@ -129,8 +129,9 @@ impl Sgd {
         let error = self.predict(x) - y;
         let eta = self.options.rate.at(self.seen + 1);
         let pull = eta * error;
+        // Without a way out, so that several numbers are looked at at once.
         let bounded = |x: &f64| (pull * x).is_finite();
-        if !(bounded(&1.0) && x.iter().all(bounded)) {
+        if !x.iter().fold(bounded(&1.0), |all, x| all & bounded(x)) {
             return false;
         }
         self.seen += 1;

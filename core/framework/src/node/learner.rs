@@ -204,10 +204,12 @@ impl TrainedRange {
     #[must_use]
     pub fn contains(&self, row: &[f64], margin: f64) -> bool {
         let ends = self.lowest.iter().zip(&self.highest);
-        ends.zip(row).all(|((&lowest, &highest), &value)| {
-            let beyond = margin * (highest - lowest);
-            value >= lowest - beyond && value <= highest + beyond
-        })
+        // Without a way out, so that several values are looked at at once.
+        ends.zip(row)
+            .fold(true, |all, ((&lowest, &highest), &value)| {
+                let beyond = margin * (highest - lowest);
+                all & (value >= lowest - beyond) & (value <= highest + beyond)
+            })
     }
 }
 
