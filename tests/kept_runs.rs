@@ -211,3 +211,24 @@ fn a_state_that_is_the_output_is_refused_be_it_there_or_not() {
     run().ended(2);
     assert_eq!(std::fs::read_to_string(&both).unwrap(), "kept");
 }
+
+#[test]
+fn a_run_that_was_once_told_of_a_far_future_says_why_the_next_predicts_nothing() {
+    let (scratch, model, data, _) = desk("future");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let ahead = format!("9{}", lines[1000]);
+    let state = scratch.path("state");
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 6] =
+        [&"run", &model, &"-i", &"-", &"--state", &state];
+    let first = [&lines[..1000], &[&ahead]].concat().join("\n");
+    athermal_fed(&arguments, first.as_bytes()).ended(0);
+    let rest = [&lines[..1], &lines[1001..2000]].concat().join("\n");
+    let next = athermal_fed(&arguments, rest.as_bytes());
+    next.tells(&[
+        "warning: ",
+        "before what the run before saw last: nothing was predicted",
+        "begins cold",
+    ]);
+    assert_eq!(next.ended(0).out.lines().count(), 1);
+}

@@ -72,7 +72,7 @@ impl Kept {
             terminal: *terminal,
             source,
             seen: self.seen,
-            told: false,
+            passed_over: None,
         }
     }
 
@@ -107,16 +107,28 @@ pub struct Rest<'a> {
     terminal: Terminal,
     source: &'a mut dyn Source,
     seen: Option<Instant>,
-    told: bool,
+    /// How long before the last that had been seen the last row was that is passed over.
+    passed_over: Option<athermal::Duration>,
 }
 
 impl Rest<'_> {
-    fn pass_over(&mut self, samples: &Samples) {
-        if !self.told {
-            self.told = true;
+    fn pass_over(&mut self, samples: &Samples, before: athermal::Duration) {
+        if self.passed_over.replace(before).is_none() {
             self.terminal.note(format_args!(
                 "the row of {} was seen by the run before: it and all like it are passed over",
                 samples.time_text
+            ));
+        }
+    }
+
+    /// Tells of an input that has come to its end while all of it was passed over: a clock may once have been ahead.
+    fn tell_of_nothing(&self) {
+        if let Some(before) = self.passed_over
+            && before > athermal::Duration::ZERO
+        {
+            self.terminal.warning(format_args!(
+                "the last row is {before} before what the run before saw last: nothing was predicted; if a clock was ahead then, a \
+                 run with another `--state` file begins cold and goes on from there"
             ));
         }
     }
@@ -127,8 +139,13 @@ impl Source for Rest<'_> {
         loop {
             let event = self.source.next(samples)?;
             match (event, self.seen) {
-                (Some(Event::Row(time)), Some(seen)) if time <= seen => self.pass_over(samples),
+                (Some(Event::Row(time)), Some(seen)) if time <= seen => {
+                    self.pass_over(samples, seen - time);
+                }
                 _ => {
+                    if event.is_none() && self.seen.is_some() {
+                        self.tell_of_nothing();
+                    }
                     self.seen = None;
                     return Ok(event);
                 }
