@@ -11,12 +11,14 @@ use athermal_core::recording::{Event, Recording};
 use athermal_core::score::{TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    autocorrelation, cross_correlation, cross_correlation_error, cross_correlation_pairs,
+    autocorrelation, bound_of_farthest, cross_correlation, cross_correlation_error,
+    cross_correlation_pairs,
 };
 use serde::Serialize;
 
 use super::observation::{Observation, main_prediction};
 use super::reach;
+use super::residual::UNLIKELY;
 
 /// Lags to either side, at most.
 const MOST_LAGS: i64 = 60;
@@ -65,6 +67,11 @@ pub struct Correlogram {
     /// The standard error of the largest if the two had nothing to do with each other, their own smoothness considered, from as
     /// many pairs as there are at its lag; where there is no largest, from those at no lag.
     pub error: f64,
+    /// How many lags the largest was looked for at.
+    pub looked_at: usize,
+    /// What the largest of all features of the truth would not exceed in 99 of 100 recordings if they had nothing to do with it:
+    /// as many standard errors as normal numbers lie from none, as many of them as lags were looked at (Bonferroni).
+    pub bound: f64,
     /// The lag in s at which it is largest in size: of a residual, of those at which the feature was known when the prediction
     /// was made.
     pub best_lag_s: f64,
@@ -73,10 +80,10 @@ pub struct Correlogram {
 }
 
 impl Correlogram {
-    /// How many standard errors the largest correlation lies from none.
+    /// Whether chance alone would hardly give a correlation as large.
     #[must_use]
-    pub fn significance(&self) -> f64 {
-        self.best.abs() / self.error
+    pub fn says_something(&self) -> bool {
+        self.best.abs() > self.bound
     }
 }
 
@@ -166,12 +173,15 @@ pub fn lags(
                 truth: against(slot, &sides[0], f64::NEG_INFINITY),
                 residual: against(slot, &sides[1], main.ahead.secs()),
             });
+            let mut features: Vec<_> = features.collect();
+            bound(&mut features, |of| &mut of.truth);
+            bound(&mut features, |of| &mut of.residual);
             Some(Lags {
                 truth: plan.channels[truth.slot].name.clone(),
                 prediction: plan.channels[main.slot].name.clone(),
                 ahead_s: main.ahead.secs(),
                 lag_s: lag_s.clone(),
-                features: features.collect(),
+                features,
             })
         });
     Ok(facts.collect())
@@ -201,6 +211,7 @@ fn correlogram(
     let most = there.iter().copied().max().unwrap_or(0);
     let counts = |&lag: &usize| SHARE_OF_PAIRS * there[lag] >= most && !r[lag].is_nan();
     let present = (0..r.len()).filter(|lag| counts(lag) && lag_s[*lag] >= from_s);
+    let looked_at = present.clone().count();
     let best = present.max_by(|&a, &b| r[a].abs().total_cmp(&r[b].abs()));
     let error = cross_correlation_error(x_smooth, y_smooth, there[best.unwrap_or(lags)]);
     Correlogram {
@@ -208,6 +219,18 @@ fn correlogram(
         best: best.map_or(f64::NAN, |best| r[best]),
         r,
         error,
+        looked_at,
+        bound: f64::NAN,
+    }
+}
+
+/// Bounds what the largest correlations of all features come to by chance.
+fn bound(features: &mut [FeatureLags], side: fn(&mut FeatureLags) -> &mut Correlogram) {
+    let looked_at = features.iter_mut().map(|of| side(of).looked_at).sum();
+    let errors = bound_of_farthest(looked_at, UNLIKELY);
+    for of in features {
+        let of = side(of);
+        of.bound = errors * of.error;
     }
 }
 
@@ -405,7 +428,7 @@ mod tests {
         assert!((found.best + 1.0).abs() < 0.02, "{}", found.best);
         let later = correlogram((&x, &smooth), (&y, &smooth), &lag_s, 50.0);
         assert!(later.best_lag_s >= 50.0 && later.r == found.r);
-        assert!(found.error >= 1.0 / 500.0_f64.sqrt() && found.significance() > 3.0);
+        assert!(found.error >= 1.0 / 500.0_f64.sqrt() && found.best.abs() > 3.0 * found.error);
     }
 
     #[test]

@@ -299,8 +299,8 @@ fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Pictu
     let lines =
         lines.map(|(nth, of)| Points::line(nth, short(&of.feature), x.clone(), side(of).r.clone()));
     let mut points: Vec<Points> = lines.collect();
-    let widest = shown.iter().map(|of| side(of).error).fold(0.0, f64::max);
-    points.extend(Points::bounds(&x, 3.0 * widest, "±3 σ of chance"));
+    let widest = shown.iter().map(|of| side(of).bound).fold(0.0, f64::max);
+    points.extend(Points::bounds(&x, widest, "99 % by chance, at most"));
     Picture {
         title: format!("Correlation of features with {title}"),
         x_label: format!("{} by which {} follows the feature", unit.name, of.truth),

@@ -169,6 +169,24 @@ pub fn cross_correlation_error(x: &[f64], y: &[f64], pairs: usize) -> f64 {
     (inflation.max(1.0) / pairs as f64).sqrt()
 }
 
+/// How many standard deviations from the mean the farthest of so many normal numbers lies but for a share of cases: `z` of
+/// `count·P(|Z| > z) = share`, which holds whatever they have to do with each other (Bonferroni; Dunn 1961).
+#[must_use]
+pub fn bound_of_farthest(count: usize, share: f64) -> f64 {
+    let beyond = |z: f64| count as f64 * libm::erfc(z / std::f64::consts::SQRT_2);
+    // Nothing of a normal number is left beyond 40.
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) > share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
 /// Distances from the mean of what is there; nothing, so no product, where a value is missing.
 fn about_mean(x: &[f64]) -> Vec<f64> {
     let about = about_mean_or_nan(x);
@@ -347,6 +365,18 @@ mod tests {
         let wide = cross_correlation_error(&smooth, &smooth, 400);
         let geometric = (1.0 - 0.81_f64.powi(20)) / (1.0 - 0.81);
         close(wide, ((2.0 * geometric - 1.0) / 400.0).sqrt(), 1e-12);
+    }
+
+    #[test]
+    fn the_farthest_of_more_numbers_may_lie_farther() {
+        close(bound_of_farthest(1, 0.05), NORMAL_95, 1e-12);
+        close(
+            bound_of_farthest(10, 0.01),
+            bound_of_farthest(1, 0.001),
+            0.0,
+        );
+        // Abramowitz and Stegun 1964, table 26.6: P = 0.9995 at 3.290527.
+        close(bound_of_farthest(1, 0.001), 3.290_526_731, 1e-9);
     }
 
     #[test]

@@ -58,7 +58,8 @@ pub use change::{Adwin, AdwinOptions, MeanChange, PageHinkley, PageHinkleyOption
 pub use collinearity::Collinearity;
 pub use correlation::{
     LjungBox, NORMAL_95, autocorrelation, autocorrelation_errors, autocorrelation_pairs,
-    cross_correlation, cross_correlation_error, cross_correlation_pairs, ljung_box,
+    bound_of_farthest, cross_correlation, cross_correlation_error, cross_correlation_pairs,
+    ljung_box,
 };
 pub use elastic_net::{ElasticNet, SparseFit};
 pub use error::NumericsError;

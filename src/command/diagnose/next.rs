@@ -4,7 +4,7 @@ use athermal::diagnosis::Main;
 use athermal::diagnosis::lag::FeatureLags;
 
 use super::Diagnose;
-use super::tables::{SAYS_SOMETHING, Tables, is_of};
+use super::tables::{Tables, is_of};
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 
@@ -81,7 +81,7 @@ impl Diagnose {
 fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
     let left = tables.main().filter_map(|main| {
         let features = tables.lags_of(main)?.features.iter();
-        let sure = features.filter(|of| of.residual.significance() >= SAYS_SOMETHING);
+        let sure = features.filter(|of| of.residual.says_something());
         let size = |of: &FeatureLags| of.residual.best.abs();
         let most = sure.max_by(|a, b| size(a).total_cmp(&size(b)))?;
         Some((main, most))

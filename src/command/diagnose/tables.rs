@@ -11,8 +11,6 @@ use crate::figures::{count, counted, matrix, number, or_dash, stated, table};
 
 /// Features that are named of each truth.
 const FEATURES: usize = 3;
-/// A correlation that lies so many standard errors from none says something.
-pub(super) const SAYS_SOMETHING: f64 = 3.0;
 /// A variance inflation beyond which a coefficient means little by itself (Marquardt 1970).
 const INFLATED: f64 = 10.0;
 
@@ -128,14 +126,14 @@ impl<'a> Tables<'a> {
             let Some(of) = self.lags_of(main) else {
                 continue;
             };
-            let mut list = |title: String, side: fn(&FeatureLags) -> &Correlogram, least: f64| {
+            let mut list = |title: String, side: fn(&FeatureLags) -> &Correlogram, all: bool| {
                 let features = of.features.iter();
                 let mut found: Vec<_> = features
-                    .filter(|of| side(of).significance() >= least)
+                    .filter(|of| all || side(of).says_something())
                     .collect();
                 found.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
                 let more = found.len().saturating_sub(FEATURES);
-                let told = match (found.is_empty(), least > 0.0 && more > 0) {
+                let told = match (found.is_empty(), !all && more > 0) {
                     (true, _) => format!("  {title}: nothing"),
                     (_, true) => format!("  {title}, and {more} more"),
                     _ => format!("  {title}"),
@@ -147,22 +145,23 @@ impl<'a> Tables<'a> {
                         format!("    {}", feature.feature),
                         format!("{:.2}", correlogram.best),
                         seconds(correlogram.best_lag_s),
-                        format!("{:.2}", correlogram.error),
+                        format!("±{:.2}", correlogram.bound),
                     ]
                 }));
             };
-            list(of.truth.clone(), |of| &of.truth, 0.0);
+            list(of.truth.clone(), |of| &of.truth, true);
             let left = format!("left of it by {}", of.prediction);
-            list(left, |of| &of.residual, SAYS_SOMETHING);
+            list(left, |of| &of.residual, false);
         }
         if rows.is_empty() {
             return String::new();
         }
         format!(
             "largest correlation of features with the truth, with the lag by which it\n\
-             follows them, and σ, which chance alone would give; and beyond 3 σ with what is\n\
-             left of it, at lags at which they were known when it was predicted\n{}",
-            table(&["", "r", "lag", "σ"], &rows)
+             follows them, and within what the largest of all would lie by chance alone in\n\
+             99 % of recordings; and beyond that with what is left of it, at lags at which\n\
+             they were known when it was predicted\n{}",
+            table(&["", "r", "lag", "99 %"], &rows)
         )
     }
 
