@@ -2,7 +2,7 @@
 
 /// `Σ a_j b_j` of two vectors of one length, in four strands so that it does not wait for each addition. Strands are summed with the
 /// next but one: a processor that adds two numbers at once then takes them as they lie.
-#[inline]
+#[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a4, a_rest) = a.as_chunks::<4>();
     let (b4, b_rest) = b.as_chunks::<4>();

@@ -7,6 +7,7 @@ use crate::scratch::Scratch;
 use crate::{Gram, NumericsError};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 /// How fast the past is forgotten.
@@ -139,6 +140,23 @@ impl Forgetting {
     }
 }
 
+/// A step for the widest vectors that the processor has: no sum is taken in another order, and no product fused with one, so that
+/// the bits are the same on all of them.
+struct Step<'a> {
+    rls: &'a mut Rls,
+    x: &'a [f64],
+    y: f64,
+}
+
+impl WithSimd for Step<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        self.rls.step_here(self.x, self.y)
+    }
+}
+
 impl Rls {
     /// Starts from coefficients and their covariance, row by row, in units of the noise variance.
     ///
@@ -187,6 +205,7 @@ impl Rls {
     /// # Panics
     /// When `x` has not one value per coefficient.
     #[must_use]
+    #[inline]
     pub fn predict(&self, x: &[f64]) -> f64 {
         assert_eq!(
             x.len(),
@@ -214,6 +233,11 @@ impl Rls {
     /// # Panics
     /// When `x` has not one value per coefficient.
     pub fn step(&mut self, x: &[f64], y: f64) -> f64 {
+        Arch::new().dispatch(Step { rls: self, x, y })
+    }
+
+    #[inline(always)]
+    fn step_here(&mut self, x: &[f64], y: f64) -> f64 {
         let error = y - self.predict(x);
         let width = x.len();
         let rows = self.covariance.chunks_exact(width.max(1));

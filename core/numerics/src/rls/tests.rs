@@ -74,6 +74,26 @@ fn variable_forgetting_follows_the_oracle() {
 }
 
 #[test]
+fn a_step_gives_the_same_bits_with_and_without_the_vectors_of_this_processor() {
+    let mut state = 7;
+    for width in [1, 3, 4, 16, 19] {
+        let mut with = Rls::new(width, 100.0, options(0.99)).unwrap();
+        let mut without = with.clone();
+        for _ in 0..300 {
+            let x: Vec<f64> = (0..width).map(|_| random(&mut state)).collect();
+            let y = random(&mut state);
+            let errors = [with.step(&x, y), without.step_here(&x, y)];
+            assert_eq!(errors[0].to_bits(), errors[1].to_bits());
+        }
+        let bits = |rls: &Rls| -> Vec<u64> {
+            let all = rls.coefficients().iter().chain(rls.covariance());
+            all.map(|value| value.to_bits()).collect()
+        };
+        assert_eq!(bits(&with), bits(&without), "{width}");
+    }
+}
+
+#[test]
 fn a_million_rows_leave_the_covariance_symmetric_and_positive() {
     for factor in [1.0, 0.999, 0.9] {
         let width = 8;
