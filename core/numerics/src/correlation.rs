@@ -375,7 +375,7 @@ mod tests {
             bound_of_farthest(1, 0.001),
             0.0,
         );
-        // Abramowitz and Stegun 1964, table 26.6: P = 0.9995 at 3.290527.
+        // scipy's norm.ppf(0.9995).
         close(bound_of_farthest(1, 0.001), 3.290_526_731, 1e-9);
     }
 
