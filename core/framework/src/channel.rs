@@ -84,8 +84,13 @@ impl Extremes {
     /// Takes a value in; NaN changes nothing.
     #[inline]
     pub fn include(&mut self, value: f64) {
-        self.lowest = self.lowest.min(value);
-        self.highest = self.highest.max(value);
+        // NaN is neither below nor above.
+        if value < self.lowest {
+            self.lowest = value;
+        }
+        if value > self.highest {
+            self.highest = value;
+        }
     }
 
     /// The largest value, in size; 0 without any.

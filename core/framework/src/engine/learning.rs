@@ -61,7 +61,7 @@ impl Learning {
         Some(Self {
             at_once: truth.allows_present() && learner.extrapolates(),
             learner,
-            // With each row stands whether learning was frozen at the run, or at the arrival of the truth.
+            // With each row stands whether learning was frozen at the run.
             withheld: Withheld::new(truth, width + 1),
             freeze: planned.freeze,
             gate: Gate {
@@ -132,11 +132,7 @@ impl Learning {
     pub(crate) fn observe(&mut self, truth: f64, now: Instant, gathered: &[Gathered], on: bool) {
         let frozen = self.frozen(gathered, on);
         self.step.truth(now);
-        if let Some(of_row) = self.withheld.observe(truth, now)
-            && frozen > *of_row
-        {
-            *of_row = frozen;
-        }
+        self.withheld.observe(truth, now, frozen);
     }
 
     /// Learns from what the embargo lets through at `now`; tells what became of the newest, and when it had arrived.
@@ -234,9 +230,10 @@ impl Gate {
             row,
             truth,
             arrived,
+            note: frozen_at_arrival,
         } = released;
-        let (row, frozen_then) = row.split_at(row.len() - 1);
-        let frozen = frozen.max(frozen_then[0]);
+        let (row, frozen_at_run) = row.split_at(row.len() - 1);
+        let frozen = frozen.max(frozen_at_run[0]).max(frozen_at_arrival);
         if frozen == f64::from(Became::FrozenOnCommand as u8) {
             return Became::FrozenOnCommand;
         }

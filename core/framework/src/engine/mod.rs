@@ -20,6 +20,7 @@ mod part;
 mod products;
 mod recent_error;
 mod revision;
+mod rows;
 mod running;
 mod sample_range;
 mod slots;

@@ -1,5 +1,6 @@
 //! Decides which run of a node a truth belongs to; not what is done with the pair.
 
+use super::rows::Rows;
 use crate::compile::TruthLink;
 use crate::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
@@ -12,13 +13,13 @@ use serde::{Deserialize, Serialize};
 pub struct Pairing {
     ahead: Duration,
     limit: Duration,
-    width: usize,
-    times: Vec<Instant>,
-    rows: Vec<f64>,
-    first: usize,
-    len: usize,
-    /// The number of the first row kept, counted over all runs.
+    runs: Rows,
+    /// How many of them are kept that no later truth belongs to.
+    past: usize,
+    /// The number of the run after these, counted over all runs.
     number: u64,
+    /// The number of the first run that is kept though no later truth belongs to it.
+    needed: u64,
 }
 
 /// A run that a truth has been paired with.
@@ -39,12 +40,10 @@ impl Pairing {
         Self {
             ahead: link.ahead,
             limit: link.limit,
-            width,
-            times: vec![Instant::MIN; 4],
-            rows: vec![0.0; 4 * width],
-            first: 0,
-            len: 0,
+            runs: Rows::new(width),
+            past: 0,
             number: 0,
+            needed: u64::MAX,
         }
     }
 
@@ -52,42 +51,34 @@ impl Pairing {
     ///
     /// # Panics
     /// When `parts` do not add up to the width.
+    #[inline]
     pub fn run<'a>(&mut self, now: Instant, parts: impl IntoIterator<Item = &'a [f64]>) {
         self.forget_before(now - self.ahead);
-        if self.len == self.times.len() {
-            self.grow();
-        }
-        let index = self.index(self.len);
-        self.times[index] = now;
-        let mut row = &mut self.rows[index * self.width..(index + 1) * self.width];
+        let mut row = self.runs.push(now);
         for part in parts {
             let (here, rest) = row.split_at_mut(part.len());
             here.copy_from_slice(part);
             row = rest;
         }
         assert!(row.is_empty(), "the parts of a row fill its width");
-        self.len += 1;
     }
 
     /// The run that a truth at `tau` belongs to. Instants asked for never go back.
+    #[inline]
     pub fn truth(&mut self, tau: Instant) -> Option<Paired<'_>> {
         let due = tau - self.ahead;
         self.forget_before(due);
-        let at = self.times[self.first];
-        if self.len == 0 || at > due || due - at > self.limit {
-            return None;
-        }
-        let row = &self.rows[self.first * self.width..(self.first + 1) * self.width];
-        Some(Paired {
+        let at = self.runs.time(self.past)?;
+        (at <= due && due - at <= self.limit).then_some(Paired {
             at,
             number: self.number,
-            row,
+            row: self.runs.row(self.past),
         })
     }
 
     /// The run that the last truth was paired with.
     pub(crate) fn last(&self) -> &[f64] {
-        &self.rows[self.first * self.width..(self.first + 1) * self.width]
+        self.runs.row(self.past)
     }
 
     /// The number of the run that the last truth was paired with.
@@ -95,42 +86,55 @@ impl Pairing {
         self.number
     }
 
-    /// Whether truths are paired as in another, and as much is written down.
-    pub(crate) fn pairs_like(&self, other: &Self) -> bool {
-        (self.ahead, self.limit, self.width) == (other.ahead, other.limit, other.width)
+    /// Keeps all runs from one of them on, whether a truth may still belong to it or not; none but those without a number.
+    pub(super) fn keep_from(&mut self, number: Option<u64>) {
+        self.needed = number.unwrap_or(u64::MAX);
+    }
+
+    /// What was written down of a run, if it is kept.
+    #[inline]
+    pub(super) fn row_of(&self, number: u64) -> Option<&[f64]> {
+        let nth = (self.past as u64 + number).checked_sub(self.number)?;
+        let nth = usize::try_from(nth)
+            .ok()
+            .filter(|&nth| nth < self.runs.len())?;
+        Some(self.runs.row(nth))
+    }
+
+    /// Goes on from another that pairs alike; false where it does not.
+    pub(super) fn go_on_from(&mut self, other: &Self) -> bool {
+        let of = |pairing: &Self| (pairing.ahead, pairing.limit, pairing.runs.width());
+        let takes =
+            of(self) == of(other) && other.runs.is_sound() && other.past <= other.runs.len();
+        if takes {
+            self.clone_from(other);
+            self.runs.reserve();
+        }
+        takes
     }
 
     /// Forgets all runs: the next one belongs to another segment.
     pub fn clear(&mut self) {
-        self.number += self.len as u64;
-        self.len = 0;
+        self.number += (self.runs.len() - self.past) as u64;
+        self.past = 0;
+        self.runs.clear();
     }
 
-    /// Forgets the runs before the last one at or before `due`.
+    /// Forgets the runs before the last one at or before `due`, but those that are needed.
     #[inline]
     fn forget_before(&mut self, due: Instant) {
-        while self.len >= 2 {
-            let second = self.index(1);
-            if self.times[second] > due {
-                break;
-            }
-            self.first = second;
-            self.len -= 1;
+        while self
+            .runs
+            .time(self.past + 1)
+            .is_some_and(|next| next <= due)
+        {
+            self.past += 1;
             self.number += 1;
         }
-    }
-
-    fn index(&self, nth: usize) -> usize {
-        (self.first + nth) & (self.times.len() - 1)
-    }
-
-    fn grow(&mut self) {
-        let capacity = self.times.len();
-        self.times.rotate_left(self.first);
-        self.rows.rotate_left(self.first * self.width);
-        self.first = 0;
-        self.times.resize(2 * capacity, Instant::MIN);
-        self.rows.resize(2 * capacity * self.width, 0.0);
+        while self.past > 0 && self.number - (self.past as u64) < self.needed {
+            self.runs.pop();
+            self.past -= 1;
+        }
     }
 }
 
@@ -199,7 +203,7 @@ mod tests {
         for t in 0..100_000 {
             pairing.run(s(t), [&[t as f64][..]]);
         }
-        assert!(pairing.times.len() <= 512, "{}", pairing.times.len());
+        assert!(pairing.runs.len() <= 302, "{}", pairing.runs.len());
         assert_eq!(pairing.truth(s(100_100)).map(|p| p.number), Some(99_800));
     }
 }

@@ -152,7 +152,7 @@ impl Vote {
     /// Takes a truth that has just been measured.
     pub(crate) fn observe(&mut self, truth: f64, now: Instant) {
         if let Some(withheld) = &mut self.withheld {
-            withheld.observe(truth, now);
+            withheld.observe(truth, now, 0.0);
         }
     }
 

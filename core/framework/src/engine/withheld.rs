@@ -13,25 +13,34 @@ use crate::time::Instant;
 pub(crate) struct Withheld {
     link: TruthLink,
     state: LearningState,
-    row: Vec<f64>,
 }
 
 /// What is withheld, as it is kept.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct LearningState {
     pairing: Pairing,
-    /// Arrival and value of truths not yet handed over.
-    withheld: VecDeque<(Instant, f64)>,
-    /// What was written down of the run that each of them belongs to.
-    rows: VecDeque<f64>,
+    withheld: VecDeque<Late>,
 }
 
-/// A truth that the embargo lets through, and what was written down of the run that it belongs to.
+/// A truth not yet handed over.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Late {
+    arrived: Instant,
+    truth: f64,
+    note: f64,
+    /// The run that it belongs to.
+    run: u64,
+}
+
+/// A truth that the embargo lets through.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Released<'a> {
+    /// What was written down of the run that it belongs to.
     pub(crate) row: &'a [f64],
     pub(crate) truth: f64,
     pub(crate) arrived: Instant,
+    /// What was noted when it arrived.
+    pub(crate) note: f64,
 }
 
 impl Withheld {
@@ -42,9 +51,7 @@ impl Withheld {
             state: LearningState {
                 pairing: Pairing::new(&link, width),
                 withheld: VecDeque::new(),
-                rows: VecDeque::new(),
             },
-            row: vec![0.0; width],
         }
     }
 
@@ -58,17 +65,22 @@ impl Withheld {
         self.state.pairing.run(now, parts);
     }
 
-    /// Takes a truth that has just been measured, if there was a run for it: the last number of its row.
-    pub(crate) fn observe(&mut self, truth: f64, now: Instant) -> Option<&mut f64> {
-        let LearningState {
-            pairing,
-            withheld,
-            rows,
-        } = &mut self.state;
-        let paired = pairing.truth(now)?;
-        withheld.push_back((now, truth));
-        rows.extend(paired.row);
-        rows.back_mut()
+    /// Takes a truth that has just been measured, and a note, if there was a run for it.
+    #[inline]
+    pub(crate) fn observe(&mut self, truth: f64, now: Instant, note: f64) {
+        let LearningState { pairing, withheld } = &mut self.state;
+        if let Some(paired) = pairing.truth(now) {
+            let run = paired.number;
+            if withheld.is_empty() {
+                pairing.keep_from(Some(run));
+            }
+            withheld.push_back(Late {
+                arrived: now,
+                truth,
+                note,
+                run,
+            });
+        }
     }
 
     /// The newest arrival that a prediction made at `now` may know of.
@@ -80,30 +92,28 @@ impl Withheld {
     #[inline]
     pub(crate) fn release(&mut self, newest: Instant, tell: impl FnMut(Released<'_>)) {
         let next = self.state.withheld.front();
-        if next.is_some_and(|&(arrived, _)| arrived <= newest) {
+        if next.is_some_and(|late| late.arrived <= newest) {
             self.release_some(newest, tell);
         }
     }
 
     #[inline(never)]
     fn release_some(&mut self, newest: Instant, mut tell: impl FnMut(Released<'_>)) {
-        while let Some(&(arrived, truth)) = self.state.withheld.front() {
-            if arrived > newest {
-                break;
+        let LearningState { pairing, withheld } = &mut self.state;
+        while let Some(&late) = withheld.front()
+            && late.arrived <= newest
+        {
+            withheld.pop_front();
+            if let Some(row) = pairing.row_of(late.run) {
+                tell(Released {
+                    row,
+                    truth: late.truth,
+                    arrived: late.arrived,
+                    note: late.note,
+                });
             }
-            self.state.withheld.pop_front();
-            let (rows, width) = (&mut self.state.rows, self.row.len());
-            let (begin, rest) = rows.as_slices();
-            let (of_begin, of_rest) = self.row.split_at_mut(width.min(begin.len()));
-            of_begin.copy_from_slice(&begin[..of_begin.len()]);
-            of_rest.copy_from_slice(&rest[..of_rest.len()]);
-            rows.drain(..width);
-            tell(Released {
-                row: &self.row,
-                truth,
-                arrived,
-            });
         }
+        pairing.keep_from(withheld.front().map(|late| late.run));
     }
 
     /// Hands over all, up to the last tick of a segment that has ended.
@@ -120,14 +130,12 @@ impl Withheld {
 
     /// Goes on from what was withheld of runs that are paired alike.
     pub(crate) fn restore(&mut self, state: &LearningState) {
-        if !self.state.pairing.pairs_like(&state.pairing) {
-            return;
+        let own = &mut self.state;
+        if own.pairing.go_on_from(&state.pairing) {
+            own.withheld.clone_from(&state.withheld);
+            // The engine thread must not have to make room.
+            own.withheld.reserve(own.withheld.len().max(16));
         }
-        self.state.clone_from(state);
-        // The engine thread must not have to make room.
-        let Self { state, row, .. } = self;
-        state.withheld.reserve(state.withheld.len().max(16));
-        state.rows.reserve(state.rows.len().max(16 * row.len()));
     }
 }
 
@@ -154,12 +162,13 @@ mod tests {
                 let of = released.truth;
                 assert_eq!(released.arrived, s(of as i64));
                 assert_eq!(released.row, [of, of + 0.25, of + 0.5]);
+                assert_eq!(released.note, 2.0 * of);
                 handed += 1;
             });
             // Some ticks are left out, so that rows do not lie alike each time round.
             if t % 7 < 4 {
                 withheld.run(s(t), [&[now, now + 0.25][..], &[now + 0.5]]);
-                withheld.observe(now, s(t));
+                withheld.observe(now, s(t), 2.0 * now);
             }
         }
         assert!(handed > 500, "{handed}");
