@@ -4,17 +4,21 @@
 
 mod workbench;
 
+use athermal::Engine;
 use athermal::core::channel::ABSENT;
 use athermal::core::compile::PlannedRole;
+use athermal::core::fit::{FitOptions, fit};
 use athermal::core::prng::Prng;
-use workbench::{Bench, linear, plan};
+use athermal::core::recording::Table;
+use workbench::{Bench, linear, plan, secs, slot};
 
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 /// Eleven are eight whose products are summed at once and three that are left.
 const SENSORS: [&str; 11] = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k"];
 const KINDS: [&str; 4] = ["thermal", "few", "motion", "both"];
 
-fn graph(axes: &[&str]) -> String {
+/// `of_each` are more keys of each estimator.
+fn graph(axes: &[&str], of_each: &str) -> String {
     format!(
         r#"
 schema = 1
@@ -27,17 +31,20 @@ each = "axis"
 inputs.features = "temperature"
 inputs.truth = "position.{{axis}}"
 ahead = "10s"
+{of_each}
 [nodes.few]
 type = "linear"
 each = "axis"
 inputs.features = ["temperature.a", "temperature.c"]
 inputs.truth = "position.{{axis}}"
 ahead = "10s"
+{of_each}
 [nodes.motion]
 type = "ar"
 each = "axis"
 inputs.truth = "position.{{axis}}"
 ahead = "10s"
+{of_each}
 lags = ["0s", "10s"]
 [nodes.both]
 type = "arx"
@@ -45,6 +52,7 @@ each = "axis"
 inputs.features = "temperature"
 inputs.truth = "position.{{axis}}"
 ahead = "10s"
+{of_each}
 lags = ["0s", "10s"]
 [outputs]
 thermal = "thermal"
@@ -57,7 +65,7 @@ both = "both"
 
 /// Coefficients of all estimators, of one axis the same whatever others there are.
 fn bench(axes: &[&str]) -> Bench {
-    let text = graph(axes);
+    let text = graph(axes, "");
     let fitted = plan(&text).nodes.clone().into_iter().map(|node| {
         let PlannedRole::Estimator { regressors, .. } = &node.role else {
             panic!("all nodes are estimators");
@@ -100,12 +108,17 @@ fn rows() -> Vec<(f64, Vec<(String, f64)>)> {
     (0..1600).map(&mut row).collect()
 }
 
-#[test]
-fn estimators_that_share_regressors_predict_the_bits_that_each_predicts_alone() {
-    let mut all = bench(&AXES);
-    let mut alone = AXES.map(|axis| bench(&[axis]));
-    let (mut there, mut missing) = ([0; KINDS.len()], [0; KINDS.len()]);
-    for (seconds, samples) in rows() {
+/// How often each kind of estimator gave a value, and how often it gave none.
+#[derive(Debug, Default)]
+struct Seen {
+    there: [u32; KINDS.len()],
+    missing: [u32; KINDS.len()],
+}
+
+impl Seen {
+    /// Steps an engine of all axes, and one of each, to the same instant and compares what they give.
+    fn step(&mut self, all: &mut Bench, alone: &mut [Bench; 3], row: &(f64, Vec<(String, f64)>)) {
+        let (seconds, samples) = row;
         let of = |names: &[&str]| -> Vec<(&str, f64)> {
             let known = samples.iter().filter(|(name, _)| {
                 names.iter().any(|axis| *name == format!("position.{axis}"))
@@ -113,9 +126,9 @@ fn estimators_that_share_regressors_predict_the_bits_that_each_predicts_alone() 
             });
             known.map(|(name, value)| (&**name, *value)).collect()
         };
-        all.tick(seconds, &of(&AXES));
-        for (axis, alone) in AXES.iter().zip(&mut alone) {
-            alone.tick(seconds, &of(&[axis]));
+        all.tick(*seconds, &of(&AXES));
+        for (axis, alone) in AXES.iter().zip(alone) {
+            alone.tick(*seconds, &of(&[axis]));
             for (nth, kind) in KINDS.iter().enumerate() {
                 let name = format!("{kind}.{axis}");
                 let (one, other) = (all.value(&name), alone.value(&name));
@@ -127,19 +140,94 @@ fn estimators_that_share_regressors_predict_the_bits_that_each_predicts_alone() 
                     "{name} at {seconds} s"
                 );
                 *(if one.is_nan() {
-                    &mut missing
+                    &mut self.missing
                 } else {
-                    &mut there
+                    &mut self.there
                 })
                 .get_mut(nth)
                 .unwrap() += 1;
             }
         }
     }
-    assert!(
-        there.iter().chain(&missing).all(|&count| count > 50),
-        "{there:?} {missing:?}"
-    );
+
+    fn is_telling(&self) -> bool {
+        self.there
+            .iter()
+            .chain(&self.missing)
+            .all(|&count| count > 50)
+    }
+}
+
+#[test]
+fn estimators_that_share_regressors_predict_the_bits_that_each_predicts_alone() {
+    let mut all = bench(&AXES);
+    let mut alone = AXES.map(|axis| bench(&[axis]));
+    let mut seen = Seen::default();
+    for row in rows() {
+        seen.step(&mut all, &mut alone, &row);
+    }
+    assert!(seen.is_telling(), "{seen:?}");
+}
+
+/// Frozen now and then, over a break in the data, and from a snapshot on.
+#[test]
+fn estimators_that_go_on_learning_predict_at_once_what_each_predicts_alone() {
+    let learning = "learn = true\nsolver = { type = \"sgd\" }";
+    let rows = rows();
+    let of_all = plan(&graph(&AXES, learning));
+    let mut table = Table::default();
+    for (seconds, samples) in &rows[..800] {
+        let mut values = vec![ABSENT; of_all.sources.len()];
+        for (name, value) in samples {
+            values[slot(&of_all, name)] = *value;
+        }
+        table.push(secs(*seconds), &values);
+    }
+    let fitted = fit(&of_all, &table, &FitOptions::default(), &mut |_| ()).unwrap();
+    let bench = |axes: &[&str], learning: &str| {
+        let named = fitted.0.iter().filter(|(name, _)| {
+            let of = |axis: &&str| name.ends_with(&format!(".{axis}"));
+            axes.iter().any(of)
+        });
+        let named: Vec<_> = named.map(|(name, fit)| (&**name, fit.clone())).collect();
+        Bench::new(&graph(axes, learning), &named)
+    };
+    let mut all = bench(&AXES, learning);
+    let mut alone = AXES.map(|axis| bench(&[axis], learning));
+    let mut as_fitted = bench(&["X"], "");
+    let (mut seen, mut learned) = (Seen::default(), [0; KINDS.len()]);
+    for (nth, row) in rows.iter().enumerate() {
+        for bench in alone.iter_mut().chain([&mut all]) {
+            bench.engine.freeze(nth % 300 > 250);
+            match nth {
+                700 => bench.engine.segment(),
+                1100 => {
+                    let snapshot = bench.engine.snapshot();
+                    let (plan, fitted) = (bench.engine.plan(), bench.engine.fitted());
+                    bench.engine = Engine::new(plan.clone(), fitted).unwrap();
+                    bench.engine.restore(&snapshot).unwrap();
+                }
+                _ => {}
+            }
+        }
+        seen.step(&mut all, &mut alone, row);
+        let samples: Vec<_> = row
+            .1
+            .iter()
+            .map(|(name, value)| (&**name, *value))
+            .collect();
+        let known = samples
+            .iter()
+            .filter(|(name, _)| name.starts_with("temperature") || *name == "position.X");
+        as_fitted.tick(row.0, &known.copied().collect::<Vec<_>>());
+        for (learned, kind) in learned.iter_mut().zip(KINDS) {
+            let name = format!("{kind}.X");
+            let (one, other) = (all.value(&name), as_fitted.value(&name));
+            *learned += u32::from((one - other).abs() > 1e-6);
+        }
+    }
+    assert!(seen.is_telling(), "{seen:?}");
+    assert!(learned.iter().all(|&count| count > 50), "{learned:?}");
 }
 
 #[test]

@@ -82,13 +82,12 @@ impl Frame {
 
     /// The coefficients on the scale of the data, and the intercept.
     fn unscaled(&self, recursion: &Recursion, coefficients: &mut [f64]) -> f64 {
-        let (weights, mut intercept) = recursion.weights();
-        let ends = self.means.iter().zip(&self.scales);
-        for ((place, weight), (mean, scale)) in coefficients.iter_mut().zip(weights).zip(ends) {
+        let (weights, intercept) = recursion.weights();
+        for ((place, weight), scale) in coefficients.iter_mut().zip(weights).zip(&self.scales) {
             *place = weight / scale;
-            intercept -= *place * mean;
         }
-        intercept + self.level
+        // In strands, since it is done for each truth that is learned.
+        intercept + self.level - form(0.0, coefficients).at(&self.means)
     }
 
     /// `s √(1 + zᵀPz)`: the noise, and what is not known of the coefficients; NaN where the recursion knows neither.
@@ -210,7 +209,11 @@ impl Predictor for OnlinePredictor {
     }
 
     fn predict(&self, regressors: &[f64]) -> f64 {
-        value(&self.coefficients, self.intercept, regressors)
+        form(self.intercept, &self.coefficients).at(regressors)
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        Some(form(self.intercept, &self.coefficients))
     }
 
     fn deviation(&self, regressors: &[f64]) -> f64 {
@@ -278,7 +281,11 @@ impl OnlineLearner {
 
 impl Learner for OnlineLearner {
     fn predict(&self, regressors: &[f64], _of: Instant) -> f64 {
-        value(&self.coefficients, self.intercept, regressors)
+        form(self.intercept, &self.coefficients).at(regressors)
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        Some(form(self.intercept, &self.coefficients))
     }
 
     fn deviation(&self, regressors: &[f64], _of: Instant) -> f64 {
@@ -337,11 +344,9 @@ impl Learner for OnlineLearner {
     }
 }
 
-/// `b₀ + Σ b_j x_j`.
-fn value(coefficients: &[f64], constant: f64, regressors: &[f64]) -> f64 {
-    let form = LinearForm {
+fn form(constant: f64, coefficients: &[f64]) -> LinearForm<'_> {
+    LinearForm {
         constant,
         coefficients,
-    };
-    form.at(regressors)
+    }
 }

@@ -64,6 +64,7 @@ struct Linear<'a> {
     node: usize,
     slot: usize,
     trigger: Option<usize>,
+    learns: bool,
     form: LinearForm<'a>,
     shared: Option<&'a Part>,
     own: &'a [Part],
@@ -97,6 +98,7 @@ impl<'a> Linear<'a> {
             node,
             slot: *slot,
             trigger: *trigger,
+            learns: !estimate.is_plain(),
             form,
             shared,
             own,
@@ -121,6 +123,7 @@ struct Member {
     slot: usize,
     /// The gather that lets it run, unless it does at every tick.
     trigger: Option<usize>,
+    learns: bool,
     constant: f64,
     /// Of the regressors whose products are not summed at once.
     coefficients: Box<[f64]>,
@@ -141,6 +144,7 @@ impl Bank {
             node: of.node,
             slot: of.slot,
             trigger: of.trigger,
+            learns: of.learns,
             constant: of.form.constant,
             coefficients: of.form.coefficients[at_once..].into(),
             own: of.own.first().cloned(),
@@ -158,18 +162,42 @@ impl Bank {
         }
     }
 
-    /// Predicts those of its estimators that run at a tick.
+    /// Lets those of its estimators that learn do so, and predicts those that run at a tick.
     pub(super) fn run(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) {
-        if !self.predict(turn) {
+        self.learn(turn, nodes);
+        if !self.predict(turn, nodes) {
             for member in self.members.iter().filter(|of| !of.whole) {
                 turn.of(&mut nodes[member.node]);
             }
         }
     }
 
+    #[inline]
+    fn learn(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) {
+        let learning = self.members.iter_mut().enumerate();
+        for (nth, member) in learning.filter(|(_, of)| of.learns) {
+            if let Running::Estimate {
+                estimate: Some(estimate),
+                ..
+            } = &mut nodes[member.node]
+                && let Some(learning) = estimate.learning()
+            {
+                turn.learn(learning, member.slot);
+                if learning.has_changed()
+                    && let Some(form) = estimate.form()
+                {
+                    let (at_once, others) = form.coefficients.split_at(self.at_once);
+                    self.products.set(nth, at_once);
+                    member.coefficients.copy_from_slice(others);
+                    member.constant = form.constant;
+                }
+            }
+        }
+    }
+
     /// Predicts those all of whose regressors are known to be there; false where there are others.
     #[inline]
-    fn predict(&mut self, turn: &mut Turn<'_>) -> bool {
+    fn predict(&mut self, turn: &mut Turn<'_>, nodes: &mut [Running]) -> bool {
         let (gathered, now) = (&*turn.gathered, turn.now);
         let shared = match &self.shared {
             None => Some((&[][..], Instant::MAX)),
@@ -188,13 +216,18 @@ impl Bank {
             }
             let others = member.others(left, gathered, &mut self.row);
             member.whole = others.is_some();
-            if let Some((others, oldest)) = others {
-                let prediction = member.constant + sums.sum(&member.coefficients, others);
-                let (value, stamp) = given(prediction, stamp.min(oldest), now);
-                turn.slots.set(member.slot, value, stamp);
-            } else {
+            let Some((others, oldest)) = others else {
                 all = false;
+                continue;
+            };
+            if member.learns
+                && let Some(learning) = nodes[member.node].learning()
+            {
+                learning.ran([at_once, others], now, gathered, !turn.frozen);
             }
+            let prediction = member.constant + sums.sum(&member.coefficients, others);
+            let (value, stamp) = given(prediction, stamp.min(oldest), now);
+            turn.slots.set(member.slot, value, stamp);
         }
         all
     }

@@ -67,7 +67,7 @@ pub(crate) struct Estimate {
     parts: Box<[Part]>,
     /// How many they are.
     width: usize,
-    /// Whether nothing is to be done but to predict by the fit.
+    /// Whether nothing is asked of it but its prediction, from what was measured.
     plain: bool,
     takes_absent: bool,
     /// What goes on learning, where the plan says so: it then predicts in place of the predictor.
@@ -127,7 +127,7 @@ impl Estimate {
         };
         Ok(Self {
             width: used.len(),
-            plain: deviation.is_none() && learning.is_none(),
+            plain: deviation.is_none(),
             takes_absent: predictor.takes_absent(),
             predictor,
             parts,
@@ -162,13 +162,17 @@ impl Estimate {
     /// Whether nothing is to be done but to [predict](Self::predict): it does not learn, nothing is fed back, and nobody asks for
     /// its deviation.
     pub(crate) fn is_plain(&self) -> bool {
-        self.plain
+        self.plain && self.learning.is_none()
     }
 
-    /// What the prediction is, where nothing is to be done but to predict by a linear form.
+    /// What the prediction is, where it is a linear form and nothing else is asked of it; it may learn.
     pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
-        let form = self.predictor.linear().filter(|_| self.plain)?;
-        (form.coefficients.len() == self.width).then_some(form)
+        let form = match &self.learning {
+            _ if !self.plain => None,
+            Some(learning) => learning.form(),
+            None => self.predictor.linear(),
+        };
+        form.filter(|form| form.coefficients.len() == self.width)
     }
 
     /// Where the regressors are.

@@ -9,7 +9,7 @@ use super::recent_error::RecentError;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
-use crate::node::{Learner, Predictor, Restored};
+use crate::node::{Learner, LinearForm, Predictor, Restored};
 use crate::time::{Duration, Instant};
 
 /// A learner in a running plan, with the truths that the embargo still withholds from it.
@@ -23,6 +23,8 @@ pub(crate) struct Learning {
     step: Step,
     /// Whether a run knows of the truth of its own tick.
     at_once: bool,
+    /// Whether it may predict otherwise than when it was asked last.
+    changed: bool,
     /// A row in which nothing is there.
     nothing: Vec<f64>,
 }
@@ -61,6 +63,7 @@ impl Learning {
         Some(Self {
             at_once: truth.allows_present() && learner.extrapolates(),
             learner,
+            changed: false,
             // With each row stands whether learning was frozen at the run.
             withheld: Withheld::new(truth, width + 1),
             freeze: planned.freeze,
@@ -113,6 +116,17 @@ impl Learning {
         self.at_once
     }
 
+    /// What the prediction is, where it is a linear form.
+    pub(crate) fn form(&self) -> Option<LinearForm<'_>> {
+        // What is given the truth of its own tick first cannot be predicted with others.
+        self.learner.linear().filter(|_| !self.at_once)
+    }
+
+    /// Whether it may predict otherwise than when this was asked last.
+    pub(crate) fn has_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
     /// Writes the regressors of a run down, where all that are needed were there.
     pub(crate) fn run(
         &mut self,
@@ -121,11 +135,24 @@ impl Learning {
         gathered: &[Gathered],
         on: bool,
     ) {
-        let row = row.unwrap_or(&self.nothing);
         let frozen = [self.frozen(gathered, on)];
+        let row = row.unwrap_or(&self.nothing);
         self.withheld.run(now, [row, &frozen]);
         let of = now + self.withheld.link().ahead;
         self.learner.run(row, of, self.newest(now));
+    }
+
+    /// The same for a linear form, whose regressors may lie in two pieces.
+    #[inline]
+    pub(crate) fn ran(
+        &mut self,
+        [first, others]: [&[f64]; 2],
+        now: Instant,
+        gathered: &[Gathered],
+        on: bool,
+    ) {
+        let frozen = [self.frozen(gathered, on)];
+        self.withheld.run(now, [first, others, &frozen]);
     }
 
     /// Takes a truth that has just been measured.
@@ -153,6 +180,7 @@ impl Learning {
             }
             news = Some((gate.offer(learner, released, frozen), released.arrived));
         });
+        self.changed |= news.is_some();
         news
     }
 
@@ -166,6 +194,7 @@ impl Learning {
                 gate.offer(learner, released, frozen);
             }
         });
+        self.changed = true;
         self.step.segment();
     }
 
@@ -187,6 +216,7 @@ impl Learning {
             Ok(None) => Restored::cold("it did not learn before"),
             Err(cold) => cold,
         };
+        self.changed = true;
         if !matches!(answer, Restored::Cold { .. }) {
             if let Some(from) = &state.learning {
                 self.withheld.restore(from);

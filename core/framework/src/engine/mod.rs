@@ -392,12 +392,11 @@ impl Engine {
             let truth = self.slots.values[slot];
             match &mut self.nodes[node] {
                 Running::Vote(vote) => vote.observe(truth, now),
-                Running::Estimate { estimate, .. } => {
-                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                other => {
+                    if let Some(learning) = other.learning() {
                         learning.observe(truth, now, &self.gathered, !self.frozen);
                     }
                 }
-                Running::Operator { .. } => {}
             }
         }
     }
@@ -406,12 +405,11 @@ impl Engine {
         for node in &mut self.nodes {
             match node {
                 Running::Vote(vote) => vote.shift(shift),
-                Running::Estimate { estimate, .. } => {
-                    if let Some(learning) = estimate.as_mut().and_then(Estimate::learning) {
+                other => {
+                    if let Some(learning) = other.learning() {
                         learning.shift(shift);
                     }
                 }
-                Running::Operator { .. } => {}
             }
         }
     }

@@ -64,16 +64,22 @@ impl Pairing {
     }
 
     /// The run that a truth at `tau` belongs to. Instants asked for never go back.
-    #[inline]
     pub fn truth(&mut self, tau: Instant) -> Option<Paired<'_>> {
+        let number = self.number_for(tau)?;
+        Some(Paired {
+            at: self.runs.time(self.past)?,
+            number,
+            row: self.last(),
+        })
+    }
+
+    /// The number of that run.
+    #[inline]
+    pub(super) fn number_for(&mut self, tau: Instant) -> Option<u64> {
         let due = tau - self.ahead;
         self.forget_before(due);
         let at = self.runs.time(self.past)?;
-        (at <= due && due - at <= self.limit).then_some(Paired {
-            at,
-            number: self.number,
-            row: self.runs.row(self.past),
-        })
+        (at <= due && due - at <= self.limit).then_some(self.number)
     }
 
     /// The run that the last truth was paired with.

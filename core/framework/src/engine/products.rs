@@ -18,19 +18,30 @@ const ABREAST: usize = 6;
 impl Products {
     /// Of forms by their coefficients, a multiple of four and of each the same number.
     pub(super) fn new(forms: &[&[f64]]) -> Self {
-        let mut coefficients = Vec::new();
-        let (abreast, others) = forms.as_chunks::<ABREAST>();
-        let groups = abreast.iter().map(|group| &group[..]);
-        for group in groups.chain(others.chunks(1)) {
-            let fours: Vec<_> = group.iter().map(|form| form.as_chunks().0).collect();
-            for nth in 0..fours[0].len() {
-                coefficients.extend(fours.iter().map(|fours| fours[nth]));
-            }
-        }
-        Self {
-            coefficients: coefficients.into(),
+        let width = forms.first().map_or(0, |form| form.len());
+        let mut products = Self {
+            coefficients: vec![[0.0; 4]; forms.len() * (width / 4)].into(),
             sums: vec![Strands::default(); forms.len()].into(),
             arch: Arch::new(),
+        };
+        for (nth, form) in forms.iter().enumerate() {
+            products.set(nth, form);
+        }
+        products
+    }
+
+    /// Sets the coefficients of one of the forms.
+    pub(super) fn set(&mut self, nth: usize, form: &[f64]) {
+        let fours = form.as_chunks::<4>().0;
+        let grouped = self.sums.len() / ABREAST * ABREAST;
+        let (group, abreast) = if nth < grouped {
+            (nth / ABREAST * ABREAST, ABREAST)
+        } else {
+            (nth, 1)
+        };
+        let of_group = self.coefficients[group * fours.len()..].iter_mut();
+        for (to, from) in of_group.skip(nth - group).step_by(abreast).zip(fours) {
+            *to = *from;
         }
     }
 

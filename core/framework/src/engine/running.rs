@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::estimate::{Estimate, fit_of};
+use super::learning::Learning;
 use super::vote::{Vote, Wires};
 use super::{EngineError, Fitted};
 use crate::compile::{Beside, Plan, PlannedNode, PlannedRole};
@@ -37,6 +38,14 @@ impl Running {
                 ..
             } => estimate.width(),
             _ => 0,
+        }
+    }
+
+    /// What goes on learning, of an estimator that does.
+    pub(super) fn learning(&mut self) -> Option<&mut Learning> {
+        match self {
+            Self::Estimate { estimate, .. } => estimate.as_mut()?.learning(),
+            _ => None,
         }
     }
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::estimate::Estimate;
 use super::gather::Gathered;
+use super::learning::Learning;
 use super::running::Running;
 use super::slots::Slots;
 use super::vote::Vote;
@@ -108,6 +109,19 @@ impl Turn<'_> {
         operator.step(&tick, &mut outputs);
     }
 
+    /// Lets an estimator learn before it runs; what became of the newest truth is told beside its prediction.
+    #[inline]
+    pub(super) fn learn(&mut self, learning: &mut Learning, slot: usize) {
+        let (now, on) = (self.now, !self.frozen);
+        if learning.at_once() && self.slots.fresh(learning.truth()) {
+            let truth = self.slots.values[learning.truth()];
+            learning.observe(truth, now, self.gathered, on);
+        }
+        if let Some((became, arrived)) = learning.release(now, self.gathered, on) {
+            self.slots.set(slot + 1, f64::from(became as u8), arrived);
+        }
+    }
+
     /// An estimator that does more than predict by its fit, or has none.
     #[inline(never)]
     fn estimate(
@@ -117,6 +131,9 @@ impl Turn<'_> {
         slot: usize,
         deviation: Option<usize>,
     ) {
+        if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning()) {
+            self.learn(learning, slot);
+        }
         let Self {
             now,
             slots,
@@ -125,15 +142,6 @@ impl Turn<'_> {
             frozen,
         } = self;
         let (now, on) = (*now, !*frozen);
-        if let Some(learning) = estimate.as_mut().and_then(|estimate| estimate.learning()) {
-            if learning.at_once() && slots.fresh(learning.truth()) {
-                let truth = slots.values[learning.truth()];
-                learning.observe(truth, now, gathered, on);
-            }
-            if let Some((became, arrived)) = learning.release(now, gathered, on) {
-                slots.set(slot + 1, f64::from(became as u8), arrived);
-            }
-        }
         if trigger.is_some_and(|gather| !gathered[gather].fresh) {
             return;
         }

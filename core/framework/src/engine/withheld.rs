@@ -69,8 +69,7 @@ impl Withheld {
     #[inline]
     pub(crate) fn observe(&mut self, truth: f64, now: Instant, note: f64) {
         let LearningState { pairing, withheld } = &mut self.state;
-        if let Some(paired) = pairing.truth(now) {
-            let run = paired.number;
+        if let Some(run) = pairing.number_for(now) {
             if withheld.is_empty() {
                 pairing.keep_from(Some(run));
             }

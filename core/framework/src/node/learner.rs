@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Mistake, Restored, State};
+use super::{LinearForm, Mistake, Restored, State};
 use crate::model::numbers;
 use crate::time::{Duration, Instant};
 
@@ -94,6 +94,13 @@ pub enum Learns {
 pub trait Learner: Debug + Send {
     /// The prediction of the truth that will be measured at `of`, from present values of the used regressors.
     fn predict(&self, regressors: &[f64], of: Instant) -> f64;
+
+    /// What it predicts now, where that is a [`LinearForm`] whatever the instant, to the bit, and a run changes nothing: the engine then
+    /// sums those of several estimators that read the same values at once, and neither asks each for its prediction nor
+    /// calls [`run`](Learner::run).
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        None
+    }
 
     /// The standard deviation of the truth that will be measured at `of` about its prediction; NaN where it is not known. Truths
     /// that miss by too much in units of it are not handed over. How large misses are is learned anew where it comes or goes: one

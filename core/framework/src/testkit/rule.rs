@@ -38,7 +38,7 @@ pub enum Rule {
     Fits,
     /// A fitted estimator written into a model and read back predicts with the same bits.
     Models,
-    /// A fitted estimator that says to be a linear form predicts what the form does.
+    /// A fitted estimator that says to be a linear form predicts what the form does, and so does one that goes on learning.
     Linear,
     /// A model that was edited by hand is refused in words, or runs.
     Edited,
@@ -132,8 +132,8 @@ impl Rule {
                  one may be infinite or NaN"
             }
             Self::Linear => {
-                "let `predict` be `LinearForm::at` of what `Predictor::linear` gives, with a coefficient for each of `uses`; where a \
-                 prediction is anything else, leave `linear` out"
+                "let `predict` be `LinearForm::at` of what `linear` gives, of a `Predictor` as of a `Learner`, with a coefficient for \
+                 each of `uses`; where a prediction is anything else, leave `linear` out"
             }
             Self::Edited => {
                 "say in `Predictor::mistakes` what does not fit together, such as a list that is not as long as `uses`: it is asked \

@@ -3,11 +3,11 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use athermal_core::node::{
-    Estimator, InputPort, LinearForm, Mistake, Predictor, Regressors, Trained, Trainer,
-    TrainingError, TrainingReport, TrainingSetup,
+    Estimator, InputPort, Learner, LinearForm, Mistake, Predictor, Regressors, Restored, State,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::testkit::{Case, Rule};
-use athermal_core::time::Duration;
+use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,8 @@ enum Fault {
     Trusting,
     /// Says to be a linear form that it is not.
     Misstated,
+    /// Says so once it goes on learning.
+    Mislearnt,
 }
 
 impl Estimator for Ratio {
@@ -113,6 +115,7 @@ impl Trainer for Averaging {
             means: vec![if written { mean } else { 0.0 }],
             trusting: self.fault == Fault::Trusting,
             misstated: (self.fault == Fault::Misstated).then(|| vec![0.0; width]),
+            mislearnt: self.fault == Fault::Mislearnt,
             unwritten: if written { 0.0 } else { mean },
         };
         Ok(Trained {
@@ -129,6 +132,7 @@ struct Fitted {
     means: Vec<f64>,
     trusting: bool,
     misstated: Option<Vec<f64>>,
+    mislearnt: bool,
     #[serde(skip)]
     unwritten: f64,
 }
@@ -157,8 +161,51 @@ impl Predictor for Fitted {
             coefficients,
         })
     }
+
+    fn learner(&self) -> Option<Box<dyn Learner>> {
+        self.mislearnt.then(|| {
+            Box::new(Mislearnt {
+                means: self.means.clone(),
+                coefficients: vec![0.0; self.regressors.len()],
+            }) as _
+        })
+    }
 }
 
+/// Predicts the last truth, and says to predict the mean of the fit.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Mislearnt {
+    /// Of the fit, then all that followed.
+    means: Vec<f64>,
+    coefficients: Vec<f64>,
+}
+
+impl Learner for Mislearnt {
+    fn predict(&self, _regressors: &[f64], _of: Instant) -> f64 {
+        self.means[self.means.len() - 1]
+    }
+
+    fn linear(&self) -> Option<LinearForm<'_>> {
+        Some(LinearForm {
+            constant: self.means[0],
+            coefficients: &self.coefficients,
+        })
+    }
+
+    fn learn(&mut self, _regressors: &[f64], truth: f64, _at: Instant) {
+        self.means.push(truth);
+    }
+
+    fn snapshot(&self) -> Box<dyn State> {
+        Box::new(self.clone())
+    }
+
+    fn restore(&mut self, _state: Box<dyn State>) -> Restored {
+        Restored::cold("it never learns")
+    }
+}
+
+athermal_core::state!(Mislearnt, "mislearnt/1");
 athermal_core::register!(Ratio, Estimator, "sabotaged_estimator");
 
 fn with(fault: &str) -> Case {
@@ -204,9 +251,7 @@ fn a_model_that_was_edited_is_not_trusted() {
 #[test]
 fn a_linear_form_is_what_is_predicted() {
     breaks_only::<Ratio>(with("misstated"), &[Rule::Linear]);
-    breaks::<Ratio>(
-        with("misstated"),
-        Rule::Linear,
-        "of which its linear form is 0.0",
-    );
+    breaks::<Ratio>(with("misstated"), Rule::Linear, "it predicts");
+    breaks_only::<Ratio>(with("mislearnt"), &[Rule::Linear]);
+    breaks::<Ratio>(with("mislearnt"), Rule::Linear, "its learner predicts");
 }

@@ -6,9 +6,10 @@ use crate::channel::ABSENT;
 use crate::engine::Fitted;
 use crate::fit::{FitOptions, fit};
 use crate::model::Model;
-use crate::node::{Feature, Read, Role};
+use crate::node::{Feature, LinearForm, Read, Role};
 use crate::prng::Prng;
 use crate::recording::Table;
+use crate::time::Instant;
 
 pub(super) fn fits(subject: &Subject<'_>) -> Result<(), String> {
     if let Role::Feature(feature) = subject.fixture.plan.nodes[0].spec.role() {
@@ -131,23 +132,47 @@ pub(super) fn models(subject: &Subject<'_>) -> Result<(), String> {
 pub(super) fn linear(subject: &Subject<'_>) -> Result<(), String> {
     let mut random = Prng::stream(41, "rows for a linear form");
     for predictor in subject.fitted.values() {
-        let Some(form) = predictor.linear() else {
+        let used = predictor.uses().len();
+        if let Some(form) = predictor.linear() {
+            is_predicted(form, used, &mut random, |row| predictor.predict(row))
+                .map_err(|found| format!("it {found}"))?;
+        }
+        let Some(mut learner) = predictor.learner() else {
             continue;
         };
-        let (found, used) = (form.coefficients.len(), predictor.uses().len());
-        if found != used {
-            return Err(format!(
-                "its linear form has {found} coefficients for {used} regressors"
-            ));
-        }
-        for _ in 0..100 {
-            let row: Vec<_> = (0..used).map(|_| random.between(-1e3, 1e3)).collect();
-            let (form, predicted) = (form.at(&row), predictor.predict(&row));
-            if form.to_bits() != predicted.to_bits() {
-                return Err(format!(
-                    "it predicts {predicted:?} from regressors of which its linear form is {form:?}"
-                ));
+        for seconds in 1..10 {
+            let at = Instant::from_ns(seconds * 1_000_000_000);
+            if let Some(form) = learner.linear() {
+                is_predicted(form, used, &mut random, |row| learner.predict(row, at))
+                    .map_err(|found| format!("its learner {found}"))?;
             }
+            let row: Vec<_> = (0..used).map(|_| random.normal()).collect();
+            learner.learn(&row, random.normal(), at);
+        }
+    }
+    Ok(())
+}
+
+/// A linear form is what is predicted from any regressors.
+fn is_predicted(
+    form: LinearForm<'_>,
+    used: usize,
+    random: &mut Prng,
+    predict: impl Fn(&[f64]) -> f64,
+) -> Result<(), String> {
+    let found = form.coefficients.len();
+    if found != used {
+        return Err(format!(
+            "has a linear form of {found} coefficients for {used} regressors"
+        ));
+    }
+    for _ in 0..100 {
+        let row: Vec<_> = (0..used).map(|_| random.between(-1e3, 1e3)).collect();
+        let (form, predicted) = (form.at(&row), predict(&row));
+        if form.to_bits() != predicted.to_bits() {
+            return Err(format!(
+                "predicts {predicted:?} from regressors of which its linear form is {form:?}"
+            ));
         }
     }
     Ok(())
