@@ -4,10 +4,13 @@
 
 mod workbench;
 
+use std::sync::Arc;
+
 use athermal::Engine;
 use athermal::core::channel::ABSENT;
 use athermal::core::compile::PlannedRole;
 use athermal::core::fit::{FitOptions, fit};
+use athermal::core::node::Predictor;
 use athermal::core::prng::Prng;
 use athermal::core::recording::Table;
 use workbench::{Bench, linear, plan, secs, slot};
@@ -15,76 +18,134 @@ use workbench::{Bench, linear, plan, secs, slot};
 const AXES: [&str; 3] = ["X", "Y", "Z"];
 /// Eleven are eight whose products are summed at once and three that are left.
 const SENSORS: [&str; 11] = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k"];
-const KINDS: [&str; 4] = ["thermal", "few", "motion", "both"];
+/// Each with what it is made of.
+const KINDS: [(&str, &str); 4] = [
+    (
+        "thermal",
+        "type = \"linear\"\ninputs.features = \"temperature\"",
+    ),
+    (
+        "few",
+        "type = \"linear\"\ninputs.features = [\"temperature.a\", \"temperature.c\"]",
+    ),
+    ("motion", "type = \"ar\"\nlags = [\"0s\", \"10s\"]"),
+    (
+        "both",
+        "type = \"arx\"\ninputs.features = \"temperature\"\nlags = [\"0s\", \"10s\"]",
+    ),
+];
+const LEARNING: &str = "learn = true\nsolver = { type = \"sgd\" }";
 
-/// `of_each` are more keys of each estimator.
-fn graph(axes: &[&str], of_each: &str) -> String {
+/// One estimator of each kind and axis, each with these keys too.
+fn graph(axes: &[&str], kinds: &[(&str, &str)], keys: &str) -> String {
+    let nodes = kinds.iter().map(|(name, kind)| {
+        // Whoever reads what is told beside a prediction must read that of the same tick.
+        let told = if keys == LEARNING {
+            format!("[nodes.told_{name}]\ntype = \"scale\"\neach = \"axis\"\ninputs.signal = \"{name}:learning.{{axis}}\"\n")
+        } else {
+            String::new()
+        };
+        format!(
+            "[nodes.{name}]\n{kind}\neach = \"axis\"\ninputs.truth = \"position.{{axis}}\"\nahead = \"10s\"\n{keys}\n{told}\
+             [outputs.{name}]\nfrom = \"{name}\"\n"
+        )
+    });
     format!(
         r#"
 schema = 1
 sets.axis = {axes:?}
 signals.temperature = {{ unit = "Cel", channels = {SENSORS:?}, max_age = "20s" }}
 signals.position = {{ unit = "nm", channels = "axis", max_age = "40s" }}
-[nodes.thermal]
-type = "linear"
-each = "axis"
-inputs.features = "temperature"
-inputs.truth = "position.{{axis}}"
-ahead = "10s"
-{of_each}
-[nodes.few]
-type = "linear"
-each = "axis"
-inputs.features = ["temperature.a", "temperature.c"]
-inputs.truth = "position.{{axis}}"
-ahead = "10s"
-{of_each}
-[nodes.motion]
-type = "ar"
-each = "axis"
-inputs.truth = "position.{{axis}}"
-ahead = "10s"
-{of_each}
-lags = ["0s", "10s"]
-[nodes.both]
-type = "arx"
-each = "axis"
-inputs.features = "temperature"
-inputs.truth = "position.{{axis}}"
-ahead = "10s"
-{of_each}
-lags = ["0s", "10s"]
-[outputs]
-thermal = "thermal"
-few = "few"
-motion = "motion"
-both = "both"
-"#
+{}"#,
+        nodes.collect::<String>()
     )
 }
 
-/// Coefficients of all estimators, of one axis the same whatever others there are.
-fn bench(axes: &[&str]) -> Bench {
-    let text = graph(axes, "");
-    let fitted = plan(&text).nodes.clone().into_iter().map(|node| {
-        let PlannedRole::Estimator { regressors, .. } = &node.role else {
-            panic!("all nodes are estimators");
+/// All estimators at once, and each alone.
+struct Benches {
+    all: Bench,
+    alone: Vec<Bench>,
+    there: [u32; KINDS.len()],
+    missing: [u32; KINDS.len()],
+}
+
+impl Benches {
+    /// `fit` is that of an instance.
+    fn new(keys: &str, fit: &dyn Fn(&str) -> Arc<dyn Predictor>) -> Self {
+        let bench = |axes: &[&str], kinds: &[(&str, &str)]| {
+            let names = axes
+                .iter()
+                .flat_map(|axis| kinds.iter().map(move |(name, _)| format!("{name}.{axis}")));
+            let fitted: Vec<_> = names.map(|name| (fit(&name), name)).collect();
+            let fitted: Vec<_> = fitted
+                .iter()
+                .map(|(fit, name)| (&**name, Arc::clone(fit)))
+                .collect();
+            Bench::new(&graph(axes, kinds, keys), &fitted)
         };
-        let name = node.instance();
-        let mut random = Prng::stream(7, &name);
-        let terms: Vec<_> = regressors
+        let each = AXES
             .iter()
-            .map(|regressor| (&*regressor.name, random.normal()))
-            .collect();
-        let fit = linear(&terms, random.normal());
-        (name, fit)
-    });
-    let fitted: Vec<_> = fitted.collect();
-    let named: Vec<_> = fitted
+            .flat_map(|axis| KINDS.iter().map(move |kind| (*axis, *kind)));
+        Self {
+            all: bench(&AXES, &KINDS),
+            alone: each.map(|(axis, kind)| bench(&[axis], &[kind])).collect(),
+            there: [0; KINDS.len()],
+            missing: [0; KINDS.len()],
+        }
+    }
+
+    fn each(&mut self) -> impl Iterator<Item = &mut Bench> {
+        self.alone.iter_mut().chain([&mut self.all])
+    }
+
+    /// Steps to the same instant, and compares what the nodes give.
+    fn step(&mut self, seconds: f64, samples: &[(String, f64)]) {
+        for bench in self.each() {
+            let plan = Arc::clone(bench.engine.plan());
+            let known = |name: &str| plan.sources.iter().any(|source| source.name == name);
+            let samples = samples.iter().map(|(name, value)| (&**name, *value));
+            let samples: Vec<_> = samples.filter(|(name, _)| known(name)).collect();
+            bench.tick(seconds, &samples);
+        }
+        for (nth, alone) in self.alone.iter().enumerate() {
+            let channels = alone.engine.plan().channels.iter();
+            for channel in channels.filter(|channel| channel.node.is_some()) {
+                let of = |bench: &Bench| {
+                    let (value, stamp) = (bench.value(&channel.name), bench.stamp(&channel.name));
+                    (value.to_bits(), bench.ran(&channel.name), stamp)
+                };
+                assert_eq!(of(&self.all), of(alone), "{} at {seconds} s", channel.name);
+            }
+            let kind = nth % KINDS.len();
+            let predicted = alone.engine.outputs()[0];
+            let count = if predicted.is_nan() {
+                &mut self.missing
+            } else {
+                &mut self.there
+            };
+            count[kind] += 1;
+        }
+    }
+
+    fn is_telling(&self) -> bool {
+        let mut counts = self.there.iter().chain(&self.missing);
+        counts.all(|&count| count > 50)
+    }
+}
+
+/// A linear form with coefficients of its own for each instance.
+fn of_chance(instance: &str) -> Arc<dyn Predictor> {
+    let plan = plan(&graph(&AXES, &KINDS, ""));
+    let node = plan.nodes.iter().find(|node| node.instance() == instance);
+    let PlannedRole::Estimator { regressors, .. } = &node.unwrap().role else {
+        panic!("all nodes are estimators");
+    };
+    let mut random = Prng::stream(7, instance);
+    let terms = regressors
         .iter()
-        .map(|(name, fit)| (&**name, std::sync::Arc::clone(fit)))
-        .collect();
-    Bench::new(&text, &named)
+        .map(|regressor| (&*regressor.name, random.normal()));
+    let terms: Vec<_> = terms.collect();
+    linear(&terms, random.normal())
 }
 
 /// A row every few seconds: now and then a sensor is silent, a position more often, and all of them for a while.
@@ -108,73 +169,25 @@ fn rows() -> Vec<(f64, Vec<(String, f64)>)> {
     (0..1600).map(&mut row).collect()
 }
 
-/// How often each kind of estimator gave a value, and how often it gave none.
-#[derive(Debug, Default)]
-struct Seen {
-    there: [u32; KINDS.len()],
-    missing: [u32; KINDS.len()],
-}
-
-impl Seen {
-    /// Steps an engine of all axes, and one of each, to the same instant and compares what they give.
-    fn step(&mut self, all: &mut Bench, alone: &mut [Bench; 3], row: &(f64, Vec<(String, f64)>)) {
-        let (seconds, samples) = row;
-        let of = |names: &[&str]| -> Vec<(&str, f64)> {
-            let known = samples.iter().filter(|(name, _)| {
-                names.iter().any(|axis| *name == format!("position.{axis}"))
-                    || name.starts_with("temperature")
-            });
-            known.map(|(name, value)| (&**name, *value)).collect()
-        };
-        all.tick(*seconds, &of(&AXES));
-        for (axis, alone) in AXES.iter().zip(alone) {
-            alone.tick(*seconds, &of(&[axis]));
-            for (nth, kind) in KINDS.iter().enumerate() {
-                let name = format!("{kind}.{axis}");
-                let (one, other) = (all.value(&name), alone.value(&name));
-                assert_eq!(one.to_bits(), other.to_bits(), "{name} at {seconds} s");
-                assert_eq!(all.ran(&name), alone.ran(&name), "{name} at {seconds} s");
-                assert_eq!(
-                    all.stamp(&name),
-                    alone.stamp(&name),
-                    "{name} at {seconds} s"
-                );
-                *(if one.is_nan() {
-                    &mut self.missing
-                } else {
-                    &mut self.there
-                })
-                .get_mut(nth)
-                .unwrap() += 1;
-            }
-        }
-    }
-
-    fn is_telling(&self) -> bool {
-        self.there
-            .iter()
-            .chain(&self.missing)
-            .all(|&count| count > 50)
-    }
-}
-
 #[test]
 fn estimators_that_share_regressors_predict_the_bits_that_each_predicts_alone() {
-    let mut all = bench(&AXES);
-    let mut alone = AXES.map(|axis| bench(&[axis]));
-    let mut seen = Seen::default();
-    for row in rows() {
-        seen.step(&mut all, &mut alone, &row);
+    let mut benches = Benches::new("", &of_chance);
+    for (seconds, samples) in rows() {
+        benches.step(seconds, &samples);
     }
-    assert!(seen.is_telling(), "{seen:?}");
+    assert!(
+        benches.is_telling(),
+        "{:?} {:?}",
+        benches.there,
+        benches.missing
+    );
 }
 
-/// Frozen now and then, over a break in the data, and from a snapshot on.
+/// Frozen now and then, over breaks in the data, and from snapshots on.
 #[test]
 fn estimators_that_go_on_learning_predict_at_once_what_each_predicts_alone() {
-    let learning = "learn = true\nsolver = { type = \"sgd\" }";
     let rows = rows();
-    let of_all = plan(&graph(&AXES, learning));
+    let of_all = plan(&graph(&AXES, &KINDS, LEARNING));
     let mut table = Table::default();
     for (seconds, samples) in &rows[..800] {
         let mut values = vec![ABSENT; of_all.sources.len()];
@@ -183,56 +196,47 @@ fn estimators_that_go_on_learning_predict_at_once_what_each_predicts_alone() {
         }
         table.push(secs(*seconds), &values);
     }
-    let fitted = fit(&of_all, &table, &FitOptions::default(), &mut |_| ()).unwrap();
-    let bench = |axes: &[&str], learning: &str| {
-        let named = fitted.0.iter().filter(|(name, _)| {
-            let of = |axis: &&str| name.ends_with(&format!(".{axis}"));
-            axes.iter().any(of)
-        });
-        let named: Vec<_> = named.map(|(name, fit)| (&**name, fit.clone())).collect();
-        Bench::new(&graph(axes, learning), &named)
-    };
-    let mut all = bench(&AXES, learning);
-    let mut alone = AXES.map(|axis| bench(&[axis], learning));
-    let mut as_fitted = bench(&["X"], "");
-    let (mut seen, mut learned) = (Seen::default(), [0; KINDS.len()]);
-    for (nth, row) in rows.iter().enumerate() {
-        for bench in alone.iter_mut().chain([&mut all]) {
+    let (fitted, _) = fit(&of_all, &table, &FitOptions::default(), &mut |_| ()).unwrap();
+    let of_fit = |instance: &str| Arc::clone(&fitted[instance]);
+    let mut benches = Benches::new(LEARNING, &of_fit);
+    let mut as_fitted = Benches::new("", &of_fit);
+    let mut learned = [0; KINDS.len()];
+    for (nth, (seconds, samples)) in rows.iter().enumerate() {
+        for bench in benches.each() {
             bench.engine.freeze(nth % 300 > 250);
-            match nth {
-                700 => bench.engine.segment(),
-                1100 => {
+            match nth % 400 {
+                // Not while a sensor is silent, so that what was learned at the end of a segment shows at once.
+                160 => bench.engine.segment(),
+                // While nothing is measured, so that nothing is learned before the next prediction.
+                205 => {
                     let snapshot = bench.engine.snapshot();
                     let (plan, fitted) = (bench.engine.plan(), bench.engine.fitted());
-                    bench.engine = Engine::new(plan.clone(), fitted).unwrap();
+                    bench.engine = Engine::new(Arc::clone(plan), fitted).unwrap();
                     bench.engine.restore(&snapshot).unwrap();
                 }
                 _ => {}
             }
         }
-        seen.step(&mut all, &mut alone, row);
-        let samples: Vec<_> = row
-            .1
-            .iter()
-            .map(|(name, value)| (&**name, *value))
-            .collect();
-        let known = samples
-            .iter()
-            .filter(|(name, _)| name.starts_with("temperature") || *name == "position.X");
-        as_fitted.tick(row.0, &known.copied().collect::<Vec<_>>());
-        for (learned, kind) in learned.iter_mut().zip(KINDS) {
+        benches.step(*seconds, samples);
+        as_fitted.step(*seconds, samples);
+        for (learned, (kind, _)) in learned.iter_mut().zip(KINDS) {
             let name = format!("{kind}.X");
-            let (one, other) = (all.value(&name), as_fitted.value(&name));
+            let (one, other) = (benches.all.value(&name), as_fitted.all.value(&name));
             *learned += u32::from((one - other).abs() > 1e-6);
         }
     }
-    assert!(seen.is_telling(), "{seen:?}");
+    assert!(
+        benches.is_telling(),
+        "{:?} {:?}",
+        benches.there,
+        benches.missing
+    );
     assert!(learned.iter().all(|&count| count > 50), "{learned:?}");
 }
 
 #[test]
 fn an_absent_regressor_silences_those_that_use_it_and_no_others() {
-    let mut bench = bench(&AXES);
+    let mut bench = Benches::new("", &of_chance).all;
     let samples: Vec<_> = SENSORS
         .iter()
         .map(|name| format!("temperature.{name}"))

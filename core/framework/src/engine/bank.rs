@@ -26,11 +26,14 @@ pub(super) fn work(plan: &Plan, nodes: &[Running]) -> Box<[Work]> {
     for step in &plan.steps {
         let linear = match *step {
             Step::Run(node) => Linear::of(node, &nodes[node]),
-            // What reads nothing of what is predicted may as well come before.
+            // What reads nothing of what they write may as well come before.
             Step::Gather(gather) => {
                 let entries = &plan.gathers[gather].entries;
-                let read = |of: &Linear<'_>| entries.iter().any(|entry| entry.slot == of.slot);
-                if bank.iter().any(read) {
+                let reads = |of: &Linear<'_>| {
+                    let written = &plan.nodes[of.node].slots;
+                    entries.iter().any(|entry| written.contains(&entry.slot))
+                };
+                if bank.iter().any(reads) {
                     close(&mut bank, &mut work);
                 }
                 work.push(Work::Step(*step));
