@@ -211,7 +211,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
             (&report.refused_rows, "unreadable row", "left out"),
             (
                 &report.refused_time,
-                "row whose time is not after the one before",
+                "row whose time is out of order",
                 "left out",
             ),
         ];

@@ -149,6 +149,17 @@ pub enum FileError {
         /// The newest time before it.
         previous: String,
     },
+    /// An instant that is far after the one before, and after the next one too.
+    TimeLeaps {
+        /// The row.
+        place: Place,
+        /// Its time, as the file gives it.
+        time: String,
+        /// The time before it.
+        previous: String,
+        /// The time after it.
+        next: String,
+    },
     /// Rows one after the other, none of them after the one before them; told only while the recording is read.
     TimeStaysBehind {
         /// The newest of them.
@@ -308,6 +319,15 @@ impl fmt::Display for FileError {
             } => write!(
                 f,
                 "{place}: the time `{time}` is not after `{previous}`; the row was left out"
+            ),
+            Self::TimeLeaps {
+                place,
+                time,
+                previous,
+                next,
+            } => write!(
+                f,
+                "{place}: the time `{time}` is far after `{previous}`, and the next one, `{next}`, is not; the row was left out"
             ),
             Self::TimeStaysBehind {
                 place,

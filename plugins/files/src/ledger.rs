@@ -9,7 +9,8 @@ use crate::{FileError, Place};
 pub struct Report {
     /// Rows given.
     pub rows: u64,
-    /// Rows left out because their time was not after the one before ([`FileError::TimeNotAfter`]).
+    /// Rows left out because their time was not after the one before ([`FileError::TimeNotAfter`]), or far after it and after the next
+    /// one too ([`FileError::TimeLeaps`]).
     pub refused_time: Count,
     /// Cells taken as absent because they could not be read; only when reading leniently.
     pub bad_cells: Count,
@@ -62,12 +63,28 @@ fn stays_behind(rows: u64) -> bool {
     rows >= 10 && 10_u64.pow(rows.ilog10()) == rows
 }
 
+/// How the time of a row follows the last one that was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Follows {
+    Next,
+    /// So far after it that either there is a gap or the time is wrong.
+    Leaping,
+    /// Not after it.
+    Behind,
+}
+
+/// After how long, and after how many times as long as the rows before, a row leaps.
+const LEAP_NS: i64 = 300_000_000_000;
+const LEAP_STEPS: i64 = 30;
+
 /// The account that a reader keeps.
 pub(crate) struct Ledger {
     pub report: Report,
     pub tell: Option<Tell>,
     lenient: bool,
     last_ns: Option<i64>,
+    /// How long after the one before it that was.
+    step_ns: i64,
     /// How many rows one after the other were not after it.
     behind: u64,
     /// The time cell of the row at that instant.
@@ -85,6 +102,7 @@ impl Ledger {
             tell: None,
             lenient,
             last_ns: None,
+            step_ns: 0,
             behind: 0,
             last_time: Vec::new(),
             time_mark: None,
@@ -92,40 +110,70 @@ impl Ledger {
         }
     }
 
-    /// Whether the row at this instant, which its time cell gives, can be used: strictly after the one before.
-    pub fn accepts(&mut self, time_ns: i64, cell: &[u8], place: impl FnOnce() -> Place) -> bool {
+    /// How a row at this instant would follow the last one taken.
+    pub fn follows(&self, time_ns: i64) -> Follows {
         match self.last_ns {
-            Some(previous_ns) if time_ns <= previous_ns => {
-                self.behind += 1;
-                if let Some(tell) = &mut self.tell
-                    && stays_behind(self.behind)
-                {
-                    tell(&FileError::TimeStaysBehind {
-                        place: place(),
-                        time: excerpt(cell),
-                        rows: self.behind,
-                        previous: excerpt(&self.last_time),
-                    });
-                    self.report.refused_time.count += 1;
-                    return false;
+            None => Follows::Next,
+            Some(last_ns) if time_ns <= last_ns => Follows::Behind,
+            Some(last_ns) => {
+                let leap = LEAP_NS.max(self.step_ns.saturating_mul(LEAP_STEPS));
+                if time_ns.saturating_sub(last_ns) > leap {
+                    Follows::Leaping
+                } else {
+                    Follows::Next
                 }
-                let error = || FileError::TimeNotAfter {
-                    place: place(),
-                    time: excerpt(cell),
-                    previous: excerpt(&self.last_time),
-                };
-                self.report.refused_time.add(error, &mut self.tell);
-                false
-            }
-            _ => {
-                self.last_ns = Some(time_ns);
-                self.behind = 0;
-                self.last_time.clear();
-                self.last_time.extend_from_slice(cell);
-                self.report.rows += 1;
-                true
             }
         }
+    }
+
+    /// Takes a row that is after the last one, by its time cell.
+    pub fn take(&mut self, time_ns: i64, cell: &[u8]) {
+        self.step_ns = self
+            .last_ns
+            .map_or(0, |last_ns| time_ns.saturating_sub(last_ns));
+        self.last_ns = Some(time_ns);
+        self.behind = 0;
+        self.last_time.clear();
+        self.last_time.extend_from_slice(cell);
+        self.report.rows += 1;
+    }
+
+    /// Leaves out a row that is not after the last one.
+    #[cold]
+    pub fn refuse_behind(&mut self, cell: &[u8], place: impl FnOnce() -> Place) {
+        self.behind += 1;
+        let (time, previous) = (excerpt(cell), excerpt(&self.last_time));
+        let (place, rows) = (place(), self.behind);
+        if let Some(tell) = &mut self.tell
+            && stays_behind(rows)
+        {
+            self.report.refused_time.count += 1;
+            tell(&FileError::TimeStaysBehind {
+                place,
+                time,
+                rows,
+                previous,
+            });
+        } else {
+            let error = || FileError::TimeNotAfter {
+                place,
+                time,
+                previous,
+            };
+            self.report.refused_time.add(error, &mut self.tell);
+        }
+    }
+
+    /// Leaves out a row that leaps, since the next one, by its time cell, does not leap as far.
+    #[cold]
+    pub fn refuse_leap(&mut self, cell: &[u8], place: Place, next: &[u8]) {
+        let error = || FileError::TimeLeaps {
+            place,
+            time: excerpt(cell),
+            previous: excerpt(&self.last_time),
+            next: excerpt(next),
+        };
+        self.report.refused_time.add(error, &mut self.tell);
     }
 
     /// The decimal mark that times have, and since which line, where this one has another. That of values may be another
@@ -184,7 +232,7 @@ mod tests {
     #[test]
     fn a_clock_that_was_set_back_is_told_again_and_again_while_nothing_comes_of_the_rows() {
         let rows = |from: u32, to: u32| (from..to).map(|t| format!("{t},1\n"));
-        let text: String = std::iter::once("t,a\n0,1\n0,1\n5000,1\n".to_owned())
+        let text: String = std::iter::once("t,a\n0,1\n0,1\n4990,1\n5000,1\n".to_owned())
             .chain(rows(1, 151))
             .chain(rows(5001, 5003))
             .collect();
@@ -208,11 +256,11 @@ mod tests {
             *told.lock().unwrap(),
             [
                 "pipe:3: the time `0` is not after `0`; the row was left out".to_owned(),
-                behind(14, 10),
-                behind(104, 100),
+                behind(15, 10),
+                behind(105, 100),
             ]
         );
         assert_eq!(reader.report().refused_time.count, 151);
-        assert_eq!(reader.report().rows, 4);
+        assert_eq!(reader.report().rows, 5);
     }
 }

@@ -8,7 +8,7 @@ use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
 use crate::instant::has_zone;
 use crate::json_rows::JsonRows;
-use crate::ledger::Ledger;
+use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
 use crate::{FileError, Format, Layout, Place, Report, TimeForm};
 
@@ -36,12 +36,38 @@ pub struct Row {
 
 /// Reads a recording row by row, each as soon as its line is there.
 ///
-/// A row is left out and counted when its time is not after the one before. A last line without an end that lacks cells
+/// A row is left out and counted when its time is not after the one before. One that is more than five minutes, and more than thirty
+/// times as long as the rows before, after the one before waits for the next: it is left out and counted when that lies between
+/// the two, since then its time is wrong and no row after it is to be lost. A last line without an end that lacks cells
 /// (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never an error.
 pub struct Reader {
     rows: Rows,
     layout: Layout,
     ledger: Ledger,
+    ahead: Option<Ahead>,
+}
+
+/// What was read to find out whether the row before it is to be taken.
+enum Ahead {
+    Row(Stamped),
+    Error(FileError),
+}
+
+/// A row with the cell that its time is from.
+struct Stamped {
+    row: Row,
+    cell: Vec<u8>,
+    place: Place,
+}
+
+impl Stamped {
+    fn new<C: Cells>(row: &Row, rows: &C) -> Self {
+        Self {
+            row: row.clone(),
+            cell: cell::trim(rows.time()).to_vec(),
+            place: rows.place(),
+        }
+    }
 }
 
 enum Rows {
@@ -86,6 +112,7 @@ impl Reader {
             rows,
             layout,
             ledger: Ledger::new(options.lenient),
+            ahead: None,
         })
     }
 
@@ -95,9 +122,15 @@ impl Reader {
     /// A cell, row or line that cannot be read, with its place, unless [`Options::lenient`]; at the end of JSON lines also
     /// a channel that no line had.
     pub fn next_into(&mut self, row: &mut Row) -> Result<bool, FileError> {
-        match &mut self.rows {
-            Rows::Csv(rows) => next(rows.as_mut(), &self.layout, &mut self.ledger, row),
-            Rows::Json(rows) => next(rows.as_mut(), &self.layout, &mut self.ledger, row),
+        let Self {
+            rows,
+            layout,
+            ledger,
+            ahead,
+        } = self;
+        match rows {
+            Rows::Csv(rows) => next(rows.as_mut(), layout, ledger, ahead, row),
+            Rows::Json(rows) => next(rows.as_mut(), layout, ledger, ahead, row),
         }
     }
 
@@ -121,18 +154,82 @@ fn next<C: Cells>(
     rows: &mut C,
     layout: &Layout,
     ledger: &mut Ledger,
+    ahead: &mut Option<Ahead>,
     row: &mut Row,
 ) -> Result<bool, FileError> {
-    while rows.advance(ledger)? {
-        if let Some(time_ns) = read_time(rows, layout, ledger, &mut row.time_text)?
-            && ledger.accepts(time_ns, cell::trim(rows.time()), || rows.place())
-        {
-            row.time_ns = time_ns;
-            read_values(rows, layout, ledger, &mut row.values)?;
+    if let Some(read_ahead) = ahead.take() {
+        let read_ahead = match read_ahead {
+            Ahead::Row(read_ahead) => read_ahead,
+            Ahead::Error(error) => return Err(error),
+        };
+        if ledger.follows(read_ahead.row.time_ns) != Follows::Behind {
+            next_doubted(rows, layout, ledger, ahead, read_ahead, row);
             return Ok(true);
         }
+        ledger.refuse_behind(&read_ahead.cell, || read_ahead.place);
     }
-    Ok(false)
+    match read(rows, layout, ledger, row)? {
+        None => return Ok(false),
+        Some(Follows::Leaping) => {
+            let doubted = Stamped::new(row, rows);
+            next_doubted(rows, layout, ledger, ahead, doubted, row);
+        }
+        Some(_) => ledger.take(row.time_ns, cell::trim(rows.time())),
+    }
+    Ok(true)
+}
+
+/// Gives a row of which the next tells whether it is taken, or else that one.
+#[cold]
+fn next_doubted<C: Cells>(
+    rows: &mut C,
+    layout: &Layout,
+    ledger: &mut Ledger,
+    ahead: &mut Option<Ahead>,
+    mut doubted: Stamped,
+    row: &mut Row,
+) {
+    while ledger.follows(doubted.row.time_ns) == Follows::Leaping {
+        let next = match read(rows, layout, ledger, row) {
+            Ok(None) => break,
+            Ok(Some(_)) => Stamped::new(row, rows),
+            Err(error) => {
+                *ahead = Some(Ahead::Error(error));
+                break;
+            }
+        };
+        if next.row.time_ns >= doubted.row.time_ns {
+            *ahead = Some(Ahead::Row(next));
+            break;
+        }
+        ledger.refuse_leap(&doubted.cell, doubted.place, &next.cell);
+        doubted = next;
+    }
+    ledger.take(doubted.row.time_ns, &doubted.cell);
+    *row = doubted.row;
+}
+
+/// Reads the next row that is after the last one taken, and how it follows that; none at the end.
+fn read<C: Cells>(
+    rows: &mut C,
+    layout: &Layout,
+    ledger: &mut Ledger,
+    row: &mut Row,
+) -> Result<Option<Follows>, FileError> {
+    while rows.advance(ledger)? {
+        let Some(time_ns) = read_time(rows, layout, ledger, &mut row.time_text)? else {
+            continue;
+        };
+        let follows = ledger.follows(time_ns);
+        if follows == Follows::Behind {
+            ledger.refuse_behind(cell::trim(rows.time()), || rows.place());
+            continue;
+        }
+        row.time_ns = time_ns;
+        read_values(rows, layout, ledger, &mut row.values)?;
+        return Ok(Some(follows));
+    }
+    Ok(None)
 }
 
 /// The instant of the current row, and its text; `None` when the row is left out for want of one.
@@ -232,218 +329,4 @@ fn mixed(place: Place, column: &str, cell: &[u8], (mark, since): (u8, u64)) -> F
 }
 
 #[cfg(test)]
-mod tests {
-    use std::io;
-    use std::sync::Arc;
-
-    use super::*;
-
-    fn layout(form: TimeForm) -> Layout {
-        Layout::new("t", form, ["a"])
-    }
-
-    fn lenient() -> Options {
-        Options {
-            lenient: true,
-            ..Options::default()
-        }
-    }
-
-    fn rows(reader: &mut Reader) -> Vec<(i64, String)> {
-        let mut row = Row::default();
-        let mut rows = Vec::new();
-        while reader.next_into(&mut row).unwrap() {
-            rows.push((row.time_ns, row.time_text.clone()));
-        }
-        rows
-    }
-
-    #[test]
-    fn a_row_whose_time_repeats_or_steps_back_is_left_out_and_counted() {
-        let text = &b"t,a\n0,1\n10,1\n10,off\n5,1\n10.5,1\n"[..];
-        let mut reader =
-            Reader::from_read("f.csv", text, layout(TimeForm::SECONDS), Options::default())
-                .unwrap();
-        let times: Vec<String> = rows(&mut reader)
-            .into_iter()
-            .map(|(_, text)| text)
-            .collect();
-        assert_eq!(times, ["0", "10", "10.5"]);
-        let refused = &reader.report().refused_time;
-        assert_eq!(refused.count, 2);
-        assert_eq!(
-            refused.first.as_ref().unwrap().to_string(),
-            "f.csv:4: the time `10` is not after `10`; the row was left out"
-        );
-    }
-
-    #[test]
-    fn a_time_that_steps_back_is_told_as_the_file_has_it() {
-        let told = |text: &'static str, form| {
-            let mut reader =
-                Reader::from_read("f.csv", text.as_bytes(), layout(form), Options::default())
-                    .unwrap();
-            assert_eq!(rows(&mut reader).len(), 1);
-            let refused = &reader.report().refused_time;
-            refused.first.as_ref().unwrap().to_string()
-        };
-        assert_eq!(
-            told(
-                "t,a\n2026-03-02T08:30:00+01:00,1\n2026-03-02T07:29:30+01:00,1\n",
-                TimeForm::Rfc3339
-            ),
-            "f.csv:3: the time `2026-03-02T07:29:30+01:00` is not after `2026-03-02T08:30:00+01:00`; the row was left out"
-        );
-        assert_eq!(
-            told("t;a\n1,50;1\n 1,25 ;1\n", TimeForm::SECONDS),
-            "f.csv:3: the time `1,25` is not after `1,50`; the row was left out"
-        );
-    }
-
-    #[test]
-    fn the_text_of_the_time_is_kept_for_every_form() {
-        let cases: [(TimeForm, &str, i64, i64); 3] = [
-            (
-                TimeForm::Numbers {
-                    ns_per_unit: 1_000_000,
-                },
-                "t,a\n 0.50,1\n1e3 ,1\n",
-                500_000,
-                1_000_000_000,
-            ),
-            (
-                TimeForm::Samples { step_ns: 80 },
-                "t,a\n1,1\n2,1\n",
-                80,
-                160,
-            ),
-            (
-                TimeForm::Rfc3339,
-                "t,a\n1970-01-01 00:00:01,1\n\"1970-01-01T00:00:02Z\",1\n",
-                1_000_000_000,
-                2_000_000_000,
-            ),
-        ];
-        for (form, text, first, second) in cases {
-            let mut reader =
-                Reader::from_read("f", text.as_bytes(), layout(form), Options::default()).unwrap();
-            let rows = rows(&mut reader);
-            assert_eq!([rows[0].0, rows[1].0], [first, second]);
-            for (_, time) in rows {
-                assert!(
-                    text.contains(&time) && time.trim() == time && !time.contains('"'),
-                    "{time}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn a_time_that_cannot_be_read_is_an_error_or_the_row_is_left_out() {
-        let text = "t,a\n0,1\n,1\nnan,1\nsoon,1\n1,1\n";
-        let mut reader = Reader::from_read(
-            "f.csv",
-            text.as_bytes(),
-            layout(TimeForm::SECONDS),
-            Options::default(),
-        )
-        .unwrap();
-        let mut row = Row::default();
-        assert!(reader.next_into(&mut row).unwrap());
-        let error = reader.next_into(&mut row).unwrap_err().to_string();
-        assert!(
-            error.starts_with("f.csv:3: column `t`: expected a decimal number, found nothing"),
-            "{error}"
-        );
-        let mut reader = Reader::from_read(
-            "f.csv",
-            text.as_bytes(),
-            layout(TimeForm::SECONDS),
-            lenient(),
-        )
-        .unwrap();
-        assert_eq!(rows(&mut reader).len(), 2);
-        assert_eq!(reader.report().refused_rows.count, 3);
-    }
-
-    #[test]
-    fn a_lenient_reader_takes_bad_cells_as_absent_and_keeps_the_first() {
-        let text = "t,a\n0,1\n1,NA\n2,-\n3,4\n";
-        let mut reader = Reader::from_read(
-            "f.csv",
-            text.as_bytes(),
-            layout(TimeForm::SECONDS),
-            lenient(),
-        )
-        .unwrap();
-        assert_eq!(rows(&mut reader).len(), 4);
-        let bad = &reader.report().bad_cells;
-        assert_eq!(bad.count, 2);
-        assert!(
-            matches!(&bad.first, Some(FileError::BadCell { place, found, .. }) if place.line == 3 && found == "NA")
-        );
-        let of_channel = &reader.report().bad_cells_of[0];
-        assert_eq!(of_channel.count, 2);
-        assert!(of_channel.first.is_some());
-    }
-
-    /// Gives one line per call, and knows how many it gave.
-    struct LineByLine {
-        lines: std::array::IntoIter<&'static str, 4>,
-        given: Arc<std::sync::atomic::AtomicUsize>,
-    }
-
-    impl Read for LineByLine {
-        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            let line = self.lines.next().unwrap_or_default();
-            buffer[..line.len()].copy_from_slice(line.as_bytes());
-            self.given
-                .fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            Ok(line.len())
-        }
-    }
-
-    #[test]
-    fn a_row_is_given_as_soon_as_its_line_is_there() {
-        let csv = ["t,a\n", "0,1\n", "1,2\r\n", "2,3\n"];
-        let json = [
-            "\n",
-            "{\"t\":0,\"a\":1}\n",
-            "{\"t\":1,\"a\":2}\r\n",
-            "{\"t\":2,\"a\":3}\n",
-        ];
-        for lines in [csv, json] {
-            let given = Arc::new(std::sync::atomic::AtomicUsize::new(0));
-            let input = LineByLine {
-                lines: lines.into_iter(),
-                given: given.clone(),
-            };
-            let mut reader =
-                Reader::from_read("pipe", input, layout(TimeForm::SECONDS), Options::default())
-                    .unwrap();
-            let mut row = Row::default();
-            for lines_needed in [2, 3, 4] {
-                assert!(reader.next_into(&mut row).unwrap());
-                assert_eq!(
-                    given.load(std::sync::atomic::Ordering::Relaxed),
-                    lines_needed
-                );
-                assert_eq!(row.values, [lines_needed as f64 - 1.0]);
-            }
-        }
-    }
-
-    #[test]
-    fn a_file_that_is_not_there_is_an_error_that_names_it() {
-        let opened = Reader::open(
-            "no-such-file.csv",
-            layout(TimeForm::SECONDS),
-            Options::default(),
-        );
-        let error = opened.err().unwrap().to_string();
-        assert!(
-            error.starts_with("no-such-file.csv: cannot be opened: "),
-            "{error}"
-        );
-    }
-}
+mod tests;

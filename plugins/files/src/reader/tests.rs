@@ -1,0 +1,286 @@
+use std::io;
+use std::sync::Arc;
+
+use super::*;
+
+fn layout(form: TimeForm) -> Layout {
+    Layout::new("t", form, ["a"])
+}
+
+fn lenient() -> Options {
+    Options {
+        lenient: true,
+        ..Options::default()
+    }
+}
+
+fn rows(reader: &mut Reader) -> Vec<(i64, String)> {
+    let mut row = Row::default();
+    let mut rows = Vec::new();
+    while reader.next_into(&mut row).unwrap() {
+        rows.push((row.time_ns, row.time_text.clone()));
+    }
+    rows
+}
+
+#[test]
+fn a_row_whose_time_repeats_or_steps_back_is_left_out_and_counted() {
+    let text = &b"t,a\n0,1\n10,1\n10,off\n5,1\n10.5,1\n"[..];
+    let mut reader =
+        Reader::from_read("f.csv", text, layout(TimeForm::SECONDS), Options::default()).unwrap();
+    let times: Vec<String> = rows(&mut reader)
+        .into_iter()
+        .map(|(_, text)| text)
+        .collect();
+    assert_eq!(times, ["0", "10", "10.5"]);
+    let refused = &reader.report().refused_time;
+    assert_eq!(refused.count, 2);
+    assert_eq!(
+        refused.first.as_ref().unwrap().to_string(),
+        "f.csv:4: the time `10` is not after `10`; the row was left out"
+    );
+}
+
+#[test]
+fn a_time_that_steps_back_is_told_as_the_file_has_it() {
+    let told = |text: &'static str, form| {
+        let mut reader =
+            Reader::from_read("f.csv", text.as_bytes(), layout(form), Options::default()).unwrap();
+        assert_eq!(rows(&mut reader).len(), 1);
+        let refused = &reader.report().refused_time;
+        refused.first.as_ref().unwrap().to_string()
+    };
+    assert_eq!(
+        told(
+            "t,a\n2026-03-02T08:30:00+01:00,1\n2026-03-02T07:29:30+01:00,1\n",
+            TimeForm::Rfc3339
+        ),
+        "f.csv:3: the time `2026-03-02T07:29:30+01:00` is not after `2026-03-02T08:30:00+01:00`; the row was left out"
+    );
+    assert_eq!(
+        told("t;a\n1,50;1\n 1,25 ;1\n", TimeForm::SECONDS),
+        "f.csv:3: the time `1,25` is not after `1,50`; the row was left out"
+    );
+}
+
+#[test]
+fn the_text_of_the_time_is_kept_for_every_form() {
+    let cases: [(TimeForm, &str, i64, i64); 3] = [
+        (
+            TimeForm::Numbers {
+                ns_per_unit: 1_000_000,
+            },
+            "t,a\n 0.50,1\n1e3 ,1\n",
+            500_000,
+            1_000_000_000,
+        ),
+        (
+            TimeForm::Samples { step_ns: 80 },
+            "t,a\n1,1\n2,1\n",
+            80,
+            160,
+        ),
+        (
+            TimeForm::Rfc3339,
+            "t,a\n1970-01-01 00:00:01,1\n\"1970-01-01T00:00:02Z\",1\n",
+            1_000_000_000,
+            2_000_000_000,
+        ),
+    ];
+    for (form, text, first, second) in cases {
+        let mut reader =
+            Reader::from_read("f", text.as_bytes(), layout(form), Options::default()).unwrap();
+        let rows = rows(&mut reader);
+        assert_eq!([rows[0].0, rows[1].0], [first, second]);
+        for (_, time) in rows {
+            assert!(
+                text.contains(&time) && time.trim() == time && !time.contains('"'),
+                "{time}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_time_that_cannot_be_read_is_an_error_or_the_row_is_left_out() {
+    let text = "t,a\n0,1\n,1\nnan,1\nsoon,1\n1,1\n";
+    let mut reader = Reader::from_read(
+        "f.csv",
+        text.as_bytes(),
+        layout(TimeForm::SECONDS),
+        Options::default(),
+    )
+    .unwrap();
+    let mut row = Row::default();
+    assert!(reader.next_into(&mut row).unwrap());
+    let error = reader.next_into(&mut row).unwrap_err().to_string();
+    assert!(
+        error.starts_with("f.csv:3: column `t`: expected a decimal number, found nothing"),
+        "{error}"
+    );
+    let mut reader = Reader::from_read(
+        "f.csv",
+        text.as_bytes(),
+        layout(TimeForm::SECONDS),
+        lenient(),
+    )
+    .unwrap();
+    assert_eq!(rows(&mut reader).len(), 2);
+    assert_eq!(reader.report().refused_rows.count, 3);
+}
+
+#[test]
+fn a_lenient_reader_takes_bad_cells_as_absent_and_keeps_the_first() {
+    let text = "t,a\n0,1\n1,NA\n2,-\n3,4\n";
+    let mut reader = Reader::from_read(
+        "f.csv",
+        text.as_bytes(),
+        layout(TimeForm::SECONDS),
+        lenient(),
+    )
+    .unwrap();
+    assert_eq!(rows(&mut reader).len(), 4);
+    let bad = &reader.report().bad_cells;
+    assert_eq!(bad.count, 2);
+    assert!(
+        matches!(&bad.first, Some(FileError::BadCell { place, found, .. }) if place.line == 3 && found == "NA")
+    );
+    let of_channel = &reader.report().bad_cells_of[0];
+    assert_eq!(of_channel.count, 2);
+    assert!(of_channel.first.is_some());
+}
+
+/// Gives one line per call, and knows how many it gave.
+struct LineByLine {
+    lines: std::array::IntoIter<&'static str, 4>,
+    given: Arc<std::sync::atomic::AtomicUsize>,
+}
+
+impl Read for LineByLine {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let line = self.lines.next().unwrap_or_default();
+        buffer[..line.len()].copy_from_slice(line.as_bytes());
+        self.given
+            .fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        Ok(line.len())
+    }
+}
+
+#[test]
+fn a_row_is_given_as_soon_as_its_line_is_there() {
+    let csv = ["t,a\n", "0,1\n", "1,2\r\n", "2,3\n"];
+    let json = [
+        "\n",
+        "{\"t\":0,\"a\":1}\n",
+        "{\"t\":1,\"a\":2}\r\n",
+        "{\"t\":2,\"a\":3}\n",
+    ];
+    for lines in [csv, json] {
+        let given = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+        let input = LineByLine {
+            lines: lines.into_iter(),
+            given: given.clone(),
+        };
+        let mut reader =
+            Reader::from_read("pipe", input, layout(TimeForm::SECONDS), Options::default())
+                .unwrap();
+        let mut row = Row::default();
+        for lines_needed in [2, 3, 4] {
+            assert!(reader.next_into(&mut row).unwrap());
+            assert_eq!(
+                given.load(std::sync::atomic::Ordering::Relaxed),
+                lines_needed
+            );
+            assert_eq!(row.values, [lines_needed as f64 - 1.0]);
+        }
+    }
+}
+
+/// The times that are given, what was left out, and the error at the end, if there was one.
+fn given(text: &'static str) -> (String, Vec<String>, String) {
+    let layout = layout(TimeForm::SECONDS);
+    let mut reader =
+        Reader::from_read("f.csv", text.as_bytes(), layout, Options::default()).unwrap();
+    let told = Arc::new(std::sync::Mutex::new(Vec::new()));
+    reader.tell_first({
+        let told = Arc::clone(&told);
+        move |error| told.lock().unwrap().push(error.to_string())
+    });
+    let (mut times, mut row) = (Vec::new(), Row::default());
+    let end = loop {
+        match reader.next_into(&mut row) {
+            Ok(true) => times.push(format!("{}={}", row.time_text, row.values[0])),
+            Ok(false) => break String::new(),
+            Err(error) => break error.to_string(),
+        }
+    };
+    assert_eq!(reader.report().rows, times.len() as u64);
+    let told = told.lock().unwrap().clone();
+    (times.join(" "), told, end)
+}
+
+#[test]
+fn a_single_time_far_ahead_is_left_out_and_the_rows_after_it_are_not() {
+    let (times, told, end) = given("t,a\n0,1\n10,2\n4102444800,3\n20,4\n30,5\n");
+    assert_eq!((&*times, &*end), ("0=1 10=2 20=4 30=5", ""));
+    assert_eq!(
+        told,
+        [
+            "f.csv:4: the time `4102444800` is far after `10`, and the next one, `20`, is not; the row was left out"
+        ]
+    );
+    let (times, ..) = given("t,a\n0,1\n10,2\n9e9,3\n8e9,4\n7,5\n20,6\n30,7\n");
+    assert_eq!(times, "0=1 10=2 20=6 30=7", "each ahead of the next");
+}
+
+#[test]
+fn rows_after_a_gap_are_all_given_up_to_the_last_one() {
+    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,4\n90000,5\n");
+    assert_eq!((&*times, &*end), ("0=1 10=2 40000=3 40010=4 90000=5", ""));
+    assert!(told.is_empty(), "{told:?}");
+    let (times, told, _) = given("t,a\n0,1\n10,2\n40000,3\n40000,4\n40010,5\n");
+    assert_eq!(times, "0=1 10=2 40000=3 40010=5");
+    assert_eq!(
+        told,
+        ["f.csv:5: the time `40000` is not after `40000`; the row was left out"]
+    );
+    let (times, _, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,off\n");
+    assert_eq!(
+        times, "0=1 10=2 40000=3",
+        "the row before an error is given first"
+    );
+    assert!(end.starts_with("f.csv:5: column `a`"), "{end}");
+}
+
+#[test]
+fn a_row_waits_for_the_next_only_where_it_leaps() {
+    let lines = ["t,a\n", "0,1\n", "3600,2\n", "7200,3\n"];
+    let given = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+    let input = LineByLine {
+        lines: lines.into_iter(),
+        given: given.clone(),
+    };
+    let layout = layout(TimeForm::SECONDS);
+    let mut reader = Reader::from_read("pipe", input, layout, Options::default()).unwrap();
+    let mut row = Row::default();
+    for (time, lines_needed) in [(0, 2), (3600, 4), (7200, 4)] {
+        assert!(reader.next_into(&mut row).unwrap());
+        assert_eq!(row.time_ns, time * 1_000_000_000);
+        let given = given.load(std::sync::atomic::Ordering::Relaxed);
+        assert_eq!(given, lines_needed, "a row each hour is no leap");
+    }
+}
+
+#[test]
+fn a_file_that_is_not_there_is_an_error_that_names_it() {
+    let opened = Reader::open(
+        "no-such-file.csv",
+        layout(TimeForm::SECONDS),
+        Options::default(),
+    );
+    let error = opened.err().unwrap().to_string();
+    assert!(
+        error.starts_with("no-such-file.csv: cannot be opened: "),
+        "{error}"
+    );
+}
