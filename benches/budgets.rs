@@ -18,19 +18,17 @@ fn main() {
     let shipped = model();
     let mut by_hand = Shipped::new(&shipped);
     let mut step = |tick: &Tick| by_hand.step(tick);
-    live("selected slopes", &shipped, ticks(9.0, 2), Some(&mut step));
+    live("selected slopes", &shipped, ticks(9.0, 2), &mut step);
     let all = dense::model();
     let mut by_hand = Dense::new(&all);
     let mut step = |tick: &Tick| by_hand.step(tick);
     let of_all = dense::ticks(9.0, 2);
-    live("all of 64 slopes", &all, of_all.clone(), Some(&mut step));
+    live("all of 64 slopes", &all, of_all.clone(), &mut step);
     let learning = dense::learning();
-    live(
-        "all of 64 slopes that go on learning",
-        &learning,
-        of_all,
-        None,
-    );
+    let mut by_hand = Dense::new(&learning);
+    let mut step = |tick: &Tick| by_hand.step(tick);
+    let of = "all of 64 slopes that go on learning";
+    live(of, &learning, of_all, &mut step);
     program();
 }
 
@@ -40,15 +38,13 @@ fn tell(work: &str, measured: &str, budget: &str) {
 
 type ByHand<'a> = &'a mut dyn FnMut(&Tick) -> [f64; 6];
 
-fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: Option<ByHand<'_>>) {
+fn live(of: &str, model: &Model, mut warm: Vec<Tick>, by_hand: ByHand<'_>) {
     println!("models of {of}:");
     let measured = warm.split_off(17_280);
     let mut engine = model.engine().expect("the fit belongs to the graph");
     for tick in &warm {
         engine.step(tick.0, &tick.1).expect("ticks are in order");
-        if let Some(step) = &mut by_hand {
-            step(tick);
-        }
+        by_hand(tick);
     }
     let start = Clock::now();
     let engine = times(&measured, |tick| {
@@ -56,10 +52,8 @@ fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: Option<ByHand
         std::hint::black_box(outputs.expect("ticks are in order"));
     });
     let seconds = start.elapsed().as_secs_f64();
-    let by_hand = by_hand.map(|step| {
-        times(&measured, |tick| {
-            std::hint::black_box(step(tick));
-        })
+    let by_hand = times(&measured, |tick| {
+        std::hint::black_box(by_hand(tick));
     });
     for (name, truth, budgets) in [
         ("a tick that carries truth", true, ["3 µs", "15 µs", "1.5"]),
@@ -69,9 +63,7 @@ fn live(of: &str, model: &Model, mut warm: Vec<Tick>, mut by_hand: Option<ByHand
         let engine = of(&engine);
         tell(&format!("{name}, median"), &us(engine.median), budgets[0]);
         tell(&format!("{name}, 99.9 %"), &us(engine.rare), budgets[1]);
-        let Some(by_hand) = by_hand.as_ref().map(|times| of(times)) else {
-            continue;
-        };
+        let by_hand = of(&by_hand);
         tell(&format!("{name}, by hand, median"), &us(by_hand.median), "");
         let ratio = engine.median.as_secs_f64() / by_hand.median.as_secs_f64();
         tell(

@@ -13,10 +13,10 @@ use divan::counter::ItemsCount;
 fn main() {
     let mut by_hand = Shipped::new(&model());
     same_bits(&model(), &ticks(2.0, 2), |tick| by_hand.step(tick));
-    let mut by_hand = Dense::new(&dense::model());
-    same_bits(&dense::model(), &dense::ticks(2.0, 2), |tick| {
-        by_hand.step(tick)
-    });
+    for model in [dense::model(), dense::learning()] {
+        let mut by_hand = Dense::new(&model);
+        same_bits(&model, &dense::ticks(2.0, 2), |tick| by_hand.step(tick));
+    }
     divan::main();
 }
 

@@ -1,13 +1,17 @@
 //! The arithmetic of the die tester's graph as one would write it for this machine alone: fixed arrays, no absence but
 //! that of positions, no graph. It gives the same bits, and what the engine costs is told by the ratio to it.
 
+mod learner;
+
 use std::collections::VecDeque;
 
 use athermal::Model;
 use athermal::core::channel::{ABSENT, COLD};
+use athermal::core::compile::PlannedRole;
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
 use serde_json::Value;
 
+use self::learner::Learner;
 use super::{AXES, Tick};
 
 const NAMES: [&str; AXES] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
@@ -25,9 +29,12 @@ struct Linear {
 }
 
 impl Linear {
-    fn read(fitted: &Value, node: &str, slopes: &[&str]) -> Self {
-        let fit = &fitted[node];
-        let list = |key: &str| fit[key].as_array().expect("a linear fit lists its terms");
+    fn read(fit: &Value, slopes: &[&str]) -> Self {
+        let list = |key: &str| {
+            // One that can go on learning keeps the names with their scales.
+            let found = fit[key].as_array().or(fit["frame"][key].as_array());
+            found.expect("a linear fit lists its terms")
+        };
         let place = |name: &Value| {
             let name = name.as_str().expect("regressors have names");
             match slopes.iter().position(|slope| *slope == name) {
@@ -63,6 +70,25 @@ impl Linear {
     }
 }
 
+/// A model, and how it goes on learning if it does.
+struct Voter {
+    linear: Linear,
+    learner: Option<Learner>,
+}
+
+impl Voter {
+    fn read(model: &Model, fitted: &Value, name: &str, slopes: &[&str]) -> Self {
+        let node = model.plan.nodes.iter().find(|node| node.instance() == name);
+        let Some(PlannedRole::Estimator { training, .. }) = node.map(|node| &node.role) else {
+            panic!("`{name}` is an estimator");
+        };
+        Self {
+            linear: Linear::read(&fitted[name], slopes),
+            learner: Learner::read(&fitted[name], training.below),
+        }
+    }
+}
+
 type Votes = [[f64; 3]; AXES];
 
 /// The shipped graph.
@@ -74,7 +100,7 @@ pub type Dense = ByHand<8, 64, 67>;
 pub struct ByHand<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize> {
     gradients: RollingSlope,
     drift: RollingSlope,
-    models: [[Linear; 3]; AXES],
+    voters: [[Voter; 3]; AXES],
     slopes: [f64; SLOPES],
     drifts: [f64; AXES],
     /// Drifts as they were measured, newest last, and for each lag the first that is too new for it.
@@ -82,6 +108,10 @@ pub struct ByHand<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: u
     next: [usize; 3],
     /// Votes by tick, newest last.
     runs: VecDeque<(i64, Votes)>,
+    /// What they were made of, where models learn: slopes, then the drifts of each lag.
+    rows: VecDeque<([f64; SLOPES], [[f64; AXES]; 3])>,
+    /// Truths to learn from at the next tick, with the oldest run.
+    truths: Option<[f64; AXES]>,
     /// Squared errors by the arrival of their truth, newest last, and those that count from the next tick on.
     errors: VecDeque<(i64, Votes)>,
     arrived: bool,
@@ -113,17 +143,20 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             cold: COLD,
         };
         let read = |node: &str, axis: &str| {
-            Linear::read(&json["fitted"], &format!("{node}.{axis}"), &names[..SLOPES])
+            let name = format!("{node}.{axis}");
+            Voter::read(model, &json["fitted"], &name, &names[..SLOPES])
         };
         Self {
             gradients: RollingSlope::new(&windows, SENSORS, coverage, no_value, false),
             drift: RollingSlope::new(&[SPAN], AXES, coverage, no_value, false),
-            models: NAMES.map(|axis| ["thermal", "motion", "both"].map(|node| read(node, axis))),
+            voters: NAMES.map(|axis| ["thermal", "motion", "both"].map(|node| read(node, axis))),
             slopes: [f64::NAN; SLOPES],
             drifts: [f64::NAN; AXES],
             past: VecDeque::with_capacity(128),
             next: [0; 3],
             runs: VecDeque::with_capacity(128),
+            rows: VecDeque::with_capacity(128),
+            truths: None,
             errors: VecDeque::with_capacity(128),
             arrived: false,
             mean_squares: [[f64::NAN; 3]; AXES],
@@ -150,6 +183,9 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             self.past.push_back((now, self.drifts));
         }
 
+        if let Some(truths) = self.truths.take() {
+            self.learn(&truths);
+        }
         let mut regressors = [f64::NAN; REGRESSORS];
         for (to, slope) in regressors.iter_mut().zip(&self.slopes) {
             *to = slope * 60_000.0;
@@ -160,11 +196,16 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             for lag in 0..3 {
                 regressors[SLOPES + lag] = lagged[lag].map_or(f64::NAN, |drifts| drifts[axis]);
             }
-            votes[axis] = [0, 1, 2].map(|node| self.models[axis][node].predict(&regressors));
+            votes[axis] = [0, 1, 2].map(|node| self.voters[axis][node].linear.predict(&regressors));
         }
         self.forget(now);
         let predicted = [0, 1, 2, 3, 4, 5].map(|axis| self.vote(&votes, axis));
         self.runs.push_back((now, votes));
+        if self.voters[0][0].learner.is_some() {
+            let slopes = std::array::from_fn(|slope| regressors[slope]);
+            let lagged = lagged.map(|drifts| drifts.unwrap_or([f64::NAN; AXES]));
+            self.rows.push_back((slopes, lagged));
+        }
         if has_truth {
             self.observe(now);
         }
@@ -194,6 +235,7 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
         let due = now - AHEAD;
         while self.runs.get(1).is_some_and(|run| run.0 <= due) {
             self.runs.pop_front();
+            self.rows.pop_front();
         }
         if let Some(&(at, mut errors)) = self.runs.front()
             && at <= due
@@ -206,6 +248,25 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             }
             self.errors.push_back((now, errors));
             self.arrived = true;
+            self.truths = Some(self.drifts);
+        }
+    }
+
+    fn learn(&mut self, truths: &[f64; AXES]) {
+        let Some((slopes, lagged)) = self.rows.front() else {
+            return;
+        };
+        let mut regressors = [f64::NAN; REGRESSORS];
+        regressors[..SLOPES].copy_from_slice(slopes);
+        for (axis, voters) in self.voters.iter_mut().enumerate() {
+            for lag in 0..3 {
+                regressors[SLOPES + lag] = lagged[lag][axis];
+            }
+            for Voter { linear, learner } in voters {
+                if let Some(learner) = learner {
+                    learner.learn(linear, &regressors, truths[axis]);
+                }
+            }
         }
     }
 
