@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant as Clock};
 
 use athermal::Model;
-use die_tester::by_hand::{Dense, Shipped};
+use die_tester::by_hand::{Dense, Learning, Shipped};
 use die_tester::{Tick, dense, has_truth, model, ticks};
 
 fn main() {
@@ -25,7 +25,7 @@ fn main() {
     let of_all = dense::ticks(9.0, 2);
     live("all of 64 slopes", &all, of_all.clone(), &mut step);
     let learning = dense::learning();
-    let mut by_hand = Dense::new(&learning);
+    let mut by_hand = Learning::new(&learning);
     let mut step = |tick: &Tick| by_hand.step(tick);
     let of = "all of 64 slopes that go on learning";
     live(of, &learning, of_all, &mut step);

@@ -5,7 +5,7 @@ mod die_tester;
 use athermal::core::channel::{ABSENT, COLD};
 use athermal::{Engine, Instant, Model};
 use athermal_features::slope::kernel::{Coverage, NoValue, RollingSlope};
-use die_tester::by_hand::{Dense, Shipped};
+use die_tester::by_hand::{Dense, Learning, Shipped};
 use die_tester::{Tick, dense, has_truth, model, ticks};
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -13,10 +13,11 @@ use divan::counter::ItemsCount;
 fn main() {
     let mut by_hand = Shipped::new(&model());
     same_bits(&model(), &ticks(2.0, 2), |tick| by_hand.step(tick));
-    for model in [dense::model(), dense::learning()] {
-        let mut by_hand = Dense::new(&model);
-        same_bits(&model, &dense::ticks(2.0, 2), |tick| by_hand.step(tick));
-    }
+    let mut by_hand = Dense::new(&dense::model());
+    let ticks = dense::ticks(2.0, 2);
+    same_bits(&dense::model(), &ticks, |tick| by_hand.step(tick));
+    let mut by_hand = Learning::new(&dense::learning());
+    same_bits(&dense::learning(), &ticks, |tick| by_hand.step(tick));
     divan::main();
 }
 

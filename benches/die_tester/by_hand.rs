@@ -15,6 +15,7 @@ use self::learner::Learner;
 use super::{AXES, Tick};
 
 const NAMES: [&str; AXES] = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
+const NODES: [&str; 3] = ["thermal", "motion", "both"];
 const MINUTE: i64 = 60_000_000_000;
 /// The lags of the drift, the horizon, the span of the drift and the memory of the vote.
 const LAGS: [i64; 3] = [0, 5 * MINUTE, 10 * MINUTE];
@@ -70,37 +71,28 @@ impl Linear {
     }
 }
 
-/// A model, and how it goes on learning if it does.
-struct Voter {
-    linear: Linear,
-    learner: Option<Learner>,
-}
-
-impl Voter {
-    fn read(model: &Model, fitted: &Value, name: &str, slopes: &[&str]) -> Self {
-        let node = model.plan.nodes.iter().find(|node| node.instance() == name);
-        let Some(PlannedRole::Estimator { training, .. }) = node.map(|node| &node.role) else {
-            panic!("`{name}` is an estimator");
-        };
-        Self {
-            linear: Linear::read(&fitted[name], slopes),
-            learner: Learner::read(&fitted[name], training.below),
-        }
-    }
-}
-
 type Votes = [[f64; 3]; AXES];
 
 /// The shipped graph.
-pub type Shipped = ByHand<6, 42, 45>;
+pub type Shipped = ByHand<6, 42, 45, false>;
 
 /// The one in which nothing is selected.
-pub type Dense = ByHand<8, 64, 67>;
+pub type Dense = ByHand<8, 64, 67, false>;
 
-pub struct ByHand<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize> {
+/// The same that goes on learning.
+pub type Learning = ByHand<8, 64, 67, true>;
+
+pub struct ByHand<
+    const SENSORS: usize,
+    const SLOPES: usize,
+    const REGRESSORS: usize,
+    const LEARNS: bool,
+> {
     gradients: RollingSlope,
     drift: RollingSlope,
-    voters: [[Voter; 3]; AXES],
+    models: [[Linear; 3]; AXES],
+    /// How they go on learning, in the same order; none where they do not.
+    learners: Vec<Learner>,
     slopes: [f64; SLOPES],
     drifts: [f64; AXES],
     /// Drifts as they were measured, newest last, and for each lag the first that is too new for it.
@@ -118,8 +110,8 @@ pub struct ByHand<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: u
     mean_squares: Votes,
 }
 
-impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
-    ByHand<SENSORS, SLOPES, REGRESSORS>
+impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize, const LEARNS: bool>
+    ByHand<SENSORS, SLOPES, REGRESSORS, LEARNS>
 {
     pub fn new(model: &Model) -> Self {
         let text = model.to_text().expect("a model can be written");
@@ -142,14 +134,22 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             absent: ABSENT,
             cold: COLD,
         };
-        let read = |node: &str, axis: &str| {
-            let name = format!("{node}.{axis}");
-            Voter::read(model, &json["fitted"], &name, &names[..SLOPES])
+        let fit = |name: &String| &json["fitted"][name];
+        let read = |name: String| Linear::read(fit(&name), &names[..SLOPES]);
+        let learner = |name: String| {
+            let node = model.plan.nodes.iter().find(|node| node.instance() == name);
+            let Some(PlannedRole::Estimator { training, .. }) = node.map(|node| &node.role) else {
+                panic!("`{name}` is an estimator");
+            };
+            Learner::read(fit(&name), training.below)
         };
+        let of_axis = |axis: &str| NODES.map(|node| format!("{node}.{axis}"));
+        let all = NAMES.iter().flat_map(|axis| of_axis(axis));
         Self {
             gradients: RollingSlope::new(&windows, SENSORS, coverage, no_value, false),
             drift: RollingSlope::new(&[SPAN], AXES, coverage, no_value, false),
-            voters: NAMES.map(|axis| ["thermal", "motion", "both"].map(|node| read(node, axis))),
+            models: NAMES.map(|axis| of_axis(axis).map(read)),
+            learners: all.filter(|_| LEARNS).map(learner).collect(),
             slopes: [f64::NAN; SLOPES],
             drifts: [f64::NAN; AXES],
             past: VecDeque::with_capacity(128),
@@ -183,7 +183,7 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             self.past.push_back((now, self.drifts));
         }
 
-        if let Some(truths) = self.truths.take() {
+        if LEARNS && let Some(truths) = self.truths.take() {
             self.learn(&truths);
         }
         let mut regressors = [f64::NAN; REGRESSORS];
@@ -196,12 +196,12 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             for lag in 0..3 {
                 regressors[SLOPES + lag] = lagged[lag].map_or(f64::NAN, |drifts| drifts[axis]);
             }
-            votes[axis] = [0, 1, 2].map(|node| self.voters[axis][node].linear.predict(&regressors));
+            votes[axis] = [0, 1, 2].map(|node| self.models[axis][node].predict(&regressors));
         }
         self.forget(now);
         let predicted = [0, 1, 2, 3, 4, 5].map(|axis| self.vote(&votes, axis));
         self.runs.push_back((now, votes));
-        if self.voters[0][0].learner.is_some() {
+        if LEARNS {
             let slopes = std::array::from_fn(|slope| regressors[slope]);
             let lagged = lagged.map(|drifts| drifts.unwrap_or([f64::NAN; AXES]));
             self.rows.push_back((slopes, lagged));
@@ -235,7 +235,9 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
         let due = now - AHEAD;
         while self.runs.get(1).is_some_and(|run| run.0 <= due) {
             self.runs.pop_front();
-            self.rows.pop_front();
+            if LEARNS {
+                self.rows.pop_front();
+            }
         }
         if let Some(&(at, mut errors)) = self.runs.front()
             && at <= due
@@ -248,7 +250,7 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
             }
             self.errors.push_back((now, errors));
             self.arrived = true;
-            self.truths = Some(self.drifts);
+            self.truths = LEARNS.then_some(self.drifts);
         }
     }
 
@@ -258,14 +260,13 @@ impl<const SENSORS: usize, const SLOPES: usize, const REGRESSORS: usize>
         };
         let mut regressors = [f64::NAN; REGRESSORS];
         regressors[..SLOPES].copy_from_slice(slopes);
-        for (axis, voters) in self.voters.iter_mut().enumerate() {
+        let learners = self.learners.as_chunks_mut::<3>().0;
+        for (axis, (models, learners)) in self.models.iter_mut().zip(learners).enumerate() {
             for lag in 0..3 {
                 regressors[SLOPES + lag] = lagged[lag][axis];
             }
-            for Voter { linear, learner } in voters {
-                if let Some(learner) = learner {
-                    learner.learn(linear, &regressors, truths[axis]);
-                }
+            for (model, learner) in models.iter_mut().zip(learners) {
+                learner.learn(model, &regressors, truths[axis]);
             }
         }
     }

@@ -22,13 +22,13 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// Goes on from a fit; none from one that does not learn.
-    pub fn read(fit: &Value, below: f64) -> Option<Self> {
-        let frame = fit.get("frame")?;
+    /// Goes on from a fit.
+    pub fn read(fit: &Value, below: f64) -> Self {
+        let frame = &fit["frame"];
         let read = |value: &Value| serde_json::from_value(value.clone()).expect("numbers");
         let means: Vec<f64> = read(&frame["means"]);
         let rmse = fit["rmse"].as_f64().expect("a fit has errors");
-        Some(Self {
+        Self {
             below,
             row: means.clone(),
             coefficients: means.clone(),
@@ -40,7 +40,7 @@ impl Learner {
             seen: 10,
             mean_square: rmse * rmse,
             refused: 0,
-        })
+        }
     }
 
     /// Learns from a truth and the regressors of the run that it belongs to.
