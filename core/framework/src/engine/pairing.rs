@@ -92,7 +92,7 @@ impl Pairing {
         self.number
     }
 
-    /// Keeps all runs from one of them on, whether a truth may still belong to it or not; none but those without a number.
+    /// Keeps all runs from one of them on, those too that no later truth belongs to; without a number none of these.
     pub(super) fn keep_from(&mut self, number: Option<u64>) {
         self.needed = number.unwrap_or(u64::MAX);
     }
@@ -100,18 +100,16 @@ impl Pairing {
     /// What was written down of a run, if it is kept.
     #[inline]
     pub(super) fn row_of(&self, number: u64) -> Option<&[f64]> {
-        let nth = (self.past as u64 + number).checked_sub(self.number)?;
-        let nth = usize::try_from(nth)
-            .ok()
-            .filter(|&nth| nth < self.runs.len())?;
-        Some(self.runs.row(nth))
+        let nth = number.checked_sub(self.first())?;
+        let nth = usize::try_from(nth).ok()?;
+        (nth < self.runs.len()).then(|| self.runs.row(nth))
     }
 
     /// Goes on from another that pairs alike; false where it does not.
     pub(super) fn go_on_from(&mut self, other: &Self) -> bool {
         let of = |pairing: &Self| (pairing.ahead, pairing.limit, pairing.runs.width());
-        let takes =
-            of(self) == of(other) && other.runs.is_sound() && other.past <= other.runs.len();
+        let counts = other.past <= other.runs.len() && other.past as u64 <= other.number;
+        let takes = of(self) == of(other) && counts;
         if takes {
             self.clone_from(other);
             self.runs.reserve();
@@ -126,6 +124,12 @@ impl Pairing {
         self.runs.clear();
     }
 
+    /// The number of the first run that is kept.
+    #[inline]
+    fn first(&self) -> u64 {
+        self.number - self.past as u64
+    }
+
     /// Forgets the runs before the last one at or before `due`, but those that are needed.
     #[inline]
     fn forget_before(&mut self, due: Instant) {
@@ -137,7 +141,7 @@ impl Pairing {
             self.past += 1;
             self.number += 1;
         }
-        while self.past > 0 && self.number - (self.past as u64) < self.needed {
+        while self.past > 0 && self.first() < self.needed {
             self.runs.pop();
             self.past -= 1;
         }

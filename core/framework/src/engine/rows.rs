@@ -7,12 +7,50 @@ use crate::time::Instant;
 /// Rows of as many numbers each and their instants, the oldest first. A row lies in one piece, and room is made by doubling until the
 /// number of rows is known.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(into = "InOrder", try_from = "InOrder")]
 pub(super) struct Rows {
     width: usize,
     times: Vec<Instant>,
     numbers: Vec<f64>,
     first: usize,
     len: usize,
+}
+
+/// Rows as they are kept: the same whatever room there is.
+#[derive(Serialize, Deserialize)]
+struct InOrder {
+    width: usize,
+    times: Vec<Instant>,
+    numbers: Vec<f64>,
+}
+
+impl From<Rows> for InOrder {
+    fn from(rows: Rows) -> Self {
+        Self {
+            width: rows.width,
+            times: (0..rows.len).filter_map(|nth| rows.time(nth)).collect(),
+            numbers: (0..rows.len)
+                .flat_map(|nth| rows.row(nth))
+                .copied()
+                .collect(),
+        }
+    }
+}
+
+impl TryFrom<InOrder> for Rows {
+    type Error = &'static str;
+
+    fn try_from(kept: InOrder) -> Result<Self, Self::Error> {
+        if kept.times.len().checked_mul(kept.width) != Some(kept.numbers.len()) {
+            return Err("rows of runs are not as long as they say");
+        }
+        let mut rows = Self::new(kept.width);
+        for (nth, at) in kept.times.iter().enumerate() {
+            let numbers = &kept.numbers[nth * kept.width..][..kept.width];
+            rows.push(*at).copy_from_slice(numbers);
+        }
+        Ok(rows)
+    }
 }
 
 impl Rows {
@@ -80,15 +118,6 @@ impl Rows {
         }
     }
 
-    /// Whether its parts fit together, which nobody says of one that was read.
-    pub(super) fn is_sound(&self) -> bool {
-        let room = self.times.len();
-        room.is_power_of_two()
-            && room.checked_mul(self.width) == Some(self.numbers.len())
-            && self.first < room
-            && self.len <= room
-    }
-
     #[inline]
     fn index(&self, nth: usize) -> usize {
         (self.first + nth) & (self.times.len() - 1)
@@ -129,8 +158,26 @@ mod tests {
                 assert_eq!(rows.row(nth), [f64::from(number); 3]);
             }
             assert_eq!(rows.time(rows.len()), None);
-            assert!(rows.is_sound());
         }
         assert!(popped > 1000 && rows.times.len() < 512, "{popped}");
+    }
+
+    #[test]
+    fn what_is_kept_of_rows_does_not_tell_how_much_room_they_had() {
+        let mut rows = Rows::new(2);
+        for nth in 0..11 {
+            rows.push(Instant::from_ns(nth)).fill(nth as f64);
+            if nth % 2 == 0 {
+                rows.pop();
+            }
+        }
+        let kept = serde_json::to_string(&rows).unwrap();
+        let mut read: Rows = serde_json::from_str(&kept).unwrap();
+        read.reserve();
+        assert_ne!(read.times.len(), rows.times.len());
+        assert_eq!(serde_json::to_string(&read).unwrap(), kept);
+        assert_eq!((read.len(), read.row(4)), (5, &[10.0, 10.0][..]));
+        let cut = kept.replacen("10.0,", "", 1);
+        assert!(serde_json::from_str::<Rows>(&cut).is_err(), "{cut}");
     }
 }

@@ -132,6 +132,8 @@ impl Withheld {
         let own = &mut self.state;
         if own.pairing.go_on_from(&state.pairing) {
             own.withheld.clone_from(&state.withheld);
+            own.pairing
+                .keep_from(own.withheld.front().map(|late| late.run));
             // The engine thread must not have to make room.
             own.withheld.reserve(own.withheld.len().max(16));
         }
