@@ -111,6 +111,7 @@ impl Ledger {
     }
 
     /// How a row at this instant would follow the last one taken.
+    #[inline]
     pub fn follows(&self, time_ns: i64) -> Follows {
         match self.last_ns {
             None => Follows::Next,
@@ -127,6 +128,7 @@ impl Ledger {
     }
 
     /// Takes a row that is after the last one, by its time cell.
+    #[inline]
     pub fn take(&mut self, time_ns: i64, cell: &[u8]) {
         self.step_ns = self
             .last_ns
