@@ -148,6 +148,57 @@ impl Pairing {
     }
 }
 
+/// As runs were kept before they waited for truths that are withheld too: in a ring of which `len` from `first` on counted.
+#[derive(Debug, Deserialize)]
+pub(super) struct FormerPairing {
+    ahead: Duration,
+    limit: Duration,
+    width: usize,
+    times: Vec<Instant>,
+    rows: Vec<f64>,
+    first: usize,
+    len: usize,
+    number: u64,
+}
+
+impl FormerPairing {
+    /// The same after some rows that truths wait with, and the number of the first of these.
+    ///
+    /// # Errors
+    /// When its parts do not fit together.
+    pub(super) fn after(
+        self,
+        waiting: &[f64],
+        count: usize,
+    ) -> Result<(Pairing, u64), &'static str> {
+        let (width, room) = (self.width, self.times.len());
+        let fits = |count: usize, numbers: &[f64]| count.checked_mul(width) == Some(numbers.len());
+        if !(fits(count, waiting) && fits(room, &self.rows) && self.len <= room) {
+            return Err("rows of runs are not as long as they say");
+        }
+        let mut runs = Rows::new(width);
+        for nth in 0..count {
+            // Nobody asks when a run was that no later truth belongs to.
+            let row = runs.push(Instant::MIN);
+            row.copy_from_slice(&waiting[nth * width..][..width]);
+        }
+        for nth in 0..self.len {
+            let index = (self.first % room + nth) % room;
+            let row = runs.push(self.times[index]);
+            row.copy_from_slice(&self.rows[index * width..][..width]);
+        }
+        let pairing = Pairing {
+            ahead: self.ahead,
+            limit: self.limit,
+            runs,
+            past: count,
+            number: self.number.saturating_add(count as u64),
+            needed: if count > 0 { self.number } else { u64::MAX },
+        };
+        Ok((pairing, self.number))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::pairing::Pairing;
+use super::pairing::{FormerPairing, Pairing};
 use crate::compile::TruthLink;
 use crate::time::Instant;
 
@@ -17,9 +17,53 @@ pub(crate) struct Withheld {
 
 /// What is withheld, as it is kept.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(try_from = "AnyForm")]
 pub(crate) struct LearningState {
     pairing: Pairing,
     withheld: VecDeque<Late>,
+}
+
+/// What is withheld, as it is or was kept.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum AnyForm {
+    Now {
+        pairing: Pairing,
+        withheld: VecDeque<Late>,
+    },
+    /// Rows of truths lay beside them, and not with those of the runs that no truth has come for.
+    Former {
+        pairing: FormerPairing,
+        withheld: Vec<(Instant, f64)>,
+        rows: Vec<f64>,
+    },
+}
+
+impl TryFrom<AnyForm> for LearningState {
+    type Error = &'static str;
+
+    fn try_from(kept: AnyForm) -> Result<Self, Self::Error> {
+        let (truths, former, rows) = match kept {
+            AnyForm::Now { pairing, withheld } => return Ok(Self { pairing, withheld }),
+            AnyForm::Former {
+                pairing,
+                withheld,
+                rows,
+            } => (withheld, pairing, rows),
+        };
+        let (pairing, first) = former.after(&rows, truths.len())?;
+        let late = |(run, (arrived, truth)): (u64, (Instant, f64))| Late {
+            arrived,
+            truth,
+            // It stood in the row.
+            note: 0.0,
+            run,
+        };
+        Ok(Self {
+            pairing,
+            withheld: (first..).zip(truths).map(late).collect(),
+        })
+    }
 }
 
 /// A truth not yet handed over.
@@ -173,5 +217,52 @@ mod tests {
             }
         }
         assert!(handed > 500, "{handed}");
+    }
+
+    #[test]
+    fn what_was_kept_in_the_former_form_is_handed_over_as_it_would_have_been() {
+        let former = r#"{
+            "pairing": {
+                "ahead": "0s", "limit": "1min", "width": 2,
+                "times": [40, 10, 20, 30], "rows": [4.0, 4.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5],
+                "first": 2, "len": 3, "number": 7
+            },
+            "withheld": [[15, 15.0], [16, 16.0]],
+            "rows": [1.0, 1.5, 1.0, 1.5]
+        }"#;
+        let minute = Duration::from_ns(60_000_000_000);
+        let link = TruthLink {
+            slot: 0,
+            ahead: Duration::ZERO,
+            span: minute,
+            limit: minute,
+        };
+        let mut withheld = Withheld::new(link, 2);
+        withheld.restore(&serde_json::from_str(former).unwrap());
+        let mut handed = Vec::new();
+        let mut release = |withheld: &mut Withheld, newest| {
+            withheld.release(Instant::from_ns(newest), |released| {
+                handed.push((released.truth, released.row.to_vec()));
+            });
+        };
+        release(&mut withheld, 15);
+        withheld.observe(35.0, Instant::from_ns(35), 0.0);
+        withheld.run(Instant::from_ns(50), [&[5.0, 5.5][..]]);
+        withheld.observe(50.0, Instant::from_ns(50), 0.0);
+        release(&mut withheld, 60);
+        assert_eq!(
+            handed,
+            [
+                (15.0, vec![1.0, 1.5]),
+                (16.0, vec![1.0, 1.5]),
+                (35.0, vec![3.0, 3.5]),
+                (50.0, vec![5.0, 5.5]),
+            ]
+        );
+        let cut = former.replace("[1.0, 1.5, 1.0, 1.5]", "[1.0]");
+        assert!(serde_json::from_str::<LearningState>(&cut).is_err());
+        let kept = serde_json::to_string(&withheld.state()).unwrap();
+        let read: LearningState = serde_json::from_str(&kept).unwrap();
+        assert_eq!(serde_json::to_string(&read).unwrap(), kept);
     }
 }
