@@ -73,7 +73,7 @@ pub(crate) enum Follows {
     Behind,
 }
 
-/// After how long, and after how many times as long as the rows before, a row leaps.
+/// After how long, and after how many times the step before, a row leaps.
 const LEAP_NS: i64 = 300_000_000_000;
 const LEAP_STEPS: i64 = 30;
 

@@ -36,9 +36,9 @@ pub struct Row {
 
 /// Reads a recording row by row, each as soon as its line is there.
 ///
-/// A row is left out and counted when its time is not after the one before. One that is more than five minutes, and more than thirty
-/// times as long as the rows before, after the one before waits for the next: it is left out and counted when that lies between
-/// the two, since then its time is wrong and no row after it is to be lost. A last line without an end that lacks cells
+/// A row is left out and counted when its time is not after the one before. One that leaps, by more than five minutes and more than
+/// thirty times the step before, waits for the next row: it is left out and counted when that lies between the two, since then
+/// its time is wrong and no row after it is to be lost. A last line without an end that lacks cells
 /// (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never an error.
 pub struct Reader {
     rows: Rows,

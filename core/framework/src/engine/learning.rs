@@ -135,8 +135,8 @@ impl Learning {
         gathered: &[Gathered],
         on: bool,
     ) {
-        let frozen = [self.frozen(gathered, on)];
         let row = row.unwrap_or(&self.nothing);
+        let frozen = [self.frozen(gathered, on)];
         self.withheld.run(now, [row, &frozen]);
         let of = now + self.withheld.link().ahead;
         self.learner.run(row, of, self.newest(now));

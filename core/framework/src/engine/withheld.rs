@@ -189,17 +189,20 @@ mod tests {
     use super::*;
     use crate::time::Duration;
 
-    #[test]
-    fn each_truth_is_handed_over_with_the_whole_row_of_its_run() {
-        let s = |seconds: i64| Instant::from_ns(seconds * 1_000_000_000);
+    fn link() -> TruthLink {
         let minute = Duration::from_ns(60_000_000_000);
-        let link = TruthLink {
+        TruthLink {
             slot: 0,
             ahead: Duration::ZERO,
             span: minute,
             limit: minute,
-        };
-        let mut withheld = Withheld::new(link, 3);
+        }
+    }
+
+    #[test]
+    fn each_truth_is_handed_over_with_the_whole_row_of_its_run() {
+        let s = |seconds: i64| Instant::from_ns(seconds * 1_000_000_000);
+        let mut withheld = Withheld::new(link(), 3);
         let mut handed = 0;
         for t in 0..1000 {
             let now = t as f64;
@@ -230,14 +233,7 @@ mod tests {
             "withheld": [[15, 15.0], [16, 16.0]],
             "rows": [1.0, 1.5, 1.0, 1.5]
         }"#;
-        let minute = Duration::from_ns(60_000_000_000);
-        let link = TruthLink {
-            slot: 0,
-            ahead: Duration::ZERO,
-            span: minute,
-            limit: minute,
-        };
-        let mut withheld = Withheld::new(link, 2);
+        let mut withheld = Withheld::new(link(), 2);
         withheld.restore(&serde_json::from_str(former).unwrap());
         let mut handed = Vec::new();
         let mut release = |withheld: &mut Withheld, newest| {

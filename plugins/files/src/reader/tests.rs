@@ -14,6 +14,11 @@ fn lenient() -> Options {
     }
 }
 
+/// Reads a file of seconds and one channel.
+fn open(text: &'static str, options: Options) -> Reader {
+    Reader::from_read("f.csv", text.as_bytes(), layout(TimeForm::SECONDS), options).unwrap()
+}
+
 fn rows(reader: &mut Reader) -> Vec<(i64, String)> {
     let mut row = Row::default();
     let mut rows = Vec::new();
@@ -25,9 +30,8 @@ fn rows(reader: &mut Reader) -> Vec<(i64, String)> {
 
 #[test]
 fn a_row_whose_time_repeats_or_steps_back_is_left_out_and_counted() {
-    let text = &b"t,a\n0,1\n10,1\n10,off\n5,1\n10.5,1\n"[..];
-    let mut reader =
-        Reader::from_read("f.csv", text, layout(TimeForm::SECONDS), Options::default()).unwrap();
+    let text = "t,a\n0,1\n10,1\n10,off\n5,1\n10.5,1\n";
+    let mut reader = open(text, Options::default());
     let times: Vec<String> = rows(&mut reader)
         .into_iter()
         .map(|(_, text)| text)
@@ -104,13 +108,7 @@ fn the_text_of_the_time_is_kept_for_every_form() {
 #[test]
 fn a_time_that_cannot_be_read_is_an_error_or_the_row_is_left_out() {
     let text = "t,a\n0,1\n,1\nnan,1\nsoon,1\n1,1\n";
-    let mut reader = Reader::from_read(
-        "f.csv",
-        text.as_bytes(),
-        layout(TimeForm::SECONDS),
-        Options::default(),
-    )
-    .unwrap();
+    let mut reader = open(text, Options::default());
     let mut row = Row::default();
     assert!(reader.next_into(&mut row).unwrap());
     let error = reader.next_into(&mut row).unwrap_err().to_string();
@@ -118,13 +116,7 @@ fn a_time_that_cannot_be_read_is_an_error_or_the_row_is_left_out() {
         error.starts_with("f.csv:3: column `t`: expected a decimal number, found nothing"),
         "{error}"
     );
-    let mut reader = Reader::from_read(
-        "f.csv",
-        text.as_bytes(),
-        layout(TimeForm::SECONDS),
-        lenient(),
-    )
-    .unwrap();
+    let mut reader = open(text, lenient());
     assert_eq!(rows(&mut reader).len(), 2);
     assert_eq!(reader.report().refused_rows.count, 3);
 }
@@ -132,13 +124,7 @@ fn a_time_that_cannot_be_read_is_an_error_or_the_row_is_left_out() {
 #[test]
 fn a_lenient_reader_takes_bad_cells_as_absent_and_keeps_the_first() {
     let text = "t,a\n0,1\n1,NA\n2,-\n3,4\n";
-    let mut reader = Reader::from_read(
-        "f.csv",
-        text.as_bytes(),
-        layout(TimeForm::SECONDS),
-        lenient(),
-    )
-    .unwrap();
+    let mut reader = open(text, lenient());
     assert_eq!(rows(&mut reader).len(), 4);
     let bad = &reader.report().bad_cells;
     assert_eq!(bad.count, 2);
@@ -198,9 +184,7 @@ fn a_row_is_given_as_soon_as_its_line_is_there() {
 
 /// The times that are given, what was left out, and the error at the end, if there was one.
 fn given(text: &'static str) -> (String, Vec<String>, String) {
-    let layout = layout(TimeForm::SECONDS);
-    let mut reader =
-        Reader::from_read("f.csv", text.as_bytes(), layout, Options::default()).unwrap();
+    let mut reader = open(text, Options::default());
     let told = Arc::new(std::sync::Mutex::new(Vec::new()));
     reader.tell_first({
         let told = Arc::clone(&told);
