@@ -215,7 +215,8 @@ impl<'a> Probe<'a> {
         let reach = reach::of_estimators(&model.plan);
         let widest = Duration::from_ns(reach.as_ns() / MOST_INSTANTS);
         let step = interval.max(widest).max(Duration::from_ns(1));
-        let ticks = (reach.as_ns() / step.as_ns() + 2).min(MOST_INSTANTS);
+        let most = MOST_INSTANTS.min(i64::MAX / step.as_ns());
+        let ticks = (reach.as_ns() / step.as_ns() + 2).min(most);
         let rest = sources
             .iter()
             .map(|of| if of.samples > 0 { of.mean } else { f64::NAN });
@@ -227,6 +228,7 @@ impl<'a> Probe<'a> {
             let clock = Clock {
                 step,
                 ticks,
+                most,
                 aside: Arc::new(aside),
             };
             let resting = clock.engine_at_rest(model, &rest)?;
@@ -299,7 +301,7 @@ impl<'a> Probe<'a> {
         }
         let mut found = vec![<[Course; 2]>::default(); self.slots.len()];
         let (clock, slots, model) = (self.clock.clone(), self.slots, self.model);
-        for tick in 0..MOST_INSTANTS {
+        for tick in 0..clock.most {
             let undisturbed = self.undisturbed(tick as usize)?;
             for (side, (engine, samples)) in runs.iter_mut().enumerate() {
                 clock.advance(engine, tick, samples)?;
@@ -320,12 +322,14 @@ impl<'a> Probe<'a> {
     }
 }
 
-/// When the ticks are; that of the step is 0.
+/// When the ticks are; that of the step is 0, at the instant 0, so that a reach as long as all time fits on either side of it.
 #[derive(Clone)]
 struct Clock {
     step: Duration,
     /// So many at rest, and at least as many after the step.
     ticks: i64,
+    /// So many after the step at most.
+    most: i64,
     /// By how much each channel goes to either side of what it is, tick by tick.
     aside: Arc<Vec<f64>>,
 }
@@ -344,7 +348,7 @@ impl Clock {
     }
 
     fn advance(&self, engine: &mut Engine, tick: i64, samples: &[f64]) -> Result<(), EngineError> {
-        let at = Instant::from_ns((self.ticks + tick) * self.step.as_ns());
+        let at = Instant::from_ns(tick * self.step.as_ns());
         let side = if tick.rem_euclid(2) == 0 { 1.0 } else { -1.0 };
         let samples = samples.iter().zip(&*self.aside);
         let samples: Vec<f64> = samples.map(|(value, aside)| value + side * aside).collect();

@@ -33,6 +33,21 @@ fn what_intervals_remember_changes_neither_answers_nor_lags() {
 }
 
 #[test]
+fn answers_reach_as_far_back_as_there_is_time() {
+    let slow = TWO_SENSORS.replace("\"10min\"", "\"100000d\"");
+    let terms = [("gradients.a@8640000000s", 0.4)];
+    let model = model("long", &slow, &[("thermal", linear(&terms, 5.0))]);
+    let table = wandering(1200, |course, row| 1000.0 * course[row][0]);
+    let observation = observe(&model, &table).unwrap();
+    let answers = response::responses(&model, &observation).unwrap();
+    let [answer] = &answers[0].sensors[..] else {
+        panic!("{answers:?}");
+    };
+    let times = answer.time_s.iter();
+    assert!(times.clone().zip(times.skip(1)).all(|(a, b)| a < b));
+}
+
+#[test]
 fn lags_reach_no_further_than_a_quarter_of_the_recording() {
     let slow = TWO_SENSORS.replace("\"10min\"", "\"2d\"");
     let model = model("short", &slow, &[("thermal", linear(&[], 0.0))]);
