@@ -75,6 +75,10 @@ impl FileReader for Noting {
         self.note(path);
         Disk.read(path)
     }
+
+    fn beside(&self, path: &Path) -> Vec<String> {
+        Disk.beside(path)
+    }
 }
 
 fn written(path: &Path) -> Written {

@@ -26,6 +26,8 @@ pub enum DocumentProblem {
         path: String,
         /// What the operating system says.
         reason: String,
+        /// The graph files in its folder, where it is not there.
+        beside: Vec<String>,
     },
     /// A file is too large.
     TooLarge {

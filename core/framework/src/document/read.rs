@@ -25,6 +25,18 @@ pub trait FileReader {
     /// # Errors
     /// What the operating system says, also for a text that is not UTF-8.
     fn read(&self, path: &Path) -> Result<String, io::Error>;
+
+    /// The names of the graph files in the folder of `path`, in order: one of them may be meant where that is not there.
+    fn beside(&self, path: &Path) -> Vec<String>;
+}
+
+/// The names of the graph files of these, in order.
+fn graph_files(paths: impl Iterator<Item = PathBuf>) -> Vec<String> {
+    let graphs = paths.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    let names = graphs.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned()));
+    let mut names: Vec<_> = names.collect();
+    names.sort_unstable();
+    names
 }
 
 /// Files of the operating system.
@@ -39,6 +51,15 @@ impl FileReader for Disk {
             .take(LARGEST as u64 + 1)
             .read_to_string(&mut text)?;
         Ok(text)
+    }
+
+    fn beside(&self, path: &Path) -> Vec<String> {
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let found = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        graph_files(found.map(|entry| entry.path()))
     }
 }
 
@@ -68,6 +89,11 @@ impl FileReader for Memory {
             .or_else(|| self.files.get(&normal(path)))
             .cloned()
             .ok_or_else(|| io::ErrorKind::NotFound.into())
+    }
+
+    fn beside(&self, path: &Path) -> Vec<String> {
+        let files = self.files.keys();
+        graph_files(files.filter(|file| file.parent() == path.parent()).cloned())
     }
 }
 
@@ -110,14 +136,7 @@ pub fn load(
     match reader.read(path) {
         Ok(text) => load_text(path, text, reader, sources, diagnostics),
         Err(error) => {
-            let path = path.display().to_string();
-            diagnostics.report(
-                None,
-                DocumentProblem::Unreadable {
-                    path,
-                    reason: unreadable(&error),
-                },
-            );
+            diagnostics.report(None, not_read(path, &error, reader, &[]));
             None
         }
     }
@@ -341,14 +360,7 @@ impl Chain<'_> {
         match self.reader.read(&path) {
             Ok(text) => self.read(&path, text),
             Err(error) => {
-                let path = path.display().to_string();
-                self.fail(
-                    place,
-                    DocumentProblem::Unreadable {
-                        path,
-                        reason: unreadable(&error),
-                    },
-                );
+                self.fail(place, not_read(&path, &error, self.reader, &self.paths));
                 None
             }
         }
@@ -357,6 +369,25 @@ impl Chain<'_> {
     fn fail(&mut self, place: Place, problem: DocumentProblem) {
         self.gaps.anywhere = true;
         self.diagnostics.report(place, problem);
+    }
+}
+
+/// None of those that are being read can be meant.
+fn not_read(
+    path: &Path,
+    error: &io::Error,
+    reader: &dyn FileReader,
+    being_read: &[PathBuf],
+) -> DocumentProblem {
+    let mut beside = match error.kind() {
+        io::ErrorKind::NotFound => reader.beside(path),
+        _ => Vec::new(),
+    };
+    beside.retain(|name| !being_read.contains(&normal(&path.with_file_name(name))));
+    DocumentProblem::Unreadable {
+        path: path.display().to_string(),
+        reason: unreadable(error),
+        beside,
     }
 }
 

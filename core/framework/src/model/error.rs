@@ -61,7 +61,12 @@ impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unreadable { path, source } => {
-                write!(f, "cannot read {}: {}", path.display(), unreadable(source))
+                let path = path.display();
+                write!(f, "cannot read {path}: {}", unreadable(source))?;
+                if source.kind() == std::io::ErrorKind::NotFound {
+                    write!(f, "; `athermal fit GRAPH --data FILE -o {path}` writes one")?;
+                }
+                Ok(())
             }
             Self::NotAModel { path, source } => {
                 write!(

@@ -1,6 +1,7 @@
 //! How each mistake in reading a graph file is told; which there are stands above.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use super::DocumentProblem;
 use crate::diagnostic::{Names, Place, Problem, nearest};
@@ -43,6 +44,18 @@ fn near_or_all<'a>(
         (None, 1) => Some(format!("there is only {}", listed(known))),
         (None, _) => Some(format!("{there_are} {}", listed(known))),
     }
+}
+
+/// Which of some graph files a path may mean: all of them end alike, and that likens none to it.
+fn graph_meant<'a>(path: &str, beside: &'a [String]) -> Option<&'a str> {
+    let stem = |path| Path::new(path).file_stem()?.to_str();
+    let wanted = stem(path)?;
+    let stems = || beside.iter().filter_map(|name| stem(name));
+    let meant = stems()
+        .find(|known| *known == wanted)
+        .or_else(|| nearest(wanted, stems()))?;
+    let mut names = beside.iter().map(String::as_str);
+    names.find(|name| stem(name) == Some(meant))
 }
 
 fn for_key(key: Option<&String>) -> String {
@@ -89,7 +102,7 @@ impl Problem for DocumentProblem {
     fn message(&self) -> String {
         match self {
             Self::Syntax { reason, .. } => format!("this is not TOML: {reason}"),
-            Self::Unreadable { path, reason } => format!("cannot read \"{path}\": {reason}"),
+            Self::Unreadable { path, reason, .. } => format!("cannot read \"{path}\": {reason}"),
             Self::TooLarge { limit } => format!("the file is larger than {} MB", limit / 1_000_000),
             Self::TooDeep { limit } => format!("keys are nested more than {limit} deep"),
             Self::LongChain { limit } => format!("more than {limit} files extend one another"),
@@ -245,6 +258,11 @@ impl Problem for DocumentProblem {
                         _ => format!("a text stands in quotes: \"{bare}\""),
                     })
             }
+            Self::Unreadable { path, beside, .. } => near_or_all(
+                graph_meant(path, beside),
+                beside.iter().map(String::as_str),
+                "the graphs in that folder are",
+            ),
             Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
             Self::InputAsKey { input, .. } => {
                 Some(format!("`{input}` is an input: write `inputs.{input} = …`"))

@@ -1,6 +1,10 @@
 //! Texts of mistakes in files as such: syntax, extending, keys.
 
+use std::path::Path;
+
 use super::rendered;
+use crate::diagnostic::{Diagnostics, Sources};
+use crate::document::{Memory, load};
 
 #[test]
 fn a_syntax_error_is_told_as_the_parser_tells_it() {
@@ -77,6 +81,30 @@ error[A002]: cannot read "m/b.toml": there is no such file
   |           ^^^^^^^^ named here
 "#
     );
+}
+
+#[test]
+fn a_file_that_is_not_there_may_be_one_that_stands_in_its_folder() {
+    let told = ["die-testr.toml", "die-tester.tml", "c.toml"].map(|wanted| {
+        let text = format!("schema = 1\nextends = \"{wanted}\"\n");
+        let memory = Memory::new()
+            .with("m/a.toml", text)
+            .with("m/die-tester.toml", "")
+            .with("m/linear-axis.toml", "")
+            .with("stranger.toml", "");
+        let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
+        load(
+            Path::new("m/a.toml"),
+            &memory,
+            &mut sources,
+            &mut diagnostics,
+        );
+        let told = diagnostics.render(&sources, false, 100);
+        told.lines().last().unwrap_or_default().trim().to_owned()
+    });
+    let near = "= help: did you mean \"die-tester.toml\"?";
+    let all = "= help: the graphs in that folder are \"die-tester.toml\", \"linear-axis.toml\"";
+    assert_eq!(told, [near, near, all]);
 }
 
 #[test]
