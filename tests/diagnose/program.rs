@@ -293,6 +293,32 @@ const DIRECT: &str = "schema = 1\n[time]\ncolumn = \"time_s\"\n[signals.in]\nuni
     [nodes.model]\ntype = \"linear\"\ninputs = { features = \"in\", truth = \"out.y\" }\nahead = \"20s\"\n[outputs]\nmodel = \"model\"\n";
 
 #[test]
+fn a_sensor_that_stands_still_stands_before_no_other_among_the_correlations() {
+    let scratch = Scratch::new("diagnose-still");
+    let graph = scratch.file("graph.toml", DIRECT);
+    let log = scratch.file("log.csv", with_gaps());
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let rows = (0..1260).map(|nth| {
+        let a = (0.11 * f64::from(nth)).sin();
+        format!("{},{a},0.5,{}\n", 10 * nth, a + 0.5)
+    });
+    let rows: String = rows.collect();
+    let log = scratch.file("still.csv", format!("time_s,a,b,y\n{rows}"));
+    let told = athermal_on("diagnose", &model, &log, &[&"--no-fit"]).ended(0);
+    let (_, correlations) = told.out.split_once("largest correlation").unwrap();
+    let listed: Vec<&str> = correlations
+        .lines()
+        .skip(5)
+        .take(3)
+        .map(str::trim)
+        .collect();
+    assert_eq!(listed[0], "out.y", "{correlations}");
+    assert!(listed[1].starts_with("in.a "), "{correlations}");
+    assert_eq!(listed[2], "never there, or never changing: 1");
+}
+
+#[test]
 fn a_fit_on_other_days_that_does_without_a_sensor_is_told() {
     let scratch = Scratch::new("diagnose-dropped");
     let graph = scratch.file("graph.toml", DIRECT);

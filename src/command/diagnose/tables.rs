@@ -128,7 +128,10 @@ impl<'a> Tables<'a> {
             };
             let mut list = |title: String, side: fn(&FeatureLags) -> &Correlogram, all: bool| {
                 let features = of.features.iter();
+                let known = |of: &&FeatureLags| !side(of).best.is_nan();
+                let unknown = of.features.len() - features.clone().filter(known).count();
                 let mut found: Vec<_> = features
+                    .filter(known)
                     .filter(|of| all || side(of).says_something())
                     .collect();
                 found.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
@@ -148,6 +151,11 @@ impl<'a> Tables<'a> {
                         format!("±{:.2}", correlogram.bound),
                     ]
                 }));
+                if all && unknown > 0 {
+                    rows.push(vec![format!(
+                        "    never there, or never changing: {unknown}"
+                    )]);
+                }
             };
             list(of.truth.clone(), |of| &of.truth, true);
             let left = format!("left of it by {}", of.prediction);
