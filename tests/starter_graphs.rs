@@ -167,6 +167,42 @@ fn a_starter_graph_of_a_fast_log_checks() {
 }
 
 #[test]
+fn dates_as_they_are_written_elsewhere_are_read_as_they_are() {
+    let folder = Folder::new("dated");
+    let mut text = "Datum;plate_degC;Z_um\n".to_owned();
+    for (time_s, degc, _, z) in grinding(3000, 30.0) {
+        let (minutes, seconds) = (time_s as u64 / 60, time_s as u64 % 60);
+        let (hours, minutes) = (minutes / 60, minutes % 60);
+        let date = format!(
+            "{:02}.03.2026 {:02}:{minutes:02}:{seconds:02}",
+            1 + hours / 24,
+            hours % 24
+        );
+        let values = format!("{degc:.4};{z:.4}").replace('.', ",");
+        let _ = writeln!(text, "{date};{values}");
+    }
+    let told = folder.started("dated.csv", &text);
+    assert!(told.contains("taken for UTC"), "{told}");
+    let graph = folder.graph("dated.csv");
+    assert!(
+        graph.contains("format = \"%d.%m.%Y %H:%M:%S%.f\""),
+        "{graph}"
+    );
+    assert!(graph.contains("3,000 rows over 25"), "{graph}");
+}
+
+#[test]
+fn a_time_that_no_instant_fits_is_told_with_the_row() {
+    let folder = Folder::new("beyond");
+    let text = "stamp_d,plate_degC,Z_um\n1e300,20.1,1\n2e300,20.2,2\n3e300,20.3,3\n";
+    let (fine, told) = folder.init("beyond.csv", text);
+    assert!(!fine);
+    assert!(told.contains("less than two rows with a time"), "{told}");
+    assert!(told.contains("beyond.csv:2: "), "{told}");
+    assert!(told.contains("more than 292 years"), "{told}");
+}
+
+#[test]
 fn the_days_of_a_spreadsheet_are_days() {
     let folder = Folder::new("days");
     let mut text = "time;plate_degC;Z_um\n".to_owned();

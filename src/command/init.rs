@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use athermal::core::time::TimeFormat;
 use clap::Args;
 use serde_json::json;
 
@@ -21,6 +22,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, print};
   athermal init log.csv
   athermal init log.csv -o graph.toml
   athermal init log.csv --time stamp --drifts probe1 probe2 -o -
+  athermal init log.csv --time-format '%d.%m.%Y %H:%M:%S'
 
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
@@ -32,6 +34,9 @@ pub struct Init {
     /// The column that gives the time
     #[arg(long, value_name = "COLUMN")]
     time: Option<String>,
+    /// How dates and times are written that are not as in RFC 3339, in the letters of strptime
+    #[arg(long, value_name = "FORMAT")]
+    time_format: Option<TimeFormat>,
     /// The columns that drift
     #[arg(long, num_args = 1.., value_name = "COLUMN")]
     drifts: Vec<String>,
@@ -48,6 +53,7 @@ impl Init {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let told = Told {
             time: self.time.clone(),
+            format: self.time_format.clone(),
             drifting: self.drifts.clone(),
         };
         let to_stdout = self.output == Path::new("-");

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use athermal::core::document::{TimeBase, TimeForm};
+use athermal::core::document::TimeBase;
 use athermal::core::engine::Carry;
 use athermal::core::live::{Control, Feed, Notice, StageError, Staged, Verdict};
+use athermal::files::TimeForm;
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
@@ -128,24 +129,10 @@ impl When {
     /// A time as the data give it, or a duration.
     fn read(text: &str, base: &TimeBase) -> Result<Self, Failure> {
         let TimeBase::Column { form, .. } = base;
-        let unit = match form {
-            TimeForm::Numbers { unit } => Some(*unit),
-            TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
-            TimeForm::Rfc3339 => None,
-        };
-        let number = || {
-            let (number, unit) = (text.parse::<f64>().ok()?, unit?);
-            let ns = (number * unit.as_ns() as f64).round();
-            (ns.abs() < 9e18).then_some(Instant::from_ns(ns as i64))
-        };
-        let date = || {
-            let time = text.parse::<jiff::Timestamp>().ok()?;
-            i64::try_from(time.as_nanosecond())
-                .ok()
-                .map(Instant::from_ns)
-        };
+        let own = TimeForm::from(form).read(text.as_bytes());
+        let time = own.or_else(|| TimeForm::Rfc3339.read(text.as_bytes()));
         let after = || text.parse().ok().map(Self::After);
-        let at = number().or_else(date).map(Self::At);
+        let at = time.map(|ns| Self::At(Instant::from_ns(ns)));
         at.or_else(after).ok_or_else(|| {
             Failure::Request(format!("--swap-at: {text:?} is no time of these data: write it as they do, or as a duration such as 6h"))
         })

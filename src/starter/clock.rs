@@ -1,9 +1,11 @@
 //! Decides which column of a log gives the time, and in which form.
 
 use athermal::core::time::Duration;
-use athermal::files::{Description, TimeForm, has_zone};
+use athermal::core::time::TimeFormat;
+use athermal::files::{Description, TimeForm};
 
 use super::column::ends_in_unit;
+use super::dates::{self, Dates};
 use crate::figures::time;
 
 /// The time of a log.
@@ -13,8 +15,8 @@ pub struct Clock {
     pub column: String,
     /// How its cells are written.
     pub form: TimeForm,
-    /// What a graph file says of it, after the column.
-    pub declared: Option<&'static str>,
+    /// What a graph file says of it beside the column: a key of `[time]` and its value.
+    pub declared: Option<(&'static str, String)>,
     /// Why it was taken.
     why: String,
 }
@@ -30,8 +32,10 @@ const NAMES: [&str; 8] = [
     "n",
 ];
 
-/// Units of a time column's name, as a graph file names them, in nanoseconds.
-const UNITS: [(&str, &str, i64); 8] = [
+/// A unit of a time column's name, as a graph file names it, in nanoseconds.
+type Unit = (&'static str, &'static str, i64);
+
+const UNITS: [Unit; 8] = [
     ("ns", "ns", 1),
     ("us", "us", 1_000),
     ("ms", "ms", 1_000_000),
@@ -74,6 +78,15 @@ impl Clock {
         time(seconds)
     }
 
+    fn dated(column: String, dates: Dates) -> Self {
+        Self {
+            column,
+            form: dates.form,
+            declared: Some(dates.declared),
+            why: dates.why,
+        }
+    }
+
     /// What was found, for people.
     #[must_use]
     pub fn remark(&self) -> String {
@@ -85,7 +98,15 @@ impl Clock {
 ///
 /// # Errors
 /// A text that says why there is none.
-pub fn find(described: &Description, named: Option<&str>) -> Result<Clock, String> {
+pub fn find(
+    described: &Description,
+    named: Option<&str>,
+    format: Option<&TimeFormat>,
+) -> Result<Clock, String> {
+    let clock = |index: usize| match format {
+        Some(format) => by_format(described, index, format),
+        None => clock(described, index),
+    };
     if let Some(name) = named {
         let index = described.columns.iter().position(|column| column == name);
         let index = index.ok_or_else(|| {
@@ -94,8 +115,7 @@ pub fn find(described: &Description, named: Option<&str>) -> Result<Clock, Strin
                 described.columns.join(", ")
             )
         })?;
-        return clock(described, index)
-            .ok_or_else(|| format!("`{name}` does not advance from row to row as a time does"));
+        return clock(index).ok_or_else(|| no_clock(described, index));
     }
     // What is in degrees or in nanometres is no time, however steadily it grows.
     let measured = |index: &usize| ends_in_unit(&described.columns[*index]);
@@ -109,15 +129,38 @@ pub fn find(described: &Description, named: Option<&str>) -> Result<Clock, Strin
             .position(|known| *known == first)
             .unwrap_or(NAMES.len())
     });
-    likely
-        .into_iter()
-        .find_map(|index| clock(described, index))
-        .ok_or_else(|| {
-            format!(
-                "no column advances from row to row as a time does; name it with --time (there are {})",
+    let found = likely.iter().find_map(|&index| clock(index));
+    found.ok_or_else(|| {
+        let timed = |index: &&usize| dates::look_like_times(&cells(described, **index));
+        match likely.iter().find(timed) {
+            Some(&index) => no_clock(described, index),
+            None => format!(
+                "no column advances from row to row as a time does, and a log needs one: a time, or a number that counts its \
+                 samples; name it with --time (there are {})",
                 described.columns.join(", ")
-            )
-        })
+            ),
+        }
+    })
+}
+
+/// Why a column is not the time.
+fn no_clock(described: &Description, index: usize) -> String {
+    let (column, cells) = (&described.columns[index], cells(described, index));
+    match cells.first() {
+        Some(first) if dates::look_like_times(&cells) => format!(
+            "`{column}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
+             e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
+        ),
+        _ => format!("`{column}` does not advance from row to row as a time does"),
+    }
+}
+
+/// A column whose cells have a format.
+fn by_format(described: &Description, index: usize, format: &TimeFormat) -> Option<Clock> {
+    let dates = dates::by(format.clone());
+    let mut cells = cells(described, index).into_iter();
+    let read = cells.any(|cell| dates.form.read(cell.as_bytes()).is_some());
+    read.then(|| Clock::dated(described.columns[index].clone(), dates))
 }
 
 /// The parts of a column's name.
@@ -127,42 +170,29 @@ pub fn words(name: &str) -> Vec<&str> {
         .collect()
 }
 
-/// What is told of times that do not say how far they are from UTC.
-pub const WITHOUT_ZONE: &str = "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when \
-     the clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00";
+/// The cells of a column that are not empty, a decimal comma as a point where a reader takes it for one.
+fn cells(described: &Description, index: usize) -> Vec<String> {
+    let comma = described.delimiter.is_some_and(|between| between != b',');
+    let cells = described.rows.iter().filter_map(|row| row.get(index));
+    let cells = cells
+        .map(|cell| cell.trim())
+        .filter(|cell| !cell.is_empty());
+    let read = |cell: &str| match cell.matches(',').count() {
+        1 if comma => cell.replace(',', "."),
+        _ => cell.to_owned(),
+    };
+    cells.map(read).collect()
+}
 
 fn clock(described: &Description, index: usize) -> Option<Clock> {
     let column = described.columns[index].clone();
-    let cells: Vec<&str> = described
-        .rows
-        .iter()
-        .filter_map(|row| row.get(index))
-        .map(|cell| cell.trim())
-        .filter(|cell| !cell.is_empty())
-        .collect();
+    let cells = cells(described, index);
     if cells.len() < 2 {
         return None;
     }
-    let numbers: Option<Vec<f64>> = cells
-        .iter()
-        .map(|cell| cell.replace(',', ".").parse::<f64>().ok())
-        .collect();
+    let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.parse::<f64>().ok()).collect();
     let Some(numbers) = numbers else {
-        let dated = cells.iter().all(|cell| {
-            let bytes = cell.as_bytes();
-            bytes.len() >= 10 && bytes[..4].iter().all(u8::is_ascii_digit) && bytes[4] == b'-'
-        });
-        let why = if cells.iter().all(|cell| has_zone(cell.as_bytes())) {
-            "dates and times as in RFC 3339"
-        } else {
-            WITHOUT_ZONE
-        };
-        return dated.then(|| Clock {
-            column,
-            form: TimeForm::Rfc3339,
-            declared: Some("unit = \"rfc3339\""),
-            why: why.to_owned(),
-        });
+        return dates::of(&cells).map(|dates| Clock::dated(column, dates));
     };
     // A clock that steps back once is still a clock.
     let steps = numbers.windows(2).filter(|pair| pair[1] > pair[0]).count();
@@ -176,7 +206,9 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         .skip(1)
         .rev()
         .find_map(|word| UNITS.iter().find(|(name, ..)| name == word));
-    if let Some(&(_, name, ns_per_unit)) = unit {
+    let furthest = numbers.iter().copied().map(f64::abs).fold(0.0, f64::max);
+    let fits = |&&(_, _, ns_per_unit): &&Unit| furthest * (ns_per_unit as f64) < i64::MAX as f64;
+    if let Some(&(_, name, ns_per_unit)) = unit.filter(fits) {
         return Some(Clock {
             column,
             form: TimeForm::Numbers { ns_per_unit },
@@ -192,7 +224,7 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         return Some(Clock {
             column,
             form: TimeForm::Samples { step_ns: SAMPLE_NS },
-            declared: Some("step = \"1s\""),
+            declared: Some(("step", "1s".to_owned())),
             why: "a sample number; how long a sample takes the log does not say".to_owned(),
         });
     }
@@ -210,17 +242,26 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
             ),
         });
     }
-    // Seconds since 1970 have ten digits before the point until 2286, milliseconds thirteen.
-    let (name, ns_per_unit) = if numbers[0] >= 1e11 {
-        ("ms", 1_000_000)
-    } else {
-        ("s", 1_000_000_000)
+    // Seconds since 1970 have ten digits before the point until 2286, milliseconds thirteen, and so on.
+    let (name, ns_per_unit) = match numbers[0] {
+        first if first >= 1e17 => ("ns", 1),
+        first if first >= 1e14 => ("us", 1_000),
+        first if first >= 1e11 => ("ms", 1_000_000),
+        _ => ("s", 1_000_000_000),
+    };
+    let why = match unit {
+        Some((_, by_name, _)) => format!(
+            "numbers, taken for {name} since 1970: in {by_name}, as its name says, they lie centuries away"
+        ),
+        None => format!(
+            "numbers, taken for {name} since its name does not say, as time_s, time_ms or time_min would"
+        ),
     };
     Some(Clock {
         column,
         form: TimeForm::Numbers { ns_per_unit },
         declared: declared(name),
-        why: format!("numbers, taken for {name} since its name does not say"),
+        why,
     })
 }
 
@@ -236,16 +277,9 @@ fn counts_days(numbers: &[f64]) -> bool {
     days && usual < 0.5
 }
 
-fn declared(unit: &str) -> Option<&'static str> {
-    Some(match unit {
-        "ns" => "unit = \"ns\"",
-        "us" => "unit = \"us\"",
-        "ms" => "unit = \"ms\"",
-        "min" => "unit = \"min\"",
-        "h" => "unit = \"h\"",
-        "d" => "unit = \"d\"",
-        _ => return None,
-    })
+/// What a graph file says of numbers of a unit; of seconds nothing.
+fn declared(unit: &str) -> Option<(&'static str, String)> {
+    (unit != "s").then(|| ("unit", unit.to_owned()))
 }
 
 #[cfg(test)]
@@ -255,6 +289,7 @@ mod tests {
     fn found(text: &'static str) -> Result<Clock, String> {
         find(
             &Description::of_read("log", text.as_bytes(), None, 10).unwrap(),
+            None,
             None,
         )
     }
@@ -295,6 +330,23 @@ mod tests {
                 },
             ),
             (
+                "time_s,a\n1772366400000,5\n1772366410000,5\n",
+                "time_s",
+                TimeForm::Numbers {
+                    ns_per_unit: 1_000_000,
+                },
+            ),
+            (
+                "stamp,a\n1772366400000000,5\n1772366410000000,5\n",
+                "stamp",
+                TimeForm::Numbers { ns_per_unit: 1_000 },
+            ),
+            (
+                "a;Zeit\n1,5;01.03.2026 12:00:00,0\n1,5;01.03.2026 12:00:00,5\n",
+                "Zeit",
+                TimeForm::Format("%d.%m.%Y %H:%M:%S%.f".parse().unwrap()),
+            ),
+            (
                 "time_s,a\n46083.00,5\n46083.01,5\n46083.02,5\n",
                 "time_s",
                 TimeForm::SECONDS,
@@ -327,10 +379,33 @@ mod tests {
             let text = format!("time,a\n2026-03-02T00:00:00Z,1\n{second},2\n");
             let text = std::io::Cursor::new(text);
             let described = Description::of_read("log", text, None, 10).unwrap();
-            let told = find(&described, None).unwrap().remark();
+            let told = find(&described, None, None).unwrap().remark();
             assert_eq!(told.contains("without a zone"), !zoned, "{told}");
             assert_eq!(told.contains("taken for UTC"), !zoned, "{told}");
         }
+    }
+
+    #[test]
+    fn a_time_in_a_form_that_is_not_known_is_told_with_a_cell_and_read_by_a_format_that_is_named() {
+        let text = "a,clock\n1,12:00 on 01.03.2026\n1,12:01 on 01.03.2026\n";
+        let described = Description::of_read("log", text.as_bytes(), None, 10).unwrap();
+        for named in [None, Some("clock")] {
+            let refused = find(&described, named, None).unwrap_err();
+            assert!(
+                refused.contains("`clock` has times such as `12:00 on 01.03.2026`")
+                    && refused.contains("--time-format"),
+                "{refused}"
+            );
+        }
+        let format: TimeFormat = "%H:%M on %d.%m.%Y".parse().unwrap();
+        let clock = find(&described, None, Some(&format)).unwrap();
+        assert_eq!(clock.column, "clock");
+        assert_eq!(clock.declared, Some(("format", format.to_string())));
+        assert!(
+            clock.remark().contains("taken for UTC"),
+            "{}",
+            clock.remark()
+        );
     }
 
     #[test]

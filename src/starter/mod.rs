@@ -2,16 +2,18 @@
 
 mod clock;
 mod column;
+mod dates;
 mod group;
 mod survey;
 mod text;
 mod window;
 
-pub use clock::WITHOUT_ZONE;
+pub use dates::WITHOUT_ZONE;
 
 use std::path::Path;
 
-use athermal::files::{Description, FileError};
+use athermal::core::time::TimeFormat;
+use athermal::files::{Description, FileError, TimeForm};
 
 use survey::Survey;
 use window::Choice;
@@ -21,6 +23,8 @@ use window::Choice;
 pub struct Told {
     /// The column that gives the time.
     pub time: Option<String>,
+    /// How it is written.
+    pub format: Option<TimeFormat>,
     /// The columns that drift.
     pub drifting: Vec<String>,
 }
@@ -58,14 +62,19 @@ impl From<FileError> for NoStarter {
 pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let described = Description::of(path, 500)?;
     let mut remarks = Vec::new();
-    let clock = clock::find(&described, told.time.as_deref()).map_err(NoStarter::Unfit)?;
+    let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
+        .map_err(NoStarter::Unfit)?;
     remarks.push(clock.remark());
     let mut columns = column::columns(&described, &clock.column);
     let survey = Survey::of(path, &clock, &columns)?;
     survey.judge(&mut columns);
     column::assign(&mut columns, told).map_err(NoStarter::Unfit)?;
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
-    let choice = Choice::of(&survey, &columns).map_err(NoStarter::Unfit)?;
+    let choice = Choice::of(&survey, &columns);
+    let choice = choice.map_err(|why| match clock.form {
+        TimeForm::Numbers { .. } => NoStarter::Unfit(format!("{why}; {}", clock.remark())),
+        _ => NoStarter::Unfit(why),
+    })?;
     remarks.extend(choice.remarks(&clock, &columns));
     Ok(Starter {
         text: text::graph(path, &clock, &columns, &survey, &choice),

@@ -113,7 +113,7 @@ impl Survey {
         let layout = Layout {
             time: TimeColumn {
                 column: clock.column.clone(),
-                form: clock.form,
+                form: clock.form.clone(),
             },
             channels: columns
                 .iter()
@@ -148,9 +148,13 @@ impl Survey {
         }
         let duration_s = first.map_or(0.0, |first| (last - first) as f64 / 1e9);
         if rows < 2 || duration_s <= 0.0 {
-            return Err(NoStarter::Unfit(
-                "it has less than two rows with a time".to_owned(),
-            ));
+            let report = reader.report();
+            let first = report.refused_rows.first.as_ref();
+            let first = first.or(report.refused_time.first.as_ref());
+            let first = first.map_or_else(String::new, |error| format!("; {error}"));
+            return Err(NoStarter::Unfit(format!(
+                "it has less than two rows with a time{first}"
+            )));
         }
         Ok(Self {
             series,

@@ -125,8 +125,8 @@ impl Writer<'_> {
             "\n[time]\ncolumn = {}",
             toml_string(&self.clock.column)
         );
-        if let Some(declared) = self.clock.declared {
-            text.push_str(declared);
+        if let Some((key, value)) = &self.clock.declared {
+            let _ = write!(text, "{key} = {}", toml_string(value));
             if self.clock.counts_samples() {
                 text.push_str("                        # the log does not say how long a sample takes: state it here");
             }

@@ -150,6 +150,39 @@ fn times_without_a_zone_are_told_once_and_those_with_one_are_not() {
 }
 
 #[test]
+fn times_of_a_form_of_their_own_are_read_and_named_as_they_are_written() {
+    let scratch = desk("dated").0;
+    let graph = "schema = 1\nextends = \"fitted.toml\"\ntime = { column = \"time_s\", format = \"%d.%m.%Y %H:%M:%S\" }\n";
+    let graph = scratch.file("dated.toml", graph);
+    let row = |row: &String| {
+        let (seconds, rest) = row.split_once(',').unwrap();
+        let seconds: u32 = seconds.parse().unwrap();
+        let (minutes, seconds) = (seconds / 60, seconds % 60);
+        format!(
+            "02.03.2026 {:02}:{:02}:{seconds:02},{rest}",
+            minutes / 60,
+            minutes % 60
+        )
+    };
+    let dated: Vec<String> = rows(0, 120).iter().map(row).collect();
+    let log = scratch.file("dated.csv", csv(&dated));
+    let model = scratch.path("dated.json");
+    let fit = athermal(&[&"fit", &graph, &"-o", &model, &"--data", &log]).ended(0);
+    fit.tells(&["without a zone, taken for UTC"]);
+    let (time, _) = dated[60].split_once(',').unwrap();
+    let swap = format!("{time}={}", model.display());
+    let run = athermal(&[&"run", &model, &"-i", &log, &"--swap-at", &swap]).ended(0);
+    run.tells(&["took over before tick 61"]);
+    assert!(run.out.contains(&format!("\n{time},")), "{}", run.out);
+    let numbered = scratch.file("numbered.csv", csv(&rows(0, 120)));
+    let refused = athermal(&[&"evaluate", &model, &"--data", &numbered]).ended(2);
+    refused.tells(&["a date and time as `%d.%m.%Y %H:%M:%S` says, found `0`"]);
+    let plain = scratch.path("fitted.toml");
+    let refused = athermal(&[&"fit", &plain, &"-o", &model, &"--data", &log]).ended(2);
+    refused.tells(&["`[time]` reads dates and times by their `format`"]);
+}
+
+#[test]
 fn a_model_and_the_results_of_tests_are_written_though_nobody_reads_what_is_told() {
     let (scratch, plain, counted, _) = desk("unread");
     let (graph, model) = (scratch.path("fitted.toml"), scratch.path("unread.json"));

@@ -13,23 +13,29 @@ use crate::{ChannelColumn, Event, Layout, Options, Recording, Report, Row, TimeC
 /// How a sample number is carried where the graph gives no step.
 const ONE_SECOND: Duration = Duration::from_ns(1_000_000_000);
 
+impl From<&Declared> for TimeForm {
+    fn from(form: &Declared) -> Self {
+        match form {
+            Declared::Numbers { unit } => Self::Numbers {
+                ns_per_unit: unit.as_ns(),
+            },
+            Declared::Rfc3339 => Self::Rfc3339,
+            Declared::Format(format) => Self::Format(format.clone()),
+            Declared::Samples { step } => Self::Samples {
+                step_ns: step.unwrap_or(ONE_SECOND).as_ns(),
+            },
+        }
+    }
+}
+
 /// What a graph expects of a table: how time is given, and a column for each measured channel.
 #[must_use]
 pub fn layout(plan: &Plan) -> Layout {
     let TimeBase::Column { column, form } = &plan.time;
-    let form = match form {
-        Declared::Numbers { unit } => TimeForm::Numbers {
-            ns_per_unit: unit.as_ns(),
-        },
-        Declared::Rfc3339 => TimeForm::Rfc3339,
-        Declared::Samples { step } => TimeForm::Samples {
-            step_ns: step.unwrap_or(ONE_SECOND).as_ns(),
-        },
-    };
     Layout {
         time: TimeColumn {
             column: column.clone(),
-            form,
+            form: form.into(),
         },
         channels: plan
             .sources

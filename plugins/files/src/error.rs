@@ -138,7 +138,7 @@ pub enum FileError {
         /// The text of the cell.
         found: String,
         /// What the cell should look like.
-        expected: &'static str,
+        expected: String,
     },
     /// An instant that is not after the one before.
     TimeNotAfter {
@@ -211,6 +211,12 @@ impl FileError {
 }
 
 /// Whether a text holds a date such as `2013-07-04`, at its beginning or as an example.
+/// Whether a text has hours and minutes in it.
+fn has_clock(text: &str) -> bool {
+    let mut around = text.as_bytes().windows(3);
+    around.any(|of| of[1] == b':' && of[0].is_ascii_digit() && of[2].is_ascii_digit())
+}
+
 fn is_date(text: &str) -> bool {
     let form = |four: &[u8]| four.iter().all(u8::is_ascii_digit);
     let mut dates = text.as_bytes().windows(10);
@@ -306,6 +312,12 @@ impl fmt::Display for FileError {
                 }
                 if is_date(found) && !is_date(expected) {
                     return write!(f, "; `unit = \"rfc3339\"` in `[time]` reads such times");
+                }
+                if has_clock(found) && !is_date(found) && !expected.contains('%') {
+                    return write!(
+                        f,
+                        "; `[time]` reads dates and times by their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59"
+                    );
                 }
                 write!(
                     f,
@@ -462,7 +474,7 @@ mod tests {
             place: place(),
             column: "time_s".into(),
             found: String::new(),
-            expected: "a decimal number",
+            expected: "a decimal number".to_owned(),
         };
         assert_eq!(
             time.to_string(),
@@ -481,12 +493,30 @@ mod tests {
             place: place(),
             column: "time_s".into(),
             found: "2026-03-01 10:00".into(),
-            expected: "a decimal number",
+            expected: "a decimal number".to_owned(),
         };
         assert_eq!(
             dated.to_string(),
             "run.csv:12: column `time_s`: expected a decimal number, found `2026-03-01 10:00`; `unit = \"rfc3339\"` in `[time]` reads such times"
         );
+        for expected in [
+            "a decimal number",
+            "a date and time such as 2013-07-04T00:00:00Z",
+        ] {
+            let elsewhere = FileError::BadTime {
+                place: place(),
+                column: "time_s".into(),
+                found: "01.03.2026 10:00".into(),
+                expected: expected.to_owned(),
+            };
+            assert_eq!(
+                elsewhere.to_string(),
+                format!(
+                    "run.csv:12: column `time_s`: expected {expected}, found `01.03.2026 10:00`; `[time]` reads dates and times by \
+                     their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59"
+                )
+            );
+        }
         let count = FileError::CellCount {
             place: place(),
             expected: 3,

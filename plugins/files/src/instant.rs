@@ -11,21 +11,24 @@ use crate::decimal::Decimal;
 const DATE_LENGTH: usize = 10;
 
 impl TimeForm {
-    /// The instant that a trimmed cell stands for, or `None` if it is not of this form or does not fit into 64 bits.
-    pub(crate) fn read(self, text: &[u8]) -> Option<i64> {
-        match self {
+    /// The instant in ns that a trimmed cell stands for, or `None` if it is not of this form or does not fit into 64 bits.
+    #[must_use]
+    pub fn read(&self, text: &[u8]) -> Option<i64> {
+        match *self {
             Self::Numbers { ns_per_unit } => Decimal::parse(text)?.times(ns_per_unit),
             Self::Samples { step_ns } => {
                 let number = Decimal::parse(text)?;
                 number.is_whole().then(|| number.times(step_ns))?
             }
             Self::Rfc3339 => i64::try_from(timestamp(text)?.as_nanosecond()).ok(),
+            Self::Format(ref format) => i64::try_from(format.read(text)?).ok(),
         }
     }
 
     /// Whether a cell is of this form, and its instant does not fit into 64 bits.
-    pub(crate) fn is_beyond(self, text: &[u8]) -> bool {
+    pub(crate) fn is_beyond(&self, text: &[u8]) -> bool {
         let is_of_form = match self {
+            Self::Format(format) => format.read(text).is_some(),
             Self::Numbers { .. } => Decimal::parse(text).is_some(),
             Self::Samples { .. } => Decimal::parse(text).is_some_and(Decimal::is_whole),
             Self::Rfc3339 => timestamp(text).is_some(),
@@ -33,12 +36,22 @@ impl TimeForm {
         is_of_form && self.read(text).is_none()
     }
 
-    /// What a cell should look like, for a message.
-    pub(crate) fn expected(self) -> &'static str {
+    /// Whether a date and time of this form says how far it is from UTC; nothing where the form is none of dates.
+    pub(crate) fn is_zoned(&self, text: &[u8]) -> Option<bool> {
         match self {
-            Self::Numbers { .. } => "a decimal number",
-            Self::Samples { .. } => "a whole sample number",
-            Self::Rfc3339 => "a date and time such as 2013-07-04T00:00:00Z",
+            Self::Rfc3339 => Some(has_zone(text)),
+            Self::Format(format) => Some(format.has_offset()),
+            Self::Numbers { .. } | Self::Samples { .. } => None,
+        }
+    }
+
+    /// What a cell should look like, for a message.
+    pub(crate) fn expected(&self) -> String {
+        match self {
+            Self::Numbers { .. } => "a decimal number".to_owned(),
+            Self::Samples { .. } => "a whole sample number".to_owned(),
+            Self::Rfc3339 => "a date and time such as 2013-07-04T00:00:00Z".to_owned(),
+            Self::Format(format) => format!("a date and time as `{format}` says"),
         }
     }
 }
@@ -116,15 +129,13 @@ mod tests {
 
     #[test]
     fn a_time_beyond_64_bits_of_nanoseconds_is_refused_and_told_from_what_is_none() {
-        let seconds = TimeForm::Numbers {
-            ns_per_unit: 1_000_000_000,
-        };
+        let seconds = TimeForm::SECONDS;
         for (form, text, beyond) in [
-            (TimeForm::Rfc3339, "2400-01-01T00:00:00Z", true),
-            (TimeForm::Rfc3339, "yesterday", false),
-            (seconds, "9223372046", true),
-            (seconds, "-1e300", true),
-            (seconds, "1h", false),
+            (&TimeForm::Rfc3339, "2400-01-01T00:00:00Z", true),
+            (&TimeForm::Rfc3339, "yesterday", false),
+            (&seconds, "9223372046", true),
+            (&seconds, "-1e300", true),
+            (&seconds, "1h", false),
         ] {
             assert_eq!(form.read(text.as_bytes()), None, "{text}");
             assert_eq!(form.is_beyond(text.as_bytes()), beyond, "{text}");

@@ -1,5 +1,7 @@
 //! What is wanted from a recording: which column gives time, and which give channels. Not where they stand in a file.
 
+use athermal_core::time::TimeFormat;
+
 /// The columns to read, by name; a column that is not named here is skipped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
@@ -19,7 +21,7 @@ pub struct TimeColumn {
 }
 
 /// How an instant is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TimeForm {
     /// Decimal numbers of a unit, read exactly and rounded to the nearest nanosecond: `0.3`, `1e3`.
     Numbers {
@@ -29,6 +31,8 @@ pub enum TimeForm {
     /// RFC 3339 text such as `2013-07-04T00:00:00Z`; without a zone (`2013-07-04 00:00:00`, `2013-07-04`) it is UTC.
     /// Nanoseconds then count from 1970-01-01T00:00:00Z.
     Rfc3339,
+    /// Dates and times in another form, such as `04.07.2013 00:00:00`.
+    Format(TimeFormat),
     /// Whole sample numbers, a fixed time apart.
     Samples {
         /// Nanoseconds from one sample to the next.

@@ -6,11 +6,10 @@ use std::path::Path;
 use crate::cell::{self, Cells};
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
-use crate::instant::has_zone;
 use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
-use crate::{FileError, Format, Layout, Place, Report, TimeForm};
+use crate::{FileError, Format, Layout, Place, Report};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -271,9 +270,9 @@ fn read_time<C: Cells>(
                 expected: time.form.expected(),
             }
         })?;
-    } else if time.form == TimeForm::Rfc3339 {
+    } else if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
         let report = &mut ledger.report;
-        if report.without_zone.is_none() && !has_zone(text.as_bytes()) {
+        if report.without_zone.is_none() && !zoned {
             report.without_zone = Some(rows.place());
         }
     } else if rows.decimal_comma()

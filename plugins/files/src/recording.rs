@@ -128,7 +128,7 @@ impl Recording {
     /// Whether an instant is the same in all files, and not counted from the beginning of its own.
     fn is_dated(&self, time_ns: i64) -> bool {
         match self.layout.time.form {
-            TimeForm::Rfc3339 => true,
+            TimeForm::Rfc3339 | TimeForm::Format(_) => true,
             TimeForm::Numbers { .. } => time_ns >= DATED_NS,
             TimeForm::Samples { .. } => false,
         }

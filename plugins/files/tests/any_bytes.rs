@@ -26,14 +26,14 @@ impl Read for Pieces {
 }
 
 /// Everything that reading gives, as text.
-fn outcome(bytes: &[u8], lengths: Vec<usize>, form: TimeForm, options: &Options) -> String {
+fn outcome(bytes: &[u8], lengths: Vec<usize>, form: &TimeForm, options: &Options) -> String {
     let input = Pieces {
         bytes: bytes.to_vec(),
         at: 0,
         lengths,
         turn: 0,
     };
-    let layout = Layout::new("t", form, ["a", "b"]);
+    let layout = Layout::new("t", form.clone(), ["a", "b"]);
     let mut reader = match Reader::from_read("any", input, layout, options.clone()) {
         Ok(reader) => reader,
         Err(error) => return error.to_string(),
@@ -53,6 +53,7 @@ fn forms() -> impl Strategy<Value = TimeForm> {
     prop_oneof![
         Just(TimeForm::SECONDS),
         Just(TimeForm::Rfc3339),
+        Just(TimeForm::Format("%d.%m.%Y %H:%M".parse().unwrap())),
         any::<i64>().prop_map(|step_ns| TimeForm::Samples { step_ns }),
     ]
 }
@@ -112,9 +113,9 @@ proptest! {
     fn any_bytes_end_in_rows_or_an_error(
         bytes in prop::collection::vec(any::<u8>(), 0..300), form in forms(), options in options(),
     ) {
-        outcome(&bytes, vec![64], form, &options);
+        outcome(&bytes, vec![64], &form, &options);
         let with_header = [b"t,a,b\n", bytes.as_slice()].concat();
-        outcome(&with_header, vec![64], form, &options);
+        outcome(&with_header, vec![64], &form, &options);
     }
 
     #[test]
@@ -122,8 +123,8 @@ proptest! {
         bytes in nearly_recordings(), form in forms(), options in options(),
         lengths in prop::collection::vec(1..20_usize, 1..5),
     ) {
-        let whole = outcome(&bytes, vec![usize::MAX], form, &options);
-        prop_assert_eq!(outcome(&bytes, lengths, form, &options), whole);
+        let whole = outcome(&bytes, vec![usize::MAX], &form, &options);
+        prop_assert_eq!(outcome(&bytes, lengths, &form, &options), whole);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use super::tree::Value;
 use crate::diagnostic::Place;
 use crate::quantity::Quantity;
-use crate::time::Duration;
+use crate::time::{Duration, TimeFormat};
 use crate::unit::Unit;
 
 /// A whole graph file after merging, with every `each` expanded.
@@ -54,7 +54,7 @@ pub enum TimeBase {
 }
 
 /// How a cell of the time column is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TimeForm {
     /// A number; `unit` is the length of one.
     Numbers {
@@ -63,6 +63,8 @@ pub enum TimeForm {
     },
     /// A date and time as RFC 3339 writes it.
     Rfc3339,
+    /// A date and time in another form.
+    Format(TimeFormat),
     /// A sample number.
     Samples {
         /// Time from one sample to the next; without it, one sample is carried as one second.
@@ -77,7 +79,7 @@ impl fmt::Display for TimeBase {
         write!(f, "the column `{column}` ")?;
         match form {
             TimeForm::Numbers { unit } => write!(f, "in steps of {unit}"),
-            TimeForm::Rfc3339 => f.write_str("of dates and times"),
+            TimeForm::Rfc3339 | TimeForm::Format(_) => f.write_str("of dates and times"),
             TimeForm::Samples { step: None } => f.write_str("of sample numbers"),
             TimeForm::Samples { step: Some(step) } => write!(f, "of samples {step} apart"),
         }
@@ -90,7 +92,7 @@ impl TimeBase {
         let TimeBase::Column { form, .. } = self;
         match form {
             TimeForm::Samples { step } => Some(step.unwrap_or(Duration::from_ns(1_000_000_000))),
-            TimeForm::Numbers { .. } | TimeForm::Rfc3339 => None,
+            TimeForm::Numbers { .. } | TimeForm::Rfc3339 | TimeForm::Format(_) => None,
         }
     }
 }

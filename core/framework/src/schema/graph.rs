@@ -386,7 +386,12 @@ fn time(duration: &Value) -> Value {
                 "enum": TIME_UNITS,
                 "default": "s"
             },
-            "step": described(duration, "The time from one sample number to the next.")
+            "step": described(duration, "The time from one sample number to the next."),
+            "format": {
+                "description": "How dates and times are written that are not as in RFC 3339, in the letters of strptime; without an offset (%z) they are UTC.",
+                "type": "string",
+                "examples": ["%d.%m.%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%d.%m.%Y %H:%M:%S%.f"]
+            }
         }
     })
 }

@@ -2,6 +2,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::*;
+use crate::TimeForm;
 
 fn layout(form: TimeForm) -> Layout {
     Layout::new("t", form, ["a"])
@@ -69,7 +70,7 @@ fn a_time_that_steps_back_is_told_as_the_file_has_it() {
 
 #[test]
 fn the_text_of_the_time_is_kept_for_every_form() {
-    let cases: [(TimeForm, &str, i64, i64); 3] = [
+    let cases: [(TimeForm, &str, i64, i64); 4] = [
         (
             TimeForm::Numbers {
                 ns_per_unit: 1_000_000,
@@ -87,6 +88,12 @@ fn the_text_of_the_time_is_kept_for_every_form() {
         (
             TimeForm::Rfc3339,
             "t,a\n1970-01-01 00:00:01,1\n\"1970-01-01T00:00:02Z\",1\n",
+            1_000_000_000,
+            2_000_000_000,
+        ),
+        (
+            TimeForm::Format("%d.%m.%Y %H:%M:%S%.f".parse().unwrap()),
+            "t,a\n01.01.1970 00:00:01,1\n\"01.01.1970 00:00:02.0\",1\n",
             1_000_000_000,
             2_000_000_000,
         ),

@@ -168,6 +168,7 @@ pub(super) fn time(plan: &Plan) -> Facts {
     match form {
         TimeForm::Numbers { unit } => facts.plain("unit", unit.to_string()),
         TimeForm::Rfc3339 => facts.plain("unit", "RFC 3339"),
+        TimeForm::Format(format) => facts.plain("format", format.as_str()),
         TimeForm::Samples { step } => {
             facts.plain("unit", "sample");
             if let Some(step) = step {

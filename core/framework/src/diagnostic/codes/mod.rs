@@ -150,7 +150,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A024",
         "contradicting time",
-        "`[time]` says two things that exclude each other, e.g. both `step` and a unit."
+        "`[time]` says two things that exclude each other, e.g. both `step` and a unit, or a `format` beside one."
     ),
     code!(
         "A025",

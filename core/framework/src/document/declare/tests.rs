@@ -46,6 +46,11 @@ fn time_is_in_seconds_unless_the_file_says_otherwise() {
         time("[time]\nunit = \"rfc3339\""),
         ("time".to_owned(), TimeForm::Rfc3339)
     );
+    let format = "%d.%m.%Y %H:%M";
+    assert_eq!(
+        time(&format!("[time]\nformat = \"{format}\"")),
+        ("time".to_owned(), TimeForm::Format(format.parse().unwrap()))
+    );
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::{TimeBase, TimeForm};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Table, Value};
-use crate::time::Duration;
+use crate::time::{Duration, TimeFormat, TimeFormatError};
 
 const SECOND: Duration = Duration::from_ns(1_000_000_000);
 /// What `unit` may be, beside the units of time.
@@ -23,23 +23,52 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
             form: seconds,
         };
     };
-    known_keys(time, &["column", "unit", "step"], "[time]", diagnostics);
+    known_keys(
+        time,
+        &["column", "unit", "step", "format"],
+        "[time]",
+        diagnostics,
+    );
     let unit = time.get("unit").and_then(|value| unit(value, diagnostics));
     let step = time.get("step").and_then(|value| step(value, diagnostics));
-    let form = form(time, unit, step, diagnostics);
+    let form = match format(time, unit, diagnostics) {
+        Some(format) => TimeForm::Format(format),
+        None => form(time, unit, step, diagnostics),
+    };
     let column = match time
         .get("column")
         .and_then(|value| text(value, "column", diagnostics))
     {
         Some(column) => column.to_owned(),
-        None => match (form, unit) {
+        None => match (&form, unit) {
             (TimeForm::Samples { .. }, _) => SAMPLE.to_owned(),
-            (TimeForm::Rfc3339, _) => "time".to_owned(),
+            (TimeForm::Rfc3339 | TimeForm::Format(_), _) => "time".to_owned(),
             (TimeForm::Numbers { .. }, Some((name, _))) => format!("time_{name}"),
             (TimeForm::Numbers { .. }, None) => "time_s".to_owned(),
         },
     };
     TimeBase::Column { column, form }
+}
+
+/// The format of dates and times, where there is one; beside it neither a unit nor a step has a meaning.
+fn format(
+    time: &Table,
+    unit: Option<(&str, Place)>,
+    diagnostics: &mut Diagnostics,
+) -> Option<TimeFormat> {
+    let entry = time.entry("format")?;
+    let beside = unit.map(|(name, _)| format!("unit = \"{name}\""));
+    let step = || time.entry("step").map(|_| "a `step`".to_owned());
+    if let Some(with) = beside.or_else(step) {
+        let key = "format";
+        diagnostics.report(entry.key, DocumentProblem::TimeContradiction { key, with });
+    }
+    let format = text(&entry.value, "format", diagnostics)?.parse();
+    if let Err(error) = &format {
+        let (key, reason) = (Some("format".to_owned()), TimeFormatError::to_string(error));
+        diagnostics.report(entry.value.place, DocumentProblem::Refused { key, reason });
+    }
+    format.ok()
 }
 
 fn form(

@@ -348,6 +348,9 @@ impl Problem for DocumentProblem {
             Self::RangeOrder { .. } => Some("write the lower limit first".to_owned()),
             Self::UnknownChannel { name, known, .. } => one_of(name, known, "its channels are"),
             Self::EmptyList { .. } => Some("name at least one".to_owned()),
+            Self::TimeContradiction { key: "format", .. } => {
+                Some("leave out one of the two".to_owned())
+            }
             Self::TimeContradiction { key, .. } => {
                 Some(format!("leave out `{key}`, or write `unit = \"sample\"`"))
             }

@@ -107,6 +107,36 @@ error[A009]: "fortnight" is not a choice for "unit"
 }
 
 #[test]
+fn a_format_says_a_whole_time_and_stands_alone() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[time]
+unit = "ms"
+format = "%H:%M:%S"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A024]: `format` has no meaning with unit = "ms"
+ --> a.toml:4:1
+  |
+4 | format = "%H:%M:%S"
+  | ^^^^^^
+  |
+  = help: leave out one of the two
+
+error[A010]: "format" is refused: it does not give a whole date and time; write year, month, day, hour and minute as strptime does, e.g. "%d.%m.%Y %H:%M:%S"
+ --> a.toml:4:10
+  |
+4 | format = "%H:%M:%S"
+  |          ^^^^^^^^^^ refused
+"#
+    );
+}
+
+#[test]
 fn a_step_is_longer_than_zero() {
     let files = [(
         "a.toml",

@@ -1,0 +1,162 @@
+//! Decides in which form a column's dates and times are written; whether it is the time is decided beside it.
+
+use athermal::core::time::TimeFormat;
+use athermal::files::{TimeForm, has_zone};
+
+/// What is told of times that do not say how far they are from UTC.
+pub const WITHOUT_ZONE: &str = "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when \
+     the clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00";
+
+/// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
+/// month that does, where only the numbers could tell them apart.
+const FORMATS: [&str; 15] = [
+    "%d.%m.%Y %H:%M:%S%.f",
+    "%d.%m.%Y %H:%M",
+    "%Y/%m/%d %H:%M:%S%.f",
+    "%Y/%m/%d %H:%M",
+    "%Y.%m.%d %H:%M:%S%.f",
+    "%d-%b-%Y %H:%M:%S%.f",
+    "%d %b %Y %H:%M:%S%.f",
+    "%d/%m/%Y %H:%M:%S%.f",
+    "%d/%m/%Y %H:%M",
+    "%m/%d/%Y %H:%M:%S%.f",
+    "%m/%d/%Y %H:%M",
+    "%m/%d/%Y %I:%M:%S%.f %p",
+    "%m/%d/%Y %I:%M %p",
+    "%Y-%m-%d_%H-%M-%S",
+    "%Y%m%d_%H%M%S",
+];
+
+/// A form of dates and times, with what is told of it.
+pub struct Dates {
+    /// The form.
+    pub form: TimeForm,
+    /// What a graph file says of it: a key of `[time]` and its value.
+    pub declared: (&'static str, String),
+    /// Why it was taken.
+    pub why: String,
+}
+
+/// The form of these cells, if one is known that nearly all of them have: a log may have been written into by hand.
+pub fn of(cells: &[String]) -> Option<Dates> {
+    if fits(&TimeForm::Rfc3339, cells) {
+        let zoned = cells.iter().all(|cell| has_zone(cell.as_bytes()));
+        let why = if zoned {
+            "dates and times as in RFC 3339"
+        } else {
+            WITHOUT_ZONE
+        };
+        return Some(Dates {
+            form: TimeForm::Rfc3339,
+            declared: ("unit", "rfc3339".to_owned()),
+            why: why.to_owned(),
+        });
+    }
+    let known = FORMATS.iter().filter_map(|format| format.parse().ok());
+    let mut fitting =
+        known.filter(|format| fits(&TimeForm::Format(TimeFormat::clone(format)), cells));
+    let format = fitting.next()?;
+    let mut found = by(format);
+    if let Some(other) = fitting.find(|other| reads_otherwise(&found.form, other, cells)) {
+        found.why.push_str(&format!(
+            "; they may as well be `{other}`: if so, give that with --time-format"
+        ));
+    }
+    Some(found)
+}
+
+/// That of a format.
+pub fn by(format: TimeFormat) -> Dates {
+    let zone = if format.has_offset() {
+        ""
+    } else {
+        WITHOUT_ZONE
+    };
+    let zone = zone.strip_prefix("dates and times").unwrap_or(zone);
+    Dates {
+        declared: ("format", format.to_string()),
+        why: format!("dates and times as `{format}`{zone}"),
+        form: TimeForm::Format(format),
+    }
+}
+
+/// Whether cells look like times of day, with or without a date.
+pub fn look_like_times(cells: &[String]) -> bool {
+    let like = |cell: &&String| {
+        let mut around = cell.as_bytes().windows(3);
+        around.any(|of| of[1] == b':' && of[0].is_ascii_digit() && of[2].is_ascii_digit())
+    };
+    !cells.is_empty() && cells.iter().filter(like).count() * 2 > cells.len()
+}
+
+fn fits(form: &TimeForm, cells: &[String]) -> bool {
+    let read = cells
+        .iter()
+        .filter(|cell| form.read(cell.as_bytes()).is_some());
+    read.count() * 100 >= cells.len() * 95
+}
+
+fn reads_otherwise(form: &TimeForm, other: &TimeFormat, cells: &[String]) -> bool {
+    let other = TimeForm::Format(other.clone());
+    cells
+        .iter()
+        .any(|cell| form.read(cell.as_bytes()) != other.read(cell.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(cells: &[&str]) -> Option<Dates> {
+        of(&cells
+            .iter()
+            .map(|&cell| cell.to_owned())
+            .collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn every_format_is_one_and_known_cells_are_read_by_theirs() {
+        assert!(
+            FORMATS
+                .iter()
+                .all(|format| format.parse::<TimeFormat>().is_ok())
+        );
+        for (cell, format) in [
+            ("01.03.2026 12:00:00", "%d.%m.%Y %H:%M:%S%.f"),
+            ("1.3.2026 12:00:00.500", "%d.%m.%Y %H:%M:%S%.f"),
+            ("01.03.2026 12:00", "%d.%m.%Y %H:%M"),
+            ("2026/03/01 12:00:00", "%Y/%m/%d %H:%M:%S%.f"),
+            ("01-Mar-2026 12:00:00", "%d-%b-%Y %H:%M:%S%.f"),
+            ("13/03/2026 12:00:00", "%d/%m/%Y %H:%M:%S%.f"),
+            ("03/13/2026 12:00:00", "%m/%d/%Y %H:%M:%S%.f"),
+            ("3/1/2026 12:00:00 PM", "%m/%d/%Y %I:%M:%S%.f %p"),
+            ("20260301_120000", "%Y%m%d_%H%M%S"),
+        ] {
+            let found = found(&[cell]).unwrap();
+            assert_eq!(found.declared, ("format", format.to_owned()), "{cell}");
+            assert!(!found.why.contains("as well"), "{}", found.why);
+        }
+    }
+
+    #[test]
+    fn a_day_that_may_be_a_month_is_told() {
+        let found = found(&["01/03/2026 12:00:00", "01/03/2026 12:00:10"]).unwrap();
+        assert_eq!(found.declared.1, "%d/%m/%Y %H:%M:%S%.f");
+        assert!(
+            found.why.contains("`%m/%d/%Y %H:%M:%S%.f`"),
+            "{}",
+            found.why
+        );
+    }
+
+    #[test]
+    fn a_time_of_day_alone_is_no_time_and_looks_like_one() {
+        for cell in ["12:00:00", "Sunday 12:00"] {
+            assert!(found(&[cell]).is_none(), "{cell}");
+            assert!(look_like_times(&[cell.to_owned()]), "{cell}");
+        }
+        for cell in ["12.5", "a:b", ""] {
+            assert!(!look_like_times(&[cell.to_owned()]), "{cell}");
+        }
+    }
+}
