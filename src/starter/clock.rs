@@ -21,12 +21,20 @@ pub struct Clock {
     why: String,
 }
 
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 16] = [
     "time",
     "timestamp",
     "datetime",
     "date",
+    "utc",
+    "epoch",
+    "ts",
     "t",
+    "datum",
+    "zeit",
+    "uhrzeit",
+    "clock",
+    "elapsed",
     "sample",
     "index",
     "n",
@@ -121,26 +129,30 @@ pub fn find(
     let measured = |index: &usize| ends_in_unit(&described.columns[*index]);
     let mut likely: Vec<usize> = (0..described.columns.len()).collect();
     likely.retain(|index| !measured(index));
-    likely.sort_by_key(|&index| {
+    let rank = |index: usize| {
         let name = described.columns[index].to_lowercase();
         let first = words(&name).into_iter().next().unwrap_or_default();
-        NAMES
-            .iter()
-            .position(|known| *known == first)
-            .unwrap_or(NAMES.len())
-    });
-    let found = likely.iter().find_map(|&index| clock(index));
-    found.ok_or_else(|| {
-        let timed = |index: &&usize| dates::look_like_times(&cells(described, **index));
-        match likely.iter().find(timed) {
-            Some(&index) => no_clock(described, index),
-            None => format!(
-                "no column advances from row to row as a time does, and a log needs one: a time, or a number that counts its \
-                 samples; name it with --time (there are {})",
-                described.columns.join(", ")
-            ),
-        }
-    })
+        let known = NAMES.iter().position(|known| *known == first);
+        known.unwrap_or(NAMES.len())
+    };
+    likely.sort_by_key(|&index| rank(index));
+    let looks_like_times = |index: &usize| dates::look_like_times(&cells(described, *index));
+    let mut unread = likely.iter().copied().filter(looks_like_times);
+    let unread = unread.find(|&index| clock(index).is_none());
+    let mut found = likely
+        .iter()
+        .filter_map(|&index| Some((index, clock(index)?)));
+    // Beside what is meant to be a time, no other column that happens to grow is one.
+    let is_meant = |index: usize| unread.is_none() || rank(index) < NAMES.len();
+    match (found.find(|(index, _)| is_meant(*index)), unread) {
+        (Some((_, clock)), _) => Ok(clock),
+        (None, Some(unread)) => Err(no_clock(described, unread)),
+        (None, None) => Err(format!(
+            "no column advances from row to row as a time does, and a log needs one: a time, or a number that counts its \
+             samples; name it with --time (there are {})",
+            described.columns.join(", ")
+        )),
+    }
 }
 
 /// Why a column is not the time.
@@ -387,19 +399,19 @@ mod tests {
 
     #[test]
     fn a_time_in_a_form_that_is_not_known_is_told_with_a_cell_and_read_by_a_format_that_is_named() {
-        let text = "a,clock\n1,12:00 on 01.03.2026\n1,12:01 on 01.03.2026\n";
+        let text = "a,when\n1,12:00 on 01.03.2026\n2,12:01 on 01.03.2026\n";
         let described = Description::of_read("log", text.as_bytes(), None, 10).unwrap();
-        for named in [None, Some("clock")] {
+        for named in [None, Some("when")] {
             let refused = find(&described, named, None).unwrap_err();
             assert!(
-                refused.contains("`clock` has times such as `12:00 on 01.03.2026`")
+                refused.contains("`when` has times such as `12:00 on 01.03.2026`")
                     && refused.contains("--time-format"),
                 "{refused}"
             );
         }
         let format: TimeFormat = "%H:%M on %d.%m.%Y".parse().unwrap();
         let clock = find(&described, None, Some(&format)).unwrap();
-        assert_eq!(clock.column, "clock");
+        assert_eq!(clock.column, "when");
         assert_eq!(clock.declared, Some(("format", format.to_string())));
         assert!(
             clock.remark().contains("taken for UTC"),
