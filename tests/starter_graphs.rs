@@ -192,6 +192,21 @@ fn dates_as_they_are_written_elsewhere_are_read_as_they_are() {
 }
 
 #[test]
+fn columns_whose_names_differ_in_signs_alone_have_channels_of_their_own() {
+    let folder = Folder::new("alike");
+    let mut text =
+        "time_s,plate (C),plate [°C],plate_degC,plate_degF,Z_um,Z um,Z (um)\n".to_owned();
+    for (time_s, degc, _, z) in grinding(3000, 30.0) {
+        let degf = 32.0 + 1.8 * degc;
+        let _ = writeln!(
+            text,
+            "{time_s},{degc:.4},{degc:.3},{degc:.2},{degf:.3},{z:.4},{z:.3},{z:.2}"
+        );
+    }
+    folder.started("alike.csv", &text);
+}
+
+#[test]
 fn a_time_that_no_instant_fits_is_told_with_the_row() {
     let folder = Folder::new("beyond");
     let text = "stamp_d,plate_degC,Z_um\n1e300,20.1,1\n2e300,20.2,2\n3e300,20.3,3\n";

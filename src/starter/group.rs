@@ -1,5 +1,9 @@
 //! Decides which columns make up one signal of a graph, and how its channels are named; not what they measure.
 
+use std::collections::BTreeSet;
+
+use athermal::core::unit::Unit;
+
 use super::column::{Column, Kind};
 
 /// Columns of one kind and unit that make up a signal.
@@ -17,7 +21,7 @@ pub struct Group {
     pub columns: Vec<usize>,
 }
 
-/// The signals of a kind.
+/// The signals of a kind; no two of their channels have the same name.
 #[must_use]
 pub fn groups(columns: &[Column], kind: Kind, signal: &str) -> Vec<Group> {
     let mut units: Vec<(&str, Vec<usize>)> = Vec::new();
@@ -31,20 +35,25 @@ pub fn groups(columns: &[Column], kind: Kind, signal: &str) -> Vec<Group> {
         }
     }
     let mut groups: Vec<Group> = Vec::new();
+    let mut taken = BTreeSet::new();
     for (unit, members) in units {
         let names: Vec<&str> = members.iter().map(|&i| columns[i].name.as_str()).collect();
-        let shared = pattern(&names);
+        let is_new = |channels: &[String]| channels.iter().all(|name| !taken.contains(name));
+        let shared = pattern(&names).filter(|(_, channels)| is_new(channels));
         let parts = match shared {
             Some((pattern, channels)) => vec![(pattern, channels, members)],
             // A signal of its own for each column, since only then may the column have any name.
             None => {
                 let single = |(&index, name): (&usize, &&str)| {
-                    ((*name).to_owned(), vec![channel_name(name)], vec![index])
+                    let channel = free(&channel_name(name), &taken);
+                    taken.insert(channel.clone());
+                    ((*name).to_owned(), vec![channel], vec![index])
                 };
                 members.iter().zip(&names).map(single).collect()
             }
         };
         for (pattern, channels, columns) in parts {
+            taken.extend(channels.iter().cloned());
             let number = groups.len() + 1;
             groups.push(Group {
                 signal: if number == 1 {
@@ -122,10 +131,22 @@ fn is_name(name: &str) -> bool {
             .all(|c| c.is_alphanumeric() || c == '_' || c == '-')
 }
 
-/// A name for a channel whose column has one that no channel can have.
+/// The name, or the first after it with a number that is not taken.
+fn free(name: &str, taken: &BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}-{number}"));
+    let mut names = std::iter::once(name.to_owned()).chain(numbered);
+    let free = names.find(|name| !taken.contains(name));
+    free.unwrap_or_default()
+}
+
+/// A name for a channel whose column has one that no channel can have, without a unit in brackets at its end.
 fn channel_name(column: &str) -> String {
+    let column = column.trim();
+    let bracketed = column.strip_suffix([']', ')']);
+    let bracketed = bracketed.and_then(|start| start.rsplit_once(['[', '(']));
+    let of_unit = bracketed.filter(|(_, unit)| Unit::in_name(unit.trim()).is_some());
     let mut name = String::new();
-    for c in column.chars() {
+    for c in of_unit.map_or(column, |(before, _)| before).chars() {
         if c.is_alphanumeric() {
             name.push(c);
         } else if !name.is_empty() && !name.ends_with('-') {
@@ -171,6 +192,13 @@ mod tests {
     #[test]
     fn columns_that_no_channel_can_be_named_after_stand_alone() {
         assert_eq!(told(&["Plate 1 [°C]", "Room air"]), None);
-        assert_eq!(channel_name("Plate 1 [°C]"), "Plate-1-C");
+        for (column, channel) in [
+            ("Plate 1 [°C]", "Plate-1"),
+            ("Z (µm) ", "Z"),
+            ("Plate [1]", "Plate-1"),
+            ("[°C]", "value"),
+        ] {
+            assert_eq!(channel_name(column), channel);
+        }
     }
 }

@@ -247,7 +247,8 @@ impl fmt::Display for FileError {
             Self::NotText { place } => {
                 write!(
                     f,
-                    "{place}: is not text in UTF-8; save the recording as CSV or JSON lines in UTF-8"
+                    "{place}: is not text in UTF-8; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\", \
+                     and `iconv -f CP1252 -t UTF-8` makes it of what Windows programs write"
                 )
             }
             Self::TooLong { place, limit } => write!(
