@@ -195,15 +195,17 @@ fn dates_as_they_are_written_elsewhere_are_read_as_they_are() {
 fn columns_whose_names_differ_in_signs_alone_have_channels_of_their_own() {
     let folder = Folder::new("alike");
     let mut text =
-        "time_s,plate (C),plate [°C],plate_degC,plate_degF,Z_um,Z um,Z (um)\n".to_owned();
+        "time_s,plate (C),plate [°C],plate_degC,plate_degF,{plate}_degC,Z_um,Z um,Z (um)\n"
+            .to_owned();
     for (time_s, degc, _, z) in grinding(3000, 30.0) {
         let degf = 32.0 + 1.8 * degc;
         let _ = writeln!(
             text,
-            "{time_s},{degc:.4},{degc:.3},{degc:.2},{degf:.3},{z:.4},{z:.3},{z:.2}"
+            "{time_s},{degc:.4},{degc:.3},{degc:.2},{degf:.3},{degc:.1},{z:.4},{z:.3},{z:.2}"
         );
     }
-    folder.started("alike.csv", &text);
+    let told = folder.started("alike.csv", &text);
+    assert!(told.contains("{plate}_degC: left out"), "{told}");
 }
 
 #[test]

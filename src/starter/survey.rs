@@ -177,7 +177,11 @@ impl Survey {
                 .first_unreadable
                 .as_ref()
                 .and_then(|first| first.mark);
-            if series.unreadable * TEXT_ONE_IN >= cells.max(1) {
+            if column.name.contains(['{', '}']) {
+                column.leave_out(
+                    "in a graph, braces in the name of a column stand for something else; rename it".to_owned(),
+                );
+            } else if series.unreadable * TEXT_ONE_IN >= cells.max(1) {
                 let all = if values == 0 { "" } else { "in part " };
                 column.leave_out(match mark {
                     Some((mark, since)) => format!(
