@@ -123,7 +123,7 @@ pub fn find(
                 described.columns.join(", ")
             )
         })?;
-        return clock(index).ok_or_else(|| no_clock(described, index));
+        return clock(index).ok_or_else(|| no_clock(described, index, format));
     }
     // What is in degrees or in nanometres is no time, however steadily it grows.
     let measured = |index: &usize| ends_in_unit(&described.columns[*index]);
@@ -146,7 +146,7 @@ pub fn find(
     let is_meant = |index: usize| unread.is_none() || rank(index) < NAMES.len();
     match (found.find(|(index, _)| is_meant(*index)), unread) {
         (Some((_, clock)), _) => Ok(clock),
-        (None, Some(unread)) => Err(no_clock(described, unread)),
+        (None, Some(unread)) => Err(no_clock(described, unread, format)),
         (None, None) => Err(format!(
             "no column advances from row to row as a time does, and a log needs one: a time, or a number that counts its \
              samples; name it with --time (there are {})",
@@ -156,10 +156,13 @@ pub fn find(
 }
 
 /// Why a column is not the time.
-fn no_clock(described: &Description, index: usize) -> String {
+fn no_clock(described: &Description, index: usize, format: Option<&TimeFormat>) -> String {
     let (column, cells) = (&described.columns[index], cells(described, index));
-    match cells.first() {
-        Some(first) if dates::look_like_times(&cells) => format!(
+    match (cells.first(), format) {
+        (Some(first), Some(format)) => {
+            format!("`{column}` has no time as `{format}` says, but such as `{first}`")
+        }
+        (Some(first), None) if dates::look_like_times(&cells) => format!(
             "`{column}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
              e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
         ),
@@ -412,6 +415,14 @@ mod tests {
         let format: TimeFormat = "%H:%M on %d.%m.%Y".parse().unwrap();
         let clock = find(&described, None, Some(&format)).unwrap();
         assert_eq!(clock.column, "when");
+        let other: TimeFormat = "%d.%m.%Y %H:%M".parse().unwrap();
+        for named in [None, Some("when")] {
+            let refused = find(&described, named, Some(&other)).unwrap_err();
+            assert!(
+                refused.contains("`when` has no time as `%d.%m.%Y %H:%M` says"),
+                "{refused}"
+            );
+        }
         assert_eq!(clock.declared, Some(("format", format.to_string())));
         assert!(
             clock.remark().contains("taken for UTC"),

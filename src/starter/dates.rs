@@ -9,9 +9,11 @@ pub const WITHOUT_ZONE: &str = "dates and times without a zone, taken for UTC; i
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
 /// month that does, where only the numbers could tell them apart.
-const FORMATS: [&str; 15] = [
+const FORMATS: [&str; 20] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
+    "%d.%m.%y %H:%M:%S%.f",
+    "%d.%m.%y %H:%M",
     "%Y/%m/%d %H:%M:%S%.f",
     "%Y/%m/%d %H:%M",
     "%Y.%m.%d %H:%M:%S%.f",
@@ -19,10 +21,13 @@ const FORMATS: [&str; 15] = [
     "%d %b %Y %H:%M:%S%.f",
     "%d/%m/%Y %H:%M:%S%.f",
     "%d/%m/%Y %H:%M",
+    "%d/%m/%y %H:%M",
     "%m/%d/%Y %H:%M:%S%.f",
     "%m/%d/%Y %H:%M",
+    "%m/%d/%y %H:%M",
     "%m/%d/%Y %I:%M:%S%.f %p",
     "%m/%d/%Y %I:%M %p",
+    "%m/%d/%y %I:%M %p",
     "%Y-%m-%d_%H-%M-%S",
     "%Y%m%d_%H%M%S",
 ];
@@ -125,10 +130,12 @@ mod tests {
             ("01.03.2026 12:00:00", "%d.%m.%Y %H:%M:%S%.f"),
             ("1.3.2026 12:00:00.500", "%d.%m.%Y %H:%M:%S%.f"),
             ("01.03.2026 12:00", "%d.%m.%Y %H:%M"),
+            ("01.03.26 12:00:00", "%d.%m.%y %H:%M:%S%.f"),
             ("2026/03/01 12:00:00", "%Y/%m/%d %H:%M:%S%.f"),
             ("01-Mar-2026 12:00:00", "%d-%b-%Y %H:%M:%S%.f"),
             ("13/03/2026 12:00:00", "%d/%m/%Y %H:%M:%S%.f"),
             ("03/13/2026 12:00:00", "%m/%d/%Y %H:%M:%S%.f"),
+            ("3/13/26 12:00", "%m/%d/%y %H:%M"),
             ("3/1/2026 12:00:00 PM", "%m/%d/%Y %I:%M:%S%.f %p"),
             ("20260301_120000", "%Y%m%d_%H%M%S"),
         ] {
