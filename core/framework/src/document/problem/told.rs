@@ -258,11 +258,14 @@ impl Problem for DocumentProblem {
                         _ => format!("a text stands in quotes: \"{bare}\""),
                     })
             }
-            Self::Unreadable { path, beside, .. } => near_or_all(
-                graph_meant(path, beside),
-                beside.iter().map(String::as_str),
-                "the graphs in that folder are",
-            ),
+            Self::Unreadable { path, beside, .. } => match graph_meant(path, beside) {
+                Some(meant) => Some(format!("did you mean \"{meant}\"?")),
+                None if beside.is_empty() => None,
+                None => {
+                    let graphs = listed(beside.iter().map(String::as_str));
+                    Some(format!("in that folder there is {graphs}"))
+                }
+            },
             Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
             Self::InputAsKey { input, .. } => {
                 Some(format!("`{input}` is an input: write `inputs.{input} = …`"))

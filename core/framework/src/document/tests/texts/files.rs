@@ -103,7 +103,7 @@ fn a_file_that_is_not_there_may_be_one_that_stands_in_its_folder() {
         told.lines().last().unwrap_or_default().trim().to_owned()
     });
     let near = "= help: did you mean \"die-tester.toml\"?";
-    let all = "= help: the graphs in that folder are \"die-tester.toml\", \"linear-axis.toml\"";
+    let all = "= help: in that folder there is \"die-tester.toml\", \"linear-axis.toml\"";
     assert_eq!(told, [near, near, all]);
 }
 
