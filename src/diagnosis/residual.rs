@@ -29,7 +29,7 @@ pub struct Residuals {
     pub truth: String,
     /// The unit of the truth.
     pub unit: String,
-    /// Residuals over all truths.
+    /// Residuals over all truths for which this prediction was valid; a score takes those for which all of the truth were.
     pub count: usize,
     /// Their root mean square.
     pub rms: f64,

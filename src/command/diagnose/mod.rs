@@ -30,7 +30,7 @@ use tables::Tables;
 /// Tells whether what predictions leave is white (p of Ljung and Box not below 0.01); which features say something of the truth, at which lag, and of what
 /// predictions leave; how each estimator answers a change of each sensor; how well the data determine it; what each sensor
 /// contributes; and, by fits of its own on the data, how well each day is predicted from the others and how many days are
-/// needed.
+/// needed. Each prediction is looked at wherever it is valid itself; `evaluate` scores those of a truth where all of them are.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   athermal diagnose model.json --data week.csv
