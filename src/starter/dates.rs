@@ -1,7 +1,7 @@
 //! Decides in which form a column's dates and times are written; whether it is the time is decided beside it.
 
 use athermal::core::time::TimeFormat;
-use athermal::files::{TimeForm, has_zone};
+use athermal::files::{TimeForm, has_clock, has_zone};
 
 /// What is told of times that do not say how far they are from UTC.
 pub const WITHOUT_ZONE: &str = "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when \
@@ -87,11 +87,8 @@ pub fn by(format: TimeFormat) -> Dates {
 
 /// Whether cells look like times of day, with or without a date.
 pub fn look_like_times(cells: &[String]) -> bool {
-    let like = |cell: &&String| {
-        let mut around = cell.as_bytes().windows(3);
-        around.any(|of| of[1] == b':' && of[0].is_ascii_digit() && of[2].is_ascii_digit())
-    };
-    !cells.is_empty() && cells.iter().filter(like).count() * 2 > cells.len()
+    let like = cells.iter().filter(|cell| has_clock(cell));
+    like.count() * 2 > cells.len()
 }
 
 fn fits(form: &TimeForm, cells: &[String]) -> bool {

@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::sync::Arc;
 
+use crate::instant::has_clock;
+
 /// Longest piece of a file that a message repeats, in characters.
 const EXCERPT: usize = 60;
 
@@ -211,12 +213,6 @@ impl FileError {
 }
 
 /// Whether a text holds a date such as `2013-07-04`, at its beginning or as an example.
-/// Whether a text has hours and minutes in it.
-fn has_clock(text: &str) -> bool {
-    let mut around = text.as_bytes().windows(3);
-    around.any(|of| of[1] == b':' && of[0].is_ascii_digit() && of[2].is_ascii_digit())
-}
-
 fn is_date(text: &str) -> bool {
     let form = |four: &[u8]| four.iter().all(u8::is_ascii_digit);
     let mut dates = text.as_bytes().windows(10);

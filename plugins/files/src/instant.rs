@@ -64,6 +64,13 @@ pub fn has_zone(text: &[u8]) -> bool {
     clock.any(|b| matches!(b, b'Z' | b'z' | b'+' | b'-'))
 }
 
+/// Whether a text has hours and minutes in it.
+#[must_use]
+pub fn has_clock(text: &str) -> bool {
+    let mut around = text.as_bytes().windows(3);
+    around.any(|of| of[1] == b':' && of[0].is_ascii_digit() && of[2].is_ascii_digit())
+}
+
 fn timestamp(text: &[u8]) -> Option<Timestamp> {
     static PARSER: DateTimeParser = DateTimeParser::new();
     if has_zone(text) {
