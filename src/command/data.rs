@@ -155,7 +155,7 @@ pub fn note_zone(terminal: &Terminal, reports: &[(String, Report)]) {
         .iter()
         .filter_map(|(_, report)| report.without_zone.as_ref());
     if let Some(place) = places.next() {
-        terminal.note(format_args!("{place}: {WITHOUT_ZONE}"));
+        terminal.note(format_args!("{place}: dates and times {WITHOUT_ZONE}"));
     }
 }
 

@@ -3,8 +3,8 @@
 use athermal::core::time::TimeFormat;
 use athermal::files::{TimeForm, has_clock, has_zone};
 
-/// What is told of times that do not say how far they are from UTC.
-pub const WITHOUT_ZONE: &str = "dates and times without a zone, taken for UTC; if they are local time, the hour that comes twice when \
+/// What is told of dates and times that do not say how far they are from UTC.
+pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local time, the hour that comes twice when \
      the clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00";
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
@@ -46,15 +46,15 @@ pub struct Dates {
 pub fn of(cells: &[String]) -> Option<Dates> {
     if fits(&TimeForm::Rfc3339, cells) {
         let zoned = cells.iter().all(|cell| has_zone(cell.as_bytes()));
-        let why = if zoned {
-            "dates and times as in RFC 3339"
+        let which = if zoned {
+            "as in RFC 3339"
         } else {
             WITHOUT_ZONE
         };
         return Some(Dates {
             form: TimeForm::Rfc3339,
             declared: ("unit", "rfc3339".to_owned()),
-            why: why.to_owned(),
+            why: format!("dates and times {which}"),
         });
     }
     let known = FORMATS.iter().filter_map(|format| format.parse().ok());
@@ -72,15 +72,13 @@ pub fn of(cells: &[String]) -> Option<Dates> {
 
 /// That of a format.
 pub fn by(format: TimeFormat) -> Dates {
-    let zone = if format.has_offset() {
-        ""
-    } else {
-        WITHOUT_ZONE
-    };
-    let zone = zone.strip_prefix("dates and times").unwrap_or(zone);
+    let mut why = format!("dates and times as `{format}`");
+    if !format.has_offset() {
+        why = format!("{why} {WITHOUT_ZONE}");
+    }
     Dates {
         declared: ("format", format.to_string()),
-        why: format!("dates and times as `{format}`{zone}"),
+        why,
         form: TimeForm::Format(format),
     }
 }
