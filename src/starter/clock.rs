@@ -221,8 +221,11 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         .skip(1)
         .rev()
         .find_map(|word| UNITS.iter().find(|(name, ..)| name == word));
-    let furthest = numbers.iter().copied().map(f64::abs).fold(0.0, f64::max);
-    let fits = |&&(_, _, ns_per_unit): &&Unit| furthest * (ns_per_unit as f64) < i64::MAX as f64;
+    // One wild cell says nothing of the unit that a name says.
+    let fits = |&&(_, _, ns_per_unit): &&Unit| {
+        let beyond = |number: &&f64| number.abs() * ns_per_unit as f64 >= i64::MAX as f64;
+        numbers.iter().filter(beyond).count() * 2 < numbers.len()
+    };
     if let Some(&(_, name, ns_per_unit)) = unit.filter(fits) {
         return Some(Clock {
             column,
@@ -347,6 +350,13 @@ mod tests {
             (
                 "time_s,a\n1772366400000,5\n1772366410000,5\n",
                 "time_s",
+                TimeForm::Numbers {
+                    ns_per_unit: 1_000_000,
+                },
+            ),
+            (
+                "time_ms,a\n0,5\n10,5\n20,5\n1e300,5\n",
+                "time_ms",
                 TimeForm::Numbers {
                     ns_per_unit: 1_000_000,
                 },

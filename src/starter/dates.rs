@@ -9,7 +9,7 @@ pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
 /// month that does, where only the numbers could tell them apart.
-const FORMATS: [&str; 20] = [
+const FORMATS: [&str; 22] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
     "%d.%m.%y %H:%M:%S%.f",
@@ -21,9 +21,11 @@ const FORMATS: [&str; 20] = [
     "%d %b %Y %H:%M:%S%.f",
     "%d/%m/%Y %H:%M:%S%.f",
     "%d/%m/%Y %H:%M",
+    "%d/%m/%y %H:%M:%S%.f",
     "%d/%m/%y %H:%M",
     "%m/%d/%Y %H:%M:%S%.f",
     "%m/%d/%Y %H:%M",
+    "%m/%d/%y %H:%M:%S%.f",
     "%m/%d/%y %H:%M",
     "%m/%d/%Y %I:%M:%S%.f %p",
     "%m/%d/%Y %I:%M %p",
@@ -131,6 +133,7 @@ mod tests {
             ("13/03/2026 12:00:00", "%d/%m/%Y %H:%M:%S%.f"),
             ("03/13/2026 12:00:00", "%m/%d/%Y %H:%M:%S%.f"),
             ("3/13/26 12:00", "%m/%d/%y %H:%M"),
+            ("3/13/26 12:00:00", "%m/%d/%y %H:%M:%S%.f"),
             ("3/1/2026 12:00:00 PM", "%m/%d/%Y %I:%M:%S%.f %p"),
             ("20260301_120000", "%Y%m%d_%H%M%S"),
         ] {

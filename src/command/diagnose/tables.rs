@@ -122,6 +122,7 @@ impl<'a> Tables<'a> {
 
     fn lags(&self) -> String {
         let mut rows = Vec::new();
+        let mut still = "";
         for main in self.main() {
             let Some(of) = self.lags_of(main) else {
                 continue;
@@ -152,9 +153,8 @@ impl<'a> Tables<'a> {
                     ]
                 }));
                 if all && unknown > 0 {
-                    rows.push(vec![format!(
-                        "    never there, or never changing: {unknown}"
-                    )]);
+                    rows.push(vec![format!("    without a correlation: {unknown}")]);
+                    still = "; there is none where\nthe one or the other never changes, or both are never there at once";
                 }
             };
             list(of.truth.clone(), |of| &of.truth, true);
@@ -168,7 +168,7 @@ impl<'a> Tables<'a> {
             "largest correlation of features with the truth, with the lag by which it\n\
              follows them, and within what the largest of all would lie by chance alone in\n\
              99 % of recordings; and beyond that with what is left of it, at lags at which\n\
-             they were known when it was predicted\n{}",
+             they were known when it was predicted{still}\n{}",
             table(&["", "r", "lag", "99 %"], &rows)
         )
     }
