@@ -234,7 +234,7 @@ fn a_channel_whose_samples_are_mostly_out_of_range_makes_one_ask_for_its_unit() 
 
 /// As the editor of another system may have saved them.
 #[test]
-fn files_that_are_no_text_in_utf_8_are_told_to_be_saved_as_that() {
+fn a_graph_and_a_model_that_are_no_text_in_utf_8_are_told_to_be_saved_as_that_and_a_log_is_read() {
     let (scratch, graph, data, model) = desk("utf-16");
     let in_utf_16 = |name: &str, path: &PathBuf| {
         let text = std::fs::read_to_string(path).unwrap();
@@ -250,7 +250,5 @@ fn files_that_are_no_text_in_utf_8_are_told_to_be_saved_as_that() {
         .ended(3)
         .tells(&["other-model.json: it is not text in UTF-8; save it as that"]);
     let log = in_utf_16("other-log.csv", &data);
-    athermal(&[&"evaluate", &model, &"--data", &log])
-        .ended(2)
-        .tells(&["other-log.csv:1: is not text in UTF-8"]);
+    athermal(&[&"evaluate", &model, &"--data", &log]).ended(0);
 }

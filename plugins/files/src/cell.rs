@@ -1,4 +1,8 @@
-//! A cell as a value: a number, no value, or neither; a value as a cell. Not what follows from a cell that is neither.
+//! A cell as a text, or as a value: a number, no value, or neither; a value as a cell. Not what follows from a cell that is neither.
+
+use std::borrow::Cow;
+
+use encoding_rs::WINDOWS_1252;
 
 use crate::ledger::Ledger;
 use crate::{FileError, Place};
@@ -17,6 +21,14 @@ pub(crate) trait Cells {
     /// Whether `1,5` is a number.
     fn decimal_comma(&self) -> bool;
     fn place(&self) -> Place;
+}
+
+/// The text of a cell: what is not UTF-8 is taken for Windows-1252, which is what Windows programs write in Western countries.
+pub(crate) fn text(cell: &[u8]) -> Cow<'_, str> {
+    match std::str::from_utf8(cell) {
+        Ok(text) => text.into(),
+        Err(_) => WINDOWS_1252.decode_without_bom_handling(cell).0,
+    }
 }
 
 /// The value of a cell, `NaN` for "no value" (empty, `NaN`, `null` in any case), 1 for `true` and 0 for `false` (in any case);

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use csv::{ByteRecord, ReaderBuilder};
 
-use crate::cell::trim;
+use crate::cell::{self, trim};
 use crate::error::excerpt;
 use crate::{FileError, MissingColumn, Place};
 
@@ -52,7 +52,7 @@ fn names_in(header: &[u8], delimiter: u8) -> Vec<String> {
 
 /// The name that a header cell gives.
 pub(crate) fn name(cell: &[u8]) -> String {
-    String::from_utf8_lossy(trim(cell)).into_owned()
+    cell::text(trim(cell)).into_owned()
 }
 
 /// Where a name stands.
@@ -80,11 +80,12 @@ pub(crate) fn check_unique(
     }
 }
 
-/// The error for columns that are not among the names found.
+/// The error for columns that are not among the names found, which may have been taken for Windows-1252.
 pub(crate) fn missing<'a>(
     place: Place,
     columns: impl Iterator<Item = &'a str>,
     found: &[String],
+    windows_1252: bool,
 ) -> FileError {
     let lower: Vec<_> = found.iter().map(|name| name.to_lowercase()).collect();
     let nearest = |column: &str| {
@@ -111,6 +112,7 @@ pub(crate) fn missing<'a>(
         place,
         missing,
         found: found.iter().map(|name| excerpt(name.as_bytes())).collect(),
+        windows_1252,
     }
 }
 
@@ -149,10 +151,11 @@ mod tests {
             file: "a".into(),
             line: 1,
         };
-        let nearest = |wanted: &str| match missing(place.clone(), [wanted].into_iter(), &found) {
-            FileError::MissingColumns { missing, .. } => missing[0].nearest.clone(),
-            other => panic!("{other}"),
-        };
+        let nearest =
+            |wanted: &str| match missing(place.clone(), [wanted].into_iter(), &found, false) {
+                FileError::MissingColumns { missing, .. } => missing[0].nearest.clone(),
+                other => panic!("{other}"),
+            };
         assert_eq!(nearest("Room_degc").as_deref(), Some("room_degC"));
         assert_eq!(nearest("chuk_degC").as_deref(), Some("chuck_degC"));
         assert_eq!(nearest("pressure"), None);

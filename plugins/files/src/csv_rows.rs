@@ -46,7 +46,13 @@ impl CsvRows {
             .chain(lacking.map(|(channel, _)| channel.column.as_str()))
             .peekable();
         if missing.peek().is_some() {
-            return Err(columns::missing(rows.place(), missing, &rows.names));
+            let assumed = std::str::from_utf8(rows.lines.text()).is_err();
+            return Err(columns::missing(
+                rows.place(),
+                missing,
+                &rows.names,
+                assumed,
+            ));
         }
         rows.channels = channels;
         rows.time = time.unwrap_or_default();
@@ -62,7 +68,8 @@ impl CsvRows {
         if !lines.advance_to_content()? {
             return Err(FileError::Empty { file: lines.file });
         }
-        if std::str::from_utf8(lines.text()).is_err() || lines.text().contains(&0) {
+        let no_text = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
+        if lines.text().iter().any(no_text) {
             return Err(FileError::NotText {
                 place: lines.place(),
             });
@@ -464,9 +471,24 @@ mod tests {
     }
 
     #[test]
-    fn two_byte_text_is_refused_with_advice() {
+    fn names_as_a_windows_program_writes_them_are_read() {
+        let layout = |name| Layout::new("t", TimeForm::SECONDS, [name]);
+        let log = &b"t;W\xe4rme [\xb0C]\n0;21,5\n"[..];
+        let read = |name| Reader::from_read("f.csv", log, layout(name), Options::default());
+        let mut row = Row::default();
+        assert!(read("Wärme [°C]").unwrap().next_into(&mut row).unwrap());
+        assert_eq!(row.values, [21.5]);
+        assert_eq!(
+            read("温度").err().unwrap().to_string(),
+            "f.csv:1: there is no column `温度`; found `t`, `Wärme [°C]` (read as Windows-1252, since they are not in UTF-8); \
+             correct the name, or make it optional if it is a channel"
+        );
+    }
+
+    #[test]
+    fn two_byte_text_without_a_mark_is_refused_with_advice() {
         let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
-        let utf16 = b"\xff\xfet\0,\0a\0\n\0";
+        let utf16 = b"t\0,\0a\0\n\0";
         let refused = Reader::from_read("f.csv", &utf16[..], layout, Options::default());
         assert!(matches!(refused, Err(FileError::NotText { place }) if place.line == 1));
     }

@@ -44,7 +44,7 @@ impl Description {
         format: Option<Format>,
         rows: usize,
     ) -> Result<Self, FileError> {
-        of_lines(Lines::new(name.into(), Box::new(input)), format, rows)
+        of_lines(Lines::new(name.into(), input), format, rows)
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 use std::sync::Arc;
 
+use crate::cell;
 use crate::instant::has_clock;
 
 /// Longest piece of a file that a message repeats, in characters.
@@ -65,9 +66,9 @@ pub enum FileError {
         /// The name of the file.
         file: Arc<str>,
     },
-    /// The file is not text, or text of two bytes per character.
+    /// The file is not text, or text of two bytes per character without the mark that says so.
     NotText {
-        /// The line with the first such byte.
+        /// The header.
         place: Place,
     },
     /// A line, or a quoted cell, goes on beyond what a row of a recording can be.
@@ -99,6 +100,8 @@ pub enum FileError {
         missing: Vec<MissingColumn>,
         /// The names that are there.
         found: Vec<String>,
+        /// Whether these are not in UTF-8, and were taken for Windows-1252.
+        windows_1252: bool,
     },
     /// A cell that is neither a number nor "no value".
     BadCell {
@@ -243,8 +246,7 @@ impl fmt::Display for FileError {
             Self::NotText { place } => {
                 write!(
                     f,
-                    "{place}: is not text in UTF-8; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\", \
-                     and `iconv -f CP1252 -t UTF-8` makes it of what Windows programs write"
+                    "{place}: is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\""
                 )
             }
             Self::TooLong { place, limit } => write!(
@@ -269,7 +271,8 @@ impl fmt::Display for FileError {
                 place,
                 missing,
                 found,
-            } => lacking(f, place, missing, found),
+                windows_1252,
+            } => lacking(f, place, missing, found, *windows_1252),
             Self::BadCell {
                 place,
                 column,
@@ -386,7 +389,7 @@ impl std::error::Error for FileError {
 
 /// Bytes of a file as a message may repeat them.
 pub(crate) fn excerpt(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4 * EXCERPT + 4)]);
+    let text = cell::text(bytes);
     let mut short: String = text.chars().take(EXCERPT).collect();
     if short.len() < bytes.len() && text.chars().count() > EXCERPT {
         short.push('…');
@@ -400,6 +403,7 @@ fn lacking(
     place: &Place,
     missing: &[MissingColumn],
     found: &[String],
+    windows_1252: bool,
 ) -> fmt::Result {
     let quoted = |name: &str| format!("`{name}`");
     let names: Vec<_> = missing.iter().map(|column| quoted(&column.name)).collect();
@@ -410,6 +414,11 @@ fn lacking(
             .map(|name| quoted(name))
             .collect::<Vec<_>>()
             .join(", "),
+    };
+    let read = if windows_1252 {
+        " (read as Windows-1252, since they are not in UTF-8)"
+    } else {
+        ""
     };
     let (is, correct) = match missing {
         [_] => (
@@ -423,7 +432,7 @@ fn lacking(
     };
     write!(
         f,
-        "{place}: there {is} {}; found {there}; ",
+        "{place}: there {is} {}; found {there}{read}; ",
         names.join(", ")
     )?;
     let near = missing
@@ -536,6 +545,7 @@ mod tests {
                 place: place(),
                 missing: missing.iter().map(column).collect(),
                 found: vec!["time_s".into(), "room".into()],
+                windows_1252: false,
             };
             error.to_string()
         };

@@ -93,7 +93,7 @@ impl JsonRows {
         let mut never = never.map(|key| key.name.as_str()).peekable();
         match &self.found {
             Some(found) if never.peek().is_some() => {
-                Some(columns::missing(self.lines.place(), never, found))
+                Some(columns::missing(self.lines.place(), never, found, false))
             }
             _ => None,
         }
@@ -127,7 +127,7 @@ impl Cells for JsonRows {
                 Ok(()) => {
                     let found = self.found.as_deref().unwrap_or_default();
                     let time = std::iter::once(self.keys[0].name.as_str());
-                    return Err(columns::missing(self.lines.place(), time, found));
+                    return Err(columns::missing(self.lines.place(), time, found, false));
                 }
                 Err(_) if !self.lines.is_complete() => {
                     ledger.report.truncated = Some(self.lines.place());

@@ -2,7 +2,8 @@
 //!
 //! This package decides what bytes mean: delimiters, quoting, numbers, instants, what "no value" looks like, and what is
 //! done with a line that cannot be used. A flag may stand as `true` or `false`, in any case, and is 1 or 0; where something else
-//! than a comma separates cells (`;`, tab, `|`), a number may have a decimal comma. It does not decide what a channel is for, its
+//! than a comma separates cells (`;`, tab, `|`), a number may have a decimal comma. Text is UTF-8, or UTF-16 with the mark that says
+//! so; cells that are not UTF-8 are taken for Windows-1252, so that `Wärme [°C]` is a name whoever wrote it. It does not decide what a channel is for, its
 //! unit, or when a value is too old.
 //!
 //! ```

@@ -1,10 +1,12 @@
-//! Lines of a byte stream, each as soon as it is there, in constant memory. Not what a line means, save that blank
-//! lines and comments mean nothing.
+//! Lines of a byte stream, each as soon as it is there, in constant memory, in UTF-8 also where the stream begins with a
+//! mark that says UTF-16. Not what a line means, save that blank lines and comments mean nothing.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
+
+use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use crate::format::begins_json_array;
 use crate::{FileError, Format, Place};
@@ -14,7 +16,6 @@ pub(crate) const LONGEST_ROW: usize = 1 << 20;
 
 /// Bytes read ahead, or held back when writing, at most.
 pub(crate) const BUFFER: usize = 64 * 1024;
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// What `-` is called where something is told of it.
 pub const STANDARD_INPUT: &str = "standard input";
@@ -29,10 +30,14 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    pub fn new(file: Arc<str>, input: Box<dyn Read + Send>) -> Self {
+    pub fn new(file: Arc<str>, input: impl Read + Send + 'static) -> Self {
+        let decoded = DecodeReaderBytesBuilder::new()
+            .utf8_passthru(true)
+            .strip_bom(true)
+            .build(input);
         Self {
             file,
-            input: BufReader::with_capacity(BUFFER, input),
+            input: BufReader::with_capacity(BUFFER, Box::new(decoded)),
             line: Vec::new(),
             number: 0,
             held: false,
@@ -42,11 +47,11 @@ impl Lines {
     /// A file, or standard input for `-`.
     pub fn open(path: &Path) -> Result<Self, FileError> {
         if path == Path::new("-") {
-            return Ok(Self::new(STANDARD_INPUT.into(), Box::new(io::stdin())));
+            return Ok(Self::new(STANDARD_INPUT.into(), io::stdin()));
         }
         let file: Arc<str> = path.display().to_string().into();
         match File::open(path) {
-            Ok(input) => Ok(Self::new(file, Box::new(input))),
+            Ok(input) => Ok(Self::new(file, input)),
             Err(source) => Err(FileError::Open {
                 file,
                 source: Arc::new(source),
@@ -74,9 +79,6 @@ impl Lines {
             return Ok(false);
         }
         self.number += 1;
-        if self.number == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
-            self.line.drain(..BYTE_ORDER_MARK.len());
-        }
         if self.line.len() > LONGEST_ROW {
             if begins_json_array(&self.line) {
                 return Err(FileError::JsonArray {
@@ -151,21 +153,34 @@ impl Lines {
 mod tests {
     use super::*;
 
-    fn lines(bytes: &'static [u8]) -> Lines {
-        Lines::new("test".into(), Box::new(bytes))
+    fn lines(bytes: impl Read + Send + 'static) -> Lines {
+        Lines::new("test".into(), bytes)
     }
 
     #[test]
     fn blank_lines_and_comments_are_skipped_and_counted() {
-        let mut lines = lines(b"\xef\xbb\xbf# made by hand\n\r\n  # more\n \t\na,b\r\n");
+        let mut lines = lines(&b"\xef\xbb\xbf# made by hand\n\r\n  # more\n \t\na,b\r\n"[..]);
         assert!(lines.advance_to_content().unwrap());
         assert_eq!((lines.text(), lines.number()), (&b"a,b\r\n"[..], 5));
         assert!(!lines.advance_to_content().unwrap());
     }
 
     #[test]
+    fn text_of_two_bytes_per_character_is_read_by_its_mark() {
+        let text = "\u{feff}t\tWärme [°C]\r\n0\t1\r\n";
+        for order in [u16::to_le_bytes, u16::to_be_bytes] {
+            let bytes: Vec<u8> = text.encode_utf16().flat_map(order).collect();
+            let mut lines = lines(std::io::Cursor::new(bytes));
+            assert!(lines.advance().unwrap());
+            assert_eq!(lines.text(), "t\tWärme [°C]\r\n".as_bytes());
+            assert!(lines.advance().unwrap());
+            assert_eq!((lines.text(), lines.number()), (&b"0\t1\r\n"[..], 2));
+        }
+    }
+
+    #[test]
     fn a_line_that_is_held_comes_again() {
-        let mut lines = lines(b"a\nb");
+        let mut lines = lines(&b"a\nb"[..]);
         assert!(lines.advance().unwrap());
         lines.hold();
         assert!(lines.advance().unwrap());
@@ -182,7 +197,7 @@ mod tests {
 
     #[test]
     fn an_endless_line_is_an_error_and_not_a_full_memory() {
-        let mut lines = Lines::new("test".into(), Box::new(std::io::repeat(b'x')));
+        let mut lines = lines(std::io::repeat(b'x'));
         assert!(
             matches!(lines.advance(), Err(FileError::TooLong { place, .. }) if place.line == 1)
         );

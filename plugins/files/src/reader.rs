@@ -99,7 +99,7 @@ impl Reader {
         layout: Layout,
         options: Options,
     ) -> Result<Self, FileError> {
-        Self::from_lines(Lines::new(name.into(), Box::new(input)), layout, options)
+        Self::from_lines(Lines::new(name.into(), input), layout, options)
     }
 
     fn from_lines(mut lines: Lines, layout: Layout, options: Options) -> Result<Self, FileError> {
