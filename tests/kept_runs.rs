@@ -121,6 +121,106 @@ fn a_watched_run_that_is_restarted_goes_on_too() {
     );
 }
 
+/// As a service manager restarts it: the same command again, after a kill that cut the last row in two.
+#[test]
+fn a_run_that_is_restarted_goes_on_with_its_output_as_it_was_left() {
+    let (scratch, model, data, whole) = desk("same-output");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let state = scratch.path("state");
+    for (name, whole) in [
+        ("out.csv", whole),
+        ("out.jsonl", {
+            let out = scratch.path("whole.jsonl");
+            athermal(&[&"run", &model, &"-i", &data, &"-o", &out]).ended(0);
+            std::fs::read_to_string(out).unwrap()
+        }),
+    ] {
+        let out = scratch.path(name);
+        let run = |rows: usize| {
+            let arguments: [&dyn AsRef<std::ffi::OsStr>; 8] =
+                [&"run", &model, &"-i", &"-", &"-o", &out, &"--state", &state];
+            athermal_fed(&arguments, lines[..rows].join("\n").as_bytes()).ended(0)
+        };
+        run(2000);
+        let kept = std::fs::read(&state).unwrap();
+        run(3000);
+        std::fs::write(&state, kept).unwrap();
+        let put_out = std::fs::read_to_string(&out).unwrap();
+        std::fs::write(&out, &put_out[..put_out.len() - 5]).unwrap();
+        run(lines.len());
+        assert!(std::fs::read_to_string(&out).unwrap() == whole, "{name}");
+        std::fs::write(&out, &put_out[..put_out.len() / 2]).unwrap();
+        run(lines.len()).tells(&["its last row is", "is lost"]);
+        std::fs::remove_file(&state).unwrap();
+        run(lines.len());
+        assert!(
+            std::fs::read_to_string(&out).unwrap() == whole,
+            "a cold run begins its output anew"
+        );
+        std::fs::remove_file(&state).unwrap();
+    }
+}
+
+#[test]
+fn an_output_that_no_run_like_it_wrote_is_left_as_it_is() {
+    let (scratch, model, data, _) = desk("other-output");
+    let state = scratch.path("state");
+    athermal(&[&"run", &model, &"-i", &data, &"--state", &state]).ended(0);
+    for (name, content, why) in [
+        (
+            "columns.csv",
+            "time_s,other\n0,1\n",
+            "its columns are `time_s`, `other` and not `time_s`, `predicted.X`",
+        ),
+        (
+            "time.csv",
+            "time_s,predicted.X,predicted.Y\nnever,1,2\n",
+            "found `never`",
+        ),
+        ("text.jsonl", "once\n", "an object"),
+        (
+            "keys.jsonl",
+            "{\"time_s\":0,\"predicted.X\":1}\n",
+            "its columns are `time_s`, `predicted.X` and not",
+        ),
+    ] {
+        let out = scratch.file(name, content);
+        let run = athermal(&[
+            &"run", &model, &"-i", &data, &"-o", &out, &"--state", &state,
+        ]);
+        run.ended(2)
+            .tells(&[name, why, "name another file, or move this one away"]);
+        assert_eq!(std::fs::read_to_string(&out).unwrap(), content);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_read_from_a_pipe_by_name_is_put_out_at_once() {
+    use std::io::Write;
+
+    let (scratch, model, data, _) = desk("pipe");
+    let (pipe, out) = (scratch.path("pipe"), scratch.path("out.csv"));
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let text = std::fs::read_to_string(&data).unwrap();
+    let rows = text.lines().take(100).collect::<Vec<_>>().join("\n") + "\n";
+    std::thread::scope(|threads| {
+        let run = threads.spawn(|| athermal(&[&"run", &model, &"-i", &pipe, &"-o", &out]).ended(0));
+        let mut feed = std::fs::File::options().write(true).open(&pipe).unwrap();
+        feed.write_all(rows.as_bytes()).unwrap();
+        let put_out = || std::fs::read_to_string(&out).map_or(0, |text| text.lines().count());
+        let begun = std::time::Instant::now();
+        while put_out() < 100 && begun.elapsed().as_secs() < 60 {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        assert_eq!(put_out(), 100, "while the pipe is still open");
+        drop(feed);
+        run.join().unwrap();
+    });
+}
+
 #[test]
 fn what_was_rejected_in_a_run_is_not_told_again_by_the_next() {
     let (scratch, model, data, _) = desk("rejected");

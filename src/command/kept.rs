@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant as Clock};
 
-use athermal::core::live::{Samples, SinkError, Source, SourceError};
+use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::{Engine, Instant};
 
@@ -66,6 +66,11 @@ impl Kept {
         Ok(kept)
     }
 
+    /// The last instant that the run before had seen.
+    pub fn seen(&self) -> Option<Instant> {
+        self.seen
+    }
+
     /// What the run before has not seen of a source.
     pub fn rest<'a>(&self, terminal: &Terminal, source: &'a mut dyn Source) -> Rest<'a> {
         Rest {
@@ -76,17 +81,23 @@ impl Kept {
         }
     }
 
-    /// Keeps what is known now and then. Where that fails, as on a disk that is full, it is told and tried again: a machine goes
-    /// without what it would know after a restart rather than without its predictions.
-    pub fn after_tick(&mut self, engine: &Engine) {
+    /// Keeps what is known now and then, once what came of it has left the program: a run that goes on from there does not
+    /// predict it again. Where it cannot be kept, as on a disk that is full, that is told and tried again: a machine goes without
+    /// what it would know after a restart rather than without its predictions.
+    ///
+    /// # Errors
+    /// When the sink fails.
+    pub fn after_tick(&mut self, engine: &Engine, sink: &mut dyn Sink) -> Result<(), SinkError> {
         if self.path.is_none() || self.written.elapsed() < KEEP_EVERY {
-            return;
+            return Ok(());
         }
+        sink.flush()?;
         if let Err(error) = self.write(engine) {
             self.terminal.warning(format_args!(
                 "{error}; the run goes on, and tries again in a minute"
             ));
         }
+        Ok(())
     }
 
     /// Keeps what is known.
@@ -156,10 +167,27 @@ impl Source for Rest<'_> {
 
 #[cfg(test)]
 mod tests {
+    use athermal::core::live::Frame;
+
     use super::*;
 
+    /// How often it was flushed.
+    struct Flushed(u32);
+
+    impl Sink for Flushed {
+        fn put(&mut self, _frame: &Frame<'_>) -> Result<(), SinkError> {
+            Ok(())
+        }
+
+        fn flush(&mut self) -> Result<(), SinkError> {
+            self.0 += 1;
+            Ok(())
+        }
+    }
+
     #[test]
-    fn what_is_known_is_kept_once_a_minute_and_not_at_every_tick() {
+    fn what_is_known_is_kept_once_a_minute_after_what_came_of_it_was_put_out_and_not_at_every_tick()
+    {
         let name = format!("athermal-kept-{}", std::process::id());
         let folder = std::env::temp_dir().join(name);
         std::fs::create_dir_all(&folder).unwrap();
@@ -176,15 +204,18 @@ mod tests {
         let mut kept = Kept::begin(&terminal, Some(&path), &mut engine).unwrap();
         let begun = std::fs::read(&path).unwrap();
         engine.step(Instant::from_ns(1), &[20.0]).unwrap();
-        kept.after_tick(&engine);
+        let mut sink = Flushed(0);
+        kept.after_tick(&engine, &mut sink).unwrap();
+        assert_eq!(sink.0, 0);
         assert_eq!(std::fs::read(&path).unwrap(), begun);
         kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
-        kept.after_tick(&engine);
+        kept.after_tick(&engine, &mut sink).unwrap();
+        assert_eq!(sink.0, 1);
         assert_eq!(std::fs::read(&path).unwrap(), engine.snapshot());
         std::fs::remove_dir_all(&folder).unwrap();
         // The run goes on without its folder too, and tells at the end that nothing is kept.
         kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
-        kept.after_tick(&engine);
+        kept.after_tick(&engine, &mut sink).unwrap();
         assert!(kept.written.elapsed() < KEEP_EVERY, "it was tried");
         assert!(kept.write(&engine).is_err());
     }

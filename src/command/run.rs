@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use athermal::core::compile::{Plan, SourceChannel};
-use athermal::core::document::TimeBase;
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
@@ -46,7 +45,7 @@ pub struct Run {
     #[arg(long)]
     frozen: bool,
     /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: when the input ends, and at least once a
-    /// minute while rows come. Rows up to the last one known are passed over. With `--watch` it is kept of whatever graph runs
+    /// minute while rows come. Rows up to the last one known are passed over, and an output file of that run is gone on with. With `--watch` it is kept of whatever graph runs
     #[arg(long, value_name = "FILE", conflicts_with = "swap_at")]
     state: Option<PathBuf>,
     #[command(flatten)]
@@ -101,20 +100,16 @@ impl Run {
         let mut reader = self.open(terminal, layout(&plan), options)?;
         let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
         engine.freeze(self.frozen);
-        let TimeBase::Column { column, .. } = &plan.time;
         let columns: Vec<String> = plan
             .outputs
             .iter()
             .map(|output| output.name.clone())
             .collect();
-        let mut writer = Writer::create(&self.output, column, &columns, self.flush())?;
+        let mut writer = self.writer(terminal, &kept, reader.layout(), &columns)?;
         let mut rest = kept.rest(terminal, &mut reader);
         let usual = model.sample_ranges();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
-        let mut keep = |engine: &Engine| {
-            kept.after_tick(engine);
-            Ok(())
-        };
+        let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, sink);
         live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
         kept.write(&engine).map_err(outside)?;
         self.tell(terminal, &engine, &reader, usual);
@@ -133,6 +128,10 @@ impl Run {
         let mut reader = self.open(terminal, layout(&read), options)?;
         let mut engine = model.engine()?;
         let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
+        columns.push("revision".to_owned());
+        let writer = self.writer(terminal, &kept, reader.layout(), &columns)?;
+        let names = &columns[..columns.len() - 1];
+        let mut writer = WithRevision(writer);
         let mut rest = kept.rest(terminal, &mut reader);
         let usual = model.sample_ranges().to_vec();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read), &usual);
@@ -143,21 +142,15 @@ impl Run {
         let (mut stepper, mut control) =
             pair_from(engine, live).map_err(|error| Failure::Request(error.to_string()))?;
         stepper.freeze(self.frozen);
-        let TimeBase::Column { column, .. } = &model.plan.time;
-        let column = column.clone();
         let mut course = swap::Course::new(
             terminal,
             &self.swap,
             &self.model,
             model,
             swaps,
-            columns.clone(),
+            names.to_vec(),
         );
-        let mut shown = vec![f64::NAN; columns.len()];
-        let names = columns.clone();
-        columns.push("revision".to_owned());
-        let writer = Writer::create(&self.output, &column, &columns, self.flush())?;
-        let mut writer = WithRevision(writer);
+        let mut shown = vec![f64::NAN; names.len()];
         let mut samples = Samples::default();
         let mut places = (String::new(), Vec::new());
         while let Some(event) = ranged.next(&mut samples).map_err(outside)? {
@@ -191,7 +184,8 @@ impl Run {
                 outputs: &shown,
             };
             writer.put(&frame).map_err(outside)?;
-            kept.after_tick(stepper.engine());
+            let kept_on = kept.after_tick(stepper.engine(), &mut writer);
+            kept_on.map_err(outside)?;
         }
         writer.finish().map_err(outside)?;
         kept.write(stepper.engine()).map_err(outside)?;
@@ -238,6 +232,31 @@ impl Run {
         Ok(reader)
     }
 
+    /// Goes on with the output of the run before, as the run does with what that one knew.
+    fn writer(
+        &self,
+        terminal: &Terminal,
+        kept: &Kept,
+        read: &Layout,
+        columns: &[String],
+    ) -> Result<Writer, Failure> {
+        let Some(seen) = kept.seen() else {
+            let time = &read.time.column;
+            return Ok(Writer::create(&self.output, time, columns, self.flush())?);
+        };
+        let writer = Writer::resume(&self.output, &read.time, columns, self.flush())?;
+        if let Some(last) = writer.stood()
+            && last < seen
+        {
+            terminal.warning(format_args!(
+                "{}: its last row is {} before what the run before saw last: what was predicted between stands in another file, or is lost",
+                self.output.display(),
+                seen - last
+            ));
+        }
+        Ok(writer)
+    }
+
     /// The channels of which a sample that does not count is told at once.
     fn ranged<'a>(&self, read: &'a Plan) -> &'a [SourceChannel] {
         if self.ends() { &[] } else { &read.sources }
@@ -245,7 +264,11 @@ impl Run {
 
     /// Whether the input is known to end: beside a machine it does not, and nor would the wait for what is told then.
     fn ends(&self) -> bool {
-        self.input.as_os_str() != "-"
+        !self.input_is_standard() && self.input.is_file()
+    }
+
+    fn input_is_standard(&self) -> bool {
+        self.input.as_os_str() == "-"
     }
 
     fn flush(&self) -> Flush {
@@ -257,10 +280,10 @@ impl Run {
     }
 
     fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader, usual: &[SampleRange]) {
-        let input = if self.ends() {
-            self.input.display().to_string()
-        } else {
+        let input = if self.input_is_standard() {
             STANDARD_INPUT.to_owned()
+        } else {
+            self.input.display().to_string()
         };
         let reports = [(input, reader.report().clone())];
         let rejected = engine.rejected_channels();

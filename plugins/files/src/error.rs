@@ -197,6 +197,13 @@ pub enum FileError {
         /// The line with which it begins.
         place: Place,
     },
+    /// A file that is to be gone on with is not one that was begun with these columns.
+    NotBegun {
+        /// The name of the file.
+        file: Arc<str>,
+        /// What tells so.
+        reason: String,
+    },
     /// A row to be written has not as many values as there are columns.
     ValueCount {
         /// The name of the file.
@@ -366,6 +373,10 @@ impl fmt::Display for FileError {
             Self::JsonArray { place } => write!(
                 f,
                 "{place}: a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
+            ),
+            Self::NotBegun { file, reason } => write!(
+                f,
+                "{file}: it cannot be gone on with, and is left as it is, since no earlier run like this wrote it: {reason}; name another file, or move this one away"
             ),
             Self::ValueCount {
                 file,

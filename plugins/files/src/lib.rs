@@ -23,6 +23,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod begun;
 mod cell;
 mod columns;
 mod csv_rows;

@@ -24,8 +24,8 @@ impl Sink for Writer {
         Ok(self.write_row(frame.time_text, frame.time.as_ns(), frame.outputs)?)
     }
 
-    fn finish(&mut self) -> Result<(), SinkError> {
-        Ok(self.flush_all()?)
+    fn flush(&mut self) -> Result<(), SinkError> {
+        Ok(self.make_last()?)
     }
 }
 
@@ -39,7 +39,7 @@ impl Sink for WithRevision {
         Ok(writer.write_labelled_row(text, time, frame.outputs, frame.revision)?)
     }
 
-    fn finish(&mut self) -> Result<(), SinkError> {
-        Ok(self.0.flush_all()?)
+    fn flush(&mut self) -> Result<(), SinkError> {
+        Ok(self.0.make_last()?)
     }
 }

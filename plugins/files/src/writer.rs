@@ -1,17 +1,18 @@
 //! Rows written as CSV or JSON lines, in the shortest numbers that read back to the same bits. Not which columns there are.
 
 use std::fmt::Write as _;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
 
 use athermal_core::time::Instant;
 
+use crate::begun::Begun;
 use crate::cell::text_of;
 use crate::json_objects::JsonObjects;
 use crate::lines::BUFFER;
-use crate::{FileError, Format};
+use crate::{FileError, Format, TimeColumn};
 
 /// When a row leaves the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +31,10 @@ pub struct Writer {
     number: zmij::Buffer,
     instant: String,
     rows: Rows,
+    /// The same file, where it is one that keeps what it is given.
+    kept: Option<File>,
+    /// The instant of the last row that stood in it before.
+    stood_ns: Option<i64>,
 }
 
 enum Rows {
@@ -62,12 +67,59 @@ impl Writer {
                 flush,
             );
         }
-        let file = path.display().to_string();
-        let output = File::create(path).map_err(|source| FileError::Open {
-            file: file.as_str().into(),
-            source: Arc::new(source),
-        })?;
-        Self::to_write(&file, output, format, time_column, columns, flush)
+        let output = File::create(path).map_err(|source| cannot_open(path, source))?;
+        let mut writer = Self::to_file(path, output, time_column, columns, flush)?;
+        writer.write_header(time_column, columns)?;
+        Ok(writer)
+    }
+
+    /// Goes on with a file that was written with the same columns before: a last line that was cut off is removed, and rows up to the
+    /// last one, which stand there already, are passed over. What is not there yet or is no file is created.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, or was written with other columns; nothing is then changed.
+    pub fn resume(
+        path: impl AsRef<Path>,
+        time: &TimeColumn,
+        columns: &[String],
+        flush: Flush,
+    ) -> Result<Self, FileError> {
+        let path = path.as_ref();
+        let format = Format::from_path(path).unwrap_or(Format::Csv);
+        let Some(begun) = Begun::of(path, format, time, columns)? else {
+            return Self::create(path, &time.column, columns, flush);
+        };
+        let open = || {
+            let output = OpenOptions::new().append(true).open(path)?;
+            output.set_len(begun.length)?;
+            Ok(output)
+        };
+        let output = open().map_err(|source| cannot_open(path, source))?;
+        let mut writer = Self::to_file(path, output, &time.column, columns, flush)?;
+        writer.stood_ns = begun.last_ns;
+        Ok(writer)
+    }
+
+    /// The instant of the last row that stood in the file before.
+    pub fn stood(&self) -> Option<Instant> {
+        self.stood_ns.map(Instant::from_ns)
+    }
+
+    fn to_file(
+        path: &Path,
+        output: File,
+        time_column: &str,
+        columns: &[String],
+        flush: Flush,
+    ) -> Result<Self, FileError> {
+        let is_file = output.metadata().is_ok_and(|of| of.is_file());
+        let kept = is_file.then(|| output.try_clone()).transpose();
+        let kept = kept.map_err(|source| cannot_open(path, source))?;
+        let name = path.display().to_string();
+        let format = Format::from_path(path).unwrap_or(Format::Csv);
+        let mut writer = Self::headless(&name, output, format, time_column, columns, flush);
+        writer.kept = kept;
+        Ok(writer)
     }
 
     /// Writes to any stream of bytes; `name` stands for it in messages.
@@ -82,6 +134,20 @@ impl Writer {
         columns: &[String],
         flush: Flush,
     ) -> Result<Self, FileError> {
+        let mut writer = Self::headless(name, output, format, time_column, columns, flush);
+        writer.write_header(time_column, columns)?;
+        Ok(writer)
+    }
+
+    /// A writer that has not written the column names.
+    fn headless(
+        name: &str,
+        output: impl Write + Send + 'static,
+        format: Format,
+        time_column: &str,
+        columns: &[String],
+        flush: Flush,
+    ) -> Self {
         let output: Box<dyn Write + Send> = Box::new(output);
         let rows = match format {
             Format::Csv => Rows::Csv(Box::new(
@@ -92,17 +158,16 @@ impl Writer {
             )),
             Format::JsonLines => Rows::Json(JsonObjects::new(output, time_column, columns)),
         };
-        let mut writer = Self {
+        Self {
             file: name.into(),
             flush,
             columns: columns.len(),
             number: zmij::Buffer::new(),
             instant: String::new(),
             rows,
-        };
-        let header = writer.write_header(time_column, columns);
-        header.map_err(|source| writer.failed(source))?;
-        Ok(writer)
+            kept: None,
+            stood_ns: None,
+        }
     }
 
     /// Writes one row: its instant as the input had it, or where `time_text` is empty `time_ns` as exact decimal seconds;
@@ -148,6 +213,9 @@ impl Writer {
                 found,
             });
         }
+        if self.stood_ns.is_some_and(|stood_ns| time_ns <= stood_ns) {
+            return Ok(());
+        }
         let time_text = match time_text {
             "" => {
                 self.instant.clear();
@@ -178,12 +246,22 @@ impl Writer {
         self.flush_when(true).map_err(|source| self.failed(source))
     }
 
-    fn write_header(&mut self, time_column: &str, columns: &[String]) -> io::Result<()> {
-        if let Rows::Csv(csv) = &mut self.rows {
-            csv.write_field(time_column).map_err(io_error)?;
-            csv.write_record(columns).map_err(io_error)?;
-        }
-        self.flush_when(self.flush == Flush::EachRow)
+    /// Writes what is still held back so that it stands in the file also after a failure of power.
+    pub(crate) fn make_last(&mut self) -> Result<(), FileError> {
+        self.flush_all()?;
+        let synced = self.kept.as_ref().map_or(Ok(()), File::sync_data);
+        synced.map_err(|source| self.failed(source))
+    }
+
+    fn write_header(&mut self, time_column: &str, columns: &[String]) -> Result<(), FileError> {
+        let mut write = || {
+            if let Rows::Csv(csv) = &mut self.rows {
+                csv.write_field(time_column).map_err(io_error)?;
+                csv.write_record(columns).map_err(io_error)?;
+            }
+            self.flush_when(self.flush == Flush::EachRow)
+        };
+        write().map_err(|source| self.failed(source))
     }
 
     fn flush_when(&mut self, now: bool) -> io::Result<()> {
@@ -217,6 +295,13 @@ fn write_cells<W: Write>(
         csv.write_field(label).map_err(io_error)?;
     }
     csv.write_record(None::<&[u8]>).map_err(io_error)
+}
+
+fn cannot_open(path: &Path, source: io::Error) -> FileError {
+    FileError::Open {
+        file: path.display().to_string().into(),
+        source: Arc::new(source),
+    }
 }
 
 /// The error as the system gave it: turned by `From`, it would lose its kind.

@@ -18,11 +18,11 @@ pub fn run(
     source: &mut dyn Source,
     sink: &mut dyn Sink,
 ) -> Result<(), RunError> {
-    run_keeping(engine, source, sink, &mut |_| Ok(()))
+    run_keeping(engine, source, sink, &mut |_, _| Ok(()))
 }
 
 /// The same, with a look at the engine after each tick that has been put out: to keep a
-/// [`snapshot`](Engine::snapshot) now and then, from which another run goes on.
+/// [`snapshot`](Engine::snapshot) now and then, from which another run goes on. The sink is to be [flushed](Sink::flush) before.
 ///
 /// # Errors
 /// When the source, the sink, the engine or `keep` fails.
@@ -30,7 +30,7 @@ pub fn run_keeping(
     engine: &mut Engine,
     source: &mut dyn Source,
     sink: &mut dyn Sink,
-    keep: &mut dyn FnMut(&Engine) -> Result<(), SinkError>,
+    keep: &mut dyn FnMut(&Engine, &mut dyn Sink) -> Result<(), SinkError>,
 ) -> Result<(), RunError> {
     let revision = engine.revision().to_owned();
     let mut samples = Samples::default();
@@ -51,7 +51,7 @@ pub fn run_keeping(
             outputs,
         };
         sink.put(&frame).map_err(RunError::Sink)?;
-        keep(engine).map_err(RunError::Keep)?;
+        keep(engine, sink).map_err(RunError::Keep)?;
     }
     sink.finish().map_err(RunError::Sink)
 }

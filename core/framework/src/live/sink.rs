@@ -40,12 +40,21 @@ pub trait Sink {
     /// When they cannot be put out, and why; what a sink gets over by itself (a lost connection) is none.
     fn put(&mut self, frame: &Frame<'_>) -> Result<(), SinkError>;
 
-    /// Puts out what is still held back. Nothing comes after it.
+    /// Puts out what is still held back, so that it lasts: what the engine knows is about to be kept, and a run that goes on from
+    /// there does not put out again what came before.
+    ///
+    /// # Errors
+    /// As [`put`](Sink::put).
+    fn flush(&mut self) -> Result<(), SinkError> {
+        Ok(())
+    }
+
+    /// The same at the end. Nothing comes after it.
     ///
     /// # Errors
     /// As [`put`](Sink::put).
     fn finish(&mut self) -> Result<(), SinkError> {
-        Ok(())
+        self.flush()
     }
 }
 

@@ -1,0 +1,144 @@
+//! Decides what a file that an earlier run wrote holds, so that another can go on with it. Not what is written next.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::csv_rows::CsvRows;
+use crate::lines::{LONGEST_ROW, Lines};
+use crate::{Description, FileError, Format, Layout, Options, Reader, Row, TimeColumn};
+
+/// A file that was begun.
+pub(crate) struct Begun {
+    /// How many bytes its whole lines are; what comes after them was cut off.
+    pub length: u64,
+    /// The instant of its last row, if it has one.
+    pub last_ns: Option<i64>,
+}
+
+impl Begun {
+    /// Looks at a file; none where there is no whole line to go on from, or no file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not one with these columns.
+    pub fn of(
+        path: &Path,
+        format: Format,
+        time: &TimeColumn,
+        columns: &[String],
+    ) -> Result<Option<Self>, FileError> {
+        if !path.metadata().is_ok_and(|of| of.is_file()) {
+            return Ok(None);
+        }
+        let file: Arc<str> = path.display().to_string().into();
+        let ends = Ends::of(path).map_err(|source| FileError::Open {
+            file: file.clone(),
+            source: Arc::new(source),
+        })?;
+        let Some(ends) = ends else { return Ok(None) };
+        let other = |reason: String| FileError::NotBegun {
+            file: file.clone(),
+            reason,
+        };
+        let expected = [std::slice::from_ref(&time.column), columns].concat();
+        let found = match format {
+            Format::Csv => ends.csv_names(),
+            Format::JsonLines => ends.json_names(),
+        };
+        let found = found.map_err(|error| other(error.to_string()))?;
+        if found != expected {
+            return Err(other(format!(
+                "its columns are {} and not {}",
+                quoted(&found),
+                quoted(&expected)
+            )));
+        }
+        let rows = match format {
+            Format::Csv if ends.is_one_line => None,
+            Format::Csv => Some([&*ends.first, &*ends.last].concat()),
+            Format::JsonLines => Some(ends.last),
+        };
+        let last_ns = rows
+            .map(|rows| last_instant(&file, rows, format, time))
+            .transpose()
+            .map_err(|error| other(error.to_string()))?
+            .flatten();
+        Ok(Some(Self {
+            length: ends.length,
+            last_ns,
+        }))
+    }
+}
+
+/// The first and the last whole line of a file.
+struct Ends {
+    first: Vec<u8>,
+    last: Vec<u8>,
+    is_one_line: bool,
+    length: u64,
+}
+
+impl Ends {
+    fn of(path: &Path) -> io::Result<Option<Self>> {
+        let mut input = BufReader::new(File::open(path)?);
+        let mut first = Vec::new();
+        input
+            .by_ref()
+            .take(LONGEST_ROW as u64)
+            .read_until(b'\n', &mut first)?;
+        let length = input.seek(SeekFrom::End(0))?;
+        let begin = input.seek(SeekFrom::Start(
+            length.saturating_sub(2 * LONGEST_ROW as u64),
+        ))?;
+        let mut tail = Vec::new();
+        input.read_to_end(&mut tail)?;
+        let Some(end) = tail.iter().rposition(|&byte| byte == b'\n') else {
+            return Ok(None);
+        };
+        tail.truncate(end + 1);
+        let before = tail[..end].iter().rposition(|&byte| byte == b'\n');
+        Ok(Some(Self {
+            first,
+            is_one_line: before.is_none(),
+            last: tail.split_off(before.map_or(0, |before| before + 1)),
+            length: begin + end as u64 + 1,
+        }))
+    }
+
+    fn csv_names(&self) -> Result<Vec<String>, FileError> {
+        let lines = Lines::new("its first line".into(), Cursor::new(self.first.clone()));
+        let rows = CsvRows::headed(lines, Some(b','), std::iter::empty())?;
+        Ok(rows.names().to_vec())
+    }
+
+    fn json_names(&self) -> Result<Vec<String>, FileError> {
+        let line = Cursor::new(self.last.clone());
+        Ok(Description::of_read("its last line", line, Some(Format::JsonLines), 1)?.columns)
+    }
+}
+
+fn last_instant(
+    file: &str,
+    rows: Vec<u8>,
+    format: Format,
+    time: &TimeColumn,
+) -> Result<Option<i64>, FileError> {
+    let layout = Layout {
+        time: time.clone(),
+        channels: Vec::new(),
+    };
+    let options = Options {
+        format: Some(format),
+        delimiter: Some(b','),
+        ..Options::default()
+    };
+    let mut row = Row::default();
+    let mut reader = Reader::from_read(file, Cursor::new(rows), layout, options)?;
+    Ok(reader.next_into(&mut row)?.then_some(row.time_ns))
+}
+
+fn quoted(names: &[String]) -> String {
+    let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    names.join(", ")
+}
