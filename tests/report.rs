@@ -209,6 +209,46 @@ fn what_a_correction_is_worth_agrees_with_a_calculation_by_hand() {
 }
 
 #[test]
+fn corrections_of_different_units_are_each_worth_what_they_are_in_one() {
+    let scratch = Scratch::new("corrections_of_different_units");
+    let model = |name: &str, units: [&str; 2]| {
+        let node = |nth: usize, axes: &str| {
+            let range = if units[nth] == "um" { 50 } else { 50_000 };
+            format!(
+                "[nodes.c{nth}]\ntype = \"compensate\"\ninputs.rate = \"vote.{axes}\"\n\
+                 range = \"{range} {}\"\nmax_rate = \"1000 nm/min\"\nmax_slew = \"50 nm/s\"\n",
+                units[nth]
+            )
+        };
+        let nodes = node(0, "{X,Y}") + &node(1, "Z");
+        let base = graph("linear-axis-compensate");
+        let extends = serde_json::Value::from(base.display().to_string());
+        let text = format!(
+            "schema = 1\nextends = {extends}\nname = \"{name}\"\n{nodes}[outputs]\nx = \"c0\"\nz = \"c1\"\n"
+        );
+        let file = scratch.file(&format!("{name}.toml"), text);
+        let days = simulated(&scratch, "fit.csv", "linear-axis", 1.0, 1);
+        let model = scratch.path(&format!("{name}.json"));
+        athermal_on("fit", &file, &days, &[&"-o", &model]).ended(0);
+        model
+    };
+    let days = simulated(&scratch, "days.csv", "linear-axis", 0.5, 2);
+    let told = |units: [&str; 2]| {
+        let model = model(&units[1..].concat(), units);
+        report(&model, &days, &[&"--format", &"json"]).json()["verdicts"].clone()
+    };
+    let (alike, mixed) = (told(["um", "um"]), told(["um", "nm"]));
+    for nth in 0..3 {
+        for figure in ["without_correction", "with_correction"] {
+            let of = |told: &Value| told[nth][figure].as_f64().unwrap();
+            close(&[of(&mixed)], &[of(&alike)], 1e-9);
+        }
+        let of = |figure: &str| mixed[nth][figure].as_f64().unwrap();
+        assert!(of("with_correction") < 0.7 * of("without_correction"));
+    }
+}
+
+#[test]
 fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
     let scratch = Scratch::new("the_page_has_all_its_sections");
     let model = fitted(&scratch, "die-tester-control", "die-tester");

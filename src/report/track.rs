@@ -13,11 +13,7 @@ const INVALID: f64 = 1.0;
 /// What the correction was and what it acts on, for working out its worth.
 #[derive(Debug)]
 pub(super) struct Track {
-    /// Names of the axes.
-    pub(super) axes: Vec<String>,
-    /// Unit of position and of drift.
-    pub(super) units: (String, String),
-    pub(super) span: Duration,
+    pub(super) axes: Vec<TrackAxis>,
     pub(super) loss: Option<OpticalLoss>,
     pub(super) settled: Option<Settled>,
     /// The unit of the set point.
@@ -25,6 +21,17 @@ pub(super) struct Track {
     pub(super) rows: Vec<TrackRow>,
     /// Which axes have had a valid prediction: before, there is no correction to be judged.
     begun: Vec<bool>,
+}
+
+/// An axis that is corrected.
+#[derive(Debug)]
+pub(super) struct TrackAxis {
+    pub(super) name: String,
+    /// The unit of its positions.
+    pub(super) position: String,
+    /// The unit of its drift, and over which time that is measured.
+    pub(super) drift: String,
+    pub(super) span: Duration,
 }
 
 /// One instant at which something was measured.
@@ -44,7 +51,8 @@ pub(super) struct Places {
     corrections: Vec<usize>,
     /// Where each correction says what holds it back.
     why: Vec<usize>,
-    factor: f64,
+    /// From the unit of each correction to that of its position.
+    factors: Vec<f64>,
     set_point: Option<usize>,
 }
 
@@ -67,10 +75,10 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
         positions: Vec::new(),
         corrections: Vec::new(),
         why: Vec::new(),
-        factor: f64::NAN,
+        factors: Vec::new(),
         set_point: None,
     };
-    let mut of_drift = None;
+    let mut axes = Vec::new();
     for node in plan
         .nodes
         .iter()
@@ -81,35 +89,34 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
             let truth = plan.channels[rate].predicts?;
             let position = measured_by(plan, truth)?;
             let unit = &plan.channels[position].channel.unit;
-            places.factor = plan.channels[correction].channel.unit.factor_to(unit)?;
+            let correcting = &plan.channels[correction].channel;
+            places.factors.push(correcting.unit.factor_to(unit)?);
             places.positions.push(position);
             places.corrections.push(correction);
             places.why.push(node.ports.get(1)?.1.start + nth);
-            of_drift = Some((truth, position));
+            let drift = &plan.channels[truth].channel;
+            axes.push(TrackAxis {
+                name: correcting.name.clone(),
+                position: unit.to_string(),
+                drift: drift.unit.to_string(),
+                span: drift.span,
+            });
         }
     }
-    let (truth, position) = of_drift?;
+    if axes.is_empty() {
+        return None;
+    }
     let settled = plan.nodes.iter().find(|node| node.kind.name == "settled");
     places.set_point = settled.and_then(|node| first_input(plan, node, 1, 0));
-    let drift = &plan.channels[truth].channel;
     let track = Track {
-        axes: places
-            .corrections
-            .iter()
-            .map(|&slot| plan.channels[slot].channel.name.clone())
-            .collect(),
-        units: (
-            plan.channels[position].channel.unit.to_string(),
-            drift.unit.to_string(),
-        ),
-        span: drift.span,
+        begun: vec![false; axes.len()],
+        axes,
         loss: parameters(plan, "optical_loss"),
         settled: parameters(plan, "settled"),
         set_point: places
             .set_point
             .map(|slot| plan.channels[slot].channel.unit.to_string()),
         rows: Vec::new(),
-        begun: vec![false; places.corrections.len()],
     };
     Some((places, track))
 }
@@ -135,11 +142,13 @@ impl Track {
         for (begun, &why) in self.begun.iter_mut().zip(&places.why) {
             *begun |= engine.value(why) != INVALID;
         }
-        let there = places.corrections.iter().zip(&self.begun);
-        let correction = there.map(|(&slot, begun)| match begun {
-            true => engine.value(slot) * places.factor,
-            false => f64::NAN,
-        });
+        let there = places.corrections.iter().zip(&places.factors);
+        let correction = there
+            .zip(&self.begun)
+            .map(|((&slot, factor), begun)| match begun {
+                true => engine.value(slot) * factor,
+                false => f64::NAN,
+            });
         self.rows.push(TrackRow {
             at: now,
             position,

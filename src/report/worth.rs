@@ -12,7 +12,7 @@ use athermal_core::time::Instant;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::track::Track;
+use super::track::{Track, TrackAxis};
 use super::{ReportError, Series};
 
 /// What a correction is worth.
@@ -20,16 +20,16 @@ use super::{ReportError, Series};
 pub struct Worth {
     /// Names of the axes.
     pub axes: Vec<String>,
-    /// Unit of the drifts.
-    pub unit: String,
+    /// Unit of each axis' drift.
+    pub units: Vec<String>,
     /// Drift of each axis without the correction.
     pub drift_without: Vec<Series>,
     /// Drift of each axis with the correction added to its positions.
     pub drift_with: Vec<Series>,
     /// Correction of each axis at its positions.
     pub correction: Vec<Series>,
-    /// Unit of the correction.
-    pub correction_unit: String,
+    /// Unit of each correction.
+    pub correction_units: Vec<String>,
     /// Optical loss in dB without and with; empty without an `optical_loss` node.
     pub loss_without: Series,
     /// See `loss_without`.
@@ -115,17 +115,19 @@ const LIMIT_DB: f64 = 0.2;
 
 /// A graph of the framework's own nodes, so that drift, loss and settle time mean the same here as anywhere.
 fn graph(track: &Track) -> String {
-    let names: Vec<String> = track.axes.iter().map(|axis| format!("{axis:?}")).collect();
-    let names = names.join(", ");
-    let (position, drift) = &track.units;
     let mut text = String::from("schema = 1\n");
+    let mut outputs = String::new();
     for way in ["without", "with"] {
-        let _ = write!(
-            text,
-            "[signals.position_{way}]\nunit = \"{position}\"\nchannels = [{names}]\nmax_age = \"10min\"\n\
-             [nodes.drift_{way}]\ntype = \"slope\"\ninputs.signal = \"position_{way}\"\nwindows = [\"{}\"]\nunit = \"{drift}\"\n",
-            track.span
-        );
+        for (nth, axis) in track.axes.iter().enumerate() {
+            let name = toml::Value::from(axis.name.as_str());
+            let _ = write!(
+                text,
+                "[signals.position_{way}_{nth}]\nunit = \"{}\"\nchannels = [{name}]\nmax_age = \"10min\"\n\
+                 [nodes.drift_{way}_{nth}]\ntype = \"slope\"\ninputs.signal = \"position_{way}_{nth}\"\nwindows = [\"{}\"]\nunit = \"{}\"\n",
+                axis.position, axis.span, axis.drift
+            );
+        }
+        let _ = writeln!(outputs, "{way} = {}", drifts(track, way));
     }
     if let Some(unit) = &track.set_point {
         let _ = write!(
@@ -133,12 +135,12 @@ fn graph(track: &Track) -> String {
             "[signals.set_point]\nunit = \"{unit}\"\nchannels = [\"set\"]\n"
         );
     }
-    let mut outputs = String::from("without = \"drift_without\"\nwith = \"drift_with\"\n");
     if let Some(loss) = &track.loss {
         for way in ["without", "with"] {
             let _ = write!(
                 text,
-                "[nodes.loss_{way}]\ntype = \"optical_loss\"\ninputs.drift = \"drift_{way}\"\n"
+                "[nodes.loss_{way}]\ntype = \"optical_loss\"\ninputs.drift = {}\n",
+                drifts(track, way)
             );
             parameters(&mut text, loss);
             let _ = writeln!(outputs, "loss_{way} = \"loss_{way}\"");
@@ -156,6 +158,14 @@ fn graph(track: &Track) -> String {
         }
     }
     text + "[outputs]\n" + &outputs
+}
+
+/// The drifts of all axes as an input or output names them.
+fn drifts(track: &Track, way: &str) -> String {
+    let each: Vec<_> = (0..track.axes.len())
+        .map(|nth| format!("\"drift_{way}_{nth}\""))
+        .collect();
+    format!("[{}]", each.join(", "))
 }
 
 /// The parameters of a node as lines of TOML: texts, numbers and lists of them look the same in JSON.
@@ -197,7 +207,7 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
         track
             .axes
             .iter()
-            .map(|axis| place(&format!("{way}.{axis}")))
+            .map(|axis| place(&format!("{way}.{}", axis.name)))
             .collect()
     };
     let drifts = [drift("without"), drift("with")];
@@ -205,16 +215,17 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
     let settled = ["settled_without.settle_time", "settled_with.settle_time"].map(&place);
     let since = place("since_without.since");
     let count = track.axes.len();
+    let of_axes = |of: fn(&TrackAxis) -> &String| track.axes.iter().map(of).cloned().collect();
     let empty = || vec![Series::default(); count];
     let decibel = athermal_core::unit::Unit::parse("dB").ok();
     let limit = track.settled.as_ref().zip(decibel.as_ref());
     let mut worth = Worth {
-        axes: track.axes.clone(),
-        unit: track.units.1.clone(),
+        axes: of_axes(|axis| &axis.name),
+        units: of_axes(|axis| &axis.drift),
         drift_without: empty(),
         drift_with: empty(),
         correction: empty(),
-        correction_unit: track.units.0.clone(),
+        correction_units: of_axes(|axis| &axis.position),
         loss_without: Series::default(),
         loss_with: Series::default(),
         loss_limit: limit
@@ -378,11 +389,11 @@ mod tests {
         };
         let worth = Worth {
             axes: Vec::new(),
-            unit: String::new(),
+            units: Vec::new(),
             drift_without: Vec::new(),
             drift_with: Vec::new(),
             correction: Vec::new(),
-            correction_unit: String::new(),
+            correction_units: Vec::new(),
             loss_without: Series::default(),
             loss_with: Series::default(),
             loss_limit: 0.2,

@@ -406,8 +406,7 @@ fn gradients(group: &Group) -> String {
 
 /// A text as TOML writes it.
 fn toml_string(text: &str) -> String {
-    // What JSON escapes, TOML's basic strings escape alike.
-    serde_json::Value::from(text).to_string()
+    toml::Value::from(text).to_string()
 }
 
 fn names(groups: &[Group]) -> String {
