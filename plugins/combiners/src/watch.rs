@@ -30,7 +30,8 @@ macro_rules! reasons {
 /// `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, and an alarm where `m_t` has gone `λ` from its smallest or largest value (Page 1954;
 /// Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins anew. The usual error is the root mean
 /// square of all that have been taken, the present one among them; one that is larger than five times that counts as five
-/// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves.
+/// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves. Among the `first`
+/// errors, at most 100, 1.4826 times the median of their sizes stands for the usual error in this.
 ///
 /// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985). Those of truths that
 /// overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much room: a bias as large as the
@@ -71,8 +72,8 @@ pub struct PageHinkley {
 /// Passes a prediction on, and watches with adaptive windowing whether the model behind it has drifted.
 ///
 /// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual error: the
-/// root mean square of all that have been taken, of which one larger than five times that counts as five. There is an alarm, and
-/// the window begins anew, where it has two sides with means that are
+/// root mean square of all that have been taken, of which one larger than five times that counts as five (among the `first`, at
+/// most 100, five times 1.4826 times the median of their sizes). There is an alarm, and the window begins anew, where it has two sides with means that are
 /// farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
@@ -159,6 +160,15 @@ fn hour() -> Duration {
 /// An error that is more times as large as usual counts as so many times.
 const LARGEST: f64 = 5.0;
 
+/// How many errors tell at most, by the median of their sizes, which are usual.
+const EARLY: u64 = 100;
+
+/// The standard deviation of normal errors in multiples of the median of their sizes (Hampel 1974).
+const OF_MEDIAN: f64 = 1.4826;
+
+/// The largest error that is taken: the squares of so many as there may be have a sum.
+const LARGEST_EVER: f64 = 1e140;
+
 /// The numbers of the port `reason`.
 mod reason {
     pub(super) const NONE: f64 = 0.0;
@@ -184,10 +194,8 @@ impl Checks {
         }
     }
 
-    fn timing(&mut self, first: u64, every: Duration, hold: Duration) {
+    fn first(&mut self, first: u64) {
         self.check("first", first, first >= 2, "2 or more");
-        self.check("every", every, every >= Duration::ZERO, "0 or longer");
-        self.check("hold", hold, hold >= Duration::ZERO, "0 or longer");
     }
 }
 
@@ -215,7 +223,7 @@ impl Combiner for PageHinkley {
             factor,
             ..
         } = *self;
-        checks.timing(self.first, self.every, self.hold);
+        checks.first(self.first);
         let fits = tolerance >= 0.0 && tolerance.is_finite();
         checks.check("tolerance", tolerance, fits, "0 or more");
         let fits = threshold > 0.0 && threshold.is_finite();
@@ -268,7 +276,7 @@ impl Combiner for Adwin {
             shortest,
             ..
         } = *self;
-        checks.timing(self.first, self.every, self.hold);
+        checks.first(self.first);
         let fits = confidence > 0.0 && confidence < 1.0;
         checks.check("confidence", confidence, fits, "above 0 and below 1");
         checks.check("clock", clock, clock >= 1, "1 or more");
@@ -339,6 +347,8 @@ struct Seen<D> {
     /// How many errors have been taken, and the mean of their squares.
     count: u64,
     mean_square: f64,
+    /// The first errors, while they do not tell yet which are usual.
+    early: Vec<f64>,
     /// When the last truth was taken.
     taken: Option<Instant>,
     /// The last alarm: when it became known, and whether the mean had gone up.
@@ -349,8 +359,8 @@ struct Seen<D> {
     newest: Option<Instant>,
 }
 
-athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/1");
-athermal_core::state!(Seen<numerics::Adwin>, "adwin/1");
+athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/2");
+athermal_core::state!(Seen<numerics::Adwin>, "adwin/2");
 
 impl<D: Detector> Watching<D> {
     fn new(watch: Watched, first: u64, every: Duration, hold: Duration, detector: D) -> Self {
@@ -363,6 +373,7 @@ impl<D: Detector> Watching<D> {
                 detector,
                 count: 0,
                 mean_square: 0.0,
+                early: Vec::with_capacity(EARLY as usize),
                 taken: None,
                 alarm: None,
                 found: None,
@@ -417,15 +428,20 @@ where
             return;
         }
         seen.taken = Some(arrived);
-        let known = seen.count >= self.first;
-        let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
-        let error = match known {
-            true => error.clamp(-LARGEST * usual, LARGEST * usual),
-            false => error,
-        };
+        let error = error.clamp(-LARGEST_EVER, LARGEST_EVER);
         seen.count += 1;
+        if seen.count as usize == seen.early.len() + 1 {
+            seen.early.push(error);
+            if seen.count >= self.first.min(EARLY) {
+                seen.mean_square = usual_square(&mut seen.early);
+                seen.early.clear();
+            }
+            return;
+        }
+        let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
+        let error = error.clamp(-LARGEST * usual, LARGEST * usual);
         seen.mean_square += (error * error - seen.mean_square) / seen.count as f64;
-        if !known {
+        if seen.count <= self.first {
             return;
         }
         let relative = error / seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
@@ -475,10 +491,25 @@ where
             }
             Ok(mut known) => {
                 known.detector = known.detector.told_by(&self.seen.detector);
+                known.early.reserve(EARLY as usize - known.early.len());
                 self.seen = known;
                 Restored::Accepted
             }
             Err(cold) => cold,
         }
     }
+}
+
+/// The mean square of the first errors, of which one that is larger than [`LARGEST`] times the usual counts as that.
+fn usual_square(errors: &mut [f64]) -> f64 {
+    let middle = errors.len() / 2;
+    let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
+    let (_, median, _) = errors.select_nth_unstable_by(middle, by_size);
+    let largest = match LARGEST * OF_MEDIAN * median.abs() {
+        // Most were exactly as predicted, which says nothing of the others.
+        0.0 => f64::INFINITY,
+        largest => largest,
+    };
+    let squares = errors.iter().map(|error| error.abs().min(largest).powi(2));
+    squares.sum::<f64>() / errors.len() as f64
 }

@@ -129,6 +129,32 @@ fn a_glitch_is_no_alarm_and_leaves_the_test_as_sensitive_as_it_was() {
 }
 
 #[test]
+fn a_glitch_among_the_first_errors_leaves_the_tests_as_sensitive_as_they_are_without_it() {
+    for glitch in [1.0, 1e6, -1e200] {
+        for node in [page_hinkley().build(1), adwin().build(1)] {
+            let alarm = first_alarm(node, 400, |nth| {
+                let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+                match nth {
+                    6 => glitch,
+                    0..200 => sign,
+                    _ => sign + 3.0,
+                }
+            });
+            assert!(
+                alarm.is_some_and(|alarm| (200..250).contains(&alarm)),
+                "{glitch}: {alarm:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn first_errors_of_which_most_are_none_tell_by_the_others_which_are_usual() {
+    assert_eq!(usual_square(&mut [0.0, 0.0, 3.0, 0.0, -1.0]), 2.0);
+    assert_eq!(usual_square(&mut [1.0, -1.0, 1.0, -1.0]), 1.0);
+}
+
+#[test]
 fn with_every_only_some_truths_are_taken() {
     let seldom = PageHinkley {
         every: Duration::from_ns(300_000_000_000),
