@@ -29,7 +29,7 @@ pub struct Health {
     /// The fastest change from one sample to the next, such as `"2 K/s"`.
     #[serde(default)]
     pub max_rate: Option<Quantity>,
-    /// For how long the very same value may come again and again.
+    /// For how long the very same value may come again and again. A silence longer than this, or than `max_gap`, ends the count.
     #[serde(default)]
     pub stuck_after: Option<Duration>,
     /// The least noise of a living sensor.
@@ -165,6 +165,8 @@ impl Feature for Health {
             );
             mistakes.push(Mistake::at("noise_samples", message));
         }
+        mistakes.extend(Mistake::unless_lasting("stuck_after", self.stuck_after));
+        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
         for channel in signal {
             if let Err(found) = self.limits(channel) {
                 mistakes.extend(found);
@@ -240,6 +242,9 @@ struct Watching {
 /// What is known of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Sensor {
+    /// When the last sample was, whatever its value.
+    heard: Option<Instant>,
+    /// The last sample within the range.
     newest: Option<(Instant, f64)>,
     /// Since when the value has been the same.
     same_since: Option<Instant>,
@@ -257,6 +262,7 @@ struct Sensor {
 impl Sensor {
     fn new(kept: usize) -> Self {
         Self {
+            heard: None,
             newest: None,
             same_since: None,
             begun: None,
@@ -269,12 +275,8 @@ impl Sensor {
     }
 
     fn forget(&mut self) {
-        (
-            self.newest,
-            self.same_since,
-            self.begun,
-            self.in_order_since,
-        ) = (None, None, None, None);
+        (self.heard, self.newest, self.same_since) = (None, None, None);
+        (self.begun, self.in_order_since) = (None, None);
         (self.fault, self.next, self.full) = (reason::HEALTHY, 0, false);
     }
 
@@ -297,6 +299,7 @@ impl Sensor {
 
     /// What is wrong with a new sample.
     fn examine(&mut self, spec: &Health, limits: &Limits, value: f64, now: Instant) -> u8 {
+        let silence = self.heard.replace(now).map(|then| now - then);
         let before = self.newest;
         // Written so that an infinite value is out of range even where there is no limit.
         if !value.is_finite() || value < limits.range.0 || value > limits.range.1 {
@@ -306,7 +309,9 @@ impl Sensor {
         if let Some((then, last)) = before {
             let difference = value - last;
             self.note(difference);
-            if difference != 0.0 {
+            let longest = spec.stuck_after.into_iter().chain(spec.max_gap).min();
+            let went_on = silence.is_none_or(|silence| longest.is_none_or(|most| silence <= most));
+            if difference != 0.0 || !went_on {
                 self.same_since = Some(now);
             }
             if difference.abs() > limits.rate * (now - then).secs() {
@@ -353,7 +358,7 @@ impl Operator for Watching {
         for (i, (&value, sensor)) in tick.port(0).iter().zip(&mut self.sensors).enumerate() {
             let begun = *sensor.begun.get_or_insert(tick.now);
             if value.is_nan() {
-                let heard = sensor.newest.map_or(begun, |(then, _)| then);
+                let heard = sensor.heard.unwrap_or(begun);
                 let silent = self
                     .spec
                     .max_gap
@@ -407,6 +412,6 @@ struct Watched {
     sensors: Vec<Sensor>,
 }
 
-athermal_core::state!(Watched, "health/1");
+athermal_core::state!(Watched, "health/2");
 
 athermal_core::register!(Health, Feature, "health");

@@ -58,6 +58,30 @@ fn a_jump_a_stuck_value_and_a_silence_are_told_apart() {
 }
 
 #[test]
+fn a_sensor_that_sends_what_is_out_of_range_is_not_silent() {
+    let both = GRAPH.replace("[\"a\"]", "[\"a\", \"b\"]");
+    let mut machine = Machine::new(&both);
+    for second in 0..100 {
+        let t = f64::from(second);
+        let value = if second % 10 == 0 { 150.0 } else { NONE };
+        machine.step(t, &[value, alive(t)]);
+        assert_eq!(machine.get("reason.a"), 1.0, "at {t} s");
+    }
+}
+
+#[test]
+fn a_value_that_comes_again_after_a_silence_is_not_stuck() {
+    let without = GRAPH.replace("max_gap = \"30s\"\n", "");
+    for graph in [GRAPH, &without] {
+        let mut machine = Machine::new(graph);
+        at(&mut machine, 0.0, 20.0);
+        let reasons = [3600.0, 3610.0, 3650.0, 3660.0].map(|t| at(&mut machine, t, 20.0).0);
+        let gap = if graph == GRAPH { 0.0 } else { 3.0 };
+        assert_eq!(reasons, [0.0, 0.0, 0.0, gap]);
+    }
+}
+
+#[test]
 fn noise_is_judged_by_successive_differences() {
     let noisy = GRAPH.replace(
         "max_gap = \"30s\"",
@@ -108,6 +132,15 @@ t = "health"
         .0
         .unwrap_err();
     assert!(told.contains("not below the highest"), "{told}");
+    for at in ["stuck_after = \"1min\"", "max_gap = \"30s\""] {
+        let (name, _) = at.split_once(' ').unwrap();
+        let never = GRAPH.replace(at, &format!("{name} = \"0s\""));
+        let told = compiled(&never).0.unwrap_err();
+        assert!(
+            told.contains(&format!("`{name}` is 0s and must be longer")),
+            "{told}"
+        );
+    }
     let told = compiled(&GRAPH.replace("1 K/s", "1 nm/s")).0.unwrap_err();
     assert!(told.contains("cannot be in K/s"), "{told}");
 }
