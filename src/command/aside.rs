@@ -68,7 +68,8 @@ pub fn copy_aside(from: &Path, path: &Path) -> io::Result<()> {
     put(path, "new", copied, written)
 }
 
-/// Makes a file beside a path and gives it that name; or writes to what is there, where that is no file.
+/// Makes a file beside a path and gives it that name; or writes to what is there, where that is no file. A link stays one, to what
+/// takes the place of what it links to.
 fn put(
     path: &Path,
     ending: &str,
@@ -78,6 +79,7 @@ fn put(
     if fs::metadata(path).is_ok_and(|of| !of.is_file() && !of.is_dir()) {
         return write_to(path);
     }
+    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let mut aside = path.as_os_str().to_owned();
     aside.push(".");
     aside.push(ending);
@@ -110,6 +112,20 @@ mod tests {
         assert!(!fs::metadata(&pipe).unwrap().is_file());
         fs::remove_file(&pipe).unwrap();
         read
+    }
+
+    #[test]
+    fn a_link_stays_one() {
+        let file = std::env::temp_dir().join(format!("athermal-linked-{}", std::process::id()));
+        let link = file.with_extension("link");
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_aside(&link, "new").unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        for path in [link, file] {
+            fs::remove_file(path).unwrap();
+        }
     }
 
     #[test]

@@ -66,6 +66,9 @@ impl Compare {
     /// # Errors
     /// When a graph has mistakes or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        let on = self.data.others(self.on.clone());
+        self.data.check_lasting("--data")?;
+        on.check_lasting("--on")?;
         let mut models = Vec::new();
         for path in &self.graphs {
             let model = Model::load(path)?;
@@ -76,7 +79,6 @@ impl Compare {
         }
         let graphs = models.iter();
         let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
-        let on = self.data.others(self.on.clone());
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
         let mut in_fits = Vec::new();
         for ((path, mut model), name) in models.into_iter().zip(names) {

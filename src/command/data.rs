@@ -1,8 +1,12 @@
 //! Decides how recorded data are named on the command line, and what is told of them after reading.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::hash::Hasher;
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
+use athermal::core::engine::Fnv1a;
 use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Format, Options, Report};
 use clap::Args;
@@ -31,6 +35,24 @@ impl Data {
         Self {
             files,
             lenient: false,
+        }
+    }
+
+    /// Refuses what can be read only once, for a command that reads its data again.
+    ///
+    /// # Errors
+    /// When there is such a file.
+    pub fn check_lasting(&self, option: &str) -> Result<(), Failure> {
+        let is_stream = |path: &&Path| {
+            let there = std::fs::metadata(path);
+            path.as_os_str() == "-" || there.is_ok_and(|of| !of.is_file() && !of.is_dir())
+        };
+        match self.paths().find(is_stream) {
+            Some(path) => Err(Failure::Request(format!(
+                "{option} {}: this can be read only once, and the command reads its data again; save it to a file first",
+                path.display()
+            ))),
+            None => Ok(()),
         }
     }
 
@@ -95,7 +117,7 @@ impl Data {
         let reports = dataset.reports();
         let mut cards = Vec::with_capacity(self.files.len());
         for path in &self.files {
-            let content = std::fs::read(path).map_err(|error| {
+            let (bytes, hash) = content_of(path).map_err(|error| {
                 Failure::Outside(format!("cannot read {}: {error}", path.display()))
             })?;
             let name = path.display().to_string();
@@ -106,11 +128,30 @@ impl Data {
             cards.push(DataCard {
                 path: name,
                 rows,
-                bytes: content.len() as u64,
-                hash: fnv_1a(&content),
+                bytes,
+                hash,
             });
         }
         Ok(cards)
+    }
+}
+
+/// The length of a file in bytes and the checksum of its content as text: [`Fnv1a`] in hexadecimal digits.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn content_of(path: &Path) -> io::Result<(u64, String)> {
+    let mut file = BufReader::with_capacity(1 << 16, File::open(path)?);
+    let (mut bytes, mut hash) = (0, Fnv1a::default());
+    loop {
+        let piece = file.fill_buf()?;
+        if piece.is_empty() {
+            return Ok((bytes, format!("{:016x}", hash.finish())));
+        }
+        hash.write(piece);
+        let read = piece.len();
+        bytes += read as u64;
+        file.consume(read);
     }
 }
 
@@ -242,22 +283,4 @@ pub fn with_overlaps(mut told: Value, reports: &[(String, Report)]) -> Value {
         told["overlaps"] = all.into();
     }
     told
-}
-
-/// The checksum of a content as text: [`athermal::core::engine::fnv_1a`] in hexadecimal digits.
-pub fn fnv_1a(content: &[u8]) -> String {
-    format!("{:016x}", athermal::core::engine::fnv_1a(content))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_checksum_is_that_of_the_published_test_vectors() {
-        // Vectors from the FNV reference page: the empty string, "a" and "foobar".
-        assert_eq!(fnv_1a(b""), "cbf29ce484222325");
-        assert_eq!(fnv_1a(b"a"), "af63dc4c8601ec8c");
-        assert_eq!(fnv_1a(b"foobar"), "85944171f73967e8");
-    }
 }

@@ -13,6 +13,7 @@ use clap::Args;
 use serde_json::json;
 
 use self::folder::Folder;
+use super::aside::write_aside;
 use super::data::Data;
 use super::fit::fit_on;
 use super::simulate::write_recording;
@@ -58,25 +59,25 @@ impl Demo {
                 terminal.note(format_args!("  {:<30}  {text}", path.display().to_string()));
             }
         };
-        std::fs::write(&graph, GRAPH).map_err(|error| failed(&graph, &error))?;
+        folder.write(files[0], |graph| write_aside(graph, GRAPH))?;
         tell(&graph, "the graph: what is computed from what");
-        for (path, (days, seed), what) in
-            [(&train, TRAIN, "to fit on"), (&test, TEST, "to test on")]
-        {
-            let rows = simulate(days, seed, path, terminal)?;
+        for (file, path, (days, seed), what) in [
+            (files[1], &train, TRAIN, "to fit on"),
+            (files[2], &test, TEST, "to test on"),
+        ] {
+            let rows = folder.write(file, |path| simulate(days, seed, path, terminal))?;
             let rows = count(rows);
             tell(
                 path,
                 &format!("{days} days {what}, seed {seed}, {rows} rows"),
             );
         }
-        let fitted = fit_model(&graph, &train, &model, terminal)?;
+        let fitted = folder.write(files[3], |model| fit_model(&graph, &train, model, terminal))?;
         let estimators = fitted.card.as_ref().map_or(0, |card| card.estimators.len());
         tell(
             &model,
             &format!("the graph and what {estimators} of its nodes have learned"),
         );
-        folder.close()?;
 
         let scores = evaluate(&model, &test, terminal)?;
         if people {
@@ -90,10 +91,6 @@ impl Demo {
         }
         Ok(Answer::Fine)
     }
-}
-
-fn failed(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::Outside(format!("cannot write {}: {error}", path.display()))
 }
 
 fn simulate(days: f64, seed: u64, path: &Path, terminal: &Terminal) -> Result<u64, Failure> {
@@ -119,7 +116,7 @@ fn fit_model(
     let text = model.to_text().map_err(|error| {
         Failure::Outside(format!("the model cannot be written as JSON: {error}"))
     })?;
-    std::fs::write(output, text).map_err(|error| failed(output, &error))?;
+    write_aside(output, text)?;
     Ok(model)
 }
 

@@ -75,6 +75,7 @@ impl Fit {
             .is_some_and(|ending| ending == "json");
         let graph = (!is_model).then_some(&*self.graph);
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
+        self.data.check_lasting("--data")?;
         let mut sources = Sources::new();
         let mut model = Model::load_from(&self.graph, Wanted::default(), &mut sources)?;
         self.doubt_tests(&model, sources, terminal);

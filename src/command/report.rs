@@ -9,7 +9,7 @@ use athermal::core::score::Lack;
 use athermal::report::{gather, page, plots, text};
 use clap::Args;
 
-use super::aside::check_apart;
+use super::aside::{check_apart, write_aside};
 use super::data::{self, Data};
 use super::evaluate::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
@@ -46,6 +46,7 @@ impl Report {
     /// # Errors
     /// When the model or the data cannot be used, or a file cannot be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+        self.data.check_lasting("--data")?;
         if let Some(output) = &self.output {
             let read = self.data.paths().chain([&*self.model]);
             check_apart("--output", output, read)?;
@@ -92,7 +93,7 @@ impl Report {
             if path.as_os_str() == "-" {
                 print!("{page}");
             } else {
-                write(path, page.as_bytes())?;
+                write_aside(path, &page)?;
                 terminal.note(format_args!(
                     "wrote {} ({} kB)",
                     path.display(),
@@ -116,9 +117,9 @@ pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result
         .map_err(|error| Failure::Outside(format!("cannot make {}: {error}", folder.display())))?;
     for plot in plots {
         let name = file_name(&plot.name);
-        write(&folder.join(format!("{name}.svg")), plot.svg.as_bytes())?;
+        write_aside(&folder.join(format!("{name}.svg")), &plot.svg)?;
         #[cfg(feature = "png")]
-        write(&folder.join(format!("{name}.png")), &plot.png)?;
+        write_aside(&folder.join(format!("{name}.png")), &plot.png)?;
     }
     terminal.note(format_args!(
         "wrote {} pictures to {}",
@@ -138,9 +139,4 @@ fn file_name(name: &str) -> String {
         }
     };
     name.chars().map(plain).collect()
-}
-
-fn write(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, content)
-        .map_err(|error| Failure::Outside(format!("cannot write {}: {error}", path.display())))
 }

@@ -76,7 +76,8 @@ impl Run {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         data::check_ending(&self.output)?;
         let read = [&*self.model, &*self.input];
-        check_apart("--output", &self.output, read)?;
+        let swapped = self.swap.paths();
+        check_apart("--output", &self.output, read.into_iter().chain(swapped))?;
         if let Some(state) = &self.state {
             if state.as_os_str() == "-" {
                 let told = "--state -: what a run knows is kept in a file, from one run to the next; name a file";

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use athermal::core::schema::graph_schema;
 use clap::Args;
 
+use super::aside::write_aside;
 use crate::terminal::{Answer, Failure, Terminal};
 
 /// Write the JSON Schema of graph files, for editors
@@ -32,9 +33,7 @@ impl Schema {
             print!("{text}");
             return Ok(Answer::Fine);
         }
-        std::fs::write(&self.output, text).map_err(|error| {
-            Failure::Outside(format!("cannot write {}: {error}", self.output.display()))
-        })?;
+        write_aside(&self.output, text)?;
         terminal.note(format_args!("wrote {}", self.output.display()));
         Ok(Answer::Fine)
     }

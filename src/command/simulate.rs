@@ -15,6 +15,7 @@ use athermal_simulation::{table_columns, write_table};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::aside::{check_apart, not_written};
 use super::data;
 use super::evaluate::load_fitted;
 use super::numbers;
@@ -93,6 +94,8 @@ impl Simulate {
         }
         let output = self.output.as_deref().unwrap_or(Path::new("-"));
         data::check_ending(output)?;
+        let read = self.compensate.iter().chain(&self.schedule);
+        check_apart("--output", output, read.map(|path| &**path))?;
         let rows = self.write(known.machine, output, terminal)?;
         if output.as_os_str() != "-" && terminal.format == Format::Table {
             terminal.note(format_args!(
@@ -214,7 +217,7 @@ pub fn write_recording(
             // Whoever read our output has seen enough.
             return Failure::Told(0);
         }
-        Failure::Outside(format!("cannot write {}: {error}", output.display()))
+        Failure::Outside(not_written(output, &error))
     };
     let out: Box<dyn Write> = if output.as_os_str() == "-" {
         Box::new(io::stdout().lock())

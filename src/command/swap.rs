@@ -65,6 +65,12 @@ impl Options {
         self.watch || !self.swap_at.is_empty()
     }
 
+    /// The files of the graphs named at the start.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        let named = self.swap_at.iter().filter_map(|text| text.split_once('='));
+        named.map(|(_, path)| Path::new(path))
+    }
+
     /// The graphs named at the start, each with the time at which it takes over.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::workbench::{Scratch, athermal, athermal_unread};
+use super::workbench::{Scratch, athermal, athermal_fed, athermal_unread};
 use super::{csv, desk, rows};
 
 #[test]
@@ -251,4 +251,73 @@ fn a_graph_and_a_model_that_are_no_text_in_utf_8_are_told_to_be_saved_as_that_an
         .tells(&["other-model.json: it is not text in UTF-8; save it as that"]);
     let log = in_utf_16("other-log.csv", &data);
     athermal(&[&"evaluate", &model, &"--data", &log]).ended(0);
+}
+
+#[test]
+fn no_output_takes_the_place_of_what_the_same_command_reads() {
+    let (scratch, graph, data, model) = desk("apart");
+    let schedule = scratch.file("schedule.csv", "time_s,stage_on\n0,1\n");
+    let next = scratch.path("next.json");
+    std::fs::copy(&model, &next).unwrap();
+    let swap = format!("1h={}", next.display());
+    let commands: [&[&dyn AsRef<std::ffi::OsStr>]; 4] = [
+        &[&"test", &graph, &"--junit", &graph],
+        &[
+            &"simulate",
+            &"linear-axis",
+            &"--schedule",
+            &schedule,
+            &"-o",
+            &schedule,
+        ],
+        &[
+            &"simulate",
+            &"linear-axis",
+            &"--compensate",
+            &model,
+            &"-o",
+            &model,
+        ],
+        &[
+            &"run",
+            &model,
+            &"-i",
+            &data,
+            &"--swap-at",
+            &swap,
+            &"-o",
+            &next,
+        ],
+    ];
+    let read = [&graph, &schedule, &model, &next].map(|path| std::fs::read(path).unwrap());
+    for command in commands {
+        athermal(command).ended(2).tells(&[
+            "this is the same file as",
+            "would be lost",
+            "name another file",
+        ]);
+    }
+    let left = [&graph, &schedule, &model, &next].map(|path| std::fs::read(path).unwrap());
+    assert!(left == read);
+}
+
+#[test]
+fn data_that_can_be_read_only_once_are_refused_by_what_reads_them_again() {
+    let (scratch, graph, data, model) = desk("once");
+    let output = scratch.path("out.json");
+    let commands: [&[&dyn AsRef<std::ffi::OsStr>]; 5] = [
+        &[&"fit", &graph, &"--data", &"-", &"-o", &output],
+        &[&"compare", &graph, &"--data", &data, &"--on", &"-"],
+        &[&"compare", &graph, &"--data", &"-", &"--on", &data],
+        &[&"report", &model, &"--data", &"-"],
+        &[&"diagnose", &model, &"--data", &"-"],
+    ];
+    let rows = std::fs::read(&data).unwrap();
+    for command in commands {
+        athermal_fed(command, &rows)
+            .ended(2)
+            .tells(&["-: this can be read only once", "save it to a file first"]);
+    }
+    assert!(!output.exists());
+    athermal_fed(&[&"evaluate", &model, &"--data", &"-"], &rows).ended(0);
 }

@@ -2,6 +2,8 @@
 //!
 //! Only integer arithmetic, `+ - * /`, `sqrt` and the pure Rust `libm` are used: the platform's own `ln` may differ in the last bit.
 
+use crate::engine::fnv_1a;
+
 /// xoshiro256++ (Blackman and Vigna, "Scrambled linear pseudorandom number generators", ACM TOMS 47(4), 2021), with normal deviates.
 #[derive(Debug, Clone)]
 pub struct Prng {
@@ -18,20 +20,13 @@ fn split_mix_64(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// FNV-1a, 64 bits (Fowler, Noll and Vo, IETF draft-eastlake-fnv).
-fn fnv_1a(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
-}
-
 impl Prng {
     /// The stream called `label` of `seed`. Streams with different labels are independent, so that one more sensor or motor leaves
     /// the numbers of all others as they were.
     #[must_use]
     pub fn stream(seed: u64, label: &str) -> Self {
         let mut mix = seed;
-        let mut mix = split_mix_64(&mut mix) ^ fnv_1a(label);
+        let mut mix = split_mix_64(&mut mix) ^ fnv_1a(label.as_bytes());
         let state = std::array::from_fn(|_| split_mix_64(&mut mix));
         Self { state, spare: None }
     }

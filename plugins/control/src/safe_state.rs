@@ -98,7 +98,7 @@ impl SafeState {
             Ok(slew) if mistakes.is_empty() => Ok((refuge, slew)),
             Ok(_) => Err(mistakes),
             Err(mistake) => {
-                mistakes.push(mistake.rests_on("refuge"));
+                mistakes.push(mistake);
                 Err(mistakes)
             }
         }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::super::data::fnv_1a;
+use super::super::aside::write_aside;
+use super::super::data::content_of;
 use crate::invocation::program;
 use crate::terminal::Failure;
 
@@ -14,7 +15,8 @@ const MARK: &str = ".athermal-demo.json";
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    files: Vec<String>,
+    /// The checksum of each file that the demo has written; none while it does.
+    own: BTreeMap<String, Option<String>>,
 }
 
 impl Folder {
@@ -27,12 +29,16 @@ impl Folder {
             Failure::Outside(format!("cannot make {}: {error}", path.display()))
         })?;
         let mark = std::fs::read_to_string(path.join(MARK)).unwrap_or_default();
-        let own: BTreeMap<String, String> = serde_json::from_str(&mark).unwrap_or_default();
+        let own: BTreeMap<String, Option<String>> = serde_json::from_str(&mark).unwrap_or_default();
         for file in files {
             let there = path.join(file);
-            if let Ok(content) = std::fs::read(&there)
-                && own.get(*file) != Some(&fnv_1a(&content))
-            {
+            let left = |(_, hash)| match own.get(*file) {
+                // A demo that was stopped has left it.
+                Some(None) => true,
+                Some(Some(written)) => *written == hash,
+                None => false,
+            };
+            if content_of(&there).is_ok_and(|content| !left(content)) {
                 let what = if own.contains_key(*file) {
                     "has been changed since a demo wrote it"
                 } else {
@@ -48,25 +54,33 @@ impl Folder {
         }
         Ok(Self {
             path: path.to_owned(),
-            files: files.iter().map(|&file| file.to_owned()).collect(),
+            own,
         })
     }
 
-    /// Remembers what has been written.
+    /// Writes a file, and remembers what has been written.
     ///
     /// # Errors
-    /// When the folder cannot be read or written.
-    pub fn close(&mut self) -> Result<(), Failure> {
-        let failed = |error: std::io::Error| {
-            Failure::Outside(format!("cannot write {}: {error}", self.path.display()))
-        };
-        let mut own = BTreeMap::new();
-        for file in &self.files {
-            let content = std::fs::read(self.path.join(file)).map_err(failed)?;
-            own.insert(file, fnv_1a(&content));
-        }
-        let text = serde_json::to_string_pretty(&own).unwrap_or_default();
-        std::fs::write(self.path.join(MARK), text + "\n").map_err(failed)
+    /// When it cannot be written.
+    pub fn write<T>(
+        &mut self,
+        file: &str,
+        make: impl FnOnce(&Path) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let path = self.path.join(file);
+        self.remember(file, None)?;
+        let made = make(&path)?;
+        let (_, hash) = content_of(&path).map_err(|error| {
+            Failure::Outside(format!("cannot read {}: {error}", path.display()))
+        })?;
+        self.remember(file, Some(hash))?;
+        Ok(made)
+    }
+
+    fn remember(&mut self, file: &str, hash: Option<String>) -> Result<(), Failure> {
+        self.own.insert(file.to_owned(), hash);
+        let text = serde_json::to_string_pretty(&self.own).unwrap_or_default();
+        write_aside(&self.path.join(MARK), text + "\n")
     }
 }
 
@@ -84,14 +98,29 @@ mod tests {
     fn a_folder_of_its_own_is_taken_again_until_somebody_works_in_it() {
         let path = fresh("own");
         let mut folder = Folder::open(&path, &["a"]).unwrap();
-        std::fs::write(path.join("a"), "demo").unwrap();
-        folder.close().unwrap();
+        let written = |folder: &mut Folder| folder.write("a", |path| write_aside(path, "demo"));
+        written(&mut folder).unwrap();
         assert!(Folder::open(&path, &["a"]).is_ok());
         std::fs::write(path.join("a"), "mine").unwrap();
         assert!(matches!(
             Folder::open(&path, &["a"]),
             Err(Failure::Request(text)) if text.contains("has been changed")
         ));
+        std::fs::remove_dir_all(&path).unwrap();
+    }
+
+    #[test]
+    fn what_a_demo_that_was_stopped_has_left_is_its_own() {
+        let path = fresh("stopped");
+        let mut folder = Folder::open(&path, &["a", "b"]).unwrap();
+        let stopped = folder.write("a", |path| {
+            write_aside(path, "half")?;
+            Err::<(), _>(Failure::Told(1))
+        });
+        assert!(stopped.is_err());
+        assert!(Folder::open(&path, &["a", "b"]).is_ok());
+        std::fs::write(path.join("b"), "mine").unwrap();
+        assert!(Folder::open(&path, &["a", "b"]).is_err());
         std::fs::remove_dir_all(&path).unwrap();
     }
 

@@ -79,6 +79,7 @@ impl Diagnose {
                 self.day
             )));
         }
+        self.data.check_lasting("--data")?;
         let model = load_fitted(&self.model, Wanted::default())?;
         self.check_names(&model.plan)?;
         let dataset = self.data.dataset();

@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::aside::{check_apart, write_aside};
 use super::threads::Threads;
 use crate::output::offer;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -46,6 +47,9 @@ impl Test {
     /// When a file has mistakes, data cannot be read, or the results not be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let began = Instant::now();
+        if let Some(path) = &self.junit {
+            check_apart("--junit", path, self.graphs.iter().map(|path| &**path))?;
+        }
         let mut suites = suite::load(&self.graphs, terminal)?;
         if let Some(text) = &self.filter {
             let text = text.to_lowercase();
@@ -78,9 +82,7 @@ impl Test {
         });
         let summary = Summary::of(&suites, &results, began.elapsed());
         if let Some(path) = &self.junit {
-            std::fs::write(path, summary.junit()).map_err(|error| {
-                Failure::Outside(format!("cannot write {}: {error}", path.display()))
-            })?;
+            write_aside(path, summary.junit())?;
         }
         let mut warned = BTreeSet::new();
         for warning in results.iter().flat_map(|ran| &ran.warnings) {

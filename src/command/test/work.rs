@@ -1,6 +1,7 @@
 //! Decides which thread fits what and runs which test, and that results come in the order of the files; a fit that several tests
 //! of a graph share is made once.
 
+use std::panic::{self, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{OnceLock, mpsc};
 use std::time::{Duration, Instant};
@@ -66,6 +67,16 @@ impl Broken {
     }
 }
 
+/// What a job gives, or that a node panicked in it: other tests wait for its fit, and are to be told of.
+fn caught<T>(job: impl FnOnce() -> Result<T, Broken>) -> Result<T, Broken> {
+    panic::catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|_| {
+        Err(Broken {
+            message: "a node panicked; what it said stands above, and is for its author".to_owned(),
+            status: 3,
+        })
+    })
+}
+
 /// A fit that some tests need.
 struct Fit<'a> {
     suite: usize,
@@ -116,7 +127,7 @@ pub(super) fn run(suites: &[Suite], threads: usize, tell: &mut dyn FnMut(&Ran)) 
                 loop {
                     let job = next.fetch_add(1, Ordering::Relaxed);
                     if let Some(fit) = fits.get(job) {
-                        let made = make(&suites[fit.suite], fit.data, options);
+                        let made = caught(|| make(&suites[fit.suite], fit.data, options));
                         let _ = fit.made.set(made);
                         continue;
                     }
@@ -209,7 +220,7 @@ fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
     });
     let made = fit.map_or(Ok(&none), |fit| fit.made.wait().as_ref());
     let began = Instant::now();
-    let verdict = made.map_err(Clone::clone).and_then(|made| {
+    let run = |made: &Made| {
         let mut warnings = made.warnings.clone();
         let verdict = match &declared.on {
             On::Data(set) => {
@@ -221,7 +232,9 @@ fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
             On::Synthetic(synthetic) => trial::run(&of.plan, declared, &made.fitted, synthetic),
         };
         Ok((verdict.map_err(Broken::of)?, made.notes.clone(), warnings))
-    });
+    };
+    let verdict = made.map_err(Clone::clone);
+    let verdict = verdict.and_then(|made| caught(|| run(made)));
     let (status, findings, notes, warnings) = match verdict {
         Err(broken) => (Status::Broken(broken), Vec::new(), Vec::new(), Vec::new()),
         Ok((verdict, notes, warnings)) => {
@@ -240,5 +253,17 @@ fn test(suites: &[Suite], fits: &[Fit<'_>], suite: usize, trial: usize) -> Ran {
         notes,
         warnings,
         took: began.elapsed(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_told_as_what_breaks_a_test() {
+        let broken = caught::<()>(|| panic!("within a node")).unwrap_err();
+        assert!(broken.message.contains("a node panicked"));
+        assert_eq!(caught(|| Ok(1)).unwrap_or_default(), 1);
     }
 }

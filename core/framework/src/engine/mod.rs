@@ -36,7 +36,7 @@ pub use carry::{Carry, NodeCarry};
 pub use error::EngineError;
 pub use mode::Mode;
 pub use pairing::{Paired, Pairing};
-pub use revision::{fnv_1a, revision};
+pub use revision::{Fnv1a, fnv_1a, revision};
 pub use sample_range::SampleRange;
 pub use state::{EngineState, RestoreError};
 

@@ -1,6 +1,7 @@
 //! Decides the revision of a fitted graph: a hash of what it computes, not of how it is written.
 
 use std::collections::BTreeMap;
+use std::hash::Hasher;
 
 use serde_json::json;
 
@@ -23,9 +24,31 @@ pub fn revision(plan: &Plan, fitted: &Fitted) -> String {
 /// Fowler, Noll and Vo's hash in its variant 1a with 64 bits: for telling contents apart, not for guarding them.
 #[must_use]
 pub fn fnv_1a(content: &[u8]) -> u64 {
-    content.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    let mut hash = Fnv1a::default();
+    hash.write(content);
+    hash.finish()
+}
+
+/// The same hash of a content in pieces.
+#[derive(Debug, Clone)]
+pub struct Fnv1a(u64);
+
+impl Default for Fnv1a {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Hasher for Fnv1a {
+    fn write(&mut self, piece: &[u8]) {
+        self.0 = piece.iter().fold(self.0, |hash, &byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        });
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
 }
 
 #[cfg(test)]
@@ -38,5 +61,9 @@ mod tests {
         assert_eq!(fnv_1a(b""), 0xcbf2_9ce4_8422_2325);
         assert_eq!(fnv_1a(b"a"), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(fnv_1a(b"foobar"), 0x8594_4171_f739_67e8);
+        let mut pieces = Fnv1a::default();
+        pieces.write(b"foo");
+        pieces.write(b"bar");
+        assert_eq!(pieces.finish(), fnv_1a(b"foobar"));
     }
 }

@@ -68,6 +68,12 @@ fn it_can_hold_or_go_to_a_stated_value() {
         .0
         .unwrap_err();
     assert!(told.contains("needs to know which"), "{told}");
+    let two = GRAPH.replace("\"zero\"", "\"bad\"");
+    let told = compiled(&two.replace("10 nm/s", "-10 nm/s")).0.unwrap_err();
+    assert!(
+        told.contains("refuge") && told.contains("max_slew"),
+        "{told}"
+    );
     let rows: Vec<_> = (0..90)
         .map(|i| {
             (
