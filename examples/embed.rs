@@ -65,7 +65,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         log.push(time, &samples);
     }
     let plan = Arc::clone(&fitting.plan);
-    (fitting.fitted, _) = fit(&plan, &log, &FitOptions::default(), &mut |_| ())?;
+    let (fitted, report) = fit(&plan, &log, &FitOptions::default(), &mut |_| ())?;
+    if let Some((node, error)) = report.failed().next() {
+        return Err(format!("{node} could not be fitted: {error}").into());
+    }
+    fitting.fitted = fitted;
     std::fs::write(&model, fitting.to_text()?)?;
 
     // From here on, all that a controller needs.

@@ -94,10 +94,7 @@ impl Fit {
             write_aside(&self.output, &text)?;
         }
         self.tell(terminal, &dataset, &report);
-        let fits = report.estimators.iter();
-        let failed = fits
-            .filter(|fit| matches!(fit.outcome, Outcome::Failed(_)))
-            .count();
+        let failed = report.failed().count();
         if to_stdout {
             print!("{text}");
         } else if terminal.format == Format::Table {

@@ -1,6 +1,7 @@
 //! Decides what a data set offers to fitting and scoring; files and formats are the business of plugins.
 
 use crate::compile::Plan;
+use crate::engine::EngineError;
 use crate::time::Instant;
 
 /// What went wrong while reading a recording; its text says what, where and what to do.
@@ -40,7 +41,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Adds a row; NaN where a channel has no value.
+    /// Adds a row: a value for each of [`Plan::sources`], NaN where a channel has none. One with more or fewer is told when it is
+    /// read.
     pub fn push(&mut self, time: Instant, values: &[f64]) {
         self.events.push((Event::Row(time), values.to_vec()));
     }
@@ -89,9 +91,38 @@ impl Recording for Table {
 
 impl Rows for std::slice::Iter<'_, (Event, Vec<f64>)> {
     fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
-        Ok(Iterator::next(self).map(|(event, row)| {
-            values[..row.len()].copy_from_slice(row);
-            *event
-        }))
+        let Some((event, row)) = Iterator::next(self) else {
+            return Ok(None);
+        };
+        if matches!(event, Event::Row(_)) {
+            let (found, expected) = (row.len(), values.len());
+            if found != expected {
+                return Err(EngineError::WrongWidth { found, expected }.into());
+            }
+            values.copy_from_slice(row);
+        }
+        Ok(Some(*event))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_another_width_is_told_and_not_filled_up_with_the_one_before() {
+        for row in [&[1.0][..], &[1.0, 2.0, 3.0]] {
+            let mut table = Table::default();
+            table.push(Instant::from_ns(0), &[1.0, 2.0]);
+            table.segment();
+            table.push(Instant::from_ns(1), row);
+            let mut rows = table.events.iter();
+            let mut values = [f64::NAN; 2];
+            for _ in 0..2 {
+                assert!(Rows::next(&mut rows, &mut values).unwrap().is_some());
+            }
+            let told = Rows::next(&mut rows, &mut values).unwrap_err().to_string();
+            assert!(told.contains("values were given"), "{told}");
+        }
     }
 }

@@ -7,7 +7,7 @@ use std::sync::{OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::fit::{FitOptions, fit};
 use athermal::core::recording::Recording;
 use athermal::core::trial::{self, DataSet, Finding, On};
 use athermal::files::{Dataset, Options};
@@ -196,13 +196,8 @@ fn make(suite: &Suite, data: &DataSet, options: &FitOptions) -> Result<Made, Bro
     let opened = Opened::of(data)?;
     let (fitted, report) =
         fit(&suite.plan, opened.recording(), options, &mut |_| {}).map_err(Broken::of)?;
-    let failed = report
-        .estimators
-        .iter()
-        .filter_map(|fit| match &fit.outcome {
-            Outcome::Failed(error) => Some(format!("{} could not be fitted: {error}", fit.node)),
-            Outcome::Fitted(_) => None,
-        });
+    let failed = report.failed();
+    let failed = failed.map(|(node, error)| format!("{node} could not be fitted: {error}"));
     Ok(Made {
         fitted,
         notes: failed.collect(),

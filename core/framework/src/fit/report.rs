@@ -60,6 +60,16 @@ pub struct FitReport {
     pub estimators: Vec<EstimatorFit>,
 }
 
+impl FitReport {
+    /// What could not be fitted, by its node, and why. It gives no predictions.
+    pub fn failed(&self) -> impl Iterator<Item = (&str, &TrainingError)> {
+        self.estimators.iter().filter_map(|fit| match &fit.outcome {
+            Outcome::Failed(error) => Some((fit.node.as_str(), error)),
+            Outcome::Fitted(_) => None,
+        })
+    }
+}
+
 /// Rows that did not take part in a fit, by reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dropped {

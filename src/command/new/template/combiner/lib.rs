@@ -1,4 +1,4 @@
-//! A combiner of athermal: the vote of whoever was closest last.
+//! A combiner of athermal: a mean of votes that weighs each by how close its voter has been.
 
 use athermal_core::node::{Combine, Combiner, InputPort, Mistake, Restored, State, Votes};
 use athermal_core::time::Instant;

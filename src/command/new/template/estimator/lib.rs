@@ -1,4 +1,4 @@
-//! An estimator of athermal: a line through the truths over the sum of the features.
+//! An estimator of athermal: a line through the truths over the first of the features.
 
 use athermal_core::node::{
     Estimator, InputPort, Mistake, Predictor, Regressors, Trained, Trainer, TrainingError,
