@@ -45,7 +45,8 @@ pub struct Run {
     #[arg(long)]
     frozen: bool,
     /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: when the input ends, and at least once a
-    /// minute while rows come. Rows up to the last one known are passed over, and an output file of that run is gone on with. With `--watch` it is kept of whatever graph runs
+    /// minute while rows come. Rows up to the last one known are passed over, and an output file of that run is gone on with. With
+    /// `--watch` it is kept of whatever graph runs
     #[arg(long, value_name = "FILE", conflicts_with = "swap_at")]
     state: Option<PathBuf>,
     #[command(flatten)]
