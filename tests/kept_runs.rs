@@ -179,6 +179,7 @@ fn an_output_that_no_run_like_it_wrote_is_left_as_it_is() {
             "found `never`",
         ),
         ("text.jsonl", "once\n", "an object"),
+        ("line.csv", "a note of mine", "it has no whole line"),
         (
             "keys.jsonl",
             "{\"time_s\":0,\"predicted.X\":1}\n",

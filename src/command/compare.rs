@@ -67,8 +67,10 @@ impl Compare {
     /// When a graph has mistakes or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let on = self.data.others(self.on.clone());
-        self.data.check_lasting("--data")?;
-        on.check_lasting("--on")?;
+        if self.graphs.len() > 1 {
+            self.data.check_lasting("--data")?;
+            on.check_lasting("--on")?;
+        }
         let mut models = Vec::new();
         for path in &self.graphs {
             let model = Model::load(path)?;

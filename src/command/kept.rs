@@ -100,11 +100,22 @@ impl Kept {
         Ok(())
     }
 
+    /// Keeps what is known at the end, once what came of it lasts.
+    ///
+    /// # Errors
+    /// When the sink fails, or the file cannot be written.
+    pub fn end(&mut self, engine: &Engine, sink: &mut dyn Sink) -> Result<(), SinkError> {
+        if self.path.is_some() {
+            sink.flush()?;
+        }
+        self.write(engine)
+    }
+
     /// Keeps what is known.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write(&mut self, engine: &Engine) -> Result<(), SinkError> {
+    fn write(&mut self, engine: &Engine) -> Result<(), SinkError> {
         let Some(path) = &self.path else {
             return Ok(());
         };

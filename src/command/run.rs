@@ -113,7 +113,7 @@ impl Run {
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
         let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, sink);
         live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
-        kept.write(&engine).map_err(outside)?;
+        kept.end(&engine, &mut writer).map_err(outside)?;
         self.tell(terminal, &engine, &reader, usual);
         Ok(Answer::Fine)
     }
@@ -190,7 +190,8 @@ impl Run {
             kept_on.map_err(outside)?;
         }
         writer.finish().map_err(outside)?;
-        kept.write(stepper.engine()).map_err(outside)?;
+        let ended = kept.end(stepper.engine(), &mut writer);
+        ended.map_err(outside)?;
         course.end(&mut control);
         let engine = stepper.engine();
         self.tell(terminal, engine, &reader, &usual);

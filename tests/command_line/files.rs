@@ -307,8 +307,8 @@ fn data_that_can_be_read_only_once_are_refused_by_what_reads_them_again() {
     let output = scratch.path("out.json");
     let commands: [&[&dyn AsRef<std::ffi::OsStr>]; 5] = [
         &[&"fit", &graph, &"--data", &"-", &"-o", &output],
-        &[&"compare", &graph, &"--data", &data, &"--on", &"-"],
-        &[&"compare", &graph, &"--data", &"-", &"--on", &data],
+        &[&"compare", &graph, &graph, &"--data", &data, &"--on", &"-"],
+        &[&"compare", &graph, &graph, &"--data", &"-", &"--on", &data],
         &[&"report", &model, &"--data", &"-"],
         &[&"diagnose", &model, &"--data", &"-"],
     ];

@@ -73,8 +73,8 @@ pub struct PageHinkley {
 ///
 /// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual error: the
 /// root mean square of all that have been taken, of which one larger than five times that counts as five (among the `first`, at
-/// most 100, five times 1.4826 times the median of their sizes). There is an alarm, and the window begins anew, where it has two sides with means that are
-/// farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
+/// most 100, five times 1.4826 times the median of their sizes). There is an alarm, and the window begins anew, where it has two
+/// sides with means that are farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
 /// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///
@@ -430,6 +430,7 @@ where
         seen.taken = Some(arrived);
         let error = error.clamp(-LARGEST_EVER, LARGEST_EVER);
         seen.count += 1;
+        // All that came before are early ones: which are usual is not known yet.
         if seen.count as usize == seen.early.len() + 1 {
             seen.early.push(error);
             if seen.count >= self.first.min(EARLY) {
@@ -491,7 +492,9 @@ where
             }
             Ok(mut known) => {
                 known.detector = known.detector.told_by(&self.seen.detector);
-                known.early.reserve(EARLY as usize - known.early.len());
+                known
+                    .early
+                    .reserve((EARLY as usize).saturating_sub(known.early.len()));
                 self.seen = known;
                 Restored::Accepted
             }

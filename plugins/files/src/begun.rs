@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::csv_rows::CsvRows;
+use crate::error::quoted;
 use crate::lines::{LONGEST_ROW, Lines};
 use crate::{Description, FileError, Format, Layout, Options, Reader, Row, TimeColumn};
 
@@ -18,7 +19,7 @@ pub(crate) struct Begun {
 }
 
 impl Begun {
-    /// Looks at a file; none where there is no whole line to go on from, or no file.
+    /// Looks at a file; none where it is empty or no file.
     ///
     /// # Errors
     /// The file cannot be read, or is not one with these columns.
@@ -28,19 +29,16 @@ impl Begun {
         time: &TimeColumn,
         columns: &[String],
     ) -> Result<Option<Self>, FileError> {
-        if !path.metadata().is_ok_and(|of| of.is_file()) {
+        if !path.metadata().is_ok_and(|of| of.is_file() && of.len() > 0) {
             return Ok(None);
         }
         let file: Arc<str> = path.display().to_string().into();
-        let ends = Ends::of(path).map_err(|source| FileError::Open {
-            file: file.clone(),
-            source: Arc::new(source),
-        })?;
-        let Some(ends) = ends else { return Ok(None) };
+        let ends = Ends::of(path).map_err(|source| FileError::cannot_open(path, source))?;
         let other = |reason: String| FileError::NotBegun {
             file: file.clone(),
             reason,
         };
+        let ends = ends.ok_or_else(|| other("it has no whole line".to_owned()))?;
         let expected = [std::slice::from_ref(&time.column), columns].concat();
         let found = match format {
             Format::Csv => ends.csv_names(),
@@ -50,8 +48,8 @@ impl Begun {
         if found != expected {
             return Err(other(format!(
                 "its columns are {} and not {}",
-                quoted(&found),
-                quoted(&expected)
+                quoted(found.iter().map(String::as_str)),
+                quoted(expected.iter().map(String::as_str))
             )));
         }
         let rows = match format {
@@ -71,7 +69,7 @@ impl Begun {
     }
 }
 
-/// The first and the last whole line of a file.
+/// The first and the last whole line of a file; `of` gives none where there is no whole line.
 struct Ends {
     first: Vec<u8>,
     last: Vec<u8>,
@@ -136,9 +134,4 @@ fn last_instant(
     let mut row = Row::default();
     let mut reader = Reader::from_read(file, Cursor::new(rows), layout, options)?;
     Ok(reader.next_into(&mut row)?.then_some(row.time_ns))
-}
-
-fn quoted(names: &[String]) -> String {
-    let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
-    names.join(", ")
 }

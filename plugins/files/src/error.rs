@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::cell;
@@ -216,6 +217,14 @@ pub enum FileError {
 }
 
 impl FileError {
+    /// That a file cannot be opened or created.
+    pub(crate) fn cannot_open(path: &Path, source: io::Error) -> Self {
+        Self::Open {
+            file: path.display().to_string().into(),
+            source: Arc::new(source),
+        }
+    }
+
     /// Whether whoever read the output went away, as `head` does: a reason to stop, but no failure.
     pub fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
@@ -402,10 +411,16 @@ impl std::error::Error for FileError {
 pub(crate) fn excerpt(bytes: &[u8]) -> String {
     let text = cell::text(bytes);
     let mut short: String = text.chars().take(EXCERPT).collect();
-    if short.len() < bytes.len() && text.chars().count() > EXCERPT {
+    if text.chars().count() > EXCERPT {
         short.push('…');
     }
     short
+}
+
+/// Names as a message lists them.
+pub(crate) fn quoted<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<_> = names.into_iter().map(|name| format!("`{name}`")).collect();
+    names.join(", ")
 }
 
 /// Which columns are missing, what is there, and what each may be called there.
@@ -416,15 +431,9 @@ fn lacking(
     found: &[String],
     windows_1252: bool,
 ) -> fmt::Result {
-    let quoted = |name: &str| format!("`{name}`");
-    let names: Vec<_> = missing.iter().map(|column| quoted(&column.name)).collect();
     let there = match found {
         [] => "no columns".to_owned(),
-        found => found
-            .iter()
-            .map(|name| quoted(name))
-            .collect::<Vec<_>>()
-            .join(", "),
+        found => quoted(found.iter().map(String::as_str)),
     };
     let read = if windows_1252 {
         " (read as Windows-1252, since they are not in UTF-8)"
@@ -444,15 +453,15 @@ fn lacking(
     write!(
         f,
         "{place}: there {is} {}; found {there}{read}; ",
-        names.join(", ")
+        quoted(missing.iter().map(|column| column.name.as_str()))
     )?;
     let near = missing
         .iter()
         .filter_map(|column| Some((column, column.nearest.as_deref()?)));
     let meant: Vec<_> = near
         .map(|(column, nearest)| match missing {
-            [_] => quoted(nearest),
-            _ => format!("{} for {}", quoted(nearest), quoted(&column.name)),
+            [_] => format!("`{nearest}`"),
+            _ => format!("`{nearest}` for `{}`", column.name),
         })
         .collect();
     if !meant.is_empty() {

@@ -52,10 +52,7 @@ impl Lines {
         let file: Arc<str> = path.display().to_string().into();
         match File::open(path) {
             Ok(input) => Ok(Self::new(file, input)),
-            Err(source) => Err(FileError::Open {
-                file,
-                source: Arc::new(source),
-            }),
+            Err(source) => Err(FileError::cannot_open(path, source)),
         }
     }
 

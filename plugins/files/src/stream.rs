@@ -27,6 +27,10 @@ impl Sink for Writer {
     fn flush(&mut self) -> Result<(), SinkError> {
         Ok(self.make_last()?)
     }
+
+    fn finish(&mut self) -> Result<(), SinkError> {
+        Ok(self.flush_all()?)
+    }
 }
 
 /// A writer whose last column is the revision of the graph that made each row.
@@ -40,6 +44,10 @@ impl Sink for WithRevision {
     }
 
     fn flush(&mut self) -> Result<(), SinkError> {
-        Ok(self.0.make_last()?)
+        self.0.flush()
+    }
+
+    fn finish(&mut self) -> Result<(), SinkError> {
+        Sink::finish(&mut self.0)
     }
 }

@@ -56,25 +56,24 @@ impl Writer {
         flush: Flush,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
-        let format = Format::from_path(path).unwrap_or(Format::Csv);
         if path == Path::new("-") {
             return Self::to_write(
                 "standard output",
                 io::stdout(),
-                format,
+                Format::Csv,
                 time_column,
                 columns,
                 flush,
             );
         }
-        let output = File::create(path).map_err(|source| cannot_open(path, source))?;
+        let output = File::create(path).map_err(|source| FileError::cannot_open(path, source))?;
         let mut writer = Self::to_file(path, output, time_column, columns, flush)?;
         writer.write_header(time_column, columns)?;
         Ok(writer)
     }
 
     /// Goes on with a file that was written with the same columns before: a last line that was cut off is removed, and rows up to the
-    /// last one, which stand there already, are passed over. What is not there yet or is no file is created.
+    /// last one, which stand there already, are passed over. What is not there yet, empty or no file is created.
     ///
     /// # Errors
     /// The file cannot be read or written, or was written with other columns; nothing is then changed.
@@ -85,7 +84,7 @@ impl Writer {
         flush: Flush,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
-        let format = Format::from_path(path).unwrap_or(Format::Csv);
+        let format = format_of(path);
         let Some(begun) = Begun::of(path, format, time, columns)? else {
             return Self::create(path, &time.column, columns, flush);
         };
@@ -94,7 +93,7 @@ impl Writer {
             output.set_len(begun.length)?;
             Ok(output)
         };
-        let output = open().map_err(|source| cannot_open(path, source))?;
+        let output = open().map_err(|source| FileError::cannot_open(path, source))?;
         let mut writer = Self::to_file(path, output, &time.column, columns, flush)?;
         writer.stood_ns = begun.last_ns;
         Ok(writer)
@@ -114,9 +113,9 @@ impl Writer {
     ) -> Result<Self, FileError> {
         let is_file = output.metadata().is_ok_and(|of| of.is_file());
         let kept = is_file.then(|| output.try_clone()).transpose();
-        let kept = kept.map_err(|source| cannot_open(path, source))?;
+        let kept = kept.map_err(|source| FileError::cannot_open(path, source))?;
         let name = path.display().to_string();
-        let format = Format::from_path(path).unwrap_or(Format::Csv);
+        let format = format_of(path);
         let mut writer = Self::headless(&name, output, format, time_column, columns, flush);
         writer.kept = kept;
         Ok(writer)
@@ -280,6 +279,11 @@ impl Writer {
     }
 }
 
+/// What the name of a file says, CSV if it says nothing.
+fn format_of(path: &Path) -> Format {
+    Format::from_path(path).unwrap_or(Format::Csv)
+}
+
 fn write_cells<W: Write>(
     csv: &mut csv::Writer<W>,
     number: &mut zmij::Buffer,
@@ -295,13 +299,6 @@ fn write_cells<W: Write>(
         csv.write_field(label).map_err(io_error)?;
     }
     csv.write_record(None::<&[u8]>).map_err(io_error)
-}
-
-fn cannot_open(path: &Path, source: io::Error) -> FileError {
-    FileError::Open {
-        file: path.display().to_string().into(),
-        source: Arc::new(source),
-    }
 }
 
 /// The error as the system gave it: turned by `From`, it would lose its kind.

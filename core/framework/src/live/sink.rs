@@ -49,7 +49,7 @@ pub trait Sink {
         Ok(())
     }
 
-    /// The same at the end. Nothing comes after it.
+    /// Puts out what is still held back, by default as [`flush`](Sink::flush) does. Nothing is put after it.
     ///
     /// # Errors
     /// As [`put`](Sink::put).
