@@ -1,0 +1,122 @@
+use super::*;
+
+fn place() -> Place {
+    Place {
+        file: "run.csv".into(),
+        line: 12,
+    }
+}
+
+#[test]
+fn messages_say_what_where_and_what_to_do() {
+    let bad = FileError::BadCell {
+        place: place(),
+        column: "room".into(),
+        found: "off".into(),
+    };
+    assert_eq!(
+        bad.to_string(),
+        "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
+    );
+    let time = FileError::BadTime {
+        place: place(),
+        column: "time_s".into(),
+        found: String::new(),
+        expected: "a decimal number".to_owned(),
+    };
+    assert_eq!(
+        time.to_string(),
+        "run.csv:12: column `time_s`: expected a decimal number, found nothing; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
+    );
+    let beyond = FileError::TimeBeyond {
+        place: place(),
+        column: "time_s".into(),
+        found: "9223372046".into(),
+    };
+    assert_eq!(
+        beyond.to_string(),
+        "run.csv:12: column `time_s`: the time `9223372046` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`, or read leniently (`--lenient`) to leave the row out"
+    );
+    let dated = FileError::BadTime {
+        place: place(),
+        column: "time_s".into(),
+        found: "2026-03-01 10:00".into(),
+        expected: "a decimal number".to_owned(),
+    };
+    assert_eq!(
+        dated.to_string(),
+        "run.csv:12: column `time_s`: expected a decimal number, found `2026-03-01 10:00`; `unit = \"rfc3339\"` in `[time]` reads such times"
+    );
+    for expected in [
+        "a decimal number",
+        "a date and time such as 2013-07-04T00:00:00Z",
+    ] {
+        let elsewhere = FileError::BadTime {
+            place: place(),
+            column: "time_s".into(),
+            found: "01.03.2026 10:00".into(),
+            expected: expected.to_owned(),
+        };
+        assert_eq!(
+            elsewhere.to_string(),
+            format!(
+                "run.csv:12: column `time_s`: expected {expected}, found `01.03.2026 10:00`; `[time]` reads dates and times by \
+                 their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59"
+            )
+        );
+    }
+    let count = FileError::CellCount {
+        place: place(),
+        expected: 3,
+        found: 2,
+    };
+    assert_eq!(
+        count.to_string(),
+        "run.csv:12: 2 cells where the header has 3; correct the row, or read leniently (`--lenient`) to leave it out"
+    );
+}
+
+#[test]
+fn all_missing_columns_stand_in_one_message() {
+    let told = |missing: &[(&str, Option<&str>)]| {
+        let column = |(name, nearest): &(&str, Option<&str>)| MissingColumn {
+            name: (*name).into(),
+            nearest: nearest.map(Into::into),
+        };
+        let error = FileError::MissingColumns {
+            place: place(),
+            missing: missing.iter().map(column).collect(),
+            found: vec!["time_s".into(), "room".into()],
+            windows_1252: false,
+        };
+        error.to_string()
+    };
+    let (time, room, plate) = (
+        ("tme_s", Some("time_s")),
+        ("rom", Some("room")),
+        ("plate", None),
+    );
+    assert_eq!(
+        told(&[room]),
+        "run.csv:12: there is no column `rom`; found `time_s`, `room`; did you mean `room`?"
+    );
+    assert_eq!(
+        told(&[plate]),
+        "run.csv:12: there is no column `plate`; found `time_s`, `room`; correct the name, or make it optional if it is a channel"
+    );
+    assert_eq!(
+        told(&[time, room]),
+        "run.csv:12: there are no columns `tme_s`, `rom`; found `time_s`, `room`; did you mean `time_s` for `tme_s`, `room` for `rom`?"
+    );
+    assert_eq!(
+        told(&[plate, room]),
+        "run.csv:12: there are no columns `plate`, `rom`; found `time_s`, `room`; did you mean `room` for `rom`? otherwise correct the names, or make optional those that are channels"
+    );
+}
+
+#[test]
+fn an_excerpt_is_short_and_never_cuts_a_character() {
+    assert_eq!(excerpt("21,5 °C".as_bytes()), "21,5 °C");
+    let long = "é".repeat(500);
+    assert_eq!(excerpt(long.as_bytes()), "é".repeat(EXCERPT) + "…");
+}
