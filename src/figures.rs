@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use athermal::Duration;
 pub use athermal::core::diagnostic::{count, counted, digits};
+use jiff::Timestamp;
 
 /// How wide tables may be, in characters.
 const WIDTH: usize = 80;
@@ -73,6 +74,26 @@ pub fn time(seconds: f64) -> String {
         false => &number,
     };
     format!("{number} {}", unit.symbol)
+}
+
+/// How often something happened of which the first is told next: `once`, `3 times, first`.
+#[must_use]
+pub fn times_first(count: usize) -> String {
+    match count {
+        1 => "once".to_owned(),
+        many => format!("{many} times, first"),
+    }
+}
+
+/// Instants from here on, in s, are dates: 1980, by a clock that began in 1970. A machine does not run for ten years.
+pub const DATES_S: f64 = 315_532_800.0;
+
+/// An instant: its date where it has one, else in s as the data have it.
+#[must_use]
+pub fn instant(at_s: f64) -> String {
+    let date = (at_s >= DATES_S).then(|| Timestamp::from_second(at_s as i64).ok());
+    date.flatten()
+        .map_or_else(|| format!("{at_s} s"), |date| date.to_string())
 }
 
 /// A time as a graph file states it; one that is too long for that as [`time`] tells it.

@@ -115,6 +115,13 @@ impl Terminal {
         }
     }
 
+    /// Shows what is doubtful in a file that is used nevertheless.
+    pub fn doubts(&self, diagnostics: &Diagnostics, sources: &Sources) {
+        if !diagnostics.is_empty() {
+            self.say(diagnostics.render(sources, self.colour, 100).trim_end());
+        }
+    }
+
     /// Shows how many ticks a longer piece of work has stepped, once it has taken a second.
     #[must_use]
     pub fn progress(&self, what: &'static str) -> Progress {

@@ -249,6 +249,45 @@ fn corrections_of_different_units_are_each_worth_what_they_are_in_one() {
 }
 
 #[test]
+fn a_correction_at_the_end_of_its_range_is_told_and_moves_its_axis_no_further() {
+    let scratch = Scratch::new("a_correction_at_the_end_of_its_range");
+    let base = graph("linear-axis-compensate");
+    let extends = serde_json::Value::from(base.display().to_string());
+    let text = format!(
+        "schema = 1\nextends = {extends}\n[nodes.c]\ntype = \"compensate\"\ninputs.rate = \"vote.*\"\nrange = \"100 nm\"\n\
+         max_rate = \"1000 nm/min\"\nmax_slew = \"50 nm/s\"\n[outputs]\nc = \"c\"\n"
+    );
+    let file = scratch.file("narrow.toml", text);
+    let [first, second] = [("fit.csv", 1), ("days.csv", 2)]
+        .map(|(name, seed)| simulated(&scratch, name, "linear-axis", 0.5, seed));
+    let model = scratch.path("model.json");
+    athermal_on("fit", &file, &first, &[&"-o", &model]).ended(0);
+    let told = report(&model, &second, &[]).out;
+    let facts = report(&model, &second, &[&"--format", &"json"]).json();
+    for departure in facts["worth"]["departures"].as_array().unwrap() {
+        let axis = departure["axis"].as_str().unwrap();
+        let share = departure["held_back"]["at the end of its range"]
+            .as_f64()
+            .unwrap();
+        let sentence = format!(
+            "The correction of {axis} is at the end of its range {:.0} % of the time.",
+            100.0 * share
+        );
+        assert!(
+            share > 0.2 && told.contains(&sentence),
+            "{sentence}\n{told}"
+        );
+        let [without, with] =
+            ["largest_without", "largest_with"].map(|of| departure[of].as_f64().unwrap());
+        assert_eq!(departure["unit"], "nm");
+        assert!(
+            without > 500.0 && (with - without).abs() <= 200.0,
+            "{axis}: {without}, {with}"
+        );
+    }
+}
+
+#[test]
 fn the_page_has_all_its_sections_and_asks_for_nothing_from_elsewhere() {
     let scratch = Scratch::new("the_page_has_all_its_sections");
     let model = fitted(&scratch, "die-tester-control", "die-tester");

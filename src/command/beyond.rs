@@ -6,8 +6,6 @@ use serde::Serialize;
 use crate::figures::number;
 use crate::terminal::Terminal;
 
-/// Data that reach farther beyond those of the fit than the range of these is wide are told of.
-const FAR: f64 = 1.0;
 /// So many widths beyond, another unit is more likely than another day.
 const ANOTHER_UNIT: f64 = 10.0;
 
@@ -76,11 +74,10 @@ pub fn usual<'a>(fit: &'a [SampleRange], channel: &str) -> Option<&'a SampleRang
 
 /// What to think of samples that lie far outside; none where they do not.
 fn doubt(usual: &SampleRange, lowest: f64, highest: f64) -> Option<&'static str> {
-    match usual.exceeded_by(lowest, highest) {
-        widths if widths > ANOTHER_UNIT => {
-            Some("is it in the unit of the fit? Nothing was learned of values so far outside")
-        }
-        widths if widths > FAR => Some("nothing was learned of values so far outside"),
-        _ => None,
+    if usual.exceeded_by(lowest, highest) > ANOTHER_UNIT {
+        Some("is it in the unit of the fit? Nothing was learned of values so far outside")
+    } else {
+        let far = usual.is_far_from(lowest, highest);
+        far.then_some("nothing was learned of values so far outside")
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use athermal::Model;
+use athermal::core::compile::Wanted;
 use athermal::core::engine::SampleRange;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
@@ -14,8 +14,8 @@ use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
-use super::evaluate::check_limit;
 use super::fit::fit_without_card;
+use super::model::{self, check_limit};
 use crate::figures::{count, counted, digits, matrix, number, or_dash, stated};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -73,7 +73,7 @@ impl Compare {
         }
         let mut models = Vec::new();
         for path in &self.graphs {
-            let model = Model::load(path)?;
+            let model = model::load(path, Wanted::default(), terminal)?;
             if let Some(limit) = &self.abs_truth_below {
                 check_limit(limit, &model)?;
             }
@@ -86,7 +86,7 @@ impl Compare {
         for ((path, mut model), name) in models.into_iter().zip(names) {
             let began = Instant::now();
             let options = FitOptions::default();
-            let (_, report) = fit_without_card(&mut model, &self.data, &options, terminal)?;
+            let report = fit_without_card(&mut model, &self.data, &options, terminal)?.report;
             let seconds = began.elapsed().as_secs_f64();
             let dataset = on.dataset();
             let mut progress = terminal.progress("scoring");

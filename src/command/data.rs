@@ -1,11 +1,12 @@
 //! Decides how recorded data are named on the command line, and what is told of them after reading.
 
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::hash::Hasher;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
+use athermal::Model;
 use athermal::core::engine::Fnv1a;
 use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Format, Options, Report};
@@ -107,6 +108,27 @@ impl Data {
         let kind = self.files.first().and_then(|file| file.extension());
         let kind = kind.map_or("csv".into(), |kind| kind.to_string_lossy());
         format!("OTHER.{kind}")
+    }
+
+    /// Tells of files on which a model was fitted, so that its scores on them say little.
+    pub fn tell_fitted_on(&self, terminal: &Terminal, model: &Model) {
+        let cards = || model.card.iter().flat_map(|card| &card.data);
+        let seen = |path: &&Path| {
+            // Only a file of the same length is read for its checksum.
+            let length = std::fs::metadata(path)
+                .ok()
+                .filter(Metadata::is_file)?
+                .len();
+            cards().find(|card| card.bytes == length)?;
+            let (bytes, hash) = content_of(path).ok()?;
+            cards().find(|card| card.bytes == bytes && card.hash == hash)
+        };
+        for path in self.paths().filter(|path| seen(path).is_some()) {
+            terminal.warning(format_args!(
+                "{}: the model was fitted on this file, so it is told how well it fits, not how well it predicts",
+                path.display()
+            ));
+        }
     }
 
     /// What a model's card says of the files.

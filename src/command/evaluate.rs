@@ -3,9 +3,7 @@
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
-use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::core::model::ModelError;
 use athermal::core::quantity::Quantity;
 use athermal::core::score::{Lack, Mode, Score, ScoreOptions, Scores, score};
 use clap::{Args, ValueEnum};
@@ -13,6 +11,7 @@ use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
+use super::model::{check_limit, load_fitted};
 use super::numbers;
 use crate::figures::{counted, number, or_dash, table};
 use crate::invocation::next;
@@ -95,7 +94,7 @@ impl Evaluate {
     /// # Errors
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let model = load_fitted(&self.model, Wanted::SCORES)?;
+        let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
         if let Some(limit) = &self.abs_truth_below {
             check_limit(limit, &model)?;
         }
@@ -146,6 +145,7 @@ impl Evaluate {
             &scores.rejected,
         );
         beyond::tell(terminal, &outside_fit);
+        self.data.tell_fitted_on(terminal, &model);
         data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);
@@ -193,51 +193,6 @@ impl Horizon {
             Self::FreeRun => "free-run",
         }
     }
-}
-
-/// Whether a limit can be compared with every truth of a model.
-///
-/// # Errors
-/// When a truth is in a unit that measures something else.
-pub fn check_limit(limit: &Quantity, model: &Model) -> Result<(), Failure> {
-    let truths = model
-        .plan
-        .channels
-        .iter()
-        .filter_map(|channel| channel.predicts);
-    for slot in truths {
-        let truth = &model.plan.channels[slot];
-        if limit.in_unit(&truth.channel.unit).is_none() {
-            return Err(Failure::Request(format!(
-                "--abs-truth-below is in {}, and `{}` is in {}",
-                limit.unit, truth.name, truth.channel.unit
-            )));
-        }
-    }
-    Ok(())
-}
-
-/// A model in which everything that needs a fit has one.
-///
-/// # Errors
-/// When it cannot be loaded, or is a graph that needs fitting.
-pub fn load_fitted(path: &std::path::Path, wanted: Wanted) -> Result<Model, Failure> {
-    let model = Model::load_for(path, wanted)?;
-    check_fitted(&model, path)?;
-    Ok(model)
-}
-
-/// Refuses a graph in which something needs fitting.
-///
-/// # Errors
-/// When it is one.
-pub fn check_fitted(model: &Model, path: &std::path::Path) -> Result<(), Failure> {
-    let nodes = model.unfitted();
-    if model.card.is_some() || nodes.is_empty() {
-        return Ok(());
-    }
-    let path = path.to_owned();
-    Err(ModelError::NotFitted { path, nodes }.into())
 }
 
 fn describe(scores: &Scores, mode: Mode) -> String {

@@ -16,6 +16,8 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
+use super::leaps::{self, LeapWatch, Leaping};
+use super::model;
 use super::numbers;
 use super::threads::Threads;
 use crate::figures::{count, counted, number, paragraph, table};
@@ -77,14 +79,14 @@ impl Fit {
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
         let mut sources = Sources::new();
-        let mut model = Model::load_from(&self.graph, Wanted::default(), &mut sources)?;
+        let mut model = model::load_from(&self.graph, Wanted::default(), &mut sources, terminal)?;
         self.doubt_tests(&model, sources, terminal);
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),
             threads: self.threads.count(),
             ..FitOptions::default()
         };
-        let (dataset, report) = fit_on(&mut model, &self.data, &options, terminal)?;
+        let told = fit_on(&mut model, &self.data, &options, terminal)?;
         let text = model.to_text().map_err(|error| {
             Failure::Outside(format!("the model cannot be written as JSON: {error}"))
         })?;
@@ -93,7 +95,8 @@ impl Fit {
         if !to_stdout {
             write_aside(&self.output, &text)?;
         }
-        self.tell(terminal, &dataset, &report);
+        self.tell(terminal, &told);
+        let report = told.report;
         let failed = report.failed().count();
         if to_stdout {
             print!("{text}");
@@ -137,7 +140,12 @@ impl Fit {
         }
     }
 
-    fn tell(&self, terminal: &Terminal, dataset: &Dataset, report: &FitReport) {
+    fn tell(&self, terminal: &Terminal, told: &Told) {
+        let Told {
+            dataset,
+            report,
+            leaps,
+        } = told;
         let to_stdout = self.output.as_os_str() == "-";
         if terminal.format == Format::Json && !to_stdout {
             let estimators: Vec<_> = report
@@ -151,7 +159,12 @@ impl Fit {
                     (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
-            let told = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
+            let told = json!({
+                "ticks": report.ticks,
+                "segments": report.segments,
+                "leaps": leaps,
+                "estimators": estimators,
+            });
             println!("{:#}", data::with_overlaps(told, &dataset.reports()));
             return;
         }
@@ -169,7 +182,17 @@ impl Fit {
     }
 }
 
-/// Fits a model on data, fills in its card, and tells what was left out of the data.
+/// What there is to tell of a fit.
+pub struct Told {
+    /// What was read.
+    pub dataset: Dataset,
+    /// How it went.
+    pub report: FitReport,
+    /// Which channels leap.
+    pub leaps: Vec<Leaping>,
+}
+
+/// Fits a model on data, fills in its card, and tells what was left out of the data, or may be wrong in them.
 ///
 /// # Errors
 /// When the data cannot be read.
@@ -178,13 +201,14 @@ pub fn fit_on(
     data: &Data,
     options: &FitOptions,
     terminal: &Terminal,
-) -> Result<(Dataset, FitReport), Failure> {
-    let (dataset, report) = fit_without_card(model, data, options, terminal)?;
+) -> Result<Told, Failure> {
+    let told = fit_without_card(model, data, options, terminal)?;
+    let (dataset, report) = (&told.dataset, &told.report);
     data::note_zone(terminal, &dataset.reports());
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),
-        data: data.cards(&dataset)?,
+        data: data.cards(dataset)?,
         period: report.period.map(|(from, to)| Period {
             from_s: seconds(from),
             to_s: seconds(to),
@@ -193,7 +217,7 @@ pub fn fit_on(
         ranges: report.ranges.clone(),
         estimators: report.estimators.iter().filter_map(short_card).collect(),
     });
-    Ok((dataset, report))
+    Ok(told)
 }
 
 /// The same for a model that is not kept: a card has the checksums of all data.
@@ -205,13 +229,15 @@ pub fn fit_without_card(
     data: &Data,
     options: &FitOptions,
     terminal: &Terminal,
-) -> Result<(Dataset, FitReport), Failure> {
+) -> Result<Told, Failure> {
     let dataset = data.dataset();
+    let watch = LeapWatch::new(&dataset);
     let mut progress = terminal.progress("fitting");
-    let (fitted, report) = fit(&model.plan, &dataset, options, &mut |ticks| {
+    let (fitted, report) = fit(&model.plan, &watch, options, &mut |ticks| {
         progress.tell(ticks);
     })?;
     drop(progress);
+    let leaps = watch.found();
     model.fitted = fitted;
     data::tell(
         terminal,
@@ -219,7 +245,12 @@ pub fn fit_without_card(
         report.refused,
         &report.rejected,
     );
-    Ok((dataset, report))
+    leaps::tell(terminal, &leaps);
+    Ok(Told {
+        dataset,
+        report,
+        leaps,
+    })
 }
 
 /// What is told of a step of a selection.

@@ -15,6 +15,8 @@ mod explain;
 mod fit;
 mod init;
 mod kept;
+mod leaps;
+mod model;
 mod new;
 mod nodes;
 mod numbers;

@@ -11,7 +11,7 @@ use clap::Args;
 
 use super::aside::{check_apart, write_aside};
 use super::data::{self, Data};
-use super::evaluate::load_fitted;
+use super::model::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
 /// Show what a model is worth on recorded data, as one page
@@ -51,7 +51,7 @@ impl Report {
             let read = self.data.paths().chain([&*self.model]);
             check_apart("--output", output, read)?;
         }
-        let model = load_fitted(&self.model, Wanted::SCORES)?;
+        let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
         let dataset = self.data.dataset();
         let names = dataset
             .paths()
@@ -69,6 +69,7 @@ impl Report {
             course.refused,
             &course.rejected,
         );
+        self.data.tell_fitted_on(terminal, &model);
         for told in Lack::told(&facts.lacks) {
             terminal.warning(told);
         }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use athermal::core::compile::Wanted;
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
@@ -13,8 +14,8 @@ use athermal::{Engine, Model};
 use clap::Args;
 
 use super::aside::check_apart;
-use super::evaluate::check_fitted;
 use super::kept::Kept;
+use super::model::{self, check_fitted};
 use super::rejected::Ranged;
 use super::swap;
 use super::{beyond, data};
@@ -87,7 +88,7 @@ impl Run {
             let others = read.into_iter().chain([&*self.output]);
             check_apart("--state", state, others)?;
         }
-        let model = Model::load(&self.model)?;
+        let model = model::load(&self.model, Wanted::default(), terminal)?;
         self.tell_unread(terminal, &model);
         check_fitted(&model, &self.model)?;
         if self.swap.any() {

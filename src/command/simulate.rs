@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use super::aside::{check_apart, not_written};
 use super::data;
-use super::evaluate::load_fitted;
+use super::model::load_fitted;
 use super::numbers;
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Progress, Terminal};
@@ -123,7 +123,7 @@ impl Simulate {
         let recording = Simulated::new(machine, setup).with_faults(self.faults.clone());
         match &self.compensate {
             None => write_recording(&recording, machine, self.truth, output, terminal),
-            Some(model) => self.write_corrected(model, &recording, machine, output),
+            Some(model) => self.write_corrected(model, &recording, machine, output, terminal),
         }
     }
 
@@ -134,8 +134,9 @@ impl Simulate {
         recording: &Simulated,
         machine: &dyn Machine,
         output: &Path,
+        terminal: &Terminal,
     ) -> Result<u64, Failure> {
-        let engine = load_fitted(model, Wanted::default())?.engine()?;
+        let engine = load_fitted(model, Wanted::default(), terminal)?.engine()?;
         let refused = |error: MachineError| Failure::Request(error.to_string());
         let simulation = recording.start().map_err(refused)?;
         let mut simulation = ClosedLoop::new(machine, simulation, engine).map_err(refused)?;

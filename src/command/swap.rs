@@ -10,6 +10,7 @@ use athermal::files::TimeForm;
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
+use super::model::check_fitted;
 use super::watched::Watched;
 use crate::figures::{count, counted, number};
 use crate::terminal::{Failure, Terminal};
@@ -120,14 +121,7 @@ pub struct Swap {
 fn load<'a>(path: &Path, known: impl Iterator<Item = &'a Model>) -> Result<Model, Failure> {
     let mut model = Model::load(path)?;
     known.for_each(|known| model.take_fits_of(known));
-    let nodes = model.unfitted();
-    if model.card.is_none() && !nodes.is_empty() {
-        let error = athermal::core::model::ModelError::NotFitted {
-            path: path.to_owned(),
-            nodes,
-        };
-        return Err(error.into());
-    }
+    check_fitted(&model, path)?;
     Ok(model)
 }
 

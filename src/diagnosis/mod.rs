@@ -7,6 +7,7 @@ pub mod comparison;
 pub mod day;
 mod gap;
 pub mod lag;
+pub mod leap;
 mod observation;
 mod plot;
 mod reach;
@@ -179,7 +180,8 @@ fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
 }
 
 /// The measured channels that a truth is made of. Whatever else is measured is a sensor that may explain it.
-fn of_truths(plan: &Plan) -> Vec<bool> {
+#[must_use]
+pub fn of_truths(plan: &Plan) -> Vec<bool> {
     let mut any = vec![false; plan.sources.len()];
     for truth in plan.channels.iter().filter_map(|channel| channel.predicts) {
         for (any, of) in any.iter_mut().zip(sources_of(plan, truth)) {

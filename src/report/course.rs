@@ -159,7 +159,9 @@ pub(super) fn follow(
         }
         begins = false;
     }
-    course.sensors.iter_mut().for_each(SensorFacts::finish);
+    for sensor in &mut course.sensors {
+        sensor.finish(model.sample_ranges());
+    }
     course.refused = engine.refused();
     course.rejected = engine.rejected_channels();
     Ok((course, found.map(|(_, track)| track)))

@@ -3,9 +3,7 @@
 use jiff::Timestamp;
 
 use super::Course;
-
-/// Times from here on, in s, are dates: 1980, by a clock that began in 1970. A machine does not run for ten years.
-const DATES_S: f64 = 315_532_800.0;
+use crate::figures::DATES_S;
 
 /// Where hours are counted from, and what that is called.
 #[derive(Debug, Clone, PartialEq)]

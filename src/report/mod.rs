@@ -4,6 +4,7 @@
 //! them, [`plots`] single pictures, [`text`] what fits on a terminal.
 
 mod course;
+mod departure;
 mod errors;
 mod hours;
 mod page;
@@ -15,6 +16,7 @@ mod verdict;
 mod worth;
 
 pub use course::{Axis, Course, Voter, Weight};
+pub use departure::Departure;
 pub use errors::Errors;
 use hours::Hours;
 pub use page::{page, plots};

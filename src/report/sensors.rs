@@ -1,17 +1,25 @@
-//! Decides what is told of a measured channel: gaps, rejected samples, noise, and what a `health` node found.
+//! Decides what is told of a measured channel: gaps, leaps, rejected samples, noise, samples where the fit saw none, and what a `health`
+//! node found.
 
 use std::collections::BTreeMap;
 
 use athermal_core::compile::{Plan, PlannedRole};
-use athermal_core::engine::Engine;
+use athermal_core::engine::{Engine, SampleRange};
+use athermal_core::unit::Unit;
 use serde::Serialize;
 
-use crate::figures::{counted, time};
+use super::figure;
+use crate::diagnosis::leap::{Finder, Leaps};
+use crate::diagnosis::of_truths;
+use crate::figures::{counted, time, times_first};
 
 /// As many samples with the very same value look stuck, where the channel changes otherwise.
 const STUCK: u64 = 20;
 /// The share of samples that differ from the one before in a channel that changes.
 const CHANGES: f64 = 0.9;
+/// The same value so many times as often as it ever was else looks stuck too, in a channel of so many changes.
+const LONGER: u64 = 5;
+const ENOUGH_CHANGES: u64 = 50;
 
 /// What can be said of a measured channel.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -36,10 +44,14 @@ pub struct SensorFacts {
     pub gaps: u64,
     /// The most samples in a row with the very same value.
     pub most_unchanged: u64,
+    /// Where it leaps, of a temperature and of what a truth is made of.
+    pub leaps: Option<Leaps>,
     /// The noise of single samples, `sqrt(mean of squared second differences / 6)`, which a steady change leaves alone.
     pub noise: Option<f64>,
     /// Lowest and highest sample.
     pub range: Option<(f64, f64)>,
+    /// The same in the data of the fit, where these reach far beyond them.
+    pub exceeds: Option<(f64, f64)>,
     /// Ticks by what a `health` node of the graph said of the channel; empty where none watches it.
     pub health: BTreeMap<&'static str, u64>,
     #[serde(skip)]
@@ -53,7 +65,10 @@ struct Looking {
     /// The difference between the last two samples.
     difference: Option<f64>,
     unchanged: u64,
+    /// The longest runs of one value that are over.
+    runs: [u64; 2],
     changes: u64,
+    finder: Option<Finder>,
     /// Squared second differences, and how many.
     squares: (f64, u64),
     lengths: Vec<f64>,
@@ -68,17 +83,23 @@ struct Looking {
 /// One for each measured channel.
 pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
     let reasons = reasons(plan);
-    let facts = |(slot, source): (usize, &athermal_core::compile::SourceChannel)| SensorFacts {
-        name: source.name.clone(),
-        unit: plan.channels[slot].channel.unit.to_string(),
-        max_age_s: plan.channels[slot].channel.max_age.map(|age| age.secs()),
-        looking: Looking {
-            limits: source.range,
-            optional: source.optional,
-            reason: reasons.get(&slot).copied(),
-            ..Looking::default()
-        },
-        ..SensorFacts::default()
+    let of_truths = of_truths(plan);
+    let facts = |(slot, source): (usize, &athermal_core::compile::SourceChannel)| {
+        let channel = &plan.channels[slot].channel;
+        let may_leap = of_truths[slot] || channel.unit.measures_same(&Unit::kelvin());
+        SensorFacts {
+            name: source.name.clone(),
+            unit: channel.unit.to_string(),
+            max_age_s: channel.max_age.map(|age| age.secs()),
+            looking: Looking {
+                limits: source.range,
+                optional: source.optional,
+                reason: reasons.get(&slot).copied(),
+                finder: may_leap.then(Finder::default),
+                ..Looking::default()
+            },
+            ..SensorFacts::default()
+        }
     };
     plan.sources.iter().enumerate().map(facts).collect()
 }
@@ -114,6 +135,19 @@ fn reasons(plan: &Plan) -> BTreeMap<usize, usize> {
     reasons
 }
 
+impl Looking {
+    /// The samples that come next are not a run with those before.
+    fn end_run(&mut self) {
+        let run = std::mem::take(&mut self.unchanged);
+        let [longest, second] = &mut self.runs;
+        if run > *longest {
+            (*longest, *second) = (run, *longest);
+        } else {
+            *second = run.max(*second);
+        }
+    }
+}
+
 impl SensorFacts {
     pub(super) fn look(&mut self, now_s: f64, value: f64, engine: &Engine) {
         if let Some(slot) = self.looking.reason {
@@ -132,7 +166,9 @@ impl SensorFacts {
             return;
         }
         let looking = &mut self.looking;
-        looking.unchanged += 1;
+        if let Some(finder) = &mut looking.finder {
+            finder.push(now_s, value);
+        }
         if let Some((last_s, last)) = looking.last {
             let gap = now_s - last_s;
             looking.lengths.push(gap);
@@ -145,10 +181,10 @@ impl SensorFacts {
             }
             if value != last {
                 looking.changes += 1;
-                looking.unchanged = 1;
+                looking.end_run();
             }
         }
-        self.most_unchanged = self.most_unchanged.max(looking.unchanged);
+        looking.unchanged += 1;
         self.samples += 1;
         let (lowest, highest) = self.range.unwrap_or((value, value));
         self.range = Some((lowest.min(value), highest.max(value)));
@@ -158,16 +194,38 @@ impl SensorFacts {
     /// Another segment begins.
     pub(super) fn segment(&mut self) {
         (self.looking.last, self.looking.difference) = (None, None);
-        self.looking.unchanged = 0;
+        self.looking.end_run();
+        if let Some(finder) = &mut self.looking.finder {
+            finder.interrupt();
+        }
     }
 
-    /// Counts what can be counted only once all is known.
-    pub(super) fn finish(&mut self) {
+    /// Counts what can be counted only once all is known; `fit` is where samples lay in the fit.
+    pub(super) fn finish(&mut self, fit: &[SampleRange]) {
+        self.looking.end_run();
+        self.most_unchanged = self.looking.runs[0];
+        self.leaps = self.looking.finder.take().and_then(|of| of.found());
+        let usual = fit.iter().find(|usual| usual.channel == self.name);
+        let exceeded = usual
+            .zip(self.range)
+            .filter(|(usual, (low, high))| usual.is_far_from(*low, *high));
+        self.exceeds = exceeded.map(|(usual, _)| (usual.lowest, usual.highest));
         let lengths = std::mem::take(&mut self.looking.lengths);
         let limit = self.max_age_s.unwrap_or(5.0 * self.mean_gap_s);
         self.gaps = lengths.iter().filter(|gap| **gap > limit).count() as u64;
         let (sum, count) = self.looking.squares;
         self.noise = (count > 0).then(|| (sum / (6.0 * count as f64)).sqrt());
+    }
+
+    fn looks_stuck(&self) -> bool {
+        let Looking {
+            changes,
+            runs: [longest, second],
+            ..
+        } = self.looking;
+        let changes_else = (changes + longest) as f64 > CHANGES * self.samples as f64;
+        let never_else = changes >= ENOUGH_CHANGES && longest > LONGER * second;
+        longest >= STUCK && (changes_else || never_else)
     }
 
     /// What somebody should look at.
@@ -190,12 +248,25 @@ impl SensorFacts {
                 time(self.longest_gap_s)
             ));
         }
-        let moving = self.looking.changes as f64 + self.most_unchanged as f64;
-        if !self.looking.optional
-            && self.most_unchanged >= STUCK
-            && moving > CHANGES * self.samples as f64
-        {
+        if !self.looking.optional && self.looks_stuck() {
             remarks.push(format!("the same value {} times", self.most_unchanged));
+        }
+        if let Some(Leaps { count, first, .. }) = &self.leaps {
+            remarks.push(format!(
+                "leaps {} from {} to {} within one sample",
+                times_first(*count),
+                figure(Some(first.from)),
+                figure(Some(first.to))
+            ));
+        }
+        if let (Some((low, high)), Some((fit_low, fit_high))) = (self.range, self.exceeds) {
+            remarks.push(format!(
+                "from {} to {}, far outside of what the fit saw, {} to {}",
+                figure(Some(low)),
+                figure(Some(high)),
+                figure(Some(fit_low)),
+                figure(Some(fit_high))
+            ));
         }
         let faults = self
             .health

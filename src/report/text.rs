@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::{Facts, Hours, Published, Worth, figure, spelled};
+use super::{Departure, Facts, Hours, Published, Worth, figure, spelled};
+use crate::figures::{paragraph, table};
 
 /// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
 #[must_use]
@@ -10,7 +11,7 @@ pub fn text(facts: &Facts) -> String {
     let mut text = String::new();
     for verdict in &facts.verdicts {
         let sentence = format!("{}: {}", verdict.axis, verdict.sentence());
-        text.push_str(&filled(&sentence, "   "));
+        text.push_str(&paragraph("", 3, &sentence));
     }
     let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
     for table in &facts.published {
@@ -18,6 +19,7 @@ pub fn text(facts: &Facts) -> String {
         published(&mut text, table);
     }
     if let Some(worth) = &facts.worth {
+        departures(&mut text, &worth.departures);
         loss(&mut text, worth, &Hours::of(&facts.course));
     }
     let sensors = facts.course.sensors.iter();
@@ -28,10 +30,8 @@ pub fn text(facts: &Facts) -> String {
     if !odd.is_empty() {
         text.push_str("\nSensors to look at:\n");
         for (sensor, remarks) in odd {
-            text.push_str(&filled(
-                &format!("  {}: {}", sensor.name, remarks.join("; ")),
-                "    ",
-            ));
+            let told = format!("{}: {}", sensor.name, remarks.join("; "));
+            text.push_str(&paragraph("  ", 4, &told));
         }
     }
     text
@@ -61,12 +61,46 @@ fn published(text: &mut String, table: &Published) {
     }
 }
 
+/// How far axes depart, and what limits their corrections.
+fn departures(text: &mut String, departures: &[Departure]) {
+    let header = [
+        "position, from its start",
+        "unit",
+        "RMS without",
+        "with",
+        "largest without",
+        "with",
+    ];
+    let line = |of: &Departure| {
+        let figures = [
+            of.rms_without,
+            of.rms_with,
+            Some(of.largest_without),
+            Some(of.largest_with),
+        ];
+        let cells = [of.axis.clone(), spelled(&of.unit).to_owned()];
+        cells.into_iter().chain(figures.map(figure)).collect()
+    };
+    let measured = departures.iter().filter(|of| of.rms_without.is_some());
+    let rows: Vec<Vec<String>> = measured.map(line).collect();
+    if !rows.is_empty() {
+        text.push('\n');
+        text.push_str(&table(&header, &rows));
+    }
+    for of in departures {
+        if let Some(limited) = of.limited() {
+            let told = format!("The correction of {} is {limited}.", of.axis);
+            text.push_str(&paragraph("", 2, &told));
+        }
+    }
+}
+
 fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
     let Some(headline) = worth.headline() else {
         return;
     };
     text.push('\n');
-    text.push_str(&filled(&headline, ""));
+    text.push_str(&paragraph("", 0, &headline));
     if worth.settling.is_empty() {
         return;
     }
@@ -119,40 +153,5 @@ fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
             figure(Some(step.largest_without)),
             figure(Some(step.largest_with))
         );
-    }
-}
-
-/// Words on lines of at most 80 letters; lines after the first begin with `indent`.
-fn filled(words: &str, indent: &str) -> String {
-    let lead = words.len() - words.trim_start().len();
-    let mut text = " ".repeat(lead);
-    let mut column = lead;
-    for (nth, word) in words.split_whitespace().enumerate() {
-        let length = word.chars().count();
-        if nth > 0 && column + 1 + length > 80 {
-            text.push('\n');
-            text.push_str(indent);
-            column = indent.len();
-        } else if nth > 0 {
-            text.push(' ');
-            column += 1;
-        }
-        text.push_str(word);
-        column += length;
-    }
-    text + "\n"
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_broken_before_the_edge_and_keep_their_indent() {
-        let words = "  a ".to_owned() + &"word ".repeat(30);
-        let text = filled(&words, "    ");
-        assert!(text.starts_with("  a word") && text.contains("\n    word"));
-        assert!(text.lines().all(|line| line.chars().count() <= 80));
-        assert_eq!(text.split_whitespace().count(), 31);
     }
 }

@@ -1,6 +1,8 @@
 //! Decides where a graph's correction comes from and what it acts on, and writes both down.
 
-use athermal_control::{OpticalLoss, Settled};
+use std::collections::BTreeMap;
+
+use athermal_control::{OpticalLoss, Settled, held_back_by};
 use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal_core::engine::Engine;
 use athermal_core::time::{Duration, Instant};
@@ -19,6 +21,7 @@ pub(super) struct Track {
     /// The unit of the set point.
     pub(super) set_point: Option<String>,
     pub(super) rows: Vec<TrackRow>,
+    pub(super) ticks: u64,
     /// Which axes have had a valid prediction: before, there is no correction to be judged.
     begun: Vec<bool>,
 }
@@ -32,6 +35,8 @@ pub(super) struct TrackAxis {
     /// The unit of its drift, and over which time that is measured.
     pub(super) drift: String,
     pub(super) span: Duration,
+    /// How many ticks its correction was held back at, by what.
+    pub(super) held_back: BTreeMap<&'static str, u64>,
 }
 
 /// One instant at which something was measured.
@@ -100,6 +105,7 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
                 position: unit.to_string(),
                 drift: drift.unit.to_string(),
                 span: drift.span,
+                held_back: BTreeMap::new(),
             });
         }
     }
@@ -117,12 +123,19 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
             .set_point
             .map(|slot| plan.channels[slot].channel.unit.to_string()),
         rows: Vec::new(),
+        ticks: 0,
     };
     Some((places, track))
 }
 
 impl Track {
     pub(super) fn look(&mut self, places: &Places, engine: &Engine, now: Instant, begins: bool) {
+        self.ticks += 1;
+        for (axis, &why) in self.axes.iter_mut().zip(&places.why) {
+            if let Some(by) = held_back_by(engine.value(why)) {
+                *axis.held_back.entry(by).or_default() += 1;
+            }
+        }
         let position: Vec<f64> = places
             .positions
             .iter()

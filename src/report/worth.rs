@@ -12,6 +12,7 @@ use athermal_core::time::Instant;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::departure::{Departure, departures};
 use super::track::{Track, TrackAxis};
 use super::{ReportError, Series};
 
@@ -30,6 +31,8 @@ pub struct Worth {
     pub correction: Vec<Series>,
     /// Unit of each correction.
     pub correction_units: Vec<String>,
+    /// How far each axis departs from where it was, and what held its correction back.
+    pub departures: Vec<Departure>,
     /// Optical loss in dB without and with; empty without an `optical_loss` node.
     pub loss_without: Series,
     /// See `loss_without`.
@@ -226,6 +229,7 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
         drift_with: empty(),
         correction: empty(),
         correction_units: of_axes(|axis| &axis.position),
+        departures: departures(track),
         loss_without: Series::default(),
         loss_with: Series::default(),
         loss_limit: limit
@@ -394,6 +398,7 @@ mod tests {
             drift_with: Vec::new(),
             correction: Vec::new(),
             correction_units: Vec::new(),
+            departures: Vec::new(),
             loss_without: Series::default(),
             loss_with: Series::default(),
             loss_limit: 0.2,

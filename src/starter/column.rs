@@ -31,7 +31,7 @@ pub struct Column {
     /// Why it was taken so.
     why: String,
     /// What else the user should know of it.
-    warning: Option<String>,
+    warnings: Vec<String>,
     unit_known: bool,
     guess: Guess,
     /// What its name alone says.
@@ -85,25 +85,31 @@ impl Column {
             Kind::Unused => return Some(format!("{}: left out, {}", self.name, self.why)),
         };
         let unit = if self.unit_known { "" } else { " (a guess)" };
-        let warning = self.warning.iter().map(|warning| format!("; {warning}"));
+        let warnings = self.warnings.iter().map(|warning| format!("; {warning}"));
         Some(format!(
             "{}: {what}, in {}{unit}; {}{}",
             self.name,
             self.unit,
             self.why,
-            warning.collect::<String>()
+            warnings.collect::<String>()
         ))
     }
 
     /// Tells the user something of it.
     pub fn warn(&mut self, what: String) {
-        self.warning = Some(what);
+        self.warnings.push(what);
     }
 
     /// Whether its unit is stated by its name.
     #[must_use]
     pub fn unit_known(&self) -> bool {
         self.unit_known
+    }
+
+    /// Whether it is a temperature, whatever it is for.
+    #[must_use]
+    pub fn is_temperature(&self) -> bool {
+        Unit::parse(&self.unit).is_ok_and(|unit| unit.measures_same(&Unit::kelvin()))
     }
 
     /// Leaves it out.
@@ -172,7 +178,7 @@ fn guess(name: &str) -> Column {
         unit: unit.as_ref().map_or(fallback, Unit::text).to_owned(),
         kind: Kind::Unused,
         why: why.to_owned(),
-        warning: None,
+        warnings: Vec::new(),
         unit_known: unit.is_some(),
         guess,
         named: guess,

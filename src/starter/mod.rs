@@ -66,9 +66,10 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
         .map_err(NoStarter::Unfit)?;
     remarks.push(clock.remark());
     let mut columns = column::columns(&described, &clock.column);
-    let survey = Survey::of(path, &clock, &columns)?;
+    let mut survey = Survey::of(path, &clock, &columns)?;
     survey.judge(&mut columns);
     column::assign(&mut columns, told).map_err(NoStarter::Unfit)?;
+    survey.leave_out_faults(&mut columns);
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     let choice = Choice::of(&survey, &columns);
     let choice = choice.map_err(|why| match clock.form {

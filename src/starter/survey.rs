@@ -4,10 +4,12 @@ use std::path::Path;
 
 use athermal::files::{ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn};
 
+use athermal::diagnosis::leap::{Finder, Leaps};
+
 use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
-use crate::figures::counted;
+use crate::figures::{counted, number, times_first};
 
 /// The values of a log, column by column.
 #[derive(Debug)]
@@ -68,6 +70,15 @@ const FEWEST_VALUES: usize = 10;
 /// A column with one unreadable cell among so many is text, one with fewer a sensor with mistakes in its log.
 const TEXT_ONE_IN: u64 = 10;
 
+/// Values so many times as far from nine tenths of all as these are from each other are faults, where the series leaps.
+const FAR: f64 = 3.0;
+
+/// Between which values a series lies without its faults.
+fn beyond((low, high): (f64, f64)) -> (f64, f64) {
+    let far = FAR * (high - low);
+    (low - far, high + far)
+}
+
 impl Series {
     /// The mean time between two values in s, interruptions not counted.
     #[must_use]
@@ -91,6 +102,25 @@ impl Series {
         gaps.sort_by(f64::total_cmp);
         let last = gaps.len().checked_sub(1)?;
         Some(gaps[(share * last as f64).round() as usize])
+    }
+
+    /// Where it leaps.
+    fn leaps(&self) -> Option<Leaps> {
+        let mut finder = Finder::default();
+        for (&time_s, &value) in self.time_s.iter().zip(&self.values) {
+            finder.push(time_s, value);
+        }
+        finder.found()
+    }
+
+    /// Leaves out the values outside of a range; how many these are.
+    fn keep_within(&mut self, (lowest, highest): (f64, f64)) -> u64 {
+        let before = self.values.len();
+        let pairs = self.time_s.iter().copied().zip(self.values.iter().copied());
+        (self.time_s, self.values) = pairs
+            .filter(|(_, value)| (lowest..=highest).contains(value))
+            .unzip();
+        (before - self.values.len()) as u64
     }
 
     /// The smallest and the largest value.
@@ -208,6 +238,46 @@ impl Survey {
                     "{many} of {cells} cannot be read{the_first} {example}: mend the log, or read it with --lenient"
                 ));
             }
+        }
+    }
+
+    /// Takes the values out of temperatures that only a failed sensor gives, and tells of leaps in these and in what drifts.
+    pub fn leave_out_faults(&mut self, columns: &mut [Column]) {
+        for (series, column) in self.series.iter_mut().zip(columns) {
+            let is_temperature = column.is_temperature();
+            let drifts = column.kind == Kind::Drifting;
+            if column.kind == Kind::Unused || !(is_temperature || drifts) {
+                continue;
+            }
+            let Some(Leaps {
+                count,
+                first,
+                usual,
+            }) = series.leaps()
+            else {
+                continue;
+            };
+            let leaps = format!(
+                "it leaps {} from {} to {} within one sample",
+                times_first(count),
+                number(first.from),
+                number(first.to)
+            );
+            let left_out = if is_temperature {
+                series.keep_within(beyond(usual))
+            } else {
+                0
+            };
+            column.warn(match left_out {
+                0 if drifts => {
+                    format!("{leaps}: was it moved, or zeroed anew? That would be learned as drift")
+                }
+                0 => format!("{leaps}: did the sensor fail?"),
+                n => format!(
+                    "{leaps}: did the sensor fail? {} far from all others are taken for faults",
+                    counted(n, "value")
+                ),
+            });
         }
     }
 

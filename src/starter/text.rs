@@ -12,6 +12,9 @@ use super::survey::Survey;
 use super::window::{Choice, ENOUGH};
 use crate::figures::{count, number};
 
+/// By how much a machine may be warmer or colder than in its log, in K: less than what a broken wire or a full scale seems to be.
+const PLAUSIBLE_K: f64 = 100.0;
+
 /// The text of the graph.
 pub fn graph(
     path: &Path,
@@ -197,15 +200,7 @@ impl Writer<'_> {
                     }
                 )
             );
-            let _ = writeln!(
-                text,
-                "# range = [\"{} {unit}\", \"{} {unit}\"]  # seen: {} to {}; a value outside would be left out",
-                number(low - (high - low) / 2.0),
-                number(high + (high - low) / 2.0),
-                number(low),
-                number(high),
-                unit = group.unit,
-            );
+            text.push_str(&range(&group.unit, low, high));
         }
     }
 
@@ -388,6 +383,29 @@ impl Writer<'_> {
             unit.difference().per(&Unit::second()).factor_to(&to)
         };
         per_s * factor().unwrap_or(1.0)
+    }
+}
+
+/// A range in which temperatures can be, as these have been; of other quantities it is only proposed.
+fn range(unit: &str, low: f64, high: f64) -> String {
+    let half = (high - low) / 2.0;
+    let per_kelvin = Unit::parse(unit).ok();
+    let per_kelvin = per_kelvin.and_then(|unit| Unit::kelvin().factor_to(&unit));
+    let seen = format!("seen: {} to {}", number(low), number(high));
+    match per_kelvin {
+        Some(factor) => {
+            let margin = half.max(PLAUSIBLE_K * factor);
+            let (from, to) = ((low - margin).floor(), (high + margin).ceil());
+            format!(
+                "range = [\"{from} {unit}\", \"{to} {unit}\"]  # {seen}; a value outside is a fault, and left out\n"
+            )
+        }
+        None => {
+            let (from, to) = (number(low - half), number(high + half));
+            format!(
+                "# range = [\"{from} {unit}\", \"{to} {unit}\"]  # {seen}; a value outside would be left out\n"
+            )
+        }
     }
 }
 

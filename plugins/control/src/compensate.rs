@@ -79,6 +79,21 @@ mod why {
     pub(super) const SLEW: f64 = 6.0;
 }
 
+/// What a number of the port `why` says held a correction back; nothing where nothing did, or for a number that says nothing.
+#[must_use]
+pub fn held_back_by(number: f64) -> Option<&'static str> {
+    [
+        (why::INVALID, "no valid prediction"),
+        (why::STABLE, "stable"),
+        (why::DEADBAND, "below the deadband"),
+        (why::RATE, "rate cut"),
+        (why::RANGE, "at the end of its range"),
+        (why::SLEW, "slewing"),
+    ]
+    .into_iter()
+    .find_map(|(known, what)| (number == known).then_some(what))
+}
+
 /// The limits in the unit of the correction and seconds.
 #[derive(Debug, Clone, Copy)]
 struct Limits {

@@ -23,7 +23,8 @@ use crate::limit;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Health {
-    /// Lowest and highest trusted value, such as `["-20 Cel", "200 Cel"]`.
+    /// Lowest and highest trusted value, such as `["-20 Cel", "200 Cel"]`. A `range` of the signal itself takes samples away before
+    /// they come here: then `reason` does not become 1, but 6 after `max_gap`. Give one of the two.
     #[serde(default)]
     pub range: Option<[Quantity; 2]>,
     /// The fastest change from one sample to the next, such as `"2 K/s"`.

@@ -9,7 +9,7 @@ mod settled;
 mod stability;
 mod uncorrected;
 
-pub use compensate::{Compensate, Stop};
+pub use compensate::{Compensate, Stop, held_back_by};
 pub use health::{Health, health_reason};
 pub use optical_loss::OpticalLoss;
 pub use safe_state::{Refuge, SafeState};

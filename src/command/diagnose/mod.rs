@@ -19,7 +19,7 @@ use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
-use super::evaluate::load_fitted;
+use super::model::load_fitted;
 use super::report::write_plots;
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -80,7 +80,7 @@ impl Diagnose {
             )));
         }
         self.data.check_lasting("--data")?;
-        let model = load_fitted(&self.model, Wanted::default())?;
+        let model = load_fitted(&self.model, Wanted::default(), terminal)?;
         self.check_names(&model.plan)?;
         let dataset = self.data.dataset();
         let options = Options {

@@ -13,7 +13,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::{Value, json};
 
-use super::evaluate::load_fitted;
+use super::model::load_fitted;
 use crate::drawing::{Diagram, Flow, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
 use coefficients::Told;
@@ -64,9 +64,9 @@ impl Show {
     ///
     /// # Errors
     /// When the graph has mistakes.
-    pub fn run(&self, _terminal: &Terminal) -> Result<Answer, Failure> {
+    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         if self.format == "coefficients" {
-            let model = load_fitted(&self.graph, Wanted::default())?;
+            let model = load_fitted(&self.graph, Wanted::default(), terminal)?;
             let told = self.told(&model)?;
             let mut unfitted = model.unfitted();
             unfitted.retain(|node| is_asked(node, &self.nodes));

@@ -67,6 +67,7 @@ fn verdicts(html: &mut String, facts: &Facts) {
 
 fn worth_section(html: &mut String, worth: &Worth, hours: &Hours) {
     html.push_str("<h2>What the correction is worth</h2>");
+    html.push_str(&tables::departures(&worth.departures));
     if let Some(chart) = charts::loss(worth, hours) {
         let worst = |losses: &[f64]| figure(Some(losses.iter().copied().fold(0.0, f64::max)));
         let _ = write!(

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal_core::model::EstimatorCard;
 use athermal_core::score::Score;
 
-use super::super::{Hours, Published, SensorFacts, Worth, figure, spelled};
+use super::super::{Departure, Hours, Published, SensorFacts, Worth, figure, spelled};
 use crate::chart::escaped;
 
 fn table(header: &[&str], rows: &str) -> String {
@@ -136,6 +136,39 @@ pub(super) fn steps(worth: &Worth) -> String {
         &["step", "how often", "largest loss without", "with"],
         &rows,
     )
+}
+
+/// How far positions depart from where they were when their corrections began, and what held these back.
+pub(super) fn departures(departures: &[Departure]) -> String {
+    let mut rows = String::new();
+    for of in departures {
+        let held = of
+            .held_back
+            .iter()
+            .map(|(by, share)| format!("{by} {:.1} %", 100.0 * share));
+        let _ = write!(
+            rows,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"left{}\">{}</td></tr>",
+            escaped(&of.axis),
+            figure(of.rms_without),
+            figure(of.rms_with),
+            figure(Some(of.largest_without)),
+            figure(Some(of.largest_with)),
+            escaped(spelled(&of.unit)),
+            if of.limited().is_some() { " bad" } else { "" },
+            held.collect::<Vec<_>>().join("; "),
+        );
+    }
+    let header = [
+        "position from its start",
+        "RMS without",
+        "with",
+        "largest without",
+        "with",
+        "unit",
+        "held back, of all ticks",
+    ];
+    table(&header, &rows)
 }
 
 pub(super) fn sensors(sensors: &[SensorFacts]) -> String {

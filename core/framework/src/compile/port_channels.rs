@@ -6,7 +6,7 @@ use std::sync::Arc;
 use indexmap::IndexMap;
 
 use super::CompileProblem;
-use super::reference::{Pattern, Reference, is_pattern};
+use super::reference::{Pattern, Reference, alternatives, is_pattern};
 use crate::diagnostic::Names;
 
 /// The channels of a port, each with its slot.
@@ -27,16 +27,24 @@ impl PortChannels {
     /// The slots of the channels that a reference to this port stands for, in order.
     ///
     /// # Errors
-    /// [`CompileProblem::UnknownChannel`].
+    /// [`CompileProblem::UnknownChannel`], also where an alternative of a choice stands for none.
     pub(crate) fn find(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
         let slots = self.slots(reference.channel);
-        match reference.channel {
-            Some(channel) if slots.is_empty() => Err(CompileProblem::UnknownChannel {
+        let Some(channel) = reference.channel else {
+            return Ok(slots);
+        };
+        let unmatched = if slots.is_empty() {
+            Some(channel.to_owned())
+        } else {
+            alternatives(channel).find(|of| self.slots(Some(of)).is_empty())
+        };
+        match unmatched {
+            Some(channel) => Err(CompileProblem::UnknownChannel {
                 node: reference.node.to_owned(),
-                channel: channel.to_owned(),
+                channel,
                 known: self.known(),
             }),
-            _ => Ok(slots),
+            None => Ok(slots),
         }
     }
 
@@ -57,5 +65,41 @@ impl PortChannels {
     fn known(&self) -> Arc<Names> {
         let listed = || Arc::new(self.slots.keys().cloned().collect());
         Arc::clone(self.known.get_or_init(listed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(reference: &str) -> Result<Vec<usize>, String> {
+        let mut port = PortChannels::default();
+        for (slot, name) in ["plate1@150s", "plate2@150s", "room@150s"]
+            .into_iter()
+            .enumerate()
+        {
+            port.insert(name.to_owned(), slot);
+        }
+        port.find(&Reference::parse(reference))
+            .map_err(|problem| match problem {
+                CompileProblem::UnknownChannel { channel, .. } => channel,
+                other => panic!("{other:?}"),
+            })
+    }
+
+    #[test]
+    fn an_alternative_that_stands_for_no_channel_is_told_though_others_stand_for_some() {
+        assert_eq!(found("slopes.{plate1,room}@*"), Ok(vec![0, 2]));
+        assert_eq!(found("slopes.{plat1,room}@*"), Err("plat1@*".to_owned()));
+        assert_eq!(found("slopes.{lid}@*"), Err("{lid}@*".to_owned()));
+    }
+
+    #[test]
+    fn of_two_choices_not_every_combination_must_be_there() {
+        assert_eq!(found("slopes.{plate,roo}{1,2,m}@*"), Ok(vec![0, 1, 2]));
+        assert_eq!(
+            found("slopes.{plate,room}{1,3,@}*"),
+            Err("{plate,room}3*".to_owned())
+        );
     }
 }

@@ -89,6 +89,16 @@ impl Pattern {
     }
 }
 
+/// For each alternative of a choice the pattern with that alternative in its place.
+pub(crate) fn alternatives(pattern: &str) -> impl Iterator<Item = String> + '_ {
+    let starts = pattern.match_indices('{').map(|(start, _)| start);
+    let groups = starts.filter_map(|start| Some((start, start + pattern[start..].find('}')?)));
+    groups.flat_map(move |(start, end)| {
+        let inside = pattern[start + 1..end].split(',');
+        inside.map(move |of| format!("{}{of}{}", &pattern[..start], &pattern[end + 1..]))
+    })
+}
+
 /// The patterns without choices that a pattern stands for. The number is bounded; beyond it the text is taken as it is.
 fn choices(pattern: &str) -> Vec<String> {
     const MOST: usize = 4096;
@@ -169,6 +179,21 @@ mod tests {
         assert!(matches("{plate,holder}1@150s", "holder1@150s"));
         assert!(!matches("{plate,holder}1", "room"));
         assert!(matches("*a*b*", "xxaxxbxx") && !matches("*a*b*", "xxbxxaxx"));
+    }
+
+    #[test]
+    fn each_alternative_is_a_pattern_with_the_other_choices_left_open() {
+        let of = |pattern| alternatives(pattern).collect::<Vec<_>>();
+        assert_eq!(
+            of("{plate,holder}{1,2}@*"),
+            [
+                "plate{1,2}@*",
+                "holder{1,2}@*",
+                "{plate,holder}1@*",
+                "{plate,holder}2@*"
+            ]
+        );
+        assert!(of("plate?@*").is_empty() && of("{plate").is_empty());
     }
 
     #[test]

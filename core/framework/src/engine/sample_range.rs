@@ -27,6 +27,12 @@ impl SampleRange {
         let beyond = (highest - self.highest).max(self.lowest - lowest);
         beyond.max(0.0) / width
     }
+
+    /// Whether samples from `lowest` to `highest` reach farther beyond it than it is wide.
+    #[must_use]
+    pub fn is_far_from(&self, lowest: f64, highest: f64) -> bool {
+        self.exceeded_by(lowest, highest) > 1.0
+    }
 }
 
 impl Engine {
@@ -63,6 +69,7 @@ mod tests {
         let usual = range(20.0, 25.0);
         assert_eq!(usual.exceeded_by(21.0, 24.0), 0.0);
         assert_eq!(usual.exceeded_by(10.0, 26.0), 2.0);
+        assert!(usual.is_far_from(10.0, 26.0) && !usual.is_far_from(15.0, 30.0));
         assert_eq!(usual.exceeded_by(295.0, 300.0), 55.0);
     }
 

@@ -10,7 +10,7 @@ use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
 use crate::engine::{Engine, Pairing};
 use crate::node::{Role, Runs, TrainingError};
 use crate::recording::Event;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// A part of the ticks of a recording, by their number.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -272,10 +272,11 @@ impl Collector {
             triggers,
             ..
         } = plan.nodes[trainee.node].rows()?;
-        let waits = triggers
+        let entries = triggers
             .iter()
-            .map(|&gather| plan.gathers[gather].entries.len());
-        let waits = &regressors[..waits.sum()];
+            .flat_map(|&gather| &plan.gathers[gather].entries);
+        let waits = &regressors[..entries.clone().count()];
+        let spans = entries.map(|entry| plan.channels[entry.slot].channel.span);
         let mut silent: Vec<String> = Vec::new();
         for sensor in waits.iter().flat_map(|regressor| &regressor.sensors) {
             let is_silent = |&slot: &usize| plan.channels[slot].name == *sensor;
@@ -286,6 +287,7 @@ impl Collector {
         Some(TrainingError::NeverRan {
             regressors: waits.iter().map(|waited| waited.name.clone()).collect(),
             silent,
+            span: spans.min().unwrap_or(Duration::ZERO),
         })
     }
 

@@ -78,11 +78,12 @@ impl Model {
     /// # Errors
     /// As [`Model::load`].
     pub fn load_for(path: impl AsRef<Path>, wanted: Wanted) -> Result<Self, ModelError> {
-        Self::load_from(path, wanted, &mut Sources::new())
+        Self::load_from(path, wanted, &mut Sources::new(), &mut Diagnostics::new())
     }
 
     /// The same, adding the files of a graph to `sources`: from there the tests of the graph can be declared
-    /// ([`trial::declare`](crate::trial::declare)) without reading it again.
+    /// ([`trial::declare`](crate::trial::declare)) without reading it again. What is doubtful in a graph file, but no mistake, is
+    /// added to `doubts`.
     ///
     /// # Errors
     /// As [`Model::load`].
@@ -90,13 +91,14 @@ impl Model {
         path: impl AsRef<Path>,
         wanted: Wanted,
         sources: &mut Sources,
+        doubts: &mut Diagnostics,
     ) -> Result<Self, ModelError> {
         let path = path.as_ref();
         if path
             .extension()
             .is_some_and(|extension| extension == "toml")
         {
-            return Self::load_graph(path, wanted, sources);
+            return Self::load_graph(path, wanted, sources, doubts);
         }
         let text = std::fs::read_to_string(path).map_err(|source| ModelError::Unreadable {
             path: path.to_owned(),
@@ -169,7 +171,12 @@ impl Model {
         })
     }
 
-    fn load_graph(path: &Path, wanted: Wanted, sources: &mut Sources) -> Result<Self, ModelError> {
+    fn load_graph(
+        path: &Path,
+        wanted: Wanted,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
         let mut diagnostics = Diagnostics::new();
         let graph = document::load(path, &Disk, sources, &mut diagnostics)
             .and_then(|read| document::declare(read, &mut diagnostics));
@@ -177,12 +184,15 @@ impl Model {
             .as_ref()
             .and_then(|graph| compile(graph, wanted, &mut diagnostics));
         match (graph, plan) {
-            (Some(graph), Some(plan)) if !diagnostics.has_errors() => Ok(Self {
-                graph,
-                plan: Arc::new(plan),
-                fitted: Fitted::new(),
-                card: None,
-            }),
+            (Some(graph), Some(plan)) if !diagnostics.has_errors() => {
+                doubts.extend(diagnostics);
+                Ok(Self {
+                    graph,
+                    plan: Arc::new(plan),
+                    fitted: Fitted::new(),
+                    card: None,
+                })
+            }
             _ => Err(ModelError::Graph {
                 diagnostics: Box::new(diagnostics),
                 sources: Box::new(std::mem::take(sources)),

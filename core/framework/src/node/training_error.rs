@@ -50,6 +50,8 @@ pub enum TrainingError {
         regressors: Vec<String>,
         /// The measured channels behind them that have no value in the data either.
         silent: Vec<String>,
+        /// How far that one looks back which looks back the least.
+        span: Duration,
     },
     /// Squares of values overflow.
     TooLarge {
@@ -126,11 +128,28 @@ impl std::fmt::Display for TrainingError {
                 }
                 Ok(())
             }
-            Self::NeverRan { regressors, silent } => {
+            Self::NeverRan {
+                regressors,
+                silent,
+                span,
+            } => {
                 let (never, none) = (names(regressors), names(silent));
                 let have = |of: &[String]| if of.len() == 1 { "has" } else { "have" };
                 match silent.as_slice() {
-                    [] => write!(f, "{never} never {} a value", have(regressors)),
+                    [] => {
+                        write!(f, "{never} never {} a value: ", have(regressors))?;
+                        if *span > Duration::ZERO {
+                            write!(
+                                f,
+                                "{span} are looked back at least, and nowhere do samples fill that"
+                            )
+                        } else {
+                            write!(
+                                f,
+                                "there is none in the data, or a node on the way lets none through"
+                            )
+                        }
+                    }
                     _ if silent == regressors => {
                         write!(f, "{none} {} no value in the data", have(silent))
                     }
@@ -170,12 +189,20 @@ fn names(of: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::TrainingError;
+    use super::{Duration, TrainingError};
 
     fn told(regressors: &[&str], silent: &[&str]) -> String {
+        told_of(regressors, silent, Duration::ZERO)
+    }
+
+    fn told_of(regressors: &[&str], silent: &[&str], span: Duration) -> String {
         let named = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-        let (regressors, silent) = (named(regressors), named(silent));
-        TrainingError::NeverRan { regressors, silent }.to_string()
+        TrainingError::NeverRan {
+            regressors: named(regressors),
+            silent: named(silent),
+            span,
+        }
+        .to_string()
     }
 
     #[test]
@@ -185,7 +212,14 @@ mod tests {
             told(&["a", "b"], &["a", "b"]),
             "`a` and `b` have no value in the data"
         );
-        assert_eq!(told(&["sum"], &[]), "`sum` never has a value");
+        assert_eq!(
+            told(&["sum"], &[]),
+            "`sum` never has a value: there is none in the data, or a node on the way lets none through"
+        );
+        assert_eq!(
+            told_of(&["slope"], &[], Duration::from_ns(150_000_000_000)),
+            "`slope` never has a value: 150s are looked back at least, and nowhere do samples fill that"
+        );
         assert_eq!(
             told(&["p", "q", "r"], &["a"]),
             "`p`, `q` and `r` never have a value, since `a` has none in the data"
@@ -193,8 +227,8 @@ mod tests {
         let many: Vec<String> = (1..=8).map(|nth| format!("s{nth}")).collect();
         let many: Vec<&str> = many.iter().map(String::as_str).collect();
         assert_eq!(
-            told(&many, &[]),
-            "`s1`, `s2`, `s3`, `s4`, `s5`, `s6` and 2 more never have a value"
+            told(&many, &["a"]),
+            "`s1`, `s2`, `s3`, `s4`, `s5`, `s6` and 2 more never have a value, since `a` has none in the data"
         );
     }
 }

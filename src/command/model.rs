@@ -1,0 +1,81 @@
+//! Decides how a command loads a model or a graph, and what is told of it before it is used.
+
+use std::path::Path;
+
+use athermal::Model;
+use athermal::core::compile::Wanted;
+use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::model::ModelError;
+use athermal::core::quantity::Quantity;
+
+use crate::terminal::{Failure, Terminal};
+
+/// A model, or a graph whose fits are still to be made. What is doubtful in a graph file is told; of a model it was when it was
+/// fitted.
+///
+/// # Errors
+/// When it cannot be loaded.
+pub fn load(path: &Path, wanted: Wanted, terminal: &Terminal) -> Result<Model, Failure> {
+    load_from(path, wanted, &mut Sources::new(), terminal)
+}
+
+/// The same, adding the files of a graph to `sources`.
+///
+/// # Errors
+/// When it cannot be loaded.
+pub fn load_from(
+    path: &Path,
+    wanted: Wanted,
+    sources: &mut Sources,
+    terminal: &Terminal,
+) -> Result<Model, Failure> {
+    let mut doubts = Diagnostics::new();
+    let model = Model::load_from(path, wanted, sources, &mut doubts)?;
+    terminal.doubts(&doubts, sources);
+    Ok(model)
+}
+
+/// A model in which everything that needs a fit has one.
+///
+/// # Errors
+/// When it cannot be loaded, or is a graph that needs fitting.
+pub fn load_fitted(path: &Path, wanted: Wanted, terminal: &Terminal) -> Result<Model, Failure> {
+    let model = load(path, wanted, terminal)?;
+    check_fitted(&model, path)?;
+    Ok(model)
+}
+
+/// Refuses a graph in which something needs fitting.
+///
+/// # Errors
+/// When it is one.
+pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
+    let nodes = model.unfitted();
+    if model.card.is_some() || nodes.is_empty() {
+        return Ok(());
+    }
+    let path = path.to_owned();
+    Err(ModelError::NotFitted { path, nodes }.into())
+}
+
+/// Refuses a limit that truths cannot have.
+///
+/// # Errors
+/// When a truth is in a unit that measures something else.
+pub fn check_limit(limit: &Quantity, model: &Model) -> Result<(), Failure> {
+    let truths = model
+        .plan
+        .channels
+        .iter()
+        .filter_map(|channel| channel.predicts);
+    for slot in truths {
+        let truth = &model.plan.channels[slot];
+        if limit.in_unit(&truth.channel.unit).is_none() {
+            return Err(Failure::Request(format!(
+                "--abs-truth-below is in {}, and `{}` is in {}",
+                limit.unit, truth.name, truth.channel.unit
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,260 @@
+//! Decides where a series leaps from one sample to the next, as that of a sensor does which fails, or of a position that is zeroed
+//! anew; not what follows from it.
+//!
+//! A body changes its temperature, and a position drifts, step by step. A leap is [`TIMES`] times as large as nineteen in twenty
+//! of the changes between two samples, and stands alone: the changes before and after it are less than a tenth of it, or take it
+//! back. A heater that is switched on makes large changes too, but many of them, one after the other.
+
+use serde::Serialize;
+
+/// So many times as large as nineteen in twenty changes is a leap. In the largest measured and simulated sets of data without one,
+/// what stands alone is at most 2.1 times as large.
+const TIMES: f64 = 20.0;
+/// The share of changes that say what is usual.
+const USUAL: f64 = 0.95;
+/// The share of a leap that the changes beside it do not reach.
+const BESIDE: f64 = 0.1;
+/// Fewer changes do not say what is usual.
+const FEWEST_CHANGES: usize = 20;
+/// A change over a time so many times as long as the median is no leap, for much may have happened.
+const LONGEST_GAP: f64 = 3.0;
+/// So many of the largest changes are kept.
+const KEPT: usize = 100;
+
+/// From one sample to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Leap {
+    /// When the second sample came, in s.
+    pub at_s: f64,
+    /// The first sample.
+    pub from: f64,
+    /// The second.
+    pub to: f64,
+}
+
+impl Leap {
+    fn change(&self) -> f64 {
+        self.to - self.from
+    }
+}
+
+/// The leaps of a series.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Leaps {
+    /// How many; 100 stands for as many or more.
+    pub count: usize,
+    /// The first of them, or of the 100 largest.
+    pub first: Leap,
+    /// Nine tenths of all samples lie between these.
+    pub usual: (f64, f64),
+}
+
+/// Finds leaps while samples come, in memory that does not grow with them.
+#[derive(Debug, Clone, Default)]
+pub struct Finder {
+    last: Option<(f64, f64)>,
+    /// The change that led to the last sample, the time it took in s, and whether it stands alone as far as is known.
+    newest: Option<(Leap, f64, bool)>,
+    /// The largest that stand alone, each with the time it took in s and its place among all.
+    alone: Vec<(Leap, f64, u64)>,
+    met: u64,
+    values: Thinned,
+    changes: Thinned,
+    gaps: Thinned,
+}
+
+impl Finder {
+    /// Takes the next sample.
+    pub fn push(&mut self, at_s: f64, value: f64) {
+        self.values.push(value);
+        let Some((last_s, from)) = self.last.replace((at_s, value)) else {
+            return;
+        };
+        let leap = Leap {
+            at_s,
+            from,
+            to: value,
+        };
+        let (change, gap_s) = (leap.change(), at_s - last_s);
+        self.gaps.push(gap_s);
+        if change != 0.0 {
+            self.changes.push(change.abs());
+        }
+        let before = self.newest.take();
+        let alone = before.is_none_or(|(before, ..)| is_small(before.change(), change));
+        self.newest = Some((leap, gap_s, alone));
+        if let Some((before, gap_s, true)) = before
+            && is_small(change, before.change())
+        {
+            self.keep(before, gap_s);
+        }
+    }
+
+    /// What follows is not set against what was.
+    pub fn interrupt(&mut self) {
+        (self.last, self.newest) = (None, None);
+    }
+
+    fn keep(&mut self, leap: Leap, gap_s: f64) {
+        let size = |of: &Leap| of.change().abs();
+        let at = self
+            .alone
+            .partition_point(|(kept, ..)| size(kept) >= size(&leap));
+        if at < KEPT && leap.change() != 0.0 {
+            self.alone.truncate(KEPT - 1);
+            self.alone.insert(at, (leap, gap_s, self.met));
+        }
+        self.met += 1;
+    }
+
+    /// The leaps; none where there are none, or too few samples to tell.
+    #[must_use]
+    pub fn found(&self) -> Option<Leaps> {
+        if self.changes.kept.len() < FEWEST_CHANGES {
+            return None;
+        }
+        let least = TIMES * self.changes.quantile(USUAL);
+        let longest_s = LONGEST_GAP * self.gaps.quantile(0.5);
+        let is_leap = |(leap, gap_s, _): &&(Leap, f64, u64)| {
+            leap.change().abs() > least && *gap_s <= longest_s
+        };
+        let leaps = || self.alone.iter().filter(is_leap);
+        let (first, ..) = leaps().min_by_key(|(.., met)| *met)?;
+        Some(Leaps {
+            count: leaps().count(),
+            first: *first,
+            usual: (self.values.quantile(0.05), self.values.quantile(0.95)),
+        })
+    }
+}
+
+/// Whether a change beside another leaves that one alone: it is small, or takes it back.
+fn is_small(change: f64, beside: f64) -> bool {
+    let least = BESIDE * beside.abs();
+    change.abs() <= least || (change + beside).abs() <= least
+}
+
+/// Every so many of what comes, evenly, so that they stay few.
+#[derive(Debug, Clone, Default)]
+struct Thinned {
+    kept: Vec<f64>,
+    /// One in two to this power is kept.
+    halvings: u32,
+    seen: u64,
+}
+
+impl Thinned {
+    const MOST: usize = 4096;
+
+    fn push(&mut self, value: f64) {
+        if self.seen.is_multiple_of(1 << self.halvings) {
+            if self.kept.len() == Self::MOST {
+                let mut even = false;
+                self.kept.retain(|_| {
+                    even = !even;
+                    even
+                });
+                self.halvings += 1;
+            }
+            if self.seen.is_multiple_of(1 << self.halvings) {
+                self.kept.push(value);
+            }
+        }
+        self.seen += 1;
+    }
+
+    /// What the share `share` does not exceed; of at least one value.
+    fn quantile(&self, share: f64) -> f64 {
+        let mut sorted = self.kept.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted[(share * (sorted.len() - 1) as f64).round() as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A temperature in °C about 22 that goes up and down within hours, with a noise of its own; a value a minute.
+    fn temperature(minute: usize) -> f64 {
+        let noise = (minute as f64 * 12.9898).sin() * 43_758.545_3;
+        22.0 + 2.0 * (minute as f64 / 300.0).sin() + 0.02 * (noise - noise.floor() - 0.5)
+    }
+
+    fn found(minutes: std::ops::Range<usize>, value: impl Fn(usize) -> f64) -> Option<Leaps> {
+        let mut finder = Finder::default();
+        for minute in minutes {
+            finder.push(60.0 * minute as f64, value(minute));
+        }
+        finder.found()
+    }
+
+    #[test]
+    fn a_sensor_that_breaks_for_an_hour_leaps_twice() {
+        let leaps = found(0..2000, |minute| match minute {
+            1000..1060 => 850.0,
+            _ => temperature(minute),
+        });
+        let leaps = leaps.unwrap();
+        assert_eq!(leaps.count, 2);
+        assert_eq!((leaps.first.at_s, leaps.first.to), (60_000.0, 850.0));
+        assert!(leaps.usual.0 > 19.9 && leaps.usual.1 < 24.1, "{leaps:?}");
+    }
+
+    #[test]
+    fn a_single_wrong_sample_leaps_there_and_back() {
+        let leaps = found(0..2000, |minute| match minute {
+            700 => -327.68,
+            _ => temperature(minute),
+        });
+        assert_eq!(leaps.unwrap().count, 2);
+    }
+
+    #[test]
+    fn a_position_that_is_zeroed_anew_leaps_once_however_far_it_drifted() {
+        let leaps = found(0..2000, |minute| {
+            let zero = if minute < 1500 { 0.0 } else { 5000.0 };
+            10.0 * minute as f64 - zero + 50.0 * temperature(minute)
+        });
+        assert_eq!(leaps.unwrap().count, 1);
+    }
+
+    #[test]
+    fn a_heater_that_is_switched_on_does_not_leap() {
+        let heated = found(0..2000, |minute| {
+            let since = minute.saturating_sub(1000) as f64;
+            temperature(minute) + 100.0 * (1.0 - (-since / 3.0).exp())
+        });
+        assert_eq!(heated, None);
+        assert_eq!(found(0..2000, temperature), None);
+    }
+
+    #[test]
+    fn what_changed_during_a_gap_or_between_segments_is_no_leap() {
+        let mut finder = Finder::default();
+        for minute in (0..1000).chain(1600..2000) {
+            let shift = if minute < 1000 { 0.0 } else { 30.0 };
+            finder.push(60.0 * minute as f64, temperature(minute) + shift);
+        }
+        finder.interrupt();
+        for minute in 0..1000 {
+            finder.push(60.0 * minute as f64, temperature(minute) - 30.0);
+        }
+        assert_eq!(finder.found(), None);
+    }
+
+    #[test]
+    fn a_long_series_takes_no_more_memory_than_a_short_one() {
+        let mut finder = Finder::default();
+        for minute in 0..200_000 {
+            let value = if minute % 1000 == 999 {
+                850.0
+            } else {
+                temperature(minute)
+            };
+            finder.push(60.0 * minute as f64, value);
+        }
+        assert_eq!(finder.found().unwrap().count, KEPT);
+        assert!(finder.values.kept.len() <= Thinned::MOST && finder.alone.len() <= KEPT);
+    }
+}

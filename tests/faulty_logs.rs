@@ -1,0 +1,242 @@
+//! Logs in which a sensor failed or a position was zeroed anew, and doubtful graphs: who fits, scores or reports is told before
+//! anything is learned from them unseen.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::fmt::Write as _;
+
+use workbench::{Scratch, athermal, athermal_on};
+
+/// A position that follows one temperature at once.
+const GRAPH: &str = r#"
+schema = 1
+[time]
+column = "time_s"
+[signals.temperature]
+unit = "Cel"
+channels = ["plate", "room"]
+column = "{channel}_degC"
+max_age = "1min"
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+column = "{channel}_nm"
+max_age = "1min"
+[nodes.thermal]
+type = "linear"
+inputs.features = "temperature"
+inputs.truth = "position.Z"
+ahead = "0s"
+[outputs]
+predicted = "thermal"
+"#;
+
+/// Between -1 and 1, in no order.
+fn noise(row: usize, of: f64) -> f64 {
+    let x = (row as f64 * 12.9898 + of).sin() * 43_758.545_3;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+/// Temperatures of a plate and a room that go up and down within hours; a value a minute.
+fn temperatures(row: usize) -> (f64, f64) {
+    let minutes = row as f64;
+    (
+        22.0 + 2.0 * (minutes / 170.0).sin() + 0.01 * noise(row, 1.0),
+        21.0 + (minutes / 60.0).cos() + 0.01 * noise(row, 2.0),
+    )
+}
+
+/// A log of two days with what `fault` makes of plate, room and position.
+fn log(fault: impl Fn(usize, &mut [f64; 3])) -> String {
+    let mut text = String::from("time_s,plate_degC,room_degC,Z_nm\n");
+    for row in 0..2880 {
+        let (plate, room) = temperatures(row);
+        let mut values = [plate, room, 400.0 * plate - 150.0 * room + noise(row, 3.0)];
+        fault(row, &mut values);
+        let [plate, room, z] = values;
+        let _ = writeln!(text, "{},{plate:.3},{room:.3},{z:.1}", 60 * row);
+    }
+    text
+}
+
+/// The plate's sensor broken for an hour.
+fn broken(row: usize, values: &mut [f64; 3]) {
+    if (1000..1060).contains(&row) {
+        values[0] = 850.0;
+    }
+}
+
+fn in_one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_fit_names_the_sensor_that_failed_in_its_data() {
+    let scratch = Scratch::new("faulty-sensor");
+    let (graph, data) = (
+        scratch.file("graph.toml", GRAPH),
+        scratch.file("log.csv", log(broken)),
+    );
+    let model = scratch.path("model.json");
+    let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    let line = fitted
+        .told
+        .lines()
+        .find(|line| line.contains("leaps"))
+        .unwrap();
+    assert!(
+        line.starts_with("warning: temperature.plate leaps 2 times, first from 21.")
+            && line.contains("to 850.0 within one sample, at 60000 s: did the sensor fail?")
+            && line.contains("a `range` in [signals.temperature]"),
+        "{line}"
+    );
+    let json = athermal_on("fit", &graph, &data, &[&"-o", &model, &"--format", &"json"]).ended(0);
+    let leaps = &json.json()["leaps"];
+    assert_eq!(leaps.as_array().unwrap().len(), 1);
+    assert_eq!(leaps[0]["channel"], "temperature.plate");
+    assert_eq!(leaps[0]["first"]["to"], 850.0);
+
+    let ranged = GRAPH.replacen("max_age", "range = [\"-30 Cel\", \"75 Cel\"]\nmax_age", 1);
+    let graph = scratch.file("ranged.toml", ranged);
+    let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    fitted.tells(&["temperature.plate: 60 samples are infinite or out of range"]);
+    assert!(!fitted.told.contains("leaps"), "{}", fitted.told);
+}
+
+#[test]
+fn a_fit_names_the_position_that_was_zeroed_anew_and_says_nothing_of_sound_data() {
+    let scratch = Scratch::new("faulty-zero");
+    let graph = scratch.file("graph.toml", GRAPH);
+    let zeroed = log(|row, values| values[2] -= if row < 2000 { 0.0 } else { 900.0 });
+    let (zeroed, sound) = (
+        scratch.file("zeroed.csv", zeroed),
+        scratch.file("sound.csv", log(|_, _| ())),
+    );
+    let model = scratch.path("model.json");
+    let fitted = athermal_on("fit", &graph, &zeroed, &[&"-o", &model]).ended(0);
+    fitted.tells(&[
+        "warning: position.Z leaps once from ",
+        "at 120000 s: was it moved, or zeroed anew? That is learned as drift",
+    ]);
+    let fitted = athermal_on("fit", &graph, &sound, &[&"-o", &model]).ended(0);
+    assert!(!fitted.told.contains("warning"), "{}", fitted.told);
+}
+
+#[test]
+fn a_starter_graph_keeps_what_a_failed_sensor_says_out_of_the_fit() {
+    let scratch = Scratch::new("faulty-start");
+    let data = scratch.file("log.csv", log(broken));
+    let graph = scratch.path("graph.toml");
+    let mut begun = athermal(&[&"init", &data, &"-o", &graph]).ended(0);
+    begun.told = in_one_line(&begun.told);
+    begun.tells(&[
+        "plate_degC: temperature",
+        "it leaps 2 times, first from 21.",
+        "60 values far from all others are taken for faults",
+    ]);
+    let text = std::fs::read_to_string(&graph).unwrap();
+    let range = text
+        .lines()
+        .find(|line| line.starts_with("range ="))
+        .unwrap();
+    assert!(
+        range.starts_with("range = [\"-81 Cel\", \"125 Cel\"]  # seen: 19.99 to 24.01;"),
+        "{range}"
+    );
+    let model = scratch.path("model.json");
+    let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    fitted.tells(&["temperature.plate: 60 samples are infinite or out of range"]);
+    assert!(!fitted.told.contains("leaps"), "{}", fitted.told);
+}
+
+#[test]
+fn a_report_says_which_sensors_leap_or_lie_where_the_fit_saw_none() {
+    let scratch = Scratch::new("faulty-report");
+    let (graph, sound) = (
+        scratch.file("graph.toml", GRAPH),
+        scratch.file("sound.csv", log(|_, _| ())),
+    );
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &sound, &[&"-o", &model]).ended(0);
+    let faulty = scratch.file("faulty.csv", log(broken));
+    let page = scratch.path("page.html");
+    let report = athermal_on("report", &model, &faulty, &[&"-o", &page]).ended(0);
+    let told = in_one_line(&report.out);
+    assert!(
+        told.contains("Sensors to look at: temperature.plate: the same value 60 times; leaps 2 times, first from 21.")
+            && told.contains("to 850 within one sample; from 20.0 to 850, far outside of what the fit saw, 20.0 to 24.0"),
+        "{told}"
+    );
+    let page = std::fs::read_to_string(&page).unwrap();
+    assert_eq!(page.matches("in order</td>").count(), 2);
+}
+
+#[test]
+fn a_coarse_sensor_that_freezes_looks_stuck_though_it_often_repeats_its_value() {
+    let scratch = Scratch::new("faulty-coarse");
+    let coarse = |frozen: bool| {
+        log(move |row, values| {
+            let at = if frozen {
+                row.min(1500).max(row.saturating_sub(900))
+            } else {
+                row
+            };
+            values[1] = (10.0 * temperatures(at).1).round() / 10.0;
+        })
+    };
+    let graph = scratch.file("graph.toml", GRAPH);
+    let (sound, frozen) = (
+        scratch.file("sound.csv", coarse(false)),
+        scratch.file("frozen.csv", coarse(true)),
+    );
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &sound, &[&"-o", &model]).ended(0);
+    let of_sound = athermal_on("report", &model, &sound, &[]).ended(0);
+    assert!(!of_sound.out.contains("the same value"), "{}", of_sound.out);
+    let of_frozen = athermal_on("report", &model, &frozen, &[]).ended(0);
+    assert!(
+        of_frozen.out.contains("temperature.room: the same value 9"),
+        "{}",
+        of_frozen.out
+    );
+}
+
+#[test]
+fn what_is_doubtful_in_a_graph_is_told_by_the_fit_too() {
+    let scratch = Scratch::new("faulty-unit");
+    let graph = GRAPH.replace("unit = \"nm\"", "unit = \"um\"");
+    let (graph, data) = (
+        scratch.file("graph.toml", graph),
+        scratch.file("log.csv", log(|_, _| ())),
+    );
+    let model = scratch.path("model.json");
+    let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model, &"--format", &"json"]).ended(0);
+    fitted.tells(&["warning[A069]", "graph.toml:"]);
+    assert!(fitted.json()["ticks"].is_u64());
+    let scored = athermal_on("evaluate", &model, &data, &[]).ended(0);
+    assert!(!scored.told.contains("A069"), "{}", scored.told);
+}
+
+#[test]
+fn scores_on_the_data_of_the_fit_are_told_to_be_that() {
+    let scratch = Scratch::new("faulty-seen");
+    let (graph, data) = (
+        scratch.file("graph.toml", GRAPH),
+        scratch.file("log.csv", log(|_, _| ())),
+    );
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    let copied = scratch.file("copy.csv", std::fs::read(&data).unwrap());
+    let told = "copy.csv: the model was fitted on this file";
+    athermal_on("evaluate", &model, &copied, &[])
+        .ended(0)
+        .tells(&[told]);
+    athermal_on("report", &model, &copied, &[])
+        .ended(0)
+        .tells(&[told]);
+    let other = scratch.file("other.csv", log(|_, values| values[2] += 0.1));
+    let scored = athermal_on("evaluate", &model, &other, &[]).ended(0);
+    assert!(!scored.told.contains("fitted on"), "{}", scored.told);
+}
