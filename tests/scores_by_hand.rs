@@ -227,3 +227,38 @@ fn a_forecast_scored_by_hand_is_what_evaluate_prints() {
 fn a_virtual_sensor_scored_by_hand_is_what_evaluate_prints() {
     check("sensor", 0.0, "linear-axis-sensor.toml");
 }
+
+/// A prediction of a plain sample, whose input may have an age of its own, on a signal that may have one.
+fn aged(signal: &str, input: &str) -> String {
+    format!(
+        "schema = 1\n[time]\ncolumn = \"t\"\n[signals.room]\nunit = \"Cel\"\nchannels = [\"room\"]\nmax_age = \"1min\"\n\
+         [signals.position]\nunit = \"nm\"\nchannels = [\"Z\"]\n{signal}\n[nodes.still]\ntype = \"zero\"\nahead = \"10s\"\n\
+         inputs.truth = {input}\n[outputs]\npredicted = \"still\"\n"
+    )
+}
+
+#[test]
+fn a_truth_is_scored_by_the_age_that_its_node_is_given_it_at_and_has_no_spread_where_rounding_makes_it()
+ {
+    let scratch = Scratch::new("scores-by-age");
+    // The truth at 100 s is predicted at 40 s at the latest, 50 s before it had to be; the others in time.
+    let rows = "t,room,Z\n0,20,\n20,20,\n30,20,0.1\n40,20,0.1\n100,20,0.1\n110,20,0.1\n";
+    let data = scratch.file("data.csv", rows);
+    let scored = |name: &str, text: String| {
+        let graph = scratch.file(name, text);
+        let arguments: [&dyn AsRef<std::ffi::OsStr>; 6] =
+            [&"evaluate", &graph, &"--data", &data, &"--format", &"json"];
+        let scores = athermal(&arguments).ended(0).json()["scores"].clone();
+        assert_eq!(scores.as_array().unwrap().len(), 1, "{name}: {scores}");
+        assert!(
+            scores[0]["r2_mean"].is_null() && scores[0]["fit"].is_null(),
+            "{scores}"
+        );
+        scores[0]["n"].as_u64().unwrap()
+    };
+    let own = "{ from = \"position.Z\", max_age = \"30s\" }";
+    let long = "max_age = \"3min\"";
+    assert_eq!(scored("long.toml", aged(long, "\"position.Z\"")), 4);
+    assert_eq!(scored("own.toml", aged(long, own)), 3);
+    assert_eq!(scored("only.toml", aged("", own)), 3);
+}

@@ -124,6 +124,19 @@ fn outputs_that_only_one_graph_has_are_empty_while_another_runs() {
 }
 
 #[test]
+fn columns_keep_their_names_where_the_new_graph_gives_its_outputs_in_another_order() {
+    let scratch = desk("order");
+    let graph = |outputs: [&str; 2]| GRAPH.replace("predicted = \"model\"\n", &outputs.concat());
+    let (last, still) = ("last = \"model:same\"\n", "still = \"model:still\"\n");
+    scratch.file("graph.toml", graph([last, still]));
+    scratch.file("turned.toml", graph([still, last]));
+    let swapped = run(&scratch, &[&swap(&scratch, "1200", "turned.toml")]).ended(0);
+    swapped.tells(&["took over before tick 21"]);
+    let alone = run(&scratch, &[&swap(&scratch, "1200", "graph.toml")]).ended(0);
+    assert_eq!(swapped.out, alone.out);
+}
+
+#[test]
 fn a_graph_that_lacks_outputs_of_what_runs_is_told() {
     let scratch = desk("lacking");
     let other = GRAPH.replace("predicted = \"model\"", "still = \"model:still\"");

@@ -443,3 +443,16 @@ expect = [{ of = "drift.Z", rmse_below = "3 nm/min" }, { of = "zero.Z", valid_ab
     ];
     assert_eq!(codes, wanted, "{json:#}");
 }
+
+#[test]
+fn samples_that_last_longer_than_time_reaches_are_a_mistake() {
+    let scratch = Scratch::new("trials-endless");
+    let tests = "[[tests]]\nname = \"endless\"\ninputs = { \"temperature.room\" = { samples = [\"1 Cel\", \"2 Cel\", \"3 Cel\"], \
+                 every = \"100000d\" } }\nexpect = [{ of = \"zero\", valid_above = 0.0 }]\n";
+    let file = scratch.file("graph.toml", graph(tests));
+    let told = athermal(&[&"check", &file]).ended(2).told;
+    assert!(
+        told.contains("100000d for 3 samples") && told.contains("at most 292 years"),
+        "{told}"
+    );
+}

@@ -155,7 +155,7 @@ impl Run {
         );
         let mut shown = vec![f64::NAN; names.len()];
         let mut samples = Samples::default();
-        let mut places = (String::new(), Vec::new());
+        let mut places = (std::ptr::null(), Vec::new());
         while let Some(event) = ranged.next(&mut samples).map_err(outside)? {
             let Event::Row(time) = event else {
                 stepper.segment();
@@ -167,13 +167,15 @@ impl Run {
                 Err(athermal::EngineError::NotAfter { .. }) => continue,
                 Err(error) => return Err(Failure::Request(error.to_string())),
             };
-            if places.0 != stepped.revision {
+            // Two graphs of one revision may give their outputs in another order. The plan before is kept until the next one runs,
+            // so that no two that follow each other stand at the same place.
+            if !std::ptr::eq(places.0, stepped.plan) {
                 let place = |name: &String| {
                     let mut outputs = stepped.plan.outputs.iter();
                     outputs.position(|output| output.name == *name)
                 };
                 places = (
-                    stepped.revision.to_owned(),
+                    std::ptr::from_ref(stepped.plan),
                     names.iter().map(place).collect(),
                 );
             }

@@ -58,6 +58,47 @@ fn only_the_lag_that_leaks_is_pointed_at() {
     assert!(told.contains("(here it is 4min)"), "{told}");
 }
 
+/// A node that follows a truth, and one that reads it as a feature.
+fn behind_a_learner(follow: &str, ahead: [&str; 2]) -> String {
+    let [followed, read] = ahead;
+    format!(
+        r#"{SAMPLES}{SLOPES}
+[nodes.follow]
+{follow}
+inputs.truth = "drift.Z"
+ahead = "{followed}"
+[nodes.cheat]
+type = "linear"
+inputs.features = ["gradients", "follow"]
+inputs.truth = "drift.Z"
+ahead = "{read}"
+[outputs]
+out = "cheat"
+"#
+    )
+}
+
+#[test]
+fn what_learns_from_a_truth_while_it_runs_is_made_of_it() {
+    let follow = "type = \"kalman\"";
+    let learn = "type = \"rls\"\ninputs.features = \"gradients\"";
+    for node in [follow, learn] {
+        let told = problems(&behind_a_learner(node, ["5min", "0s"]));
+        assert!(told.contains("contains part of the answer"), "{told}");
+        assert!(
+            told.contains("`follow.Z` reads `drift.Z`") || told.contains("drift.Z"),
+            "{told}"
+        );
+        for ahead in ["0s", "150s", "5min"] {
+            plan(&behind_a_learner(node, [ahead, ahead]));
+        }
+        plan(&behind_a_learner(node, ["0s", "5min"]));
+    }
+    // What stays as it was fitted has seen nothing of the truths that it predicts.
+    let fitted = format!("{learn}\nlearn = false");
+    plan(&behind_a_learner(&fitted, ["5min", "0s"]));
+}
+
 fn through(delay: &str, ahead: &str, feature: &str) -> String {
     format!(
         r#"{SAMPLES}{SLOPES}

@@ -8,6 +8,7 @@ mod workbench;
 mod allocation;
 mod blending;
 mod course;
+mod failures;
 mod model;
 mod properties;
 mod random_graph;

@@ -23,8 +23,6 @@ pub enum NumericsError {
         /// How many there are.
         found: usize,
     },
-    /// A difference of two Gram matrices needs one shift in both, and the part may not be larger than the whole.
-    NotAPart,
     /// A column index is not below the number of regressors.
     Column {
         /// The index that was asked for.
@@ -124,10 +122,6 @@ impl fmt::Display for NumericsError {
             } => write!(
                 f,
                 "the length of {name} is {found} where {expected} is needed"
-            ),
-            Self::NotAPart => write!(
-                f,
-                "the rows to take away are not a part of these: their shift or their number does not fit"
             ),
             Self::Column { column, width } => {
                 write!(f, "column {column} of {width} columns does not exist")

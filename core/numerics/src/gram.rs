@@ -156,7 +156,7 @@ impl Gram {
         let mut columns = self.cross.as_mut_slice();
         for (j, products) in products.chunks_exact(order).enumerate() {
             let (column, rest) = columns.split_at_mut(order - j);
-            add(column, &products[j..], 1.0);
+            add(column, &products[j..]);
             columns = rest;
         }
     }
@@ -196,35 +196,11 @@ impl Gram {
             self.shift.clone_from(&other.shift);
         }
         if self.shift == other.shift {
-            self.accumulate(other, 1.0);
+            self.accumulate(other);
         } else {
-            self.accumulate(&other.shifted_to(&self.shift), 1.0);
+            self.accumulate(&other.shifted_to(&self.shift));
         }
         Ok(())
-    }
-
-    /// These statistics without the rows of `part`.
-    ///
-    /// # Errors
-    /// [`NumericsError::Width`] when the widths differ, [`NumericsError::NotAPart`] when the shifts differ or `part` has more
-    /// rows.
-    pub fn minus(&self, part: &Self) -> Result<Self, NumericsError> {
-        if part.width != self.width {
-            return Err(NumericsError::Width {
-                expected: self.width,
-                found: part.width,
-            });
-        }
-        if part.count == 0 {
-            return Ok(self.clone());
-        }
-        if part.shift != self.shift || part.count > self.count {
-            return Err(NumericsError::NotAPart);
-        }
-        let mut rest = self.clone();
-        rest.accumulate(part, -1.0);
-        rest.count = self.count - part.count;
-        Ok(rest)
     }
 
     /// No rows, about the same shift.
@@ -238,14 +214,14 @@ impl Gram {
     /// [`Gram::merge`] for parts that are known to be of one width and, once they have rows, of one shift.
     pub(crate) fn add_same_shift(&mut self, other: &Self) {
         debug_assert!(other.count == 0 || self.shift == other.shift);
-        self.accumulate(other, 1.0);
+        self.accumulate(other);
     }
 
-    fn accumulate(&mut self, other: &Self, sign: f64) {
+    fn accumulate(&mut self, other: &Self) {
         self.count += other.count;
-        self.weight += sign * other.weight;
-        add(&mut self.sum, &other.sum, sign);
-        add(&mut self.cross, &other.cross, sign);
+        self.weight += other.weight;
+        add(&mut self.sum, &other.sum);
+        add(&mut self.cross, &other.cross);
     }
 
     fn shifted_to(&self, shift: &[f64]) -> Self {
@@ -304,21 +280,6 @@ impl Gram {
         self.moments_off_shift(&self.mean_offsets())
     }
 
-    /// The covariance about `centre`: [`Gram::moments_about`] over the sum of the weights (population, not sample).
-    ///
-    /// # Panics
-    /// When `centre` has not `width + 1` values.
-    pub fn covariance_about(&self, centre: &[f64]) -> Mat<f64> {
-        let moments = self.moments_about(centre);
-        if self.weight > 0.0 {
-            Mat::from_fn(self.width + 1, self.width + 1, |i, j| {
-                moments[(i, j)] / self.weight
-            })
-        } else {
-            moments
-        }
-    }
-
     /// The population variances of the regressors and, last, of the target: exactly 0 where what is left after taking
     /// the mean out cannot be told from rounding.
     pub fn variances(&self) -> Vec<f64> {
@@ -375,9 +336,9 @@ fn place(i: usize, j: usize, order: usize) -> usize {
     triangle(order) - triangle(order - j) + i - j
 }
 
-fn add(to: &mut [f64], added: &[f64], sign: f64) {
+fn add(to: &mut [f64], added: &[f64]) {
     for (a, b) in to.iter_mut().zip(added) {
-        *a += sign * b;
+        *a += b;
     }
 }
 
@@ -504,17 +465,6 @@ mod tests {
             assert!((a - b).abs() < 1e-14);
         }
         assert!(merged.merge(&Gram::new(3)).is_err());
-    }
-
-    #[test]
-    fn the_whole_minus_a_part_is_the_rest() {
-        let whole = of(&ROWS);
-        let mut part = Gram::with_shift(whole.shift().unwrap().to_vec()).unwrap();
-        part.push(&ROWS[3][..2], ROWS[3][2]);
-        let rest = whole.minus(&part).unwrap();
-        assert_eq!(rest.count(), 3);
-        assert_near(&rest.moments(), &of(&ROWS[..3]).moments());
-        assert_eq!(whole.minus(&of(&ROWS[3..])), Err(NumericsError::NotAPart));
     }
 
     #[test]

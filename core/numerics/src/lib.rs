@@ -47,7 +47,6 @@ mod prediction_error;
 mod prediction_variance;
 mod rls;
 mod scaler;
-mod score;
 mod scratch;
 mod selection;
 mod sgd;
@@ -83,7 +82,6 @@ pub use prediction_error::{
 pub use prediction_variance::PredictionVariance;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use scaler::{Standardization, Standardizer};
-pub use score::{Score, ScoreAccumulator};
 pub use selection::{
     CandidateScore, Candidates, Change, Direction, Search, Selection, SelectionScore,
     SelectionStep, Smallest, Start, Stepwise, StepwiseSelection, StepwiseStep,

@@ -143,6 +143,9 @@ impl Resolver<'_> {
             return None;
         }
         let (training, learning) = (training?, learning?);
+        if learning.is_some() {
+            behind.push(link.learned_from());
+        }
         let behind = Provenance::of(
             behind
                 .iter()

@@ -2,7 +2,7 @@
 //!
 //! It looks at the graph once all of it is known, since feedback through a delay brings what comes later in the order.
 
-use super::plan::{PlannedNode, TruthLink};
+use super::plan::{PlannedNode, PlannedRole, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::{Provenance, leaks};
 use super::resolver::{Resolver, Suspect};
@@ -75,7 +75,8 @@ impl Resolver<'_> {
         way
     }
 
-    /// What a slot of a node is made of: the slots that the node reads for it, with the delay at which each reaches it.
+    /// What a slot of a node is made of: the slots that the node reads for it, and the truth that it learns from, with the delay at
+    /// which each reaches it.
     fn parts(&self, node: usize, slot: usize) -> Vec<(usize, Duration)> {
         let node = &self.nodes[node];
         let entries = |gather: usize| &self.gathers[gather].entries;
@@ -89,7 +90,14 @@ impl Resolver<'_> {
             });
         }
         let entries = node.role.inputs().flat_map(entries);
-        entries.map(|entry| (entry.slot, entry.lag)).collect()
+        let read = entries.map(|entry| (entry.slot, entry.lag));
+        let learned = match &node.role {
+            PlannedRole::Estimator {
+                truth, learning, ..
+            } if learning.is_some() => Some(truth.learned_from()),
+            _ => None,
+        };
+        read.chain(learned).collect()
     }
 
     /// The slots that a feature reads as data, port by port.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::persistence_lag;
 use super::slot_set::SlotSet;
 use crate::channel::Channel;
 use crate::document::TimeBase;
@@ -415,6 +416,11 @@ impl TruthLink {
     #[must_use]
     pub fn embargo(&self) -> Duration {
         (self.span - self.ahead).max(Duration::ZERO)
+    }
+
+    /// The truth that a learner's predictions are made of beside their regressors, with the delay of the newest that it has seen.
+    pub(crate) fn learned_from(&self) -> (usize, Duration) {
+        (self.slot, persistence_lag(self.span, self.ahead))
     }
 
     /// Whether the truth of a run's own tick is a regressor that it may have: the window of what it predicts begins where that

@@ -141,6 +141,12 @@ pub enum CompileProblem {
     EndlessTruth { channel: String, node: String },
     /// A limit of a unit that is not the truth's.
     LimitUnit { found: Unit, expected: Unit },
+    /// A rate at which no output passes from one graph to the next.
+    Blend {
+        output: String,
+        found: Quantity,
+        expected: Unit,
+    },
     /// Two channels of the same name.
     DuplicateName { name: String, what: &'static str },
     /// Columns of the same names as others of the output, because of one reference; with an output that it could be alone.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use crate::time::Duration;
 
-/// The measured channels behind a value, each with the smallest delay on any path, through data inputs only.
+/// The measured channels behind a value, each with the smallest delay on any path: through data inputs, and through the truth of
+/// what learns while it runs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Provenance(Arc<BTreeMap<usize, Duration>>);
 

@@ -21,6 +21,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::GraphFile;
 use crate::node::{Mistake, OutputPort, Role};
 use crate::time::Duration;
+use crate::unit::Unit;
 
 /// The name of a channel among those of all members; the only one of an instance has its member's name.
 fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
@@ -313,6 +314,7 @@ impl<'g> Resolver<'g> {
         for output in &graph.outputs {
             for (text, place) in &output.from {
                 let mut taken = Vec::new();
+                let mut blends = true;
                 for slot in self.look_up(text, *place).unwrap_or_default() {
                     let channel = self.channels[slot]
                         .name
@@ -322,10 +324,23 @@ impl<'g> Resolver<'g> {
                     if !names.insert(name.clone()) {
                         taken.push(name.clone());
                     }
+                    if let Some((rate, place)) = &output.blend {
+                        let unit = &self.channels[slot].channel.unit;
+                        let per_second = unit.difference().per(&Unit::second());
+                        let is_rate = rate.in_unit(&per_second).is_some_and(|rate| rate > 0.0);
+                        if std::mem::replace(&mut blends, is_rate) && !is_rate {
+                            let problem = CompileProblem::Blend {
+                                output: name.clone(),
+                                found: rate.clone(),
+                                expected: per_second,
+                            };
+                            self.diagnostics.report(*place, problem);
+                        }
+                    }
                     outputs.push(PlannedOutput {
                         name,
                         slot,
-                        blend: output.blend.clone(),
+                        blend: output.blend.as_ref().map(|(rate, _)| rate.clone()),
                     });
                 }
                 if let [first, more @ ..] = &taken[..] {

@@ -179,6 +179,6 @@ pub struct OutputDecl {
     pub place: Place,
     /// The references, each with where it stands.
     pub from: Vec<(String, Place)>,
-    /// The rate at which the output passes from an old graph to a new one.
-    pub blend: Option<Quantity>,
+    /// The rate at which the output passes from an old graph to a new one, and where it stands.
+    pub blend: Option<(Quantity, Place)>,
 }

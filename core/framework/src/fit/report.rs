@@ -16,6 +16,8 @@ pub enum FitError {
     Recording(RecordingError),
     /// The engine cannot be built.
     Engine(EngineError),
+    /// A node panicked.
+    Panicked,
 }
 
 impl fmt::Display for FitError {
@@ -23,6 +25,11 @@ impl fmt::Display for FitError {
         match self {
             Self::Recording(error) => write!(f, "{error}"),
             Self::Engine(error) => write!(f, "{error}"),
+            Self::Panicked => write!(
+                f,
+                "a node panicked while it was fitted, which is a mistake of its own and not of the data; what it said stands in the \
+                 program's messages"
+            ),
         }
     }
 }

@@ -243,7 +243,9 @@ impl Control {
     pub fn commit(&mut self) -> Result<(), StageError> {
         self.pump();
         let mut staged = self.staged.take().ok_or(StageError::NothingStaged)?;
-        if let Err(error) = self.send(&mut staged.seated) {
+        // A rollback may have come between, to a graph that it was not set against.
+        let unfit = StageError::between(&self.running, staged.seated.engine.plan());
+        if let Err(error) = unfit.map_or_else(|| self.send(&mut staged.seated), Err) {
             self.staged = Some(staged);
             return Err(error);
         }

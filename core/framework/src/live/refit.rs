@@ -2,7 +2,7 @@
 
 use std::thread::JoinHandle;
 
-use crossbeam::channel::{Receiver, bounded};
+use crossbeam::channel::{Receiver, TryRecvError, bounded};
 
 use super::Control;
 use crate::fit::{FitError, FitOptions, FitReport, fit};
@@ -44,16 +44,26 @@ impl Refit {
 
     /// The outcome, once there is one; it is given once.
     pub fn poll(&mut self) -> Option<Result<(Model, FitReport), FitError>> {
-        let outcome = self.outcome.try_recv().ok()?;
-        self.thread.take().map(JoinHandle::join);
-        Some(outcome)
+        match self.outcome.try_recv() {
+            Ok(outcome) => self.over(Some(outcome)),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => self.over(None),
+        }
     }
 
     /// Waits for the outcome; none where it has been given already.
     pub fn wait(mut self) -> Option<Result<(Model, FitReport), FitError>> {
         let outcome = self.outcome.recv().ok();
-        self.thread.take().map(JoinHandle::join);
-        outcome
+        self.over(outcome)
+    }
+
+    /// The thread has ended: with an outcome, or by a panic where none has been given before.
+    fn over(
+        &mut self,
+        outcome: Option<Result<(Model, FitReport), FitError>>,
+    ) -> Option<Result<(Model, FitReport), FitError>> {
+        let joined = self.thread.take()?.join();
+        outcome.or_else(|| joined.is_err().then_some(Err(FitError::Panicked)))
     }
 }
 

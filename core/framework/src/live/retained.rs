@@ -44,6 +44,9 @@ impl Retained {
 
     /// What follows belongs to another segment.
     pub(super) fn segment(&mut self) {
+        if self.times.back() == Some(&None) {
+            return;
+        }
         self.times.push_back(None);
         self.samples
             .extend(std::iter::repeat_n(f64::NAN, self.width));

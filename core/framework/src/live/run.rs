@@ -32,6 +32,18 @@ pub fn run_keeping(
     sink: &mut dyn Sink,
     keep: &mut dyn FnMut(&Engine, &mut dyn Sink) -> Result<(), SinkError>,
 ) -> Result<(), RunError> {
+    let ended = run_to_the_end(engine, source, sink, keep);
+    // Also after an error: what was put out until then is not to be lost.
+    let finished = sink.finish().map_err(RunError::Sink);
+    ended.and(finished)
+}
+
+fn run_to_the_end(
+    engine: &mut Engine,
+    source: &mut dyn Source,
+    sink: &mut dyn Sink,
+    keep: &mut dyn FnMut(&Engine, &mut dyn Sink) -> Result<(), SinkError>,
+) -> Result<(), RunError> {
     let revision = engine.revision().to_owned();
     let mut samples = Samples::default();
     while let Some(event) = source.next(&mut samples).map_err(RunError::Source)? {
@@ -53,7 +65,7 @@ pub fn run_keeping(
         sink.put(&frame).map_err(RunError::Sink)?;
         keep(engine, sink).map_err(RunError::Keep)?;
     }
-    sink.finish().map_err(RunError::Sink)
+    Ok(())
 }
 
 /// Why a run ended before its source did.

@@ -157,11 +157,13 @@ fn pairs(running: &Plan, candidate: &Plan) -> Vec<Pair> {
         if !predicts_same {
             return None;
         }
+        let own = here.node.and_then(|node| running.nodes[node].role.truth());
+        let limit = own.map(|link| link.limit);
         let link = TruthLink {
             slot: here.predicts?,
             ahead: here.channel.ahead,
             span: truth.channel.span,
-            limit: truth.channel.default_max_age()?,
+            limit: limit.or(truth.channel.default_max_age())?,
         };
         let predicted = |slot| Predicted {
             slot,

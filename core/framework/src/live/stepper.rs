@@ -32,7 +32,7 @@ pub struct Stepper {
 /// What came of a tick.
 #[derive(Debug)]
 pub struct Stepped<'a> {
-    /// The revision of the graph that made the outputs.
+    /// The revision of the graph that made the outputs. Graphs of one revision compute the same, but may give it in another order.
     pub revision: &'a str,
     /// Its plan, in whose order the outputs are.
     pub plan: &'a Plan,

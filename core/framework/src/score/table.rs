@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::watch::{Truth, Watch};
 use super::{IntervalScore, Lack, Mode, ScoreOptions};
+use crate::channel::Extremes;
 use crate::compile::Plan;
 use crate::engine::{Engine, SampleRange};
 use crate::time::Instant;
@@ -163,8 +164,12 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
             let persistence = &truth.persistences[&prediction.ahead].values;
             let n = instants.len();
             let mean = mean(truths());
+            let mut range = Extremes::NONE;
+            truths().for_each(|y| range.include(y));
+            // What differs by rounding alone has no spread that could be told.
+            let about_mean = mean.filter(|_| !range.is_one_value());
             let about_mean =
-                mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());
+                about_mean.map(|mean| truths().map(|y| (y - mean) * (y - mean)).sum::<f64>());
             let squared: f64 = errors().map(|e| e * e).sum();
             let about_zero: f64 = truths().map(|y| y * y).sum();
             let share = |of: f64| (of > 0.0).then(|| 1.0 - squared / of);

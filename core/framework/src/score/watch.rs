@@ -66,7 +66,9 @@ impl Watch {
                 continue;
             };
             let (span, ahead) = (plan.channels[of].channel.span, channel.channel.ahead);
-            let Some(limit) = plan.channels[of].channel.default_max_age() else {
+            // As the node itself is given truths; a combiner may be given none.
+            let own = plan.nodes[node].role.truth().map(|link| link.limit);
+            let Some(limit) = own.or(plan.channels[of].channel.default_max_age()) else {
                 continue;
             };
             let link = TruthLink {

@@ -65,6 +65,11 @@ impl Shaping<'_> {
             .map(|(key, _)| key)
             .collect();
         if let Some(samples) = &table.samples {
+            let last = i64::try_from(samples.len()).unwrap_or(i64::MAX);
+            if table.every.as_ns().checked_mul(last).is_none() {
+                let found = format!("{} for {} samples", table.every, samples.len());
+                self.range("every", found, "at most 292 years for all of them");
+            }
             for key in given.into_iter().chain(table.length.map(|_| "for")) {
                 self.keys(key, "samples", true);
             }

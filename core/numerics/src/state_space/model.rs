@@ -131,7 +131,10 @@ pub(super) fn spectral_radius(matrix: &Mat<f64>) -> f64 {
     let mut logarithm = 0.0;
     for doubling in 0..SQUARINGS {
         let norm = squared.norm_l2();
-        if norm.is_nan() || norm <= 0.0 {
+        if !norm.is_finite() {
+            return f64::INFINITY;
+        }
+        if norm <= 0.0 {
             return 0.0;
         }
         logarithm += norm.ln() / 2_f64.powi(doubling);

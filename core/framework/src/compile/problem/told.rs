@@ -72,7 +72,7 @@ impl Problem for CompileProblem {
             Self::Parameter { .. } => "A054",
             Self::NoHorizon { .. } => "A055",
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "A056",
-            Self::LimitUnit { .. } => "A057",
+            Self::LimitUnit { .. } | Self::Blend { .. } => "A057",
             Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "A058",
             Self::UnusedNode { .. } => "A059",
             Self::UnusedSignal { .. } => "A060",
@@ -126,6 +126,7 @@ impl Problem for CompileProblem {
             | Self::TruthOfPrediction { .. }
             | Self::EndlessTruth { .. }
             | Self::LimitUnit { .. }
+            | Self::Blend { .. }
             | Self::DuplicateName { .. }
             | Self::DuplicateColumns { .. }
             | Self::UnusedNode { .. }
@@ -249,6 +250,15 @@ impl Problem for CompileProblem {
             Self::LimitUnit { found, expected } => {
                 format!("the limit is in {found} and the truth in {expected}, which do not convert")
             }
+            Self::Blend {
+                output,
+                found,
+                expected,
+            } => {
+                format!(
+                    "`blend` is {found}, and `{output}` can only pass over at a rate above zero in {expected}"
+                )
+            }
             Self::DuplicateName { name, what } => format!("there are two {what} named `{name}`"),
             Self::DuplicateColumns { first, more, .. } => {
                 let more = match more {
@@ -317,6 +327,7 @@ impl Problem for CompileProblem {
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "not measured",
             Self::EndlessTruth { .. } => "of no span",
             Self::LimitUnit { .. } => "another unit",
+            Self::Blend { .. } => "no such rate",
             Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => "the name is taken",
             Self::UnusedNode { .. } | Self::UnusedSignal { .. } => "not used",
             Self::ColumnUnit { .. } => "another unit",
@@ -415,6 +426,9 @@ impl Problem for CompileProblem {
                 "say how much of the past counts, such as `span = \"10min\"` on `{node}`, or use a window, such as `slope`"
             ),
             Self::LimitUnit { expected, .. } => format!("write the limit in {expected}"),
+            Self::Blend { expected, .. } => {
+                format!("write by how much it may change per time, such as `5 {expected}`; without `blend` it steps over at once")
+            }
             Self::DuplicateColumns {
                 alone: Some(alone), ..
             } => {

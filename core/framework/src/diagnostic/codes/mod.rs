@@ -260,7 +260,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A057",
         "a limit in another unit",
-        "Limits of the absolute truth are in a unit that converts to the truth's."
+        "Limits of the absolute truth are in a unit that converts to the truth's, and `blend` is a rate above zero in one that converts to the output's per second."
     ),
     code!(
         "A058",

@@ -24,7 +24,7 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
             let known = ["from", "blend"];
             known_keys(keys, &known, &what, diagnostics);
             let blend = meant(keys, "blend", &known)
-                .and_then(|value| quantity(value, "blend", diagnostics));
+                .and_then(|value| Some((quantity(value, "blend", diagnostics)?, value.place)));
             match meant(keys, "from", &known) {
                 Some(from) => (from, blend),
                 None => {

@@ -160,7 +160,7 @@ fn an_output_may_be_blended() {
         graph.outputs[2]
             .blend
             .as_ref()
-            .map(ToString::to_string)
+            .map(|(rate, _)| rate.to_string())
             .as_deref(),
         Some("5 nm/s")
     );
