@@ -152,7 +152,7 @@ impl Engine {
     /// The answer is in the order of [`Plan::outputs`], NaN where a node did not run or gave nothing at this tick.
     ///
     /// # Errors
-    /// A time that is not after the last one, or another number of samples: the engine is as it was, and counts it.
+    /// A time that is not after the last one, which is counted, or another number of samples: the engine is as it was.
     pub fn step(&mut self, time: Instant, samples: &[f64]) -> Result<&[f64], EngineError> {
         if samples.len() != self.plan.sources.len() {
             return Err(EngineError::WrongWidth {

@@ -80,6 +80,9 @@ impl Stepwise {
     }
 }
 
+/// The share of the target's spread that is rounding: what is left of data without noise says nothing of further columns.
+const ROUNDING: f64 = 1e-12;
+
 /// Moments swept by the chosen columns (Goodnight 1979).
 struct Swept {
     moments: Mat<f64>,
@@ -113,7 +116,7 @@ impl Swept {
     fn run(mut self, how: &Stepwise) -> StepwiseSelection {
         let most = how.most.unwrap_or(usize::MAX);
         let mut refused = None;
-        while self.columns.len() < most {
+        while self.columns.len() < most && self.unexplained() > ROUNDING * self.spread {
             let candidates = self.entering();
             let best = candidates.iter().copied().filter(|c| !c.mean.is_nan());
             let Some(best) = best.reduce(|a, b| if b.mean > a.mean { b } else { a }) else {

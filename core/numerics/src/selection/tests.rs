@@ -341,6 +341,22 @@ fn stepwise_regression_takes_the_steps_of_the_own_oracle() {
     }
 }
 
+#[test]
+fn nothing_more_is_taken_once_only_rounding_is_left() {
+    let mut gram = crate::Gram::new(4);
+    for i in 0..200 {
+        let row = [0.1, 0.7, 1.3, 2.9].map(|rate| sine(i, rate));
+        gram.push(&row, 2.0 * row[2] + 1.0);
+    }
+    let how = Stepwise {
+        enter: 4.0,
+        remove: 3.9,
+        most: None,
+    };
+    let chosen = how.run(&gram, &[1.0; 4]).unwrap();
+    assert_eq!(chosen.columns, [2]);
+}
+
 fn sine(i: u32, rate: f64) -> f64 {
     (rate * f64::from(i) * (1.0 + 1e-3 * f64::from(i))).sin()
 }
