@@ -50,7 +50,7 @@ pub struct SensorFacts {
     pub noise: Option<f64>,
     /// Lowest and highest sample.
     pub range: Option<(f64, f64)>,
-    /// The same in the data of the fit, where these reach far beyond them.
+    /// The same in the data of the fit, where these reach far beyond them; not of what a truth is made of, whose drift is what counts.
     pub exceeds: Option<(f64, f64)>,
     /// Ticks by what a `health` node of the graph said of the channel; empty where none watches it.
     pub health: BTreeMap<&'static str, u64>,
@@ -69,6 +69,8 @@ struct Looking {
     runs: [u64; 2],
     changes: u64,
     finder: Option<Finder>,
+    /// Whether a truth is made of it.
+    wanders: bool,
     /// Squared second differences, and how many.
     squares: (f64, u64),
     lengths: Vec<f64>,
@@ -96,6 +98,7 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
                 optional: source.optional,
                 reason: reasons.get(&slot).copied(),
                 finder: may_leap.then(Finder::default),
+                wanders: of_truths[slot],
                 ..Looking::default()
             },
             ..SensorFacts::default()
@@ -206,6 +209,7 @@ impl SensorFacts {
         self.most_unchanged = self.looking.runs[0];
         self.leaps = self.looking.finder.take().and_then(|of| of.found());
         let usual = fit.iter().find(|usual| usual.channel == self.name);
+        let usual = usual.filter(|_| !self.looking.wanders);
         let exceeded = usual
             .zip(self.range)
             .filter(|(usual, (low, high))| usual.is_far_from(*low, *high));

@@ -125,16 +125,16 @@ pub(super) struct ExpectTable {
     /// The root mean square error of the prediction, on all instants at which it has a value, is below.
     pub(super) rmse_below: Option<Quantity>,
     /// R² of the prediction, 1 − Σ(ŷ − y)² / Σ(y − ȳ)², on all instants at which it has a value, is above.
-    #[schemars(range(max = 1))]
+    #[schemars(extend("exclusiveMaximum" = 1))]
     pub(super) r2_above: Option<f64>,
     /// The root mean square error is below that of each of these, on the instants at which all have a value: `zero`, `persistence`, or other predictions of the same truth.
     #[schemars(length(min = 1))]
     pub(super) beats: Option<Vec<String>>,
     /// The share that has a value is above: of a prediction, of the measured truths; of any other channel, of the ticks at which it was computed.
-    #[schemars(range(min = 0, max = 1))]
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1))]
     pub(super) valid_above: Option<f64>,
     /// The share of all ticks at which the channel was given a value is above, whether a truth was measured or not.
-    #[schemars(range(min = 0, max = 1))]
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1))]
     pub(super) given_above: Option<f64>,
     /// Every value, or the one `at` a time, equals this.
     pub(super) equals: Option<Quantity>,
