@@ -121,6 +121,35 @@ fn a_watched_run_that_is_restarted_goes_on_too() {
     );
 }
 
+#[test]
+fn a_log_that_names_its_columns_again_in_another_order_gives_the_same_run_in_one_piece_and_restarted()
+ {
+    let (scratch, model, data, whole) = desk("again");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let turned = |line: &str| line.rsplit(',').collect::<Vec<_>>().join(",");
+    let (names, rows) = text.split_once('\n').unwrap();
+    let rows: Vec<_> = rows.lines().collect();
+    let before = format!("{names}\n{}\n{}\n", rows[..1000].join("\n"), turned(names));
+    let after: String = rows[1000..].iter().map(|row| turned(row) + "\n").collect();
+    let all = before.clone() + &after;
+    let run = |log: &str, more: &[&str]| {
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"run", &model, &"-i", &"-"];
+        arguments.extend(more.iter().map(|more| more as &dyn AsRef<std::ffi::OsStr>));
+        athermal_fed(&arguments, log.as_bytes()).ended(0)
+    };
+    for more in [&[][..], &["--lenient"]] {
+        let ran = run(&all, more);
+        ran.tells(&[
+            "standard input:1002: the names of the columns stand here again, in other places",
+        ]);
+        assert!(ran.out == whole);
+    }
+    let state = scratch.path("state").display().to_string();
+    let first = run(&before, &["--state", &state]).out;
+    let second = run(&all, &["--state", &state]).out;
+    assert!(first + second.split_once('\n').unwrap().1 == whole);
+}
+
 /// As a service manager restarts it: the same command again, after a kill that cut the last row in two.
 #[test]
 fn a_run_that_is_restarted_goes_on_with_its_output_as_it_was_left() {

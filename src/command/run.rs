@@ -231,7 +231,9 @@ impl Run {
                 FileError::MissingColumns { .. } => {
                     terminal.warning(format_args!("{first} (missing until a line has it)"));
                 }
-                FileError::TimeStaysBehind { .. } => terminal.warning(format_args!("{first}")),
+                FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { .. } => {
+                    terminal.warning(format_args!("{first}"));
+                }
                 _ => terminal.warning(format_args!("{first}; others like it are counted")),
             });
         }

@@ -106,7 +106,7 @@ impl Ends {
 
     fn csv_names(&self) -> Result<Vec<String>, FileError> {
         let lines = Lines::new("its first line".into(), Cursor::new(self.first.clone()));
-        let rows = CsvRows::headed(lines, Some(b','), std::iter::empty())?;
+        let rows = CsvRows::headed(lines, Some(b','), None)?;
         Ok(rows.names().to_vec())
     }
 

@@ -21,6 +21,10 @@ pub(crate) trait Cells {
     /// Whether `1,5` is a number.
     fn decimal_comma(&self) -> bool;
     fn place(&self) -> Place;
+    /// Takes the columns from here on as the current row names them, if that is what it does.
+    fn take_header(&mut self, _ledger: &mut Ledger) -> Result<bool, FileError> {
+        Ok(false)
+    }
 }
 
 /// The text of a cell: what is not UTF-8 is taken for Windows-1252, which is what Windows programs write in Western countries.
@@ -67,6 +71,20 @@ fn unusual(cell: &[u8], decimal_comma: bool) -> Option<f64> {
     fast_float2::parse(cell).ok()
 }
 
+/// Whether a cell holds a value, whichever its decimal mark: neither text nor nothing.
+pub(crate) fn is_number(cell: &str) -> bool {
+    !cell.is_empty() && value(cell.as_bytes(), true).is_some()
+}
+
+/// A time with a point for a decimal comma, as a reader takes it where something else than a comma separates cells.
+#[must_use]
+pub fn with_decimal_point(time: &str) -> Cow<'_, str> {
+    match comma_of_time(time.as_bytes()) {
+        Some(comma) => format!("{}.{}", &time[..comma], &time[comma + 1..]).into(),
+        None => time.into(),
+    }
+}
+
 /// The decimal mark of a number; none in one that has none.
 pub(crate) fn decimal_mark(number: &[u8]) -> Option<u8> {
     let mut marks = number.iter().filter(|b| matches!(b, b',' | b'.'));
@@ -83,6 +101,14 @@ pub(crate) fn single_comma(cell: &[u8]) -> Option<usize> {
         (Some((at, b',')), None) => Some(at),
         _ => None,
     }
+}
+
+/// Where the decimal comma of a time stands: the only comma from its hours and minutes on, so that a date before may have points.
+pub(crate) fn comma_of_time(cell: &[u8]) -> Option<usize> {
+    let clock = cell.iter().position(|&b| b == b':').unwrap_or(0);
+    let comma = clock + single_comma(&cell[clock..])?;
+    let is_decimal = cell.get(comma + 1).is_some_and(u8::is_ascii_digit);
+    is_decimal.then_some(comma)
 }
 
 /// Without the spaces around it, and without quotes that stand inside such spaces (` "a" `).

@@ -1,4 +1,5 @@
-//! The columns that a file has against those that are wanted: the delimiter, missing and doubled names. Not their cells.
+//! The columns that a file has against those that are wanted: the delimiter, where each stands, missing and doubled names. Not their
+//! cells.
 
 use std::collections::HashSet;
 
@@ -6,10 +7,10 @@ use csv::{ByteRecord, ReaderBuilder};
 
 use crate::cell::{self, trim};
 use crate::error::excerpt;
-use crate::{FileError, MissingColumn, Place};
+use crate::{FileError, Layout, MissingColumn, Place};
 
 /// What may stand between cells, the most usual first.
-const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
+pub(crate) const DELIMITERS: [u8; 4] = [b',', b';', b'\t', b'|'];
 
 /// How alike two names must be for one to be suggested for the other (Jaro–Winkler, 0 to 1).
 const ALIKE: f64 = 0.8;
@@ -37,7 +38,7 @@ pub(crate) fn choose_delimiter<'a>(
         .unwrap_or(b',')
 }
 
-fn names_in(header: &[u8], delimiter: u8) -> Vec<String> {
+pub(crate) fn names_in(header: &[u8], delimiter: u8) -> Vec<String> {
     let mut record = ByteRecord::new();
     let read = ReaderBuilder::new()
         .has_headers(false)
@@ -53,6 +54,41 @@ fn names_in(header: &[u8], delimiter: u8) -> Vec<String> {
 /// The name that a header cell gives.
 pub(crate) fn name(cell: &[u8]) -> String {
     cell::text(trim(cell)).into_owned()
+}
+
+/// Where the wanted columns stand.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Columns {
+    /// The column of the time, if it is there.
+    pub time: Option<usize>,
+    /// The column of each channel, if it is there.
+    pub channels: Vec<Option<usize>>,
+}
+
+impl Columns {
+    /// Looks them up among names.
+    pub fn of(layout: &Layout, names: &[String]) -> Self {
+        let channels = layout.channels.iter();
+        Self {
+            time: position(names, &layout.time.column),
+            channels: channels.map(|of| position(names, &of.column)).collect(),
+        }
+    }
+
+    /// Whether so many of them are there that it is no chance: the time, or half of the channels and at least two.
+    pub fn are_named(&self, layout: &Layout) -> bool {
+        let channels = self.channels.iter().flatten().count();
+        self.time.is_some() || channels >= 2 && 2 * channels >= layout.channels.len()
+    }
+
+    /// The names of those that must be there and are not.
+    pub fn lacking<'a>(&self, layout: &'a Layout) -> Vec<&'a str> {
+        let time = self.time.is_none().then_some(layout.time.column.as_str());
+        let channels = layout.channels.iter().zip(&self.channels);
+        let channels = channels.filter(|(channel, at)| at.is_none() && !channel.optional);
+        let channels = channels.map(|(channel, _)| channel.column.as_str());
+        time.into_iter().chain(channels).collect()
+    }
 }
 
 /// Where a name stands.
@@ -83,7 +119,7 @@ pub(crate) fn check_unique(
 /// The error for columns that are not among the names found, which may have been taken for Windows-1252.
 pub(crate) fn missing<'a>(
     place: Place,
-    columns: impl Iterator<Item = &'a str>,
+    columns: impl IntoIterator<Item = &'a str>,
     found: &[String],
     windows_1252: bool,
 ) -> FileError {
@@ -100,7 +136,7 @@ pub(crate) fn missing<'a>(
     let mut missing: Vec<MissingColumn> = Vec::new();
     let mut told = HashSet::new();
     // Two channels may have one column.
-    for column in columns.filter(|column| told.insert(*column)) {
+    for column in columns.into_iter().filter(|column| told.insert(*column)) {
         missing.push(MissingColumn {
             name: column.to_owned(),
             nearest: (missing.len() < COMPARED)

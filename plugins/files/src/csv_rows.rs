@@ -2,11 +2,13 @@
 
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
-use crate::cell::Cells;
-use crate::columns;
+use crate::cell::{Cells, is_number};
+use crate::columns::{self, Columns};
+use crate::header;
 use crate::ledger::Ledger;
 use crate::lines::{LONGEST_ROW, Lines};
-use crate::{FileError, Layout, Place};
+use crate::units::are_units;
+use crate::{FileError, Layout, LongFormat, Place};
 
 /// The rows of a CSV file.
 pub(crate) struct CsvRows {
@@ -17,8 +19,14 @@ pub(crate) struct CsvRows {
     row_line: u64,
     delimiter: u8,
     names: Vec<String>,
-    time: usize,
-    channels: Vec<Option<usize>>,
+    /// The units in the row below the names; none where there is no such row.
+    units: Vec<String>,
+    /// How many cells a row has; 0 until the first row below the names.
+    width: usize,
+    /// Whether rows, but not the names, end in a delimiter.
+    ends_in_delimiter: bool,
+    layout: Option<Layout>,
+    columns: Columns,
 }
 
 /// How a row came out of the stream.
@@ -27,56 +35,52 @@ enum Record {
     Row { cells: usize, complete: bool },
 }
 
+/// How many rows are looked at to tell why a column is missing.
+const LOOKED_AT: usize = 20;
+
 impl CsvRows {
     /// Reads the header and finds the wanted columns in it.
     pub fn new(lines: Lines, layout: &Layout, delimiter: Option<u8>) -> Result<Self, FileError> {
-        let mut rows = Self::headed(lines, delimiter, layout.names())?;
-        let at = |name: &str| columns::position(&rows.names, name);
-        let time = at(&layout.time.column);
-        let channels: Vec<_> = layout
-            .channels
-            .iter()
-            .map(|channel| at(&channel.column))
-            .collect();
-        let lacks_time = time.is_none().then_some(layout.time.column.as_str());
-        let lacking = layout.channels.iter().zip(&channels);
-        let lacking = lacking.filter(|(channel, at)| at.is_none() && !channel.optional);
-        let mut missing = lacks_time
-            .into_iter()
-            .chain(lacking.map(|(channel, _)| channel.column.as_str()))
-            .peekable();
-        if missing.peek().is_some() {
-            let assumed = std::str::from_utf8(rows.lines.text()).is_err();
-            return Err(columns::missing(
-                rows.place(),
-                missing,
-                &rows.names,
-                assumed,
-            ));
+        let mut rows = Self::headed(lines, delimiter, Some(layout))?;
+        rows.columns = Columns::of(layout, &rows.names);
+        let lacking = rows.columns.lacking(layout);
+        if lacking.is_empty() {
+            return Ok(rows);
         }
-        rows.channels = channels;
-        rows.time = time.unwrap_or_default();
-        Ok(rows)
+        let missing = rows.missing(lacking, &rows.names);
+        if rows.columns.channels.iter().any(Option::is_some) {
+            return Err(missing);
+        }
+        let (names, place) = (rows.names.clone(), rows.place());
+        let mut texts = Vec::new();
+        while texts.len() < LOOKED_AT
+            && let Ok(Record::Row { cells, .. }) = rows.read_record()
+        {
+            texts.push(rows.current(cells));
+        }
+        match LongFormat::of(&names, &texts, &|name| layout.names().any(|of| of == name)) {
+            Some(long) => Err(FileError::LongFormat { place, long }),
+            None => Err(missing),
+        }
     }
 
-    /// Reads the header; the delimiter, unless stated, is the one that shows the most of the wanted columns.
-    pub fn headed<'a>(
+    fn missing(&self, lacking: Vec<&str>, names: &[String]) -> FileError {
+        let assumed = std::str::from_utf8(self.lines.text()).is_err();
+        columns::missing(self.place(), lacking, names, assumed)
+    }
+
+    /// Whether the current row is a comment; only where the header was one are others read.
+    fn is_comment(&self) -> bool {
+        self.lines.comments_count && self.column(0).trim_ascii_start().starts_with(b"#")
+    }
+
+    /// Reads the header, which a layout tells from what may stand above it; the delimiter, unless stated, is found with it.
+    pub fn headed(
         mut lines: Lines,
         delimiter: Option<u8>,
-        wanted: impl Iterator<Item = &'a str> + Clone,
+        layout: Option<&Layout>,
     ) -> Result<Self, FileError> {
-        if !lines.advance_to_content()? {
-            return Err(FileError::Empty { file: lines.file });
-        }
-        let no_text = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
-        if lines.text().iter().any(no_text) {
-            return Err(FileError::NotText {
-                place: lines.place(),
-            });
-        }
-        let delimiter =
-            delimiter.unwrap_or_else(|| columns::choose_delimiter(lines.text(), wanted));
-        lines.hold();
+        let delimiter = header::seek(&mut lines, delimiter, layout)?;
         let splitter = ReaderBuilder::new()
             .delimiter(delimiter)
             .terminator(Terminator::Any(b'\n'))
@@ -89,15 +93,18 @@ impl CsvRows {
             row_line: 0,
             delimiter,
             names: Vec::new(),
-            time: 0,
-            channels: Vec::new(),
+            units: Vec::new(),
+            width: 0,
+            ends_in_delimiter: false,
+            layout: layout.cloned(),
+            columns: Columns::default(),
         };
         let Record::Row { cells, .. } = rows.read_record()? else {
             return Err(FileError::Empty {
                 file: rows.lines.file,
             });
         };
-        rows.names = (0..cells).map(|i| columns::name(rows.column(i))).collect();
+        rows.names = rows.current(cells);
         columns::check_unique(&rows.names, || rows.place())?;
         Ok(rows)
     }
@@ -107,6 +114,11 @@ impl CsvRows {
         &self.names
     }
 
+    /// The units in the row below the names; none where there is no such row, known once a row was read.
+    pub fn units(&self) -> &[String] {
+        &self.units
+    }
+
     /// What stands between cells.
     pub fn delimiter(&self) -> u8 {
         self.delimiter
@@ -114,9 +126,83 @@ impl CsvRows {
 
     /// The texts of the current row.
     pub fn texts(&self) -> Vec<String> {
-        (0..self.names.len())
-            .map(|i| columns::name(self.column(i)))
-            .collect()
+        self.current(self.names.len())
+    }
+
+    fn current(&self, cells: usize) -> Vec<String> {
+        (0..cells).map(|i| columns::name(self.column(i))).collect()
+    }
+
+    /// A row that is no usual one: whether it is to be taken, or the data end with it; none where the next is to be read.
+    #[cold]
+    fn unusual(
+        &mut self,
+        cells: usize,
+        complete: bool,
+        ledger: &mut Ledger,
+    ) -> Result<Option<bool>, FileError> {
+        if self.takes_header(cells, ledger)? || self.is_comment() {
+            return Ok(None);
+        }
+        let expected = self.names.len();
+        if self.width == 0 {
+            let row = self.current(cells);
+            let is_below_names = self.units.is_empty();
+            if is_below_names && cells <= expected + 1 && are_units(&row) {
+                self.units = row;
+                self.units.resize(expected, String::new());
+                return Ok(None);
+            }
+            self.width = expected;
+            self.ends_in_delimiter = cells == expected + 1 && row[expected].is_empty();
+            if cells == expected || self.ends_in_delimiter {
+                return Ok(Some(true));
+            }
+        }
+        let place = self.place();
+        if !complete && cells < expected {
+            ledger.report.truncated = Some(place);
+            return Ok(Some(false));
+        }
+        ledger.refuse_row(|| FileError::CellCount {
+            place,
+            expected,
+            found: cells,
+        })?;
+        Ok(None)
+    }
+
+    /// Takes the columns by the current row of so many cells, if it names wanted columns and holds no values.
+    fn takes_header(&mut self, cells: usize, ledger: &mut Ledger) -> Result<bool, FileError> {
+        let Some(layout) = &self.layout else {
+            return Ok(false);
+        };
+        let mut names = self.current(cells);
+        if self.is_comment() {
+            let first = names[0].trim_start().trim_start_matches('#');
+            names[0] = first.trim().to_owned();
+        }
+        let columns = Columns::of(layout, &names);
+        let is_value = |name: &String| is_number(name) && !self.names.contains(name);
+        if !columns.are_named(layout) || names.iter().any(is_value) {
+            return Ok(false);
+        }
+        columns::check_unique(&names, || self.place())?;
+        let lacking = columns.lacking(layout);
+        let is_forgiven = ledger.is_lenient() && columns.time.is_some();
+        if !lacking.is_empty() && !is_forgiven {
+            return Err(self.missing(lacking, &names));
+        }
+        ledger.header(FileError::HeaderAgain {
+            place: self.place(),
+            moved: columns != self.columns,
+            lacking: lacking.into_iter().map(str::to_owned).collect(),
+        });
+        (self.names, self.columns) = (names, columns);
+        self.units.clear();
+        self.width = 0;
+        self.ends_in_delimiter = false;
+        Ok(true)
     }
 
     /// Reads one record into `cells`, over several lines if it has line breaks in quotes.
@@ -139,8 +225,10 @@ impl CsvRows {
             match result {
                 ReadRecordResult::Record => {
                     self.drop_carriage_return(counted);
+                    let beyond = self.ends_in_delimiter && counted == self.width + 1;
+                    let beyond = beyond && self.column(self.width).trim_ascii().is_empty();
                     return Ok(Record::Row {
-                        cells: counted,
+                        cells: counted - usize::from(beyond),
                         complete: self.lines.is_complete(),
                     });
                 }
@@ -192,29 +280,21 @@ impl Cells for CsvRows {
             let Record::Row { cells, complete } = self.read_record()? else {
                 return Ok(false);
             };
-            let expected = self.names.len();
-            if cells == expected {
+            if cells == self.width && !self.is_comment() {
                 return Ok(true);
             }
-            let place = self.lines.place_of(self.row_line);
-            if !complete && cells < expected {
-                ledger.report.truncated = Some(place);
-                return Ok(false);
+            if let Some(taken) = self.unusual(cells, complete, ledger)? {
+                return Ok(taken);
             }
-            ledger.refuse_row(|| FileError::CellCount {
-                place,
-                expected,
-                found: cells,
-            })?;
         }
     }
 
     fn time(&self) -> &[u8] {
-        self.column(self.time)
+        self.columns.time.map_or(&[], |column| self.column(column))
     }
 
     fn channel(&self, index: usize) -> &[u8] {
-        self.channels[index].map_or(&[], |column| self.column(column))
+        self.columns.channels[index].map_or(&[], |column| self.column(column))
     }
 
     fn decimal_comma(&self) -> bool {
@@ -224,272 +304,11 @@ impl Cells for CsvRows {
     fn place(&self) -> Place {
         self.lines.place_of(self.row_line)
     }
+
+    fn take_header(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
+        self.takes_header(self.width, ledger)
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use crate::{FileError, Layout, Options, Reader, Row, TimeForm};
-
-    fn reader(text: &str, options: Options) -> Result<Reader, FileError> {
-        let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
-        Reader::from_read(
-            "f.csv",
-            std::io::Cursor::new(text.to_owned()),
-            layout,
-            options,
-        )
-    }
-
-    /// All rows as text, the way `{:?}` shows numbers, and the reader for its report.
-    fn read_with(text: &str, options: Options) -> (String, Reader) {
-        let mut reader = reader(text, options).unwrap();
-        let mut row = Row::default();
-        let mut told = Vec::new();
-        while reader.next_into(&mut row).unwrap() {
-            told.push(format!("{} {:?}", row.time_text, row.values));
-        }
-        (told.join("; "), reader)
-    }
-
-    fn read(text: &str) -> String {
-        read_with(text, Options::default()).0
-    }
-
-    /// The message of the first error.
-    fn error(text: &str) -> String {
-        let mut reader = match reader(text, Options::default()) {
-            Ok(reader) => reader,
-            Err(error) => return error.to_string(),
-        };
-        let mut row = Row::default();
-        loop {
-            match reader.next_into(&mut row) {
-                Ok(true) => {}
-                Ok(false) => panic!("there was no error"),
-                Err(error) => return error.to_string(),
-            }
-        }
-    }
-
-    fn lenient() -> Options {
-        Options {
-            lenient: true,
-            ..Options::default()
-        }
-    }
-
-    const TWO_ROWS: &str = "0 [1.0, 2.5]; 1 [3.0, NaN]";
-
-    #[test]
-    fn every_delimiter_is_recognised() {
-        for delimiter in [",", ";", "\t", "|"] {
-            let text = "t,b,skipped,a\n0,2.5,x,1\n1,,y,3\n".replace(',', delimiter);
-            assert_eq!(read(&text), TWO_ROWS, "{delimiter:?}");
-        }
-    }
-
-    #[test]
-    fn a_stated_delimiter_is_taken() {
-        let options = Options {
-            delimiter: Some(b'/'),
-            ..Options::default()
-        };
-        assert_eq!(read_with("t/a/b\n0/1/2.5\n", options).0, "0 [1.0, 2.5]");
-    }
-
-    #[test]
-    fn a_decimal_comma_is_read_where_something_else_than_a_comma_separates() {
-        for delimiter in [";", "\t", "|"] {
-            let text = "t;a;b\n0,5;1,5;-2,25e1\n".replace(';', delimiter);
-            assert_eq!(read(&text), "0.5 [1.5, -22.5]", "{delimiter:?}");
-            let mixed = "t;a;b\n0;1,5;2\n1;1.5;2\n".replace(';', delimiter);
-            assert!(error(&mixed).contains("with the decimal mark `,`"));
-        }
-        assert!(error("t,a,b\n0,\"1,5\",2\n").contains("`1,5`"));
-    }
-
-    #[test]
-    fn a_file_has_one_decimal_mark() {
-        let mixed = "t;a;b\n0;1,5;2\n1;1;1.234\n2;7;2,5\n";
-        assert_eq!(
-            error(mixed),
-            "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
-        );
-        let (rows, reader) = read_with(mixed, lenient());
-        assert_eq!(rows, "0 [1.5, 2.0]; 1 [1.0, NaN]; 2 [7.0, 2.5]");
-        assert_eq!(reader.report().bad_cells.count, 1);
-        let times = "t;a;b\n0.5;1.5;2\n1,5;1;1\n2.5;7;3\n";
-        assert!(error(times).starts_with("f.csv:3: column `t`: expected a number with the decimal mark `.`, as in line 2, found `1,5`"));
-        let (rows, reader) = read_with(times, lenient());
-        assert_eq!(rows, "0.5 [1.5, 2.0]; 2.5 [7.0, 3.0]");
-        assert_eq!(reader.report().refused_rows.count, 1);
-        assert_eq!(
-            read("t;a;b\n0.5;1.5;2\n1;1;2.5\n"),
-            "0.5 [1.5, 2.0]; 1 [1.0, 2.5]"
-        );
-    }
-
-    #[test]
-    fn times_may_have_another_mark_than_values() {
-        assert_eq!(
-            read("t;a;b\n0.5;1,5;2\n1.5;1;2,5\n"),
-            "0.5 [1.5, 2.0]; 1.5 [1.0, 2.5]"
-        );
-    }
-
-    #[test]
-    fn the_seconds_of_a_date_may_have_another_mark_than_numbers() {
-        let layout = Layout::new("t", TimeForm::Rfc3339, ["a"]);
-        let text = &b"t;a\n2013-07-04T00:00:00.5Z;1,5\n"[..];
-        let mut reader = Reader::from_read("f", text, layout, Options::default()).unwrap();
-        let mut row = Row::default();
-        assert!(reader.next_into(&mut row).unwrap());
-        assert_eq!(row.values, [1.5]);
-    }
-
-    #[test]
-    fn marks_of_other_programs_do_no_harm() {
-        assert_eq!(read("\u{feff}t,a,b\r\n0,1,2.5\r\n1,3,\r\n"), TWO_ROWS);
-        assert_eq!(
-            read("# note\n\nt,a,b\n\n0,1,2.5\n  \n# 1,1,1\n1,3,\n\n"),
-            TWO_ROWS
-        );
-        assert_eq!(read(" t , \"a\" ,b\n 0 , 1, 2.5 \n1,3, \n"), TWO_ROWS);
-    }
-
-    #[test]
-    fn quoted_names_and_cells_are_read() {
-        let text = "\"t\",\"a\",\"b\",\"a, \"\"quoted\"\" note\"\n\"0\",\"1\",2.5,\"x, y\nz\"\n1,3,\"\",\"\"\n";
-        assert_eq!(read(text), TWO_ROWS);
-    }
-
-    #[test]
-    fn a_row_keeps_its_line_after_comments_and_quoted_line_breaks() {
-        assert_eq!(
-            error("# one\nt,a,b\n0,\"1\n\",2\n\n# six\n1,off,2\n"),
-            "f.csv:7: column `a`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
-        );
-    }
-
-    #[test]
-    fn a_doubled_name_is_an_error() {
-        assert!(error("t,a,b,a\n").starts_with("f.csv:1: the name `a` stands at columns 2 and 4"));
-    }
-
-    #[test]
-    fn a_missing_column_is_an_error_that_lists_those_found() {
-        assert_eq!(
-            error("t,a,bb\n0,1,2\n"),
-            "f.csv:1: there is no column `b`; found `t`, `a`, `bb`; did you mean `bb`?"
-        );
-        assert!(
-            error("time,a,b\n")
-                .starts_with("f.csv:1: there is no column `t`; found `time`, `a`, `b`")
-        );
-    }
-
-    #[test]
-    fn all_missing_columns_are_told_at_once_and_an_optional_one_is_not() {
-        let mut layout = Layout::new("t", TimeForm::SECONDS, ["room", "plate", "chuck", "room"]);
-        layout.channels[1].optional = true;
-        let file = &b"time,chuk,rooms\n0,1,2\n"[..];
-        let error = Reader::from_read("f.csv", file, layout, Options::default()).err();
-        assert_eq!(
-            error.unwrap().to_string(),
-            "f.csv:1: there are no columns `t`, `room`, `chuck`; found `time`, `chuk`, `rooms`; did you mean `rooms` for `room`, `chuk` for `chuck`? otherwise correct the names, or make optional those that are channels"
-        );
-    }
-
-    #[test]
-    fn an_optional_column_that_is_missing_is_absent_throughout() {
-        let mut layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
-        layout.channels[0].optional = true;
-        let mut reader =
-            Reader::from_read("f.csv", &b"t,b\n0,1\n1,2\n"[..], layout, Options::default())
-                .unwrap();
-        let mut row = Row::default();
-        for expected in [1.0, 2.0] {
-            assert!(reader.next_into(&mut row).unwrap());
-            assert!(row.values[0].is_nan());
-            assert_eq!(row.values[1], expected);
-        }
-    }
-
-    #[test]
-    fn a_row_of_another_length_is_an_error_or_left_out() {
-        let text = "t,a,b\n0,1,2.5\n5,1\n6,1,2,3\n1,3,\n";
-        assert_eq!(
-            error(text),
-            "f.csv:3: 2 cells where the header has 3; correct the row, or read leniently (`--lenient`) to leave it out"
-        );
-        let (rows, reader) = read_with(text, lenient());
-        assert_eq!(rows, TWO_ROWS);
-        assert_eq!(reader.report().refused_rows.count, 2);
-        assert_eq!(reader.report().rows, 2);
-    }
-
-    #[test]
-    fn a_last_line_that_was_cut_off_is_reported_and_the_rest_used() {
-        let (rows, reader) = read_with("t,a,b\n0,1,2.5\n1,3,\n2,4", Options::default());
-        assert_eq!(rows, TWO_ROWS);
-        assert_eq!(
-            reader.report().truncated.as_ref().map(|place| place.line),
-            Some(4)
-        );
-        assert_eq!(reader.report().refused_rows.count, 0);
-    }
-
-    #[test]
-    fn a_last_line_with_all_cells_but_no_end_is_complete() {
-        let (rows, reader) = read_with("t,a,b\n0,1,2.5\n1,3,", Options::default());
-        assert_eq!(rows, TWO_ROWS);
-        assert!(reader.report().truncated.is_none());
-    }
-
-    #[test]
-    fn a_quote_that_is_never_closed_is_an_error_at_its_row() {
-        assert!(
-            error("t,a,b\n0,1,\"2\n1,3,\n2,4,5\n")
-                .starts_with("f.csv:2: a quoted cell starts here")
-        );
-        let endless = format!("t,a,b\n0,1,\"{}", "2\n".repeat(1_000_000));
-        assert!(error(&endless).starts_with("f.csv:2: a quoted cell starts here"));
-    }
-
-    #[test]
-    fn an_empty_file_and_one_without_rows_differ() {
-        assert!(matches!(
-            reader("", Options::default()),
-            Err(FileError::Empty { .. })
-        ));
-        assert!(matches!(
-            reader("# only\n\n", Options::default()),
-            Err(FileError::Empty { .. })
-        ));
-        assert_eq!(read("t,a,b\n"), "");
-        assert_eq!(read("t,a,b"), "");
-    }
-
-    #[test]
-    fn names_as_a_windows_program_writes_them_are_read() {
-        let layout = |name| Layout::new("t", TimeForm::SECONDS, [name]);
-        let log = &b"t;W\xe4rme [\xb0C]\n0;21,5\n"[..];
-        let read = |name| Reader::from_read("f.csv", log, layout(name), Options::default());
-        let mut row = Row::default();
-        assert!(read("Wärme [°C]").unwrap().next_into(&mut row).unwrap());
-        assert_eq!(row.values, [21.5]);
-        assert_eq!(
-            read("温度").err().unwrap().to_string(),
-            "f.csv:1: there is no column `温度`; found `t`, `Wärme [°C]` (read as Windows-1252, since they are not in UTF-8); \
-             correct the name, or make it optional if it is a channel"
-        );
-    }
-
-    #[test]
-    fn two_byte_text_without_a_mark_is_refused_with_advice() {
-        let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
-        let utf16 = b"t\0,\0a\0\n\0";
-        let refused = Reader::from_read("f.csv", &utf16[..], layout, Options::default());
-        assert!(matches!(refused, Err(FileError::NotText { place }) if place.line == 1));
-    }
-}
+mod tests;

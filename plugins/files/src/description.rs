@@ -9,7 +9,7 @@ use crate::cell::Cells;
 use crate::csv_rows::CsvRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;
-use crate::{FileError, Format};
+use crate::{FileError, Format, LongFormat, units};
 
 /// The columns of a file and the texts of its first rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,6 +20,8 @@ pub struct Description {
     pub delimiter: Option<u8>,
     /// The names of the columns in their order; of JSON lines, the keys of the rows looked at.
     pub columns: Vec<String>,
+    /// The units in a row below the names, a text per column, empty where it says none; nothing at all where there is no such row.
+    pub units: Vec<String>,
     /// The first rows: one text per column, empty where there is no value.
     pub rows: Vec<Vec<String>>,
 }
@@ -48,6 +50,22 @@ impl Description {
     }
 }
 
+impl Description {
+    /// What the columns are where the file is in long format.
+    #[must_use]
+    pub fn long_format(&self) -> Option<LongFormat> {
+        LongFormat::of(&self.columns, &self.rows, &|_| false)
+    }
+
+    /// The unit in the row below the names, without brackets; empty where there is none.
+    #[must_use]
+    pub fn unit(&self, column: &str) -> &str {
+        let at = self.columns.iter().position(|name| name == column);
+        let text = at.and_then(|at| self.units.get(at));
+        text.map_or("", |text| units::bare(text))
+    }
+}
+
 fn of_lines(
     mut lines: Lines,
     format: Option<Format>,
@@ -60,16 +78,25 @@ fn of_lines(
 }
 
 fn of_csv(lines: Lines, rows: usize) -> Result<Description, FileError> {
-    let mut csv = CsvRows::headed(lines, None, std::iter::empty())?;
+    let mut csv = CsvRows::headed(lines, None, None)?;
     let mut ledger = Ledger::new(true);
     let mut texts = Vec::new();
     while texts.len() < rows && csv.advance(&mut ledger)? {
-        texts.push(csv.texts());
+        let row = csv.texts();
+        if row == csv.names() {
+            continue;
+        }
+        // From there on columns may stand elsewhere.
+        if row.iter().all(|cell| csv.names().contains(cell)) {
+            break;
+        }
+        texts.push(row);
     }
     Ok(Description {
         format: Format::Csv,
         delimiter: Some(csv.delimiter()),
         columns: csv.names().to_vec(),
+        units: csv.units().to_vec(),
         rows: texts,
     })
 }
@@ -102,6 +129,7 @@ fn of_json(mut lines: Lines, rows: usize) -> Result<Description, FileError> {
         format: Format::JsonLines,
         delimiter: None,
         columns,
+        units: Vec::new(),
         rows: texts,
     })
 }
@@ -134,5 +162,51 @@ mod tests {
         let described = Description::of_read("f", &b"a,b\n"[..], None, 5).unwrap();
         assert_eq!(described.columns, ["a", "b"]);
         assert!(described.rows.is_empty());
+    }
+
+    fn described(text: &str) -> Description {
+        Description::of_read("f", std::io::Cursor::new(text.to_owned()), None, 5).unwrap()
+    }
+
+    #[test]
+    fn the_table_is_found_below_what_a_logger_writes_above_it() {
+        for (above, below) in [
+            ("sep=;\n", ""),
+            ("Export of 01.03.2026\nDevice;Logger, model 3000\n\n", ""),
+            ("Device;Logger;;\nSerial;12345;;\n;;;\n", ""),
+            ("# made by hand\n", ""),
+            ("Device;Logger\n# ", ""),
+            ("", ";°C;°C;nm\n"),
+            ("sep=;\n\n", "[s];[°C];[°C];[nm]\n"),
+        ] {
+            for end in ["", ";"] {
+                let rows = [0, 10, 20]
+                    .map(|t| format!("{t};21,5;20,25;-{t},5{end}\n"))
+                    .concat();
+                let text = format!("{above}Time;Plate;Room;Z\n{below}{rows}");
+                let found = described(&text);
+                assert_eq!(found.columns, ["Time", "Plate", "Room", "Z"], "{text}");
+                assert_eq!(found.delimiter, Some(b';'));
+                assert_eq!(found.rows[0], ["0", "21,5", "20,25", "-0,5"]);
+                assert_eq!(found.rows.len(), 3);
+                let unit = if below.is_empty() { "" } else { "nm" };
+                assert_eq!(found.unit("Z"), unit);
+            }
+        }
+    }
+
+    #[test]
+    fn a_table_without_names_begins_at_its_first_line() {
+        assert_eq!(described("0,1\n1,2\n").columns, ["0", "1"]);
+        assert_eq!(described("t,1,2\n0,1,2\n").columns, ["t", "1", "2"]);
+        assert_eq!(described("t\n0\n").columns, ["t"]);
+        // Rows that do not fit their names are for whoever wrote them to mend.
+        assert_eq!(described("t,a\n0,1,2\n1,2,3\n").columns, ["t", "a"]);
+    }
+
+    #[test]
+    fn names_that_stand_within_the_rows_are_no_row() {
+        assert_eq!(described("t,a\n0,1\nt,a\n1,2\n").rows.len(), 2);
+        assert_eq!(described("t,a\n0,1\na,t\n1,2\n").rows.len(), 1);
     }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::cell;
 use crate::instant::has_clock;
+use crate::long::LongFormat;
 
 /// Longest piece of a file that a message repeats, in characters.
 const EXCERPT: usize = 60;
@@ -177,6 +178,22 @@ pub enum FileError {
         /// The newest time before them.
         previous: String,
     },
+    /// A row within a recording that names its columns again.
+    HeaderAgain {
+        /// The row.
+        place: Place,
+        /// Whether wanted columns stand elsewhere than before.
+        moved: bool,
+        /// Those that must be there and are not; only when reading leniently.
+        lacking: Vec<String>,
+    },
+    /// The log has a row for each value.
+    LongFormat {
+        /// The header.
+        place: Place,
+        /// What its columns are.
+        long: LongFormat,
+    },
     /// A row with more or fewer cells than the header.
     CellCount {
         /// The row.
@@ -238,6 +255,14 @@ fn is_date(text: &str) -> bool {
     dates.any(|of| {
         form(&of[..4]) && of[4] == b'-' && form(&of[5..7]) && of[7] == b'-' && form(&of[8..])
     })
+}
+
+/// Whether a text is a time of day such as `12:00:00,5`, without a date.
+fn is_time_of_day(text: &str) -> bool {
+    has_clock(text)
+        && text
+            .bytes()
+            .all(|b| b.is_ascii_digit() || b":.,".contains(&b))
 }
 
 impl fmt::Display for FileError {
@@ -326,6 +351,12 @@ impl fmt::Display for FileError {
                     "" => write!(f, "nothing")?,
                     found => write!(f, "`{found}`")?,
                 }
+                if is_time_of_day(found) {
+                    return write!(
+                        f,
+                        "; a time of day alone is no instant: write its date before it, in the same column"
+                    );
+                }
                 if is_date(found) && !is_date(expected) {
                     return write!(f, "; `unit = \"rfc3339\"` in `[time]` reads such times");
                 }
@@ -367,6 +398,25 @@ impl fmt::Display for FileError {
                 "{place}: the last {rows} rows were all left out, up to the time `{time}`, since `{previous}` came before them: has the \
                  clock been set back, or was that time wrong? Rows are taken again once they are after it"
             ),
+            Self::HeaderAgain {
+                place,
+                moved,
+                lacking,
+            } => {
+                write!(f, "{place}: the names of the columns stand here again, ")?;
+                match moved {
+                    true => write!(f, "in other places; from here on values are taken by them")?,
+                    false => write!(f, "as before; the row was left out")?,
+                }
+                match lacking.as_slice() {
+                    [] => Ok(()),
+                    lacking => {
+                        let names = quoted(lacking.iter().map(String::as_str));
+                        write!(f, ", and without {names}, of which there are none")
+                    }
+                }
+            }
+            Self::LongFormat { place, long } => write!(f, "{place}: {long}"),
             Self::CellCount {
                 place,
                 expected,

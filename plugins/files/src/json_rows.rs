@@ -46,7 +46,8 @@ impl JsonRows {
                 place: lines.place(),
             });
         }
-        lines.hold();
+        let first = lines.take();
+        lines.hold(vec![first]);
         let mut keys = vec![Key::new(&layout.time.column, false)];
         let mut channels = Vec::with_capacity(layout.channels.len());
         for channel in &layout.channels {

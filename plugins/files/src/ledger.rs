@@ -18,6 +18,8 @@ pub struct Report {
     pub bad_cells_of: Vec<Count>,
     /// Rows left out because of their time cell, number of cells or syntax; only when reading leniently.
     pub refused_rows: Count,
+    /// Rows within the recording that name its columns again ([`FileError::HeaderAgain`]), unless each was told at once.
+    pub headers: Count,
     /// The first time that is a date without a zone, and was taken for UTC.
     pub without_zone: Option<Place>,
     /// The last line, when it was cut off in the middle and left out.
@@ -211,6 +213,19 @@ impl Ledger {
     pub fn tell_early(&mut self, error: impl FnOnce() -> FileError) {
         if let Some(tell) = &mut self.tell {
             tell(&error());
+        }
+    }
+
+    /// Whether what cannot be read is left out.
+    pub fn is_lenient(&self) -> bool {
+        self.lenient
+    }
+
+    /// A row that names the columns again; each is told, since with each they may stand elsewhere.
+    pub fn header(&mut self, again: FileError) {
+        match &mut self.tell {
+            Some(tell) => tell(&again),
+            None => self.report.headers.add(|| again, &mut None),
         }
     }
 

@@ -3,8 +3,9 @@
 //! This package decides what bytes mean: delimiters, quoting, numbers, instants, what "no value" looks like, and what is
 //! done with a line that cannot be used. A flag may stand as `true` or `false`, in any case, and is 1 or 0; where something else
 //! than a comma separates cells (`;`, tab, `|`), a number may have a decimal comma. Text is UTF-8, or UTF-16 with the mark that says
-//! so; cells that are not UTF-8 are taken for Windows-1252, so that `Wärme [°C]` is a name whoever wrote it. It does not decide what a channel is for, its
-//! unit, or when a value is too old.
+//! so; cells that are not UTF-8 are taken for Windows-1252, so that `Wärme [°C]` is a name whoever wrote it. A table may have other
+//! lines above its names and a row of units below them, and may name its columns again, in another order. It does not decide what a
+//! channel is for, its unit, or when a value is too old.
 //!
 //! ```
 //! use athermal_files::{Layout, Options, Reader, Row, TimeForm};
@@ -32,17 +33,21 @@ mod decimal;
 mod description;
 mod error;
 mod format;
+mod header;
 mod instant;
 mod json_objects;
 mod json_rows;
 mod layout;
 mod ledger;
 mod lines;
+mod long;
 mod reader;
 mod recording;
 mod stream;
+mod units;
 mod writer;
 
+pub use cell::with_decimal_point;
 pub use dataset::{Dataset, layout};
 pub use description::Description;
 pub use error::{FileError, MissingColumn, Place};
@@ -51,6 +56,7 @@ pub use instant::{has_clock, has_zone};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};
 pub use lines::STANDARD_INPUT;
+pub use long::LongFormat;
 pub use reader::{Options, Reader, Row};
 pub use recording::{Event, Recording};
 pub use stream::WithRevision;

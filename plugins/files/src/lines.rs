@@ -26,7 +26,10 @@ pub(crate) struct Lines {
     input: BufReader<Box<dyn Read + Send>>,
     line: Vec<u8>,
     number: u64,
-    held: bool,
+    /// Lines that were read and are to come again, the next one last.
+    held: Vec<(u64, Vec<u8>)>,
+    /// Whether comments are content: the header was one, and so may the next be.
+    pub comments_count: bool,
 }
 
 impl Lines {
@@ -40,7 +43,8 @@ impl Lines {
             input: BufReader::with_capacity(BUFFER, Box::new(decoded)),
             line: Vec::new(),
             number: 0,
-            held: false,
+            held: Vec::new(),
+            comments_count: false,
         }
     }
 
@@ -58,7 +62,8 @@ impl Lines {
 
     /// Goes to the next line; false at the end of the stream.
     pub fn advance(&mut self) -> Result<bool, FileError> {
-        if std::mem::take(&mut self.held) {
+        if let Some((number, line)) = self.held.pop() {
+            (self.number, self.line) = (number, line);
             return Ok(true);
         }
         self.line.clear();
@@ -93,30 +98,43 @@ impl Lines {
     /// Goes to the next line that is neither blank nor a comment; false at the end of the stream.
     pub fn advance_to_content(&mut self) -> Result<bool, FileError> {
         while self.advance()? {
-            if !matches!(self.line.trim_ascii_start().first(), None | Some(b'#')) {
+            if is_content(&self.line) || self.comments_count && !self.line.trim_ascii().is_empty() {
                 return Ok(true);
             }
         }
         Ok(false)
     }
 
-    /// The format stated, or the one that the first line looks like; that line stays to be read.
+    /// The format stated, or the one that the first line of content looks like; all lines stay to be read.
     pub fn format_or(&mut self, stated: Option<Format>) -> Result<Format, FileError> {
         if let Some(format) = stated {
             return Ok(format);
         }
-        if !self.advance_to_content()? {
-            return Err(FileError::Empty {
-                file: self.file.clone(),
-            });
+        let mut lines = Vec::new();
+        loop {
+            if !self.advance()? {
+                return Err(FileError::Empty {
+                    file: self.file.clone(),
+                });
+            }
+            let is_content = is_content(&self.line);
+            let format = Format::from_first_line(&self.line);
+            lines.push(self.take());
+            if is_content {
+                self.hold(lines);
+                return Ok(format);
+            }
         }
-        self.hold();
-        Ok(Format::from_first_line(&self.line))
     }
 
-    /// Gives the current line once more at the next call.
-    pub fn hold(&mut self) {
-        self.held = true;
+    /// Takes the current line out, with its number.
+    pub fn take(&mut self) -> (u64, Vec<u8>) {
+        (self.number, std::mem::take(&mut self.line))
+    }
+
+    /// Gives lines with these numbers, the first of them at the next call.
+    pub fn hold(&mut self, lines: Vec<(u64, Vec<u8>)>) {
+        self.held.extend(lines.into_iter().rev());
     }
 
     /// The current line with its end, if it has one.
@@ -144,6 +162,11 @@ impl Lines {
             line,
         }
     }
+}
+
+/// Whether a line is neither blank nor a comment.
+pub(crate) fn is_content(line: &[u8]) -> bool {
+    !matches!(line.trim_ascii_start().first(), None | Some(b'#'))
 }
 
 #[cfg(test)]
@@ -179,7 +202,8 @@ mod tests {
     fn a_line_that_is_held_comes_again() {
         let mut lines = lines(&b"a\nb"[..]);
         assert!(lines.advance().unwrap());
-        lines.hold();
+        let line = lines.take();
+        lines.hold(vec![line]);
         assert!(lines.advance().unwrap());
         assert_eq!(
             (lines.text(), lines.number(), lines.is_complete()),

@@ -233,7 +233,7 @@ fn read<C: Cells>(
 
 /// The instant of the current row, and its text; `None` when the row is left out for want of one.
 fn read_time<C: Cells>(
-    rows: &C,
+    rows: &mut C,
     layout: &Layout,
     ledger: &mut Ledger,
     text: &mut String,
@@ -245,7 +245,7 @@ fn read_time<C: Cells>(
         Ok(cell) => {
             text.push_str(cell);
             if rows.decimal_comma()
-                && let Some(comma) = cell::single_comma(cell.as_bytes())
+                && let Some(comma) = cell::comma_of_time(cell.as_bytes())
             {
                 text.replace_range(comma..=comma, ".");
             }
@@ -254,8 +254,12 @@ fn read_time<C: Cells>(
         Err(_) => None,
     };
     if time_ns.is_none() {
+        if rows.take_header(ledger)? {
+            return Ok(None);
+        }
         ledger.refuse_row(|| {
-            let (place, column, found) = (rows.place(), time.column.clone(), excerpt(cell));
+            let found = excerpt(cell::trim(rows.time()));
+            let (place, column) = (rows.place(), time.column.clone());
             if time.form.is_beyond(text.as_bytes()) {
                 return FileError::TimeBeyond {
                     place,

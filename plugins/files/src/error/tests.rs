@@ -65,6 +65,17 @@ fn messages_say_what_where_and_what_to_do() {
             )
         );
     }
+    let of_day = FileError::BadTime {
+        place: place(),
+        column: "Time".into(),
+        found: "12:00:00,5".into(),
+        expected: "a date and time such as 2013-07-04T00:00:00Z".to_owned(),
+    };
+    assert_eq!(
+        of_day.to_string(),
+        "run.csv:12: column `Time`: expected a date and time such as 2013-07-04T00:00:00Z, found `12:00:00,5`; a time of day alone is \
+         no instant: write its date before it, in the same column"
+    );
     let count = FileError::CellCount {
         place: place(),
         expected: 3,

@@ -1,0 +1,65 @@
+//! Whether a row below the names says the units of the columns. Not what follows from a unit.
+
+use athermal_core::unit::Unit;
+
+use crate::cell::is_number;
+
+/// Whether a row holds units, and nothing that could be a value: no number, nothing with a digit that is no unit, and at most one other
+/// text, as how times are written.
+pub(crate) fn are_units(row: &[String]) -> bool {
+    let cells = row.iter().map(|cell| bare(cell));
+    let texts = cells.filter(|text| !matches!(*text, "" | "-"));
+    if texts.clone().any(is_number) {
+        return false;
+    }
+    let (units, others): (Vec<&str>, Vec<&str>) = texts.partition(|text| is_unit(text));
+    let has_digit = |text: &&str| text.contains(|c: char| c.is_ascii_digit());
+    !units.is_empty() && others.len() <= 1 && !others.iter().any(has_digit)
+}
+
+/// A unit as a cell says it, without brackets around it, save those that are its own, as of `[m_H2O]`.
+pub(crate) fn bare(cell: &str) -> &str {
+    let without = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
+    match without('[', ']').or_else(|| without('(', ')')) {
+        Some(inner) if is_unit(inner) || !is_unit(cell) => inner.trim(),
+        _ => cell,
+    }
+}
+
+/// Numbers are none, though 1 is the unit of what has no dimension.
+fn is_unit(text: &str) -> bool {
+    !is_number(text) && (Unit::in_name(text).is_some() || Unit::parse(text).is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_units_is_told_from_one_of_values_and_one_of_names() {
+        let are = |row: &str| {
+            let row: Vec<String> = row.split(';').map(str::to_owned).collect();
+            are_units(&row)
+        };
+        for row in [
+            ";°C;°C;nm",
+            "s;degC;degC;mm",
+            "[s];[°C];[µm];[-]",
+            "hh:mm:ss;(°C);%;",
+            "DD.MM.YYYY;[degF];W/m2;-",
+        ] {
+            assert!(are(row), "{row}");
+        }
+        for row in [
+            ";;;",
+            ";21;nm",
+            "0;;A;",
+            "2026-03-01 12:00;;A;",
+            "Time;Plate;Room;Z",
+            ";NaN;nm",
+            ";true;nm",
+        ] {
+            assert!(!are(row), "{row}");
+        }
+    }
+}
