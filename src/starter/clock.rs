@@ -2,7 +2,7 @@
 
 use athermal::core::time::Duration;
 use athermal::core::time::TimeFormat;
-use athermal::files::{Description, TimeForm};
+use athermal::files::{Description, TimeForm, with_decimal_point};
 
 use super::column::ends_in_unit;
 use super::dates::{self, Dates};
@@ -157,17 +157,44 @@ pub fn find(
 
 /// Why a column is not the time.
 fn no_clock(described: &Description, index: usize, format: Option<&TimeFormat>) -> String {
-    let (column, cells) = (&described.columns[index], cells(described, index));
-    match (cells.first(), format) {
+    let column = &described.columns[index];
+    match (written(described, index).next(), format) {
         (Some(first), Some(format)) => {
             format!("`{column}` has no time as `{format}` says, but such as `{first}`")
         }
-        (Some(first), None) if dates::look_like_times(&cells) => format!(
+        (Some(first), None) if dates::is_time_of_day(first) => {
+            of_day_alone(described, index, first)
+        }
+        (Some(first), None) if dates::look_like_times(&cells(described, index)) => format!(
             "`{column}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
-             e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
+             e.g. --time-format \"%d.%m.%Y %H:%M:%S\""
         ),
         _ => format!("`{column}` does not advance from row to row as a time does"),
     }
+}
+
+/// Why times of day are not the time, and what to do where their dates stand beside them.
+fn of_day_alone(described: &Description, index: usize, first: &str) -> String {
+    let column = &described.columns[index];
+    let of_date = |&other: &usize| {
+        let mut cells = written(described, other).peekable();
+        cells.peek().is_some() && cells.all(dates::is_date)
+    };
+    let (Some(date), Some(between)) = (
+        (0..described.columns.len()).find(of_date),
+        described.delimiter.map(char::from),
+    ) else {
+        return format!(
+            "`{column}` has times of day such as `{first}`, and no date: log date and time in one column"
+        );
+    };
+    format!(
+        "`{column}` has times of day such as `{first}` and `{}` their dates, and both must stand in one column: join them, e.g. by \
+         awk -F '{between}' -v 'OFS={between}' '{{ ${at} = ${at} \" \" ${}; print }}'",
+        described.columns[date],
+        index + 1,
+        at = date + 1,
+    )
 }
 
 /// A column whose cells have a format.
@@ -185,18 +212,22 @@ pub fn words(name: &str) -> Vec<&str> {
         .collect()
 }
 
-/// The cells of a column that are not empty, a decimal comma as a point where a reader takes it for one.
+/// The cells of a column that are not empty.
+fn written(described: &Description, index: usize) -> impl Iterator<Item = &str> {
+    let cells = described.rows.iter().filter_map(move |row| row.get(index));
+    cells
+        .map(|cell| cell.trim())
+        .filter(|cell| !cell.is_empty())
+}
+
+/// The cells of a column that are not empty, as a reader takes them: a decimal comma may be a point.
 fn cells(described: &Description, index: usize) -> Vec<String> {
     let comma = described.delimiter.is_some_and(|between| between != b',');
-    let cells = described.rows.iter().filter_map(|row| row.get(index));
-    let cells = cells
-        .map(|cell| cell.trim())
-        .filter(|cell| !cell.is_empty());
-    let read = |cell: &str| match cell.matches(',').count() {
-        1 if comma => cell.replace(',', "."),
-        _ => cell.to_owned(),
+    let read = |cell| match comma {
+        true => with_decimal_point(cell).into_owned(),
+        false => str::to_owned(cell),
     };
-    cells.map(read).collect()
+    written(described, index).map(read).collect()
 }
 
 fn clock(described: &Description, index: usize) -> Option<Clock> {
@@ -207,7 +238,11 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
     }
     let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.parse::<f64>().ok()).collect();
     let Some(numbers) = numbers else {
-        return dates::of(&cells).map(|dates| Clock::dated(column, dates));
+        // A date that stands beside a time of day is that of many rows.
+        let repeats = cells.windows(2).filter(|pair| pair[0] == pair[1]).count() * 2 > cells.len();
+        let is_clock = !(repeats && cells.iter().all(|cell| dates::is_date(cell)));
+        let dates = dates::of(&cells).filter(|_| is_clock);
+        return dates.map(|dates| Clock::dated(column, dates));
     };
     // A clock that steps back once is still a clock.
     let steps = numbers.windows(2).filter(|pair| pair[1] > pair[0]).count();
@@ -216,11 +251,9 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
     }
     let lower = column.to_lowercase();
     let parts = words(&lower);
-    let unit = parts
-        .iter()
-        .skip(1)
-        .rev()
-        .find_map(|word| UNITS.iter().find(|(name, ..)| name == word));
+    let known = |word: &&str| UNITS.iter().find(|(name, ..)| name == word);
+    let below = described.unit(&column);
+    let unit = known(&below).or_else(|| parts.iter().skip(1).rev().find_map(known));
     // One wild cell says nothing of the unit that a name says.
     let fits = |&&(_, _, ns_per_unit): &&Unit| {
         let beyond = |number: &&f64| number.abs() * ns_per_unit as f64 >= i64::MAX as f64;
@@ -231,7 +264,10 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
             column,
             form: TimeForm::Numbers { ns_per_unit },
             declared: declared(name),
-            why: format!("numbers in {name}, by its name"),
+            why: match known(&below) {
+                Some(_) => format!("numbers in {name}, as the row below its name says"),
+                None => format!("numbers in {name}, by its name"),
+            },
         });
     }
     let numbered = parts
@@ -439,6 +475,38 @@ mod tests {
             "{}",
             clock.remark()
         );
+    }
+
+    #[test]
+    fn a_decimal_comma_is_one_in_seconds_behind_a_date_with_points() {
+        let text = "when;a\n01.03.2026 12:00:00,4;1\n01.03.2026 12:00:10,4;2\n";
+        let form = TimeForm::Format("%d.%m.%Y %H:%M:%S%.f".parse().unwrap());
+        assert_eq!(found(text).unwrap().form, form);
+    }
+
+    #[test]
+    fn the_unit_of_a_time_may_stand_below_its_name() {
+        let clock = found("Time;a\n[ms];\u{b0}C\n0;1\n250;2\n").unwrap();
+        assert_eq!(clock.declared, Some(("unit", "ms".to_owned())));
+        assert_eq!(clock.why, "numbers in ms, as the row below its name says");
+    }
+
+    #[test]
+    fn a_time_of_day_is_told_as_the_log_has_it_and_joined_with_its_date() {
+        assert_eq!(
+            found("Time;a\n12:00:00,400;1\n12:00:10,400;2\n").unwrap_err(),
+            "`Time` has times of day such as `12:00:00,400`, and no date: log date and time in one column"
+        );
+        for date in ["01.03.2026", "2026-03-01", "3/1/2026"] {
+            let text = format!("Date;a;Time\n{date};1;12:00:00\n{date};2;12:00:10\n");
+            let text = std::io::Cursor::new(text);
+            let described = Description::of_read("log", text, None, 10).unwrap();
+            assert_eq!(
+                find(&described, None, None).unwrap_err(),
+                "`Time` has times of day such as `12:00:00` and `Date` their dates, and both must stand in one column: join them, e.g. \
+                 by awk -F ';' -v 'OFS=;' '{ $1 = $1 \" \" $3; print }'"
+            );
+        }
     }
 
     #[test]

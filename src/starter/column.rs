@@ -126,17 +126,20 @@ pub fn columns(described: &Description, time: &str) -> Vec<Column> {
     let columns = described.columns.iter();
     columns
         .filter(|name| *name != time)
-        .map(|name| guess(name))
+        .map(|name| guess(name, described.unit(name)))
         .collect()
 }
 
-fn guess(name: &str) -> Column {
+/// The guess of a column by its name and by what stands for its unit below it.
+fn guess(name: &str, below: &str) -> Column {
     let parts = words(name);
-    let unit = parts
+    let by_name = parts
         .iter()
         .skip(1)
         .rev()
         .find_map(|word| Unit::in_name(word));
+    let below = Unit::in_name(below).or_else(|| Unit::parse(below).ok());
+    let unit = below.as_ref().or(by_name.as_ref());
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
     let has = |known: &[&str]| {
         lower
@@ -146,7 +149,7 @@ fn guess(name: &str) -> Column {
     let measures = |what: &str| {
         Unit::parse(what)
             .ok()
-            .zip(unit.as_ref())
+            .zip(unit)
             .is_some_and(|(what, unit)| unit.measures_same(&what))
     };
     let temp_named = has(&TEMPERATURES) || lower.iter().any(|word| word.contains("temp"));
@@ -175,9 +178,17 @@ fn guess(name: &str) -> Column {
     };
     Column {
         name: name.to_owned(),
-        unit: unit.as_ref().map_or(fallback, Unit::text).to_owned(),
+        unit: unit.map_or(fallback, Unit::text).to_owned(),
         kind: Kind::Unused,
-        why: why.to_owned(),
+        why: match (&below, &by_name) {
+            (Some(below), Some(by_name)) if below.text() != by_name.text() => {
+                format!(
+                    "{why}, as the row below its name says, though the name says {}",
+                    by_name.text()
+                )
+            }
+            _ => why.to_owned(),
+        },
         warnings: Vec::new(),
         unit_known: unit.is_some(),
         guess,
@@ -371,9 +382,34 @@ mod tests {
 
     #[test]
     fn brackets_and_degree_signs_are_units_too() {
-        assert_eq!(guess("Temp Plate [°F]").unit, "[degF]");
-        assert_eq!(guess("Pos Z (µm)").unit, "um");
-        assert_eq!(guess("Probe Z [mm]").guess, Guess::Position);
+        assert_eq!(guess("Temp Plate [°F]", "").unit, "[degF]");
+        assert_eq!(guess("Pos Z (µm)", "").unit, "um");
+        assert_eq!(guess("Probe Z [mm]", "").guess, Guess::Position);
+    }
+
+    #[test]
+    fn units_in_a_row_below_the_names_are_those_of_the_columns() {
+        let found = kinds("time_s;Plate;Z;Load;Gap_mm\n;°C;nm;%;µm\n0;1;2;3;4\n").unwrap();
+        let told = found.iter().map(|(_, kind, unit)| (*kind, &**unit));
+        assert_eq!(
+            told.collect::<Vec<_>>(),
+            [
+                (Kind::Temperature, "Cel"),
+                (Kind::Drifting, "nm"),
+                (Kind::Drive, "%"),
+                (Kind::Drifting, "um"),
+            ]
+        );
+    }
+
+    #[test]
+    fn a_unit_that_the_name_contradicts_is_told() {
+        let column = guess("Z_nm", "mm");
+        assert_eq!(column.unit, "mm");
+        assert_eq!(
+            column.why,
+            "a length, as the row below its name says, though the name says nm"
+        );
     }
 
     #[test]
@@ -385,7 +421,7 @@ mod tests {
     #[test]
     fn a_factor_of_an_axis_is_no_position_of_it() {
         for factor in ["scale_x", "gain_x", "x_factor"] {
-            assert_eq!(guess(factor).guess, Guess::Other, "{factor}");
+            assert_eq!(guess(factor, "").guess, Guess::Other, "{factor}");
         }
         let found = kinds("time_s,plate_degC,X_um,scale_x\n").unwrap();
         assert_eq!(found[1].1, Kind::Drifting);

@@ -61,6 +61,9 @@ impl From<FileError> for NoStarter {
 /// When the file cannot be read, or nothing in it drifts with something that could explain it.
 pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let described = Description::of(path, 500)?;
+    if let Some(long) = described.long_format() {
+        return Err(NoStarter::Unfit(long.to_string()));
+    }
     let mut remarks = Vec::new();
     let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
         .map_err(NoStarter::Unfit)?;
