@@ -187,11 +187,10 @@ mod tests {
             file: "a".into(),
             line: 1,
         };
-        let nearest =
-            |wanted: &str| match missing(place.clone(), [wanted].into_iter(), &found, false) {
-                FileError::MissingColumns { missing, .. } => missing[0].nearest.clone(),
-                other => panic!("{other}"),
-            };
+        let nearest = |wanted: &str| match missing(place.clone(), [wanted], &found, false) {
+            FileError::MissingColumns { missing, .. } => missing[0].nearest.clone(),
+            other => panic!("{other}"),
+        };
         assert_eq!(nearest("Room_degc").as_deref(), Some("room_degC"));
         assert_eq!(nearest("chuk_degC").as_deref(), Some("chuck_degC"));
         assert_eq!(nearest("pressure"), None);

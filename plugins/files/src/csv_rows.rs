@@ -4,7 +4,7 @@ use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
 use crate::cell::{Cells, is_number};
 use crate::columns::{self, Columns};
-use crate::header;
+use crate::header::{self, Head};
 use crate::ledger::Ledger;
 use crate::lines::{LONGEST_ROW, Lines};
 use crate::units::are_units;
@@ -19,6 +19,8 @@ pub(crate) struct CsvRows {
     row_line: u64,
     delimiter: u8,
     names: Vec<String>,
+    /// The first cells of the lines above the names.
+    above: Vec<String>,
     /// The units in the row below the names; none where there is no such row.
     units: Vec<String>,
     /// How many cells a row has; 0 until the first row below the names.
@@ -80,7 +82,7 @@ impl CsvRows {
         delimiter: Option<u8>,
         layout: Option<&Layout>,
     ) -> Result<Self, FileError> {
-        let delimiter = header::seek(&mut lines, delimiter, layout)?;
+        let Head { delimiter, above } = header::seek(&mut lines, delimiter, layout)?;
         let splitter = ReaderBuilder::new()
             .delimiter(delimiter)
             .terminator(Terminator::Any(b'\n'))
@@ -93,6 +95,7 @@ impl CsvRows {
             row_line: 0,
             delimiter,
             names: Vec::new(),
+            above,
             units: Vec::new(),
             width: 0,
             ends_in_delimiter: false,
@@ -172,7 +175,8 @@ impl CsvRows {
         Ok(None)
     }
 
-    /// Takes the columns by the current row of so many cells, if it names wanted columns and holds no values.
+    /// Takes the columns by the current row of so many cells, if it names wanted columns and holds no values. Lines that stood above
+    /// the names stand there again.
     fn takes_header(&mut self, cells: usize, ledger: &mut Ledger) -> Result<bool, FileError> {
         let Some(layout) = &self.layout else {
             return Ok(false);
@@ -183,12 +187,15 @@ impl CsvRows {
             names[0] = first.trim().to_owned();
         }
         let columns = Columns::of(layout, &names);
+        let lacking = columns.lacking(layout);
+        if !lacking.is_empty() && self.above.contains(&names[0]) {
+            return Ok(true);
+        }
         let is_value = |name: &String| is_number(name) && !self.names.contains(name);
         if !columns.are_named(layout) || names.iter().any(is_value) {
             return Ok(false);
         }
         columns::check_unique(&names, || self.place())?;
-        let lacking = columns.lacking(layout);
         let is_forgiven = ledger.is_lenient() && columns.time.is_some();
         if !lacking.is_empty() && !is_forgiven {
             return Err(self.missing(lacking, &names));

@@ -9,7 +9,15 @@ use crate::{FileError, Layout};
 /// How many lines are looked at for a header.
 const LOOKED_AT: usize = 50;
 
-/// Goes to the header, so that it is the next line, and gives what stands between cells, unless that is stated.
+/// What is known of a table before its names are read.
+pub(crate) struct Head {
+    /// What stands between cells.
+    pub delimiter: u8,
+    /// The first cells of the lines above, as a logger writes them again when it begins anew.
+    pub above: Vec<String>,
+}
+
+/// Goes to the header, so that it is the next line. The delimiter may be stated.
 ///
 /// By a layout the header is the first line that names the time and all channels that must be there, and may be a comment; if none
 /// does, the line that names the most. Where none names any, and without a layout, it is the line that begins the longest table.
@@ -17,14 +25,16 @@ pub(crate) fn seek(
     lines: &mut Lines,
     stated: Option<u8>,
     layout: Option<&Layout>,
-) -> Result<u8, FileError> {
+) -> Result<Head, FileError> {
     let mut delimiter = stated;
+    let mut above = Vec::new();
     let mut seen: Vec<Line> = Vec::new();
     let mut found = None;
     while found.is_none() && seen.len() < LOOKED_AT && lines.advance()? {
         let named = delimiter_named(lines.text()).filter(|_| seen.is_empty());
         if let Some(named) = named {
             delimiter = delimiter.or(Some(named));
+            above.push(DELIMITER_KEY.to_owned());
         } else if !lines.text().trim_ascii().is_empty() {
             let (number, text) = lines.take();
             let line = Line { number, text };
@@ -49,7 +59,9 @@ pub(crate) fn seek(
             place: lines.place_of(line.number),
         });
     }
-    seen.drain(..first);
+    let skipped = seen.drain(..first).filter(|line| !line.is_comment());
+    let first_cells = skipped.filter_map(|line| names_in(&line.text, delimiter).into_iter().next());
+    above.extend(first_cells.filter(|cell| !cell.is_empty()));
     let header = &mut seen[0];
     lines.comments_count = header.is_comment();
     header.text = header.names().to_vec();
@@ -58,8 +70,11 @@ pub(crate) fn seek(
             .map(|line| (line.number, line.text))
             .collect(),
     );
-    Ok(delimiter)
+    Ok(Head { delimiter, above })
 }
+
+/// With this a first line names the delimiter, for spreadsheets.
+const DELIMITER_KEY: &str = "sep=";
 
 /// What a first line `sep=;` says, as a spreadsheet takes it.
 fn delimiter_named(line: &[u8]) -> Option<u8> {
@@ -67,7 +82,7 @@ fn delimiter_named(line: &[u8]) -> Option<u8> {
     let line = line.strip_prefix(b"\"").unwrap_or(line);
     match line {
         [key @ .., _, b'\r', b'\n'] | [key @ .., _, b'\n' | b'"'] | [key @ .., _]
-            if key.eq_ignore_ascii_case(b"sep=") =>
+            if key.eq_ignore_ascii_case(DELIMITER_KEY.as_bytes()) =>
         {
             line.get(key.len()).copied()
         }

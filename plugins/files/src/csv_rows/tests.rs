@@ -440,3 +440,16 @@ fn seconds_of_a_date_with_points_may_have_a_decimal_comma() {
     assert!(reader.next_into(&mut row).unwrap());
     assert_eq!(row.time_text, "04.07.2013 00:00:00.5");
 }
+
+#[test]
+fn a_logger_that_begins_anew_writes_all_that_stood_above_its_table_again() {
+    let above = "sep=;\nDevice;Logger 3000;;\nExported;01.03.2026\n";
+    let text = format!("{above}t;a;b\ns;nm;nm\n0;1;2,5\n{above}t;b;a\ns;nm;nm\n1;;3\n");
+    let (rows, reader) = read_with(&text, Options::default());
+    assert_eq!(rows, TWO_ROWS);
+    assert_eq!(headers(&reader).0, 1);
+    let like_a_name = "t;12:00;\nt;a;b\n0;1;2,5\nt;13:00;\nt;b;a\n1;;3\n";
+    assert_eq!(read(like_a_name), TWO_ROWS);
+    let unknown = "Device;5\nt;a;b\n0;1;2,5\nSerial;7\n";
+    assert!(error(unknown).contains("2 cells where the header has 3"));
+}
