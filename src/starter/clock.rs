@@ -2,7 +2,7 @@
 
 use athermal::core::time::Duration;
 use athermal::core::time::TimeFormat;
-use athermal::files::{Description, TimeForm, with_decimal_point};
+use athermal::files::{Description, TimeForm, is_time_of_day, with_decimal_point};
 
 use super::column::ends_in_unit;
 use super::dates::{self, Dates};
@@ -162,12 +162,10 @@ fn no_clock(described: &Description, index: usize, format: Option<&TimeFormat>) 
         (Some(first), Some(format)) => {
             format!("`{column}` has no time as `{format}` says, but such as `{first}`")
         }
-        (Some(first), None) if dates::is_time_of_day(first) => {
-            of_day_alone(described, index, first)
-        }
+        (Some(first), None) if is_time_of_day(first) => of_day_alone(described, index, first),
         (Some(first), None) if dates::look_like_times(&cells(described, index)) => format!(
             "`{column}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
-             e.g. --time-format \"%d.%m.%Y %H:%M:%S\""
+             e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
         ),
         _ => format!("`{column}` does not advance from row to row as a time does"),
     }

@@ -91,14 +91,6 @@ pub fn look_like_times(cells: &[String]) -> bool {
     like.count() * 2 > cells.len()
 }
 
-/// Whether a cell is a time of day without a date.
-pub fn is_time_of_day(cell: &str) -> bool {
-    has_clock(cell)
-        && cell
-            .chars()
-            .all(|c| c.is_ascii_digit() || ":.,".contains(c))
-}
-
 /// Whether a cell is a date without a time of day.
 pub fn is_date(cell: &str) -> bool {
     let parts: Vec<&str> = cell.split(['.', '-', '/']).collect();

@@ -321,3 +321,30 @@ fn data_that_can_be_read_only_once_are_refused_by_what_reads_them_again() {
     assert!(!output.exists());
     athermal_fed(&[&"evaluate", &model, &"--data", &"-"], &rows).ended(0);
 }
+
+#[test]
+fn names_that_stand_within_a_log_are_told_once_for_each_log_and_beside_a_machine_each() {
+    let (scratch, _, _, model) = desk("again");
+    let (all, names) = (rows(0, 60), "time_s,room,Z\n");
+    let again = csv(&all[..40]) + names + &csv(&all[40..]);
+    let data = scratch.file("again.csv", &again);
+    let whole = scratch.file("whole.csv", csv(&all));
+    let run = |data| athermal(&[&"run", &model, &"-i", data]).ended(0);
+    let (ran, of_whole) = (run(&data), run(&whole));
+    assert_eq!(ran.out, of_whole.out);
+    let (at, stand) = (
+        data.display(),
+        "the names of the columns stand here again, as before; the row was left out",
+    );
+    assert!(
+        ran.told
+            .contains(&format!("warning: {at}:42: {stand}; 2 in all\n")),
+        "{}",
+        ran.told
+    );
+    let fed = athermal_fed(&[&"run", &model, &"-i", &"-"], again.as_bytes()).ended(0);
+    for line in [42, 43] {
+        let told = format!("warning: standard input:{line}: {stand}\n");
+        assert_eq!(fed.told.matches(&told).count(), 1, "{}", fed.told);
+    }
+}

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::cell;
-use crate::instant::has_clock;
+use crate::instant::{has_clock, is_time_of_day};
 use crate::long::LongFormat;
 
 /// Longest piece of a file that a message repeats, in characters.
@@ -255,14 +255,6 @@ fn is_date(text: &str) -> bool {
     dates.any(|of| {
         form(&of[..4]) && of[4] == b'-' && form(&of[5..7]) && of[7] == b'-' && form(&of[8..])
     })
-}
-
-/// Whether a text is a time of day such as `12:00:00,5`, without a date.
-fn is_time_of_day(text: &str) -> bool {
-    has_clock(text)
-        && text
-            .bytes()
-            .all(|b| b.is_ascii_digit() || b":.,".contains(&b))
 }
 
 impl fmt::Display for FileError {

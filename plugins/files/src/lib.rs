@@ -52,7 +52,7 @@ pub use dataset::{Dataset, layout};
 pub use description::Description;
 pub use error::{FileError, MissingColumn, Place};
 pub use format::Format;
-pub use instant::{has_clock, has_zone};
+pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};
 pub use ledger::{Count, Report};
 pub use lines::STANDARD_INPUT;
