@@ -1,7 +1,7 @@
 //! The columns that a file has against those that are wanted: the delimiter, where each stands, missing and doubled names. Not their
 //! cells.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use csv::{ByteRecord, ReaderBuilder};
 
@@ -25,9 +25,8 @@ pub(crate) fn choose_delimiter<'a>(
 ) -> u8 {
     let score = |delimiter: u8| {
         let names = names_in(header, delimiter);
-        let wanted = wanted
-            .clone()
-            .filter(|name| position(&names, name).is_some());
+        let known: HashSet<&str> = names.iter().map(String::as_str).collect();
+        let wanted = wanted.clone().filter(|name| known.contains(name));
         (wanted.count(), names.len())
     };
     // `max_by_key` takes the last of equals; the most usual delimiter is to win.
@@ -68,11 +67,20 @@ pub(crate) struct Columns {
 impl Columns {
     /// Looks them up among names.
     pub fn of(layout: &Layout, names: &[String]) -> Self {
+        let places = names.iter().enumerate().rev();
+        let places: HashMap<&str, usize> = places.map(|(at, name)| (name.as_str(), at)).collect();
+        let place = |name: &str| places.get(name).copied();
         let channels = layout.channels.iter();
         Self {
-            time: position(names, &layout.time.column),
-            channels: channels.map(|of| position(names, &of.column)).collect(),
+            time: place(&layout.time.column),
+            channels: channels.map(|channel| place(&channel.column)).collect(),
         }
+    }
+
+    /// How many are there.
+    pub fn count(&self) -> usize {
+        let channels = self.channels.iter().flatten().count();
+        channels + usize::from(self.time.is_some())
     }
 
     /// Whether so many of them are there that it is no chance: the time, or half of the channels and at least two.
@@ -89,11 +97,6 @@ impl Columns {
         let channels = channels.map(|(channel, _)| channel.column.as_str());
         time.into_iter().chain(channels).collect()
     }
-}
-
-/// Where a name stands.
-pub(crate) fn position(names: &[String], wanted: &str) -> Option<usize> {
-    names.iter().position(|name| name == wanted)
 }
 
 /// Refuses names that stand twice; columns without a name may be many.

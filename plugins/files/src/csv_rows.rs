@@ -2,7 +2,7 @@
 
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
-use crate::cell::{Cells, is_number};
+use crate::cell::{self, Cells, is_number};
 use crate::columns::{self, Columns};
 use crate::header::{self, Head};
 use crate::ledger::Ledger;
@@ -181,6 +181,15 @@ impl CsvRows {
         let Some(layout) = &self.layout else {
             return Ok(false);
         };
+        // Most rows that cannot be used hold values, and are seen to without anything being set up.
+        let is_value = |at: usize| {
+            let text = cell::text(cell::trim(self.column(at)));
+            is_number(&text) && !self.names.iter().any(|name| *name == text)
+        };
+        let is_above = self.above.contains(&columns::name(self.column(0)));
+        if (0..cells).any(is_value) {
+            return Ok(is_above);
+        }
         let mut names = self.current(cells);
         if self.is_comment() {
             let first = names[0].trim_start().trim_start_matches('#');
@@ -188,12 +197,8 @@ impl CsvRows {
         }
         let columns = Columns::of(layout, &names);
         let lacking = columns.lacking(layout);
-        if !lacking.is_empty() && self.above.contains(&names[0]) {
-            return Ok(true);
-        }
-        let is_value = |name: &String| is_number(name) && !self.names.contains(name);
-        if !columns.are_named(layout) || names.iter().any(is_value) {
-            return Ok(false);
+        if !lacking.is_empty() && is_above || !columns.are_named(layout) {
+            return Ok(is_above);
         }
         columns::check_unique(&names, || self.place())?;
         let is_forgiven = ledger.is_lenient() && columns.time.is_some();

@@ -2,7 +2,7 @@
 //! of their own above it. Not which of its columns are where, nor what its rows hold.
 
 use crate::cell::is_number;
-use crate::columns::{DELIMITERS, choose_delimiter, names_in, position};
+use crate::columns::{Columns, DELIMITERS, choose_delimiter, names_in};
 use crate::lines::{Lines, is_content};
 use crate::{FileError, Layout};
 
@@ -114,12 +114,9 @@ impl Line {
     /// What stands between cells where this is the header that a layout asks for.
     fn header_of(&self, layout: &Layout, stated: Option<u8>) -> Option<u8> {
         let delimiter = stated.unwrap_or_else(|| choose_delimiter(self.names(), layout.names()));
-        let names = names_in(self.names(), delimiter);
-        let has = |name: &str| position(&names, name).is_some();
-        let channels = &layout.channels;
-        let all = channels.iter().all(|of| of.optional || has(&of.column));
-        let any = channels.is_empty() || channels.iter().any(|of| has(&of.column));
-        (has(&layout.time.column) && all && any).then_some(delimiter)
+        let columns = Columns::of(layout, &names_in(self.names(), delimiter));
+        let any = layout.channels.is_empty() || columns.channels.iter().any(Option::is_some);
+        (any && columns.lacking(layout).is_empty()).then_some(delimiter)
     }
 }
 
@@ -132,10 +129,10 @@ fn most_named(seen: &[Line], stated: Option<u8>, layout: &Layout) -> Option<(usi
     let each = content.map(|(at, line)| {
         let delimiter = stated.unwrap_or_else(|| choose_delimiter(&line.text, layout.names()));
         let names = names_in(&line.text, delimiter);
-        let named = layout
-            .names()
-            .filter(|name| position(&names, name).is_some());
-        let named = if can_name(&names) { named.count() } else { 0 };
+        let named = match can_name(&names) {
+            true => Columns::of(layout, &names).count(),
+            false => 0,
+        };
         (named, at, delimiter)
     });
     // `max_by_key` takes the last of equals.

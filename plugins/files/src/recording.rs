@@ -284,6 +284,12 @@ mod tests {
     }
 
     #[test]
+    fn each_file_has_an_order_of_columns_of_its_own_and_may_change_it() {
+        let parts = ["t,x\n0,1\n", "x,t\n2,10\nt,x\n20,3\n"];
+        assert_eq!(told("columns", &parts), "1@0 2@10 3@20");
+    }
+
+    #[test]
     fn a_single_file_is_one_segment() {
         assert_eq!(told("single", &["t,x\n0,1\n10,2\n"]), "1@0 2@10");
     }
