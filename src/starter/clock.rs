@@ -237,8 +237,8 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
     let numbers: Option<Vec<f64>> = cells.iter().map(|cell| cell.parse::<f64>().ok()).collect();
     let Some(numbers) = numbers else {
         // A date that stands beside a time of day is that of many rows.
-        let repeats = cells.windows(2).filter(|pair| pair[0] == pair[1]).count() * 2 > cells.len();
-        let is_clock = !(repeats && cells.iter().all(|cell| dates::is_date(cell)));
+        let again = cells.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        let is_clock = !(again * 2 >= cells.len() && cells.iter().all(|cell| dates::is_date(cell)));
         let dates = dates::of(&cells).filter(|_| is_clock);
         return dates.map(|dates| Clock::dated(column, dates));
     };
