@@ -200,6 +200,10 @@ impl CsvRows {
         if !lacking.is_empty() && is_above || !columns.are_named(layout) {
             return Ok(is_above);
         }
+        if !lacking.is_empty() && !self.lines.is_complete() {
+            ledger.report.truncated = Some(self.place());
+            return Ok(true);
+        }
         columns::check_unique(&names, || self.place())?;
         let is_forgiven = ledger.is_lenient() && columns.time.is_some();
         if !lacking.is_empty() && !is_forgiven {

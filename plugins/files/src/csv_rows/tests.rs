@@ -339,6 +339,17 @@ fn a_header_within_the_log_that_lacks_a_channel_is_an_error_and_leniently_the_ch
 }
 
 #[test]
+fn a_header_that_was_cut_off_at_the_end_lacks_nothing() {
+    for cut in ["t,a", "t,a,", "t,a,c"] {
+        let (rows, reader) = read_with(&format!("t,a,b\n0,1,2.5\n1,3,\n{cut}"), Options::default());
+        assert_eq!(rows, TWO_ROWS);
+        let truncated = reader.report().truncated.as_ref();
+        assert_eq!(truncated.map(|place| place.line), Some(4), "{cut}");
+        assert_eq!(headers(&reader).0, 0);
+    }
+}
+
+#[test]
 fn a_row_with_a_text_that_is_a_name_too_is_no_header() {
     let text = "t,a,b,axis\n0,1,2.5,a\nx,,,a\n1,3,,t\n";
     let (rows, reader) = read_with(text, lenient());
