@@ -13,7 +13,7 @@ const LOOKED_AT: usize = 50;
 pub(crate) struct Head {
     /// What stands between cells.
     pub delimiter: u8,
-    /// The first cells of the lines above, as a logger writes them again when it begins anew.
+    /// The first cells of the lines above, save values, as a logger writes them again when it begins anew.
     pub above: Vec<String>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn seek(
     }
     let skipped = seen.drain(..first).filter(|line| !line.is_comment());
     let first_cells = skipped.filter_map(|line| names_in(&line.text, delimiter).into_iter().next());
-    above.extend(first_cells.filter(|cell| !cell.is_empty()));
+    above.extend(first_cells.filter(|cell| !cell.is_empty() && !is_value(cell)));
     let header = &mut seen[0];
     lines.comments_count = header.is_comment();
     header.text = header.names().to_vec();
@@ -186,10 +186,11 @@ fn is_of_width(row: &[String], width: usize) -> bool {
 
 /// Whether a row may hold the names of columns, and no values.
 fn can_name(row: &[String]) -> bool {
-    let is_value = |cell: &String| {
-        cell.starts_with(|first: char| first.is_ascii_digit())
-            && !cell.contains(char::is_alphabetic)
-            || is_number(cell)
-    };
-    !row.iter().any(is_value)
+    !row.iter().any(|cell| is_value(cell))
+}
+
+/// Whether a cell holds a number, a date or a time.
+fn is_value(cell: &str) -> bool {
+    let begins = cell.starts_with(|first: char| first.is_ascii_digit());
+    begins && !cell.contains(char::is_alphabetic) || is_number(cell)
 }

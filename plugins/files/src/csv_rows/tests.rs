@@ -461,6 +461,8 @@ fn a_logger_that_begins_anew_writes_all_that_stood_above_its_table_again() {
     assert_eq!(headers(&reader).0, 1);
     let like_a_name = "t;12:00;\nt;a;b\n0;1;2,5\nt;13:00;\nt;b;a\n1;;3\n";
     assert_eq!(read(like_a_name), TWO_ROWS);
+    let numbered = "1;Plate\nt;a;b\n0;1;2,5\n1;3\n";
+    assert!(error(numbered).contains("2 cells where the header has 3"));
     let unknown = "Device;5\nt;a;b\n0;1;2,5\nSerial;7\n";
     assert!(error(unknown).contains("2 cells where the header has 3"));
 }
