@@ -220,6 +220,28 @@ fn what_is_doubtful_in_a_graph_is_told_by_the_fit_too() {
 }
 
 #[test]
+fn a_unit_below_the_name_of_a_column_that_is_not_that_of_its_signal_is_told() {
+    let scratch = Scratch::new("faulty-unit-row");
+    let graph = GRAPH.replace("column = \"{channel}_nm\"", "column = \"{channel}\"");
+    let log = log(|_, _| ()).replacen("Z_nm\n", "Z\ns,degC,degC,um\n", 1);
+    let (graph, data) = (
+        scratch.file("graph.toml", graph),
+        scratch.file("log.csv", log),
+    );
+    let model = scratch.path("model.json");
+    let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+    fitted.tells(&[
+        "log.csv: `um` stands below the name of the column `Z`, and position.Z takes its numbers for nm: correct `unit`",
+    ]);
+    assert_eq!(
+        fitted.told.matches("stands below").count(),
+        1,
+        "{}",
+        fitted.told
+    );
+}
+
+#[test]
 fn scores_on_the_data_of_the_fit_are_told_to_be_that() {
     let scratch = Scratch::new("faulty-seen");
     let (graph, data) = (

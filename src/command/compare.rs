@@ -98,7 +98,13 @@ impl Compare {
                 }
             })?;
             drop(progress);
-            data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+            data::tell(
+                terminal,
+                &model.plan,
+                &dataset.reports(),
+                trace.refused,
+                &trace.rejected,
+            );
             let new = |range: &&SampleRange| beyond::usual(&in_fits, &range.channel).is_none();
             let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
             beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));

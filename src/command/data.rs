@@ -7,6 +7,7 @@ use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
+use athermal::core::compile::Plan;
 use athermal::core::engine::Fnv1a;
 use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Format, Options, Report};
@@ -222,14 +223,19 @@ pub fn note_zone(terminal: &Terminal, reports: &[(String, Report)]) {
     }
 }
 
-/// Tells of rows and cells that were not taken, of samples that were rejected, and of files that count more than once.
+/// Tells of rows and cells that were not taken, of samples that were rejected, of units that the data have and the graph has not, and
+/// of files that count more than once.
 pub fn tell(
     terminal: &Terminal,
+    plan: &Plan,
     reports: &[(String, Report)],
     refused: u64,
     rejected: &[(String, u64)],
 ) {
     for told in of_files(reports) {
+        terminal.warning(told);
+    }
+    for told in other_units(plan, reports) {
         terminal.warning(told);
     }
     if refused > 0 {
@@ -251,6 +257,27 @@ pub fn tell(
             _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),
         });
     }
+}
+
+/// Columns under whose names another unit stands than that of their signal.
+fn other_units(plan: &Plan, reports: &[(String, Report)]) -> Vec<String> {
+    let mut told = Vec::new();
+    for (file, report) in reports {
+        for (column, unit) in &report.units {
+            let sources = plan.sources.iter().zip(&plan.channels);
+            let mut others = sources
+                .filter(|(source, _)| source.column == *column)
+                .map(|(source, planned)| (&source.name, &planned.channel.unit))
+                .filter(|(_, own)| !unit.measures_same(own) || unit.is_another_than(own));
+            if let Some((channel, own)) = others.next() {
+                told.push(format!(
+                    "{file}: `{unit}` stands below the name of the column `{column}`, and {channel} takes its numbers for {own}: \
+                     correct `unit` of the signal"
+                ));
+            }
+        }
+    }
+    told
 }
 
 /// What is told of files after reading: rows and cells that were not taken, and files that count more than once.

@@ -140,6 +140,7 @@ impl Evaluate {
         }
         data::tell(
             terminal,
+            &model.plan,
             &dataset.reports(),
             scores.refused,
             &scores.rejected,

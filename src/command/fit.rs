@@ -241,6 +241,7 @@ pub fn fit_without_card(
     model.fitted = fitted;
     data::tell(
         terminal,
+        &model.plan,
         &dataset.reports(),
         report.refused,
         &report.rejected,

@@ -65,6 +65,7 @@ impl Report {
         let course = &facts.course;
         data::tell(
             terminal,
+            &model.plan,
             &dataset.reports(),
             course.refused,
             &course.rejected,

@@ -295,7 +295,13 @@ impl Run {
         };
         let reports = [(input, reader.report().clone())];
         let rejected = engine.rejected_channels();
-        data::tell(terminal, &reports, engine.refused(), &rejected);
+        data::tell(
+            terminal,
+            engine.plan(),
+            &reports,
+            engine.refused(),
+            &rejected,
+        );
         if self.ends() {
             beyond::tell(terminal, &beyond::beyond(usual, &engine.sample_ranges()));
         }

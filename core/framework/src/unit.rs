@@ -180,6 +180,16 @@ impl Unit {
         self.dimension == other.dimension && self.opaque == other.opaque
     }
 
+    /// Whether both measure the same and a number means something else in one than in the other: nm and um, Cel and K.
+    #[must_use]
+    pub fn is_another_than(&self, other: &Unit) -> bool {
+        let same = [0.0, 1.0].iter().all(|&value| {
+            let converted = self.convert(value, other);
+            converted.is_none_or(|converted| (converted - value).abs() < 1e-9)
+        });
+        !same
+    }
+
     /// How many of `to` one of this unit is; `None` if they do not measure the same.
     ///
     /// Between temperature scales, and between a scale and K, it is the factor of *differences* (`[degF]` to `K`: 5/9).

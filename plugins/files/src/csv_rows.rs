@@ -5,9 +5,9 @@ use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 use crate::cell::{self, Cells, is_number};
 use crate::columns::{self, Columns};
 use crate::header::{self, Head};
-use crate::ledger::Ledger;
+use crate::ledger::{Ledger, Report};
 use crate::lines::{LONGEST_ROW, Lines};
-use crate::units::are_units;
+use crate::units::{self, are_units};
 use crate::{FileError, Layout, LongFormat, Place};
 
 /// The rows of a CSV file.
@@ -154,6 +154,7 @@ impl CsvRows {
             if is_below_names && cells <= expected + 1 && are_units(&row) {
                 self.units = row;
                 self.units.resize(expected, String::new());
+                self.report_units(&mut ledger.report);
                 return Ok(None);
             }
             self.width = expected;
@@ -173,6 +174,23 @@ impl CsvRows {
             found: cells,
         })?;
         Ok(None)
+    }
+
+    fn report_units(&self, report: &mut Report) {
+        let channels = self.layout.iter().flat_map(|layout| &layout.channels);
+        for channel in channels {
+            let at = self.names.iter().position(|name| *name == channel.column);
+            let known = report
+                .units
+                .iter()
+                .any(|(column, _)| *column == channel.column);
+            if let Some(unit) = at
+                .filter(|_| !known)
+                .and_then(|at| units::unit(&self.units[at]))
+            {
+                report.units.push((channel.column.clone(), unit));
+            }
+        }
     }
 
     /// Takes the columns by the current row of so many cells, if it names wanted columns and holds no values. Lines that stood above

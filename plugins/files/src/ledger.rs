@@ -1,5 +1,7 @@
 //! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
 
+use athermal_core::unit::Unit;
+
 use crate::cell::decimal_mark;
 use crate::error::excerpt;
 use crate::{FileError, Place};
@@ -20,6 +22,8 @@ pub struct Report {
     pub refused_rows: Count,
     /// Rows within the recording that name its columns again ([`FileError::HeaderAgain`]), unless each was told at once.
     pub headers: Count,
+    /// The columns of channels under whose names stands a unit, with that.
+    pub units: Vec<(String, Unit)>,
     /// The first time that is a date without a zone, and was taken for UTC.
     pub without_zone: Option<Place>,
     /// The last line, when it was cut off in the middle and left out.

@@ -106,7 +106,13 @@ impl Diagnose {
             print!("{}", tables.text());
         }
         let trace = &observation.trace;
-        data::tell(terminal, &dataset.reports(), trace.refused, &trace.rejected);
+        data::tell(
+            terminal,
+            &model.plan,
+            &dataset.reports(),
+            trace.refused,
+            &trace.rejected,
+        );
         let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
         beyond::tell(terminal, &outside_fit);
         for told in Lack::told(&diagnosis.lacks) {

@@ -18,12 +18,7 @@ fn of_name(column: &str) -> Option<Unit> {
 
 /// The unit that columns are named for, where it measures the same as the signal's and is another one.
 pub(super) fn other_than(unit: &Unit, column: &str) -> Option<Unit> {
-    let named = of_name(column)?;
-    let same = [0.0, 1.0].iter().all(|&value| {
-        let converted = named.convert(value, unit);
-        converted.is_none_or(|converted| (converted - value).abs() < 1e-9)
-    });
-    (!same).then_some(named)
+    of_name(column).filter(|named| named.is_another_than(unit))
 }
 
 #[cfg(test)]
