@@ -1,7 +1,7 @@
 //! Decides where a series leaps from one sample to the next, as that of a sensor does which fails, or of a position that is zeroed
 //! anew; not what follows from it.
 //!
-//! A body changes its temperature, and a position drifts, step by step. A leap is [`TIMES`] times as large as nineteen in twenty
+//! A body changes its temperature, and a position drifts, step by step. A leap is 20 times as large as nineteen in twenty
 //! of the changes between two samples, and stands alone: the changes before and after it are less than a tenth of it, or take it
 //! back. A heater that is switched on makes large changes too, but many of them, one after the other.
 
