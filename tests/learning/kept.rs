@@ -128,8 +128,14 @@ fn a_swap_carries_what_was_learned_unless_the_fit_is_new_and_not_told_to() {
     let rows = rows(12, 900, 200);
     let old = model("carry-old", &text);
     let retuned = model("carry-retuned", &text.replace("0.98", "0.97"));
+    // What was learned for one horizon is no answer for another.
+    let farther = model(
+        "carry-farther",
+        &text.replace("ahead = \"20s\"", "ahead = \"30s\""),
+    );
     let anew = refitted(&old);
     for (new, learned, outcome, as_before) in [
+        (&farther, true, "warmed", false),
         (&old, false, "carried", true),
         (&retuned, false, "warmed", false),
         (&retuned, true, "adopted", false),

@@ -204,6 +204,8 @@ enum Own {
     New,
     Type,
     Inputs,
+    /// What was learned for another one says nothing of this.
+    Horizon,
     Parameters,
     Unit,
     Fit,
@@ -219,11 +221,13 @@ impl Own {
                         .iter()
                         .any(|change| change.path.split('.').next() == Some(name))
                 };
-                Some(match (of("type"), of("inputs")) {
-                    (true, _) => Self::Type,
-                    (false, true) => Self::Inputs,
-                    (false, false) => Self::Parameters,
-                })
+                let kinds = [
+                    ("type", Self::Type),
+                    ("inputs", Self::Inputs),
+                    ("ahead", Self::Horizon),
+                ];
+                let kind = kinds.into_iter().find(|(name, _)| of(name));
+                Some(kind.map_or(Self::Parameters, |(_, own)| own))
             }
             Some(Change::Unchanged) => None,
         }
@@ -234,6 +238,7 @@ impl Own {
             Self::New => "it is new",
             Self::Type => "its type changed",
             Self::Inputs => "its inputs changed",
+            Self::Horizon => "its horizon changed",
             Self::Parameters => "its parameters changed",
             Self::Unit => "the unit of its outputs changed",
             Self::Fit => "it was fitted anew",
