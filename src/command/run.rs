@@ -121,7 +121,7 @@ impl Run {
 
     /// Runs so that the graph can be replaced; the rows say which revision made them.
     fn run_replaceable(&self, terminal: &Terminal, model: Model) -> Result<Answer, Failure> {
-        let swaps = self.swap.schedule(&model)?;
+        let swaps = self.swap.schedule(&model, terminal)?;
         let (feed, mut columns) = swap::union(&model, &swaps);
         let options = Options {
             lenient: self.lenient,

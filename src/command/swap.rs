@@ -76,7 +76,7 @@ impl Options {
     ///
     /// # Errors
     /// When a time cannot be read, or a graph not be used.
-    pub fn schedule(&self, running: &Model) -> Result<Vec<Swap>, Failure> {
+    pub fn schedule(&self, running: &Model, terminal: &Terminal) -> Result<Vec<Swap>, Failure> {
         let mut swaps: Vec<Swap> = Vec::new();
         for text in &self.swap_at {
             let (time, path) = text.split_once('=').ok_or_else(|| {
@@ -84,7 +84,7 @@ impl Options {
             })?;
             let at = When::read(time, &running.plan.time)?;
             let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
-            let model = load(Path::new(path), known)?;
+            let model = load(Path::new(path), known, terminal)?;
             let known = std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
             let refused = |known: &Model| StageError::between(&known.plan, &model.plan);
             if let Some(refused) = known.filter_map(refused).next() {
@@ -118,10 +118,22 @@ pub struct Swap {
 }
 
 /// A graph or model, with the fits of what means the same in one that is known.
-fn load<'a>(path: &Path, known: impl Iterator<Item = &'a Model>) -> Result<Model, Failure> {
+fn load<'a>(
+    path: &Path,
+    known: impl Iterator<Item = &'a Model>,
+    terminal: &Terminal,
+) -> Result<Model, Failure> {
     let mut model = Model::load(path)?;
-    known.for_each(|known| model.take_fits_of(known));
+    let doubtful: Vec<String> = known.flat_map(|known| model.take_fits_of(known)).collect();
     check_fitted(&model, path)?;
+    if !doubtful.is_empty() {
+        terminal.warning(format_args!(
+            "{}: {} {} as fitted before, though what they read is now made in another way: fit the graph anew to be sure",
+            path.display(),
+            doubtful.join(", "),
+            if doubtful.len() == 1 { "stays" } else { "stay" },
+        ));
+    }
     Ok(model)
 }
 
@@ -235,7 +247,7 @@ impl<'a> Course<'a> {
         }
         let path = watched.path.clone();
         *watched = Watched::of(&path);
-        let model = match load(&path, std::iter::once(&self.running)) {
+        let model = match load(&path, std::iter::once(&self.running), &self.terminal) {
             Ok(model) => model,
             Err(failure) => {
                 self.terminal.error(&failure);

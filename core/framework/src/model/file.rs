@@ -220,20 +220,32 @@ impl Model {
             .collect()
     }
 
-    /// Takes from another model the fits of estimators that mean the same in both.
-    pub fn take_fits_of(&mut self, other: &Self) {
+    /// Takes from another model the fits of estimators that mean the same in both. Gives those among them that read, over however
+    /// many nodes, what is now made in another way than it was for the fit.
+    pub fn take_fits_of(&mut self, other: &Self) -> Vec<String> {
         let diff = diff(&other.plan, &self.plan);
-        for node in diff
-            .nodes
-            .iter()
-            .filter(|node| node.change == Change::Unchanged)
-        {
-            if let Some(fit) = other.fitted.get(&node.instance)
-                && !self.fitted.contains_key(&node.instance)
-            {
-                self.fitted.insert(node.instance.clone(), Arc::clone(fit));
+        let changed = |index: usize| {
+            let change = diff.node(&self.plan.nodes[index].instance());
+            change.is_some_and(|change| *change != Change::Unchanged)
+        };
+        let mut doubtful = Vec::new();
+        for node in &self.plan.nodes {
+            let instance = node.instance();
+            let Some(fit) = other.fitted.get(&instance) else {
+                continue;
+            };
+            let is_same = diff.node(&instance) == Some(&Change::Unchanged);
+            if !is_same || self.fitted.contains_key(&instance) {
+                continue;
+            }
+            self.fitted.insert(instance.clone(), Arc::clone(fit));
+            let behind = self.plan.behind(node.slots.clone());
+            let mut slots = (0..self.plan.channels.len()).filter(|&slot| behind.contains(slot));
+            if slots.any(|slot| self.plan.channels[slot].node.is_some_and(changed)) {
+                doubtful.push(instance);
             }
         }
+        doubtful
     }
 
     /// An engine that runs the model, cold.
