@@ -86,7 +86,6 @@ impl Trainer for Writing {
 #[derive(Debug, Serialize, Deserialize)]
 struct Nothing {}
 
-#[typetag::serde(name = "test_diary")]
 impl Predictor for Nothing {
     fn uses(&self) -> &[String] {
         &[]
@@ -96,6 +95,8 @@ impl Predictor for Nothing {
         0.0
     }
 }
+
+athermal::core::predictor!(Nothing, "test_diary");
 
 const GRAPH: &str = r#"
 schema = 1

@@ -1,7 +1,7 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
 use athermal::core::diagnostic::nearest;
-use athermal::core::node::{FREEZE, Kind, Read, RoleName, kind, kinds};
+use athermal::core::node::{FREEZE, Kind, Read, RoleName, kind, kinds, written_names};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -49,7 +49,7 @@ fn list(terminal: &Terminal) {
             .flatten()
             .map(|kind| describe(kind))
             .collect();
-        println!("{:#}", json!({ "nodes": all }));
+        println!("{:#}", json!({ "nodes": all, "written": written_names() }));
         return;
     }
     let group = |kind: &Kind| (kind.role, kind.package, kind.version);

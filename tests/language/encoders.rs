@@ -143,7 +143,6 @@ struct Covariances {
     weights: Vec<f64>,
 }
 
-#[typetag::serde(name = "test_along")]
 impl Predictor for Covariances {
     fn uses(&self) -> &[String] {
         &self.uses
@@ -154,6 +153,8 @@ impl Predictor for Covariances {
         products.map(|(weight, value)| weight * value).sum()
     }
 }
+
+athermal::core::predictor!(Covariances, "test_along");
 
 struct Summing {
     fit: Option<(Covariances, Vec<usize>)>,

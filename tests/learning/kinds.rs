@@ -67,7 +67,6 @@ struct Start {
     regressors: Vec<String>,
 }
 
-#[typetag::serde(name = "test_told")]
 impl Predictor for Start {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -84,6 +83,8 @@ impl Predictor for Start {
         }))
     }
 }
+
+athermal::core::predictor!(Start, "test_told");
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Last {

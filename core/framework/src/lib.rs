@@ -131,9 +131,9 @@ pub mod unit;
 #[doc(hidden)]
 pub use inventory;
 
-/// What [`register!`] needs at its place of use.
+/// What [`register!`], [`state!`] and [`predictor!`] need at their place of use.
 #[doc(hidden)]
 pub mod __private {
     pub use crate::node::read;
-    pub use {schemars, serde_json};
+    pub use {schemars, serde_json, typetag};
 }

@@ -150,7 +150,6 @@ impl Operator for Encoding {
 #[serde(transparent)]
 struct FittedEncoder(Fit);
 
-#[typetag::serde(name = "lstm_encoder")]
 impl Predictor for FittedEncoder {
     fn uses(&self) -> &[String] {
         &self.0.uses
@@ -164,6 +163,8 @@ impl Predictor for FittedEncoder {
         self.0.predict(regressors)
     }
 }
+
+athermal_core::predictor!(FittedEncoder, "lstm_encoder");
 
 athermal_core::register!(LstmEncoder, Feature, "lstm_encoder");
 

@@ -94,7 +94,6 @@ pub(crate) fn predictor(fit: Fit) -> Box<dyn Predictor> {
     Box::new(FittedLstm(fit))
 }
 
-#[typetag::serde(name = "lstm")]
 impl Predictor for FittedLstm {
     fn uses(&self) -> &[String] {
         &self.0.uses
@@ -108,6 +107,8 @@ impl Predictor for FittedLstm {
         self.0.predict(regressors)
     }
 }
+
+athermal_core::predictor!(FittedLstm, "lstm");
 
 athermal_core::register!(Lstm, Estimator, "lstm");
 

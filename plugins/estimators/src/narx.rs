@@ -379,7 +379,6 @@ pub struct NarxPredictor {
     mean: f64,
 }
 
-#[typetag::serde(name = "narx")]
 impl Predictor for NarxPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -441,3 +440,5 @@ impl Predictor for NarxPredictor {
         })
     }
 }
+
+athermal_core::predictor!(NarxPredictor, "narx");

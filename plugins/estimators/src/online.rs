@@ -192,7 +192,6 @@ impl OnlinePredictor {
     }
 }
 
-#[typetag::serde(name = "online_linear")]
 impl Predictor for OnlinePredictor {
     fn uses(&self) -> &[String] {
         &self.frame.regressors
@@ -238,6 +237,8 @@ impl Predictor for OnlinePredictor {
         Some(&self.range)
     }
 }
+
+athermal_core::predictor!(OnlinePredictor, "online_linear");
 
 /// What has been learned: enough to go on, whatever the fit that it is carried to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -50,7 +50,6 @@ struct Same {
     regressors: Vec<String>,
 }
 
-#[typetag::serde(name = "persistence")]
 impl Predictor for Same {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -71,6 +70,8 @@ impl Predictor for Same {
         })
     }
 }
+
+athermal_core::predictor!(Same, "persistence");
 
 impl Trainer for Same {
     fn row(&mut self, _regressors: &[f64], _truth: f64) {}

@@ -298,7 +298,6 @@ pub struct PolynomialPredictor {
     intercept: f64,
 }
 
-#[typetag::serde(name = "polynomial")]
 impl Predictor for PolynomialPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -341,3 +340,5 @@ impl Predictor for PolynomialPredictor {
         })
     }
 }
+
+athermal_core::predictor!(PolynomialPredictor, "polynomial");

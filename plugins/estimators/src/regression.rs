@@ -352,7 +352,6 @@ impl LinearPredictor {
     }
 }
 
-#[typetag::serde(name = "linear")]
 impl Predictor for LinearPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -390,3 +389,5 @@ impl Predictor for LinearPredictor {
         Some(Coefficients::linear(constant, values, errors.as_deref()))
     }
 }
+
+athermal_core::predictor!(LinearPredictor, "linear");

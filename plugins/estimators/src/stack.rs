@@ -265,7 +265,6 @@ impl Stacked {
     }
 }
 
-#[typetag::serde(name = "stack")]
 impl Predictor for Stacked {
     fn uses(&self) -> &[String] {
         &self.saved.regressors
@@ -304,6 +303,8 @@ impl Predictor for Stacked {
         true
     }
 }
+
+athermal_core::predictor!(Stacked, "stack");
 
 athermal_core::register!(Stack, Estimator, "stack");
 

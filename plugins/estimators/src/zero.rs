@@ -39,7 +39,6 @@ impl Estimator for Zero {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Nothing {}
 
-#[typetag::serde(name = "zero")]
 impl Predictor for Nothing {
     fn uses(&self) -> &[String] {
         &[]
@@ -53,6 +52,8 @@ impl Predictor for Nothing {
         Some(Coefficients::linear(0.0, &[], None))
     }
 }
+
+athermal_core::predictor!(Nothing, "zero");
 
 impl Trainer for Nothing {
     fn row(&mut self, _regressors: &[f64], _truth: f64) {}

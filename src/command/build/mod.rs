@@ -78,9 +78,14 @@ impl Build {
         let built = Path::new(target)
             .join("release")
             .join(project::executable());
-        let kinds = known(&built, "nodes")?;
+        let kinds = known(&built, "nodes", "nodes")?;
         twice("node type", &kinds)?;
-        let machines = known(&built, "machines")?;
+        let written = known(&built, "nodes", "written")?;
+        for of in ["state", "predictor"] {
+            let of_role = written.iter().filter(|known| known.role == of);
+            twice(of, &of_role.cloned().collect::<Vec<_>>())?;
+        }
+        let machines = known(&built, "simulate", "machines")?;
         twice("machine", &machines)?;
         place(&built, &self.output)?;
         self.tell(terminal, &wishes, &resolved, &kinds, &machines);
@@ -144,7 +149,7 @@ impl Build {
     }
 }
 
-/// A kind or a machine of a binary.
+/// A kind, a machine, or a name under which something is written, of a binary.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Known {
     name: String,
@@ -158,8 +163,8 @@ fn machine() -> String {
     "machine".to_owned()
 }
 
-/// Asks a binary for its `nodes` or its `machines`.
-fn known(binary: &Path, what: &str) -> Result<Vec<Known>, Failure> {
+/// Asks a binary's command for what it lists under a key.
+fn known(binary: &Path, command: &str, what: &str) -> Result<Vec<Known>, Failure> {
     let binary = std::fs::canonicalize(binary).unwrap_or_else(|_| binary.to_owned());
     let failed = |reason: String| {
         Failure::Outside(format!(
@@ -167,7 +172,6 @@ fn known(binary: &Path, what: &str) -> Result<Vec<Known>, Failure> {
             binary.display()
         ))
     };
-    let command = if what == "machines" { "simulate" } else { what };
     let output = Command::new(&binary)
         .args([command, "--format", "json"])
         .output()
@@ -177,12 +181,12 @@ fn known(binary: &Path, what: &str) -> Result<Vec<Known>, Failure> {
     serde_json::from_value(listed[what].clone()).map_err(|error| failed(error.to_string()))
 }
 
-/// Refuses a name that two crates use.
+/// Refuses a name that two crates use for the same sort of thing.
 fn twice(what: &str, all: &[Known]) -> Result<(), Failure> {
     for (nth, known) in all.iter().enumerate() {
         if let Some(other) = all[..nth].iter().find(|other| other.name == known.name) {
             return Err(Failure::Request(format!(
-                "the {what} `{}` is in {} {} and in {} {}: no graph could use it; leave one of them out, or rename it",
+                "the {what} `{}` is in {} {} and in {} {}: no graph could tell which is meant; leave one of them out, or rename it",
                 known.name, other.package, other.version, known.package, known.version
             )));
         }
@@ -254,9 +258,9 @@ mod tests {
         let Err(Failure::Request(told)) = refused else {
             panic!("{refused:?}")
         };
-        assert!(
-            told.contains("`a` is in one 0.1.0 and in two 0.1.0"),
-            "{told}"
+        assert_eq!(
+            told,
+            "the node type `a` is in one 0.1.0 and in two 0.1.0: no graph could tell which is meant; leave one of them out, or rename it"
         );
     }
 

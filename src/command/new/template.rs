@@ -115,7 +115,7 @@ const KEYWORDS: [&str; 51] = [
 ];
 
 /// The crates and modules that a new one cannot be called, because it uses them.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 9] = [
     "athermal",
     "athermal_core",
     "alloc",
@@ -125,7 +125,6 @@ const CRATES: [&str; 10] = [
     "serde",
     "std",
     "test",
-    "typetag",
 ];
 
 /// The athermal that a crate is written for, as it stands in a manifest.

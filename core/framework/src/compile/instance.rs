@@ -10,7 +10,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::{
     Data, Decoded, GraphFile, InputDecl, InstanceDecl, NodeDecl, Table, Value, decode_rest,
 };
-use crate::node::{Kind, Mistake, NodeSpec, Role, kinds};
+use crate::node::{Kind, Mistake, NodeSpec, Role, kinds, taken_twice};
 
 /// A node whose kind and parameters have been read.
 pub(crate) struct ReadNode {
@@ -120,7 +120,18 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
 /// The kind of a name; `None` when an error about it has been told.
 fn find(name: &str, place: Place, diagnostics: &mut Diagnostics) -> Option<&'static Kind> {
     match kinds().get(name).map(Vec::as_slice) {
-        Some([kind]) => return Some(*kind),
+        Some([kind]) => {
+            let Some((of, name, packages)) = taken_twice(kind.package) else {
+                return Some(*kind);
+            };
+            let problem = CompileProblem::WrittenTwice {
+                kind: kind.name.to_owned(),
+                of,
+                name,
+                packages,
+            };
+            diagnostics.report(place, problem);
+        }
         Some(several) => {
             let packages = several.iter().map(|kind| kind.package).collect();
             let kind = name.to_owned();

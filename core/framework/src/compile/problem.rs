@@ -5,6 +5,7 @@ mod told;
 use std::sync::Arc;
 
 use crate::diagnostic::Names;
+use crate::node::Written;
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -21,6 +22,13 @@ pub enum CompileProblem {
     /// Two crates bring the same kind.
     KindTwice {
         kind: String,
+        packages: Vec<&'static str>,
+    },
+    /// Something that the kind's crate writes has a name that is taken twice.
+    WrittenTwice {
+        kind: String,
+        of: Written,
+        name: &'static str,
         packages: Vec<&'static str>,
     },
     /// A reference to a node or signal that is not there.

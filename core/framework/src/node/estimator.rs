@@ -1,16 +1,12 @@
 //! Decides what the author of an estimator implements: learning from rows, and predicting from a row.
 
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Coefficients, Figure, Figures, InputPort, Learner, Learns, LinearForm, Mistake, TrainedRange,
-    TrainingError,
-};
+use super::{Figure, Figures, InputPort, Learns, Mistake, Predictor, TrainingError};
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -69,7 +65,6 @@ use crate::unit::Unit;
 ///     mean: f64,
 /// }
 ///
-/// #[typetag::serde(name = "mean_of_fit")]
 /// impl Predictor for MeanOfFit {
 ///     fn uses(&self) -> &[String] {
 ///         &[]
@@ -80,6 +75,7 @@ use crate::unit::Unit;
 ///     }
 /// }
 ///
+/// athermal_core::predictor!(MeanOfFit, "mean_of_fit");
 /// athermal_core::register!(Mean, Estimator, "mean_of_fit");
 /// # fn main() {}
 /// ```
@@ -448,52 +444,4 @@ pub struct CandidateScore {
     /// The score that the step would have had with it.
     #[serde(with = "crate::model::number")]
     pub score: f64,
-}
-
-/// A fitted estimator, or what an [`Encoder`](super::Encoder) was fitted to. Predicting never changes what was learned.
-#[typetag::serde(tag = "type")]
-pub trait Predictor: Any + Debug + Send + Sync {
-    /// The names of the regressors that [`predict`](Predictor::predict) takes, in order.
-    fn uses(&self) -> &[String];
-
-    /// What of it does not fit together, all of it, each at its path in the model file; asked for when a model is read, which
-    /// may have been edited by hand. Where there is any, nothing else is asked of it.
-    fn mistakes(&self) -> Vec<Mistake> {
-        Vec::new()
-    }
-
-    /// The prediction, from present values of the used regressors.
-    fn predict(&self, regressors: &[f64]) -> f64;
-
-    /// What its prediction is, where that is a [`LinearForm`] and nothing else, to the bit: the engine then sums those of several
-    /// estimators that read the same values at once, and does not ask each for its prediction.
-    fn linear(&self) -> Option<LinearForm<'_>> {
-        None
-    }
-
-    /// Whether it predicts from the regressors that are there, NaN standing for the others, while there is any.
-    fn takes_absent(&self) -> bool {
-        false
-    }
-
-    /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
-    /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
-    fn deviation(&self, _regressors: &[f64]) -> f64 {
-        f64::NAN
-    }
-
-    /// What it consists of, for people; none for one that says nothing of it.
-    fn coefficients(&self) -> Option<Coefficients> {
-        None
-    }
-
-    /// What goes on learning from here; none for one that stays as it was fitted.
-    fn learner(&self) -> Option<Box<dyn Learner>> {
-        None
-    }
-
-    /// The range of the used regressors in the fit, where it is known: outside, nothing is learned.
-    fn trained_range(&self) -> Option<&TrainedRange> {
-        None
-    }
 }

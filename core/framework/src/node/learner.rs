@@ -40,7 +40,6 @@ pub enum Learns {
 ///     value: f64,
 /// }
 ///
-/// #[typetag::serde(name = "start")]
 /// impl Predictor for Start {
 ///     fn uses(&self) -> &[String] {
 ///         &[]
@@ -54,6 +53,8 @@ pub enum Learns {
 ///         Some(Box::new(Last { value: self.value }))
 ///     }
 /// }
+///
+/// athermal_core::predictor!(Start, "start");
 ///
 /// #[derive(Debug, Clone, Serialize, Deserialize)]
 /// struct Last {

@@ -19,18 +19,20 @@ mod forms;
 mod learner;
 mod linear_form;
 mod port;
+mod predictor;
 mod reach;
 mod registry;
 mod state;
 mod training_error;
+mod written_name;
 
 pub use coefficients::{Coefficients, Factor, Mode, Noise, Of, Term};
 pub use combiner::{Combine, Combiner, Evidence, Votes};
 pub use encoder::Encoder;
 pub(crate) use encoder::FeatureFit;
 pub use estimator::{
-    CandidateScore, Estimator, OrderFigure, OrderTable, Predictor, Regressor, Regressors, Runs,
-    SelectionStep, Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
+    CandidateScore, Estimator, OrderFigure, OrderTable, Regressor, Regressors, Runs, SelectionStep,
+    Trained, Trainer, TrainingReport, TrainingSetup, TriedOrder, TruthLags,
 };
 pub use feature::{Feature, Operator, Outputs, Tick};
 pub use figure::{Figure, Figures};
@@ -39,6 +41,9 @@ pub use learner::{Learner, Learns, TrainedRange};
 pub use linear_form::LinearForm;
 pub(crate) use linear_form::Strands;
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
+#[doc(hidden)]
+pub use predictor::InModel;
+pub use predictor::Predictor;
 pub use reach::Reach;
 #[cfg(feature = "testkit")]
 pub(crate) use registry::as_toml;
@@ -49,3 +54,5 @@ pub use registry::{
 };
 pub use state::{Restored, State};
 pub use training_error::TrainingError;
+pub(crate) use written_name::taken_twice;
+pub use written_name::{Written, WrittenName, written_names};

@@ -56,15 +56,21 @@ impl Restored {
 
 /// Makes a serde struct the state of a node, under a name that ends in its version: `state!(Memory, "vote/1")`.
 ///
-/// The crate that uses it depends on `typetag`.
+/// All crates of a program share the names: begin one with that of the kind.
 #[macro_export]
 macro_rules! state {
     ($state:ty, $name:literal) => {
-        #[typetag::serde(name = $name)]
-        impl $crate::node::State for $state {
-            fn into_any(self: Box<Self>) -> Box<dyn std::any::Any> {
-                self
+        const _: () = {
+            use $crate::__private::typetag;
+
+            #[typetag::serde(name = $name)]
+            impl $crate::node::State for $state {
+                fn into_any(self: Box<Self>) -> Box<dyn std::any::Any> {
+                    self
+                }
             }
-        }
+        };
+
+        $crate::__written!(State, $name);
     };
 }

@@ -131,7 +131,6 @@ impl Trainer for Largest {
     }
 }
 
-#[typetag::serde(name = "sabotaged_share")]
 impl Predictor for Largest {
     fn uses(&self) -> &[String] {
         &self.uses
@@ -141,6 +140,8 @@ impl Predictor for Largest {
         f64::NAN
     }
 }
+
+athermal_core::predictor!(Largest, "sabotaged_share");
 
 struct Scaling {
     largest: f64,

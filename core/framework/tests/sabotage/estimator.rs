@@ -137,7 +137,6 @@ struct Fitted {
     unwritten: f64,
 }
 
-#[typetag::serde(name = "sabotaged_estimator")]
 impl Predictor for Fitted {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -171,6 +170,8 @@ impl Predictor for Fitted {
         })
     }
 }
+
+athermal_core::predictor!(Fitted, "sabotaged_estimator");
 
 /// Predicts the last truth, and says to predict the mean of the fit.
 #[derive(Debug, Clone, Serialize, Deserialize)]

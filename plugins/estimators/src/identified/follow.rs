@@ -47,7 +47,6 @@ pub(super) struct Identified {
     pub(super) beginnings: Vec<Beginning>,
 }
 
-#[typetag::serde(name = "identified")]
 impl Predictor for Identified {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -100,6 +99,8 @@ impl Predictor for Identified {
         Some(Box::new(Following::new(self)))
     }
 }
+
+athermal_core::predictor!(Identified, "identified");
 
 /// One of the interleaved series that a model is followed in.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -234,7 +234,6 @@ struct KalmanPredictor {
     every: Duration,
 }
 
-#[typetag::serde(name = "kalman")]
 impl Predictor for KalmanPredictor {
     fn uses(&self) -> &[String] {
         &self.regressors
@@ -275,6 +274,8 @@ impl Predictor for KalmanPredictor {
         Some(Box::new(self.following()))
     }
 }
+
+athermal_core::predictor!(KalmanPredictor, "kalman");
 
 impl KalmanPredictor {
     fn following(&self) -> Following {

@@ -56,7 +56,7 @@ impl Problem for CompileProblem {
     fn code(&self) -> &'static str {
         match self {
             Self::UnknownKind { .. } => "A040",
-            Self::KindTwice { .. } => "A041",
+            Self::KindTwice { .. } | Self::WrittenTwice { .. } => "A041",
             Self::UnknownNode { .. } | Self::RemovedNode { .. } => "A042",
             Self::UnknownPort { .. } => "A043",
             Self::UnknownChannel { .. } => "A044",
@@ -136,6 +136,7 @@ impl Problem for CompileProblem {
             | Self::NoOutputs => true,
             Self::UnknownKind { .. }
             | Self::KindTwice { .. }
+            | Self::WrittenTwice { .. }
             | Self::UnknownInput { .. }
             | Self::Parameter { .. } => false,
         }
@@ -150,6 +151,15 @@ impl Problem for CompileProblem {
                     names(packages)
                 )
             }
+            Self::WrittenTwice {
+                kind,
+                of,
+                name,
+                packages,
+            } => format!(
+                "`{kind}` cannot be used, since the name of the {of} `{name}` is taken twice, by {}",
+                names(packages)
+            ),
             Self::UnknownNode { node, .. } => format!("there is no node or signal `{node}`"),
             Self::RemovedNode { node } => {
                 format!("`{node}` is referred to, and `nodes.{node} = false` removes it")
@@ -304,7 +314,7 @@ impl Problem for CompileProblem {
     fn label(&self) -> String {
         match self {
             Self::UnknownKind { .. } => "no such type",
-            Self::KindTwice { .. } => "which of them?",
+            Self::KindTwice { .. } | Self::WrittenTwice { .. } => "which of them?",
             Self::UnknownNode { .. } => "not found",
             Self::RemovedNode { .. } => "removed",
             Self::UnknownPort { .. } => "no such port",
@@ -345,6 +355,9 @@ impl Problem for CompileProblem {
                 let what = "`athermal build --with CRATE` brings those of a plugin crate; types in this program:";
                 or_known(kind, known, what)
             }
+            Self::WrittenTwice { of, .. } => format!(
+                "give one of them another name in its `{of}!`, or leave one of the crates out when the program is built"
+            ),
             Self::KindTwice { .. } => {
                 "leave one of the crates out when the program is built".to_owned()
             }

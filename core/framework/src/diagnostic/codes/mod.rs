@@ -179,8 +179,9 @@ pub const CODES: &[Code] = &[
     ),
     code!(
         "A041",
-        "ambiguous node type",
-        "Two crates in this program bring a node of the same type, so that the graph could mean either."
+        "ambiguous name",
+        "Two crates in this program bring a node of the same type, or write what a node knows under the same name, so that a graph \
+         or a file could mean either."
     ),
     code!(
         "A042",

@@ -111,7 +111,6 @@ pub struct MyNodeFitted {
     slope: f64,
 }
 
-#[typetag::serde(name = "my_node")]
 impl Predictor for MyNodeFitted {
     fn uses(&self) -> &[String] {
         &self.uses
@@ -122,6 +121,8 @@ impl Predictor for MyNodeFitted {
         self.truth + self.slope * (feature - self.feature)
     }
 }
+
+athermal_core::predictor!(MyNodeFitted, "my_node");
 
 athermal_core::register!(MyNode, Estimator, "my_node");
 

@@ -1,0 +1,89 @@
+//! Decides under which names states and fitted predictors become known, and which names were taken twice; what stands under them
+//! in a file is decided by what is written.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::OnceLock;
+
+use serde::Serialize;
+
+/// A name under which something of a node is written into snapshots or models. All crates of a program share these names;
+/// [`state!`](crate::state) and [`predictor!`](crate::predictor) make them known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct WrittenName {
+    /// Of what it is the name.
+    #[serde(rename = "role")]
+    pub of: Written,
+    /// The name.
+    pub name: &'static str,
+    /// The crate that brings it.
+    pub package: &'static str,
+    /// The version of that crate.
+    pub version: &'static str,
+}
+
+/// What is written under a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Written {
+    /// See [`State`](super::State).
+    State,
+    /// See [`Predictor`](super::Predictor).
+    Predictor,
+}
+
+impl fmt::Display for Written {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::State => "state",
+            Self::Predictor => "predictor",
+        })
+    }
+}
+
+inventory::collect!(WrittenName);
+
+/// All these names that are linked into this program, in order; a name that was taken twice stands there twice.
+pub fn written_names() -> &'static [WrittenName] {
+    static NAMES: OnceLock<Vec<WrittenName>> = OnceLock::new();
+    NAMES.get_or_init(|| {
+        let mut names: Vec<_> = inventory::iter::<WrittenName>().copied().collect();
+        names.sort_unstable();
+        names
+    })
+}
+
+/// The first of a crate's names that is taken twice: what it names, the name and the crates that took it.
+pub(crate) fn taken_twice(package: &str) -> Option<(Written, &'static str, Vec<&'static str>)> {
+    type Takers = BTreeMap<(Written, &'static str), Vec<&'static str>>;
+    static TWICE: OnceLock<Takers> = OnceLock::new();
+    let twice = TWICE.get_or_init(|| {
+        let mut takers = Takers::new();
+        for known in written_names() {
+            let packages = takers.entry((known.of, known.name)).or_default();
+            packages.push(known.package);
+        }
+        takers.retain(|_, packages| packages.len() > 1);
+        takers
+    });
+    let of_package = |packages: &Vec<&str>| packages.contains(&package);
+    let mut found = twice.iter().filter(|(_, packages)| of_package(packages));
+    let (&(of, name), packages) = found.next()?;
+    Some((of, name, packages.clone()))
+}
+
+/// Makes a name known, with the crate that takes it.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __written {
+    ($of:ident, $name:literal) => {
+        $crate::inventory::submit! {
+            $crate::node::WrittenName {
+                of: $crate::node::Written::$of,
+                name: $name,
+                package: env!("CARGO_PKG_NAME"),
+                version: env!("CARGO_PKG_VERSION"),
+            }
+        }
+    };
+}
