@@ -170,6 +170,7 @@ impl Bank {
         self.learn(turn, nodes);
         if !self.predict(turn, nodes) {
             for member in self.members.iter().filter(|of| !of.whole) {
+                turn.at_hand.is(member.node);
                 turn.of(&mut nodes[member.node]);
             }
         }
@@ -185,6 +186,7 @@ impl Bank {
             } = &mut nodes[member.node]
                 && let Some(learning) = estimate.learning()
             {
+                turn.at_hand.is(member.node);
                 turn.learn(learning, member.slot);
                 if learning.has_changed()
                     && let Some(form) = estimate.form()
@@ -226,6 +228,7 @@ impl Bank {
             if member.learns
                 && let Some(learning) = nodes[member.node].learning()
             {
+                turn.at_hand.is(member.node);
                 learning.ran([at_once, others], now, gathered, !turn.frozen);
             }
             let prediction = member.constant + sums.sum(&member.coefficients, others);

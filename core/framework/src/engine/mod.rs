@@ -1,6 +1,7 @@
 //! Decides how a plan is stepped: what runs at a tick, in which order, and when truths are told; not where samples come
 //! from or go.
 
+mod at_hand;
 mod bank;
 mod blend;
 mod carry;
@@ -40,6 +41,7 @@ pub use revision::{Fnv1a, fnv_1a, revision};
 pub use sample_range::SampleRange;
 pub use state::{EngineState, RestoreError};
 
+pub(crate) use at_hand::AtHand;
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
@@ -174,6 +176,7 @@ impl Engine {
         self.slots.tick += 1;
         self.take_in(time, samples);
         let Self {
+            plan,
             slots,
             gathered,
             histories,
@@ -189,17 +192,25 @@ impl Engine {
             gathered,
             row,
             frozen: *frozen,
+            at_hand: AtHand::at(plan, time),
         };
         for work in work {
             match work {
                 Work::Step(Step::Gather(gather)) => {
                     turn.gathered[*gather].read(turn.slots, histories, time);
                 }
-                Work::Step(Step::Run(node)) => turn.of(&mut nodes[*node]),
-                Work::Step(Step::Capture(node)) => turn.capture(&mut nodes[*node]),
+                Work::Step(Step::Run(node)) => {
+                    turn.at_hand.is(*node);
+                    turn.of(&mut nodes[*node]);
+                }
+                Work::Step(Step::Capture(node)) => {
+                    turn.at_hand.is(*node);
+                    turn.capture(&mut nodes[*node]);
+                }
                 Work::Bank(bank) => bank.run(&mut turn, nodes),
             }
         }
+        drop(turn);
         self.remember(time);
         self.outlets.put_out(&self.slots, time);
         Ok(self.outlets.values())
@@ -272,7 +283,9 @@ impl Engine {
         if self.last == Instant::MIN {
             return;
         }
-        for node in &mut self.nodes {
+        let mut at_hand = AtHand::at(&self.plan, self.last);
+        for (nth, node) in self.nodes.iter_mut().enumerate() {
+            at_hand.is(nth);
             match node {
                 Running::Operator { operator, .. } => operator.segment(),
                 Running::Estimate { estimate, .. } => {
@@ -286,6 +299,7 @@ impl Engine {
                 Running::Vote(vote) => vote.segment(self.last),
             }
         }
+        drop(at_hand);
         self.slots.clear();
         self.gathered.iter_mut().for_each(Gathered::clear);
         self.histories.iter_mut().flatten().for_each(History::clear);

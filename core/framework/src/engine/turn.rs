@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::at_hand::AtHand;
 use super::estimate::Estimate;
 use super::gather::Gathered;
 use super::learning::Learning;
@@ -21,6 +22,7 @@ pub(super) struct Turn<'a> {
     pub(super) row: &'a mut [f64],
     /// Whether learning has been frozen on command.
     pub(super) frozen: bool,
+    pub(super) at_hand: AtHand<'a>,
 }
 
 impl Turn<'_> {
@@ -140,6 +142,7 @@ impl Turn<'_> {
             gathered,
             row,
             frozen,
+            ..
         } = self;
         let (now, on) = (*now, !*frozen);
         if trigger.is_some_and(|gather| !gathered[gather].fresh) {

@@ -1,5 +1,6 @@
 //! Decides how collected examples become a fitted estimator.
 
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::FitOptions;
@@ -8,6 +9,7 @@ use super::doubt::{Lacking, Truths, tell_constant};
 use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedRole};
+use crate::engine::AtHand;
 use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
 use crate::time::Instant;
 
@@ -285,6 +287,7 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
                 return made;
             }
             let trainee = &collector.trainees[index];
+            let _at_hand = AtHand::in_fit(plan, trainee.node);
             // The whole memory, or how folds are cut would depend on the number of threads.
             let mut making = begin(plan, trainee, options.memory, Vec::new());
             collector.replay(index, &mut making);
@@ -305,10 +308,10 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
             let handles: Vec<_> = (0..threads).map(|_| scope.spawn(|_| work())).collect();
             handles
                 .into_iter()
-                .flat_map(|handle| handle.join().expect("training does not panic"))
+                .flat_map(|handle| handle.join().unwrap_or_else(|panic| resume_unwind(panic)))
                 .collect::<Vec<_>>()
         })
-        .expect("training does not panic")
+        .expect("each thread has been joined")
     };
     made.sort_by_key(|&(index, _)| index);
     made.into_iter().map(|(_, made)| made).collect()
