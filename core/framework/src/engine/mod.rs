@@ -337,24 +337,36 @@ impl Engine {
     }
 
     /// Whether a slot was given something at the present tick, be it nothing.
+    ///
+    /// # Panics
+    /// Where the plan has no such slot: there is one for each of [`Plan::channels`].
     #[must_use]
     pub fn ran(&self, slot: usize) -> bool {
         self.slots.ran(slot)
     }
 
     /// The value that a slot was given at the present tick; NaN where its node did not run or gave nothing.
+    ///
+    /// # Panics
+    /// Where the plan has no such slot.
     #[must_use]
     pub fn value(&self, slot: usize) -> f64 {
         self.slots.now(slot)
     }
 
     /// The stamp of a slot's last value.
+    ///
+    /// # Panics
+    /// Where the plan has no such slot.
     #[must_use]
     pub fn stamp(&self, slot: usize) -> Instant {
         self.slots.given[slot].stamp
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.
+    ///
+    /// # Panics
+    /// Where the plan has no such gather.
     #[must_use]
     pub fn gathered(&self, gather: usize) -> (&[f64], bool) {
         (&self.gathered[gather].values, self.gathered[gather].fresh)

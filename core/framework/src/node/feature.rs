@@ -165,13 +165,20 @@ pub struct Tick<'a> {
 }
 
 impl<'a> Tick<'a> {
-    /// The values of an input port in channel order; NaN where there is none.
+    /// The values of an input port in channel order; NaN where there is none. Ports count from 0 as the kind declares them, those
+    /// left out included, the truth not.
+    ///
+    /// # Panics
+    /// Where the kind declares no such port.
     #[must_use]
     pub fn port(&self, index: usize) -> &'a [f64] {
         &self.gathered[self.ports[index]].values
     }
 
     /// The stamps of the values of an input port; of no meaning where there is no value.
+    ///
+    /// # Panics
+    /// Where the kind declares no such port.
     #[must_use]
     pub fn stamps(&self, index: usize) -> &'a [Instant] {
         &self.gathered[self.ports[index]].stamps
@@ -189,17 +196,26 @@ pub struct Outputs<'a> {
 
 impl Outputs<'_> {
     /// Gives a value, or NaN for "ran, and has nothing". The stamp is the oldest among the inputs' present values.
+    ///
+    /// # Panics
+    /// Where the node has no such output channel: [`len`](Self::len) says how many it has.
     pub fn set(&mut self, index: usize, value: f64) {
         self.set_stamped(index, value, self.default_stamp);
     }
 
     /// Gives a value with a stamp of its own, such as a window's newest sample. What is infinite is no value.
+    ///
+    /// # Panics
+    /// Where the node has no such output channel.
     pub fn set_stamped(&mut self, index: usize, value: f64, stamp: Instant) {
         self.values[index] = unless_infinite(value);
         self.given[index] = self.given_now(stamp);
     }
 
     /// Gives values with one stamp to channels side by side: the answer is to be filled with them, none of them infinite.
+    ///
+    /// # Panics
+    /// Where the range ends beyond the node's output channels.
     pub fn fill_stamped(&mut self, range: Range<usize>, stamp: Instant) -> &mut [f64] {
         let given = self.given_now(stamp);
         self.given[range.clone()].fill(given);
