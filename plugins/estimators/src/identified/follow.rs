@@ -24,6 +24,8 @@ pub(super) const UNSEEN: usize = 10;
 pub(super) const MOST_STEPS: i64 = 10_000;
 /// How many runs within a step are kept.
 const RUNS_PER_STEP: i64 = 16;
+/// For how many runs room is made at most, however far ahead is predicted.
+const MOST_RUNS: f64 = 4_096.0;
 
 /// A model as it was identified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -234,6 +236,16 @@ impl Known {
         self.begun = true;
     }
 
+    /// Makes room for the runs that are kept where truths are missing, of which the next may be told so long after its run.
+    fn make_room(&mut self, after: Duration) {
+        let steps = after.secs() / self.step.secs() + 2.0;
+        let runs = (RUNS_PER_STEP as f64 * steps).min(MOST_RUNS) as usize;
+        self.runs.reserve(runs.saturating_sub(self.runs.len()));
+        let inputs = runs * self.regressors.len();
+        self.inputs
+            .reserve(inputs.saturating_sub(self.inputs.len()));
+    }
+
     /// The inputs of the last run that predicted this instant or one before; those of `row` where there was none.
     fn inputs_at<'a>(&'a self, at: Instant, row: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
         let count = self.runs.partition_point(|&of| of <= at);
@@ -325,6 +337,7 @@ impl Learner for Following {
         }
         if !known.begun {
             known.begin(regressors, of, &self.beginnings);
+            known.make_room(of - told);
         }
         // A truth that has not been told by now never will be.
         for nth in 0..known.series.len() {
