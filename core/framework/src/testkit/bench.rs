@@ -113,7 +113,8 @@ impl Bench {
     /// Steps through rows: times in s, and the samples of all ports, in the order in which the kind declares them; NaN for none.
     ///
     /// # Panics
-    /// Where the graph is refused, with what a user would be told; where times do not rise, or a row is too short or long.
+    /// Where the graph is refused, with what a user would be told; where times do not rise or are none, or a row is too short or
+    /// long.
     pub fn feed<S: AsRef<[f64]>>(&mut self, rows: impl IntoIterator<Item = (f64, S)>) -> &mut Self {
         for (seconds, samples) in rows {
             let (fixture, engine) = self.running();
@@ -144,8 +145,13 @@ impl Bench {
     /// Where there is no such channel; it says which there are.
     #[must_use]
     pub fn output(&self, name: &str) -> Vec<f64> {
-        let Some((fixture, _)) = &self.running else {
-            return Vec::new();
+        let made;
+        let fixture = match &self.running {
+            Some((fixture, _)) => fixture,
+            None => {
+                made = self.fixture();
+                &made
+            }
         };
         let names: Vec<&str> = fixture
             .slots()
@@ -158,16 +164,26 @@ impl Bench {
 
     /// The engine with its graph, made where there is none yet.
     fn running(&mut self) -> &mut (Fixture, Engine) {
-        self.running.get_or_insert_with(|| {
-            let given = self.case.given(self.kind);
-            let fixture = Fixture::new(self.kind, &self.parameters, &given)
-                .unwrap_or_else(|told| panic!("{told}"));
+        if self.running.is_none() {
+            let fixture = self.fixture();
             let engine = fixture.engine(&self.fitted);
-            (fixture, engine)
-        })
+            self.running = Some((fixture, engine));
+        }
+        self.running.as_mut().expect("it has just been made")
+    }
+
+    fn fixture(&self) -> Fixture {
+        let given = self.case.given(self.kind);
+        Fixture::new(self.kind, &self.parameters, &given).unwrap_or_else(|told| panic!("{told}"))
     }
 }
 
 fn at(seconds: f64) -> Instant {
-    Instant::from_ns((seconds * 1e9).round() as i64)
+    let ns = (seconds * 1e9).round();
+    // Written so that NaN fails.
+    assert!(
+        ns.abs() < i64::MAX as f64,
+        "{seconds} is no time: a row begins with one in seconds, less than 9.2e9"
+    );
+    Instant::from_ns(ns as i64)
 }

@@ -73,15 +73,21 @@ inventory::collect!(Examined);
 /// `conformance!(Slope, Case::new(r#"windows = ["1min"]"#));`
 #[macro_export]
 macro_rules! conformance {
-    ($node:ident, $($case:expr),+ $(,)?) => {
+    (@ $node:ty, $first:ident :: $($rest:ident)::+, $($case:expr),+) => {
+        $crate::conformance!(@ $node, $($rest)::+, $($case),+);
+    };
+    (@ $node:ty, $name:ident, $($case:expr),+) => {
         #[test]
         #[allow(non_snake_case)]
-        fn $node() {
+        fn $name() {
             $crate::testkit::assert_conforms::<$node>(&[$($case),+]);
         }
 
         $crate::inventory::submit! {
             $crate::testkit::Examined { kind: <$node as $crate::node::NodeSpec>::kind_name }
         }
+    };
+    ($($node:ident)::+, $($case:expr),+ $(,)?) => {
+        $crate::conformance!(@ $($node)::+, $($node)::+, $($case),+);
     };
 }
