@@ -42,6 +42,10 @@ use crate::time::{Duration, Instant};
 ///         Reach::Own
 ///     }
 ///
+///     fn is_endless(&self) -> bool {
+///         true // the value before may be of any time
+///     }
+///
 ///     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
 ///         Box::new(Differencing { last: vec![f64::NAN; inputs.port("signal").len()] })
 ///     }

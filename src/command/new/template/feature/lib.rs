@@ -36,6 +36,11 @@ impl Feature for MyNode {
         }])
     }
 
+    fn is_endless(&self) -> bool {
+        // So many samples reach back as long as they please. A window in time would be the `span` of the channels instead.
+        true
+    }
+
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let room = || VecDeque::with_capacity(self.samples + 1);
         Box::new(Averaging {
