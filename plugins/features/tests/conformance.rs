@@ -37,6 +37,10 @@ conformance!(
         time_constants = ["1min", "3min"]
         span = "15min"
         "#
+    )
+    .except(
+        Rule::Past,
+        "`span` says how far back it is to count, beyond which a share of 0.7 % is left"
     ),
 );
 
@@ -107,7 +111,12 @@ conformance!(
 
 conformance!(
     Hampel,
-    Case::new(r#"window = "5min""#).input("signal", 2, "Cel"),
+    Case::new(r#"window = "5min""#)
+        .input("signal", 2, "Cel")
+        .except(
+            Rule::Past,
+            "the verdict on a sample is of its instant, though it rests on the window"
+        ),
     Case::new(
         r#"
         window = "2min"
@@ -122,7 +131,12 @@ conformance!(
 conformance!(
     MinimumDifference,
     Case::new(r#"difference = "5 mK""#).input("signal", 2, "Cel"),
-    Case::new(r#"difference = "0.2 um""#).input("signal", 1, "nm"),
+    Case::new(r#"difference = "0.2 um""#)
+        .input("signal", 1, "nm")
+        .except(
+            Rule::Past,
+            "within `difference` of the sample, which is all of the range here, it is that of any time before"
+        ),
 );
 
 conformance!(

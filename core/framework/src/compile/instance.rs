@@ -253,9 +253,31 @@ impl Declared<'_> {
 
     /// The place of what a kind points at: an input or a parameter.
     pub(crate) fn place_of(&self, mistake: &Mistake) -> Place {
+        #[cfg(feature = "testkit")]
+        assert!(
+            self.has(&mistake.at),
+            "it finds a mistake at `{}`, which is none of its parameters and ports: {}",
+            mistake.at,
+            mistake.message
+        );
         match mistake.at.strip_prefix("inputs.") {
             Some(port) => self.input_place(port),
             None => self.parameter_place(&mistake.at),
+        }
+    }
+
+    /// Whether a kind that points at this points at something of its own.
+    #[cfg(feature = "testkit")]
+    fn has(&self, at: &str) -> bool {
+        match at.split_once('.') {
+            None if at.is_empty() => true,
+            Some(("inputs", port)) => (self.kind.inputs)().iter().any(|own| own.name == port),
+            way => {
+                let first = way.map_or(at, |(first, _)| first);
+                let schema = serde_json::Value::from((self.kind.schema)());
+                !schema["properties"][first].is_null()
+                    || self.kind.framework_keys().contains(&first)
+            }
         }
     }
 

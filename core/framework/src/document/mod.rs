@@ -17,6 +17,8 @@ mod toml_text;
 mod tree;
 
 pub use declare::declare;
+#[cfg(feature = "testkit")]
+pub(crate) use declare::is_name;
 pub(crate) use declare::{TIME_UNITS, is_misspelt, known_keys};
 pub use decode::{Decoded, decode};
 pub(crate) use decode::{LeftOut, Wanted, decode_rest};

@@ -1,6 +1,16 @@
-//! Decides how a node is asked for answers that nobody wants, to find out whether asking changes it.
+//! Decides how a node is asked for answers that nobody wants, to find out what they are and whether asking changes it.
 
 use super::{Engine, Running};
+
+/// What a combiner makes of votes.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) combined: f64,
+    /// NaN for each vote where it does not weigh.
+    pub(crate) weights: Vec<f64>,
+    /// Both ends, NaN where there is none.
+    pub(crate) interval: [f64; 2],
+}
 
 impl Engine {
     /// Asks every estimator and combiner for answers to values that `value` draws.
@@ -15,9 +25,22 @@ impl Engine {
                 }
                 Running::Vote(vote) => {
                     let votes = self.gathered[vote.wires.voters].values.iter();
-                    vote.ask_idly(votes.map(|_| value()).collect());
+                    let mut votes: Vec<f64> = votes.map(|_| value()).collect();
+                    vote.answer(&votes);
+                    if let Some(first) = votes.first_mut() {
+                        *first = f64::NAN;
+                    }
+                    vote.answer(&votes);
                 }
             }
         }
+    }
+
+    /// What the only combiner would make of votes; none where there is no combiner.
+    pub(crate) fn answer(&self, votes: &[f64]) -> Option<Answer> {
+        self.nodes.iter().find_map(|node| match node {
+            Running::Vote(vote) => Some(vote.answer(votes)),
+            Running::Operator { .. } | Running::Estimate { .. } => None,
+        })
     }
 }

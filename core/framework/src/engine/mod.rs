@@ -45,6 +45,8 @@ pub(crate) use at_hand::AtHand;
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
+#[cfg(feature = "testkit")]
+pub(crate) use idle::Answer;
 pub(crate) use slots::{Given, Slots};
 
 use crate::channel::Extremes;

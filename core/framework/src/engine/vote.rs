@@ -1,6 +1,8 @@
 //! Decides when a combiner is told of a truth; not what it makes of it.
 
 use super::gather::Gathered;
+#[cfg(feature = "testkit")]
+use super::idle::Answer;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::channel::unless_infinite;
@@ -131,17 +133,16 @@ impl Vote {
         }
     }
 
-    /// Asks for the answer to any votes, all of them and all but the first.
+    /// The answer to any votes.
     #[cfg(feature = "testkit")]
-    pub(crate) fn ask_idly(&self, mut votes: Vec<f64>) {
-        self.combine.combine(Votes(&votes));
-        self.combine.interval(Votes(&votes));
-        self.combine
-            .weights(Votes(&votes), &mut vec![f64::NAN; votes.len()]);
-        if let Some(first) = votes.first_mut() {
-            *first = f64::NAN;
+    pub(crate) fn answer(&self, votes: &[f64]) -> Answer {
+        let mut weights = vec![f64::NAN; votes.len()];
+        self.combine.weights(Votes(votes), &mut weights);
+        Answer {
+            combined: self.combine.combine(Votes(votes)),
+            weights,
+            interval: self.combine.interval(Votes(votes)),
         }
-        self.combine.combine(Votes(&votes));
     }
 
     /// The truth to look at after all outputs, if any.

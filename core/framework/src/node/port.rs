@@ -118,13 +118,23 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// The channels of a port; none where the port has been left out.
+    /// The channels of a port; none where the port has been left out, or the kind declares no such port.
+    ///
+    /// # Panics
+    /// With the feature `testkit`, where the kind declares no such port.
     #[must_use]
     pub fn port(&self, name: &str) -> &[Channel] {
-        self.ports
-            .iter()
-            .find(|(port, _)| port.name == name)
-            .map_or(&[], |(_, channels)| channels)
+        let found = self.ports.iter().find(|(port, _)| port.name == name);
+        #[cfg(feature = "testkit")]
+        assert!(
+            found.is_some(),
+            "it asks for the input port `{name}`, and declares {:?}",
+            self.ports
+                .iter()
+                .map(|(port, _)| port.name)
+                .collect::<Vec<_>>()
+        );
+        found.map_or(&[], |(_, channels)| channels)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Decides what of a run is compared, and how a difference is told.
 
 use super::fixture::Fixture;
+use crate::channel::is_cold;
 use crate::engine::Engine;
 use crate::recording::Event;
 use crate::time::Instant;
@@ -12,7 +13,7 @@ pub(super) struct Course {
 }
 
 /// What a slot was given at a tick; none where the node did not run.
-type Given = Option<(f64, Instant)>;
+pub(super) type Given = Option<(f64, Instant)>;
 
 impl Course {
     /// Writes down what the engine's last tick gave.
@@ -29,6 +30,13 @@ impl Course {
         self.ticks
             .iter()
             .map(move |(_, slots)| slots[number].map_or(f64::NAN, |(value, _)| value))
+    }
+
+    /// What a slot of the node was given, tick by tick.
+    pub(super) fn given(&self, number: usize) -> impl Iterator<Item = (Instant, Given)> + '_ {
+        self.ticks
+            .iter()
+            .map(move |(now, slots)| (*now, slots[number]))
     }
 
     /// The instants of the ticks.
@@ -74,7 +82,12 @@ fn alike(one: Given, two: Given) -> bool {
     match (one, two) {
         (None, None) => true,
         (Some((one, at_one)), Some((two, at_two))) => {
-            one.to_bits() == two.to_bits() && (one.is_nan() || at_one == at_two)
+            if one.is_nan() {
+                // Of what is said by the payload of a NaN, this alone counts.
+                two.is_nan() && is_cold(one) == is_cold(two)
+            } else {
+                one.to_bits() == two.to_bits() && at_one == at_two
+            }
         }
         _ => false,
     }
@@ -83,6 +96,7 @@ fn alike(one: Given, two: Given) -> bool {
 fn told(given: Given) -> String {
     match given {
         None => "not given".to_owned(),
+        Some((value, _)) if is_cold(value) => "absent (`COLD`)".to_owned(),
         Some((value, _)) if value.is_nan() => "absent".to_owned(),
         Some((value, stamp)) => format!("{value:?} (of {stamp} s)"),
     }

@@ -7,12 +7,14 @@ use std::fmt;
 pub enum Rule {
     /// The kind, its ports and its parameters are explained, and bare numbers have no unit hidden in their names.
     Explained,
+    /// The kind, its states and its predictors have names that no other has, and its ports and channels such as a reference can name.
+    Names,
     /// A case compiles, and something comes out of the node in it.
     Answers,
     /// The parameters written out and read back are the same.
     ReadsBack,
     /// A parameter out of the range that its schema states is refused by its name, as is one that is no number; all that the
-    /// schema allows is taken.
+    /// schema allows is taken and runs.
     Ranges,
     /// The same samples give the same bits, again and on another thread.
     Deterministic,
@@ -26,12 +28,18 @@ pub enum Rule {
     Absence,
     /// Huge and infinite samples do no harm that outlasts them, and nothing infinite comes out.
     Infinity,
+    /// A value is made of the channels that `reach` names, as far back as its span, and of nothing yet to come.
+    Past,
     /// A new segment starts afresh, at whatever time it begins.
     Segments,
     /// The same samples in other units give the same outputs in theirs.
     Units,
     /// Once warm, a tick allocates nothing.
     Allocation,
+    /// A combiner takes no absent vote for zero, and its answer is the sum of the votes by its weights where it weighs.
+    Votes,
+    /// A deviation is not negative, and an interval stands about the prediction.
+    Uncertainty,
     /// An answer that is asked for leaves no trace.
     NoTrace,
     /// A fit is the same with any number of threads; data that allow none are an error in words.
@@ -50,6 +58,7 @@ impl Rule {
     pub fn name(self) -> &'static str {
         match self {
             Self::Explained => "explained",
+            Self::Names => "names",
             Self::Answers => "answers",
             Self::ReadsBack => "reads back",
             Self::Ranges => "ranges",
@@ -59,9 +68,12 @@ impl Rule {
             Self::Versions => "versions",
             Self::Absence => "absence",
             Self::Infinity => "infinity",
+            Self::Past => "past",
             Self::Segments => "segments",
             Self::Units => "units",
             Self::Allocation => "allocation",
+            Self::Votes => "votes",
+            Self::Uncertainty => "uncertainty",
             Self::NoTrace => "no trace",
             Self::Fits => "fits",
             Self::Models => "models",
@@ -78,6 +90,10 @@ impl Rule {
                 "write a doc comment of a sentence or more; it is what `athermal nodes KIND` prints. Give times as `Duration` \
                  and sizes as `Quantity`, so that the unit stands in the graph file"
             }
+            Self::Names => {
+                "take another name, and begin those of states and predictors with that of the kind: all crates of a program share them. \
+                 Ports and kinds are a letter, then letters, digits, `_` and `-`"
+            }
             Self::Answers => {
                 "give the case what a graph file needs too, such as `ahead = \"5min\"` in `Case::new`, and inputs with which the node has \
                  something to say (`Case::input`, `Case::between`)"
@@ -87,8 +103,8 @@ impl Rule {
             }
             Self::Ranges => {
                 "say the range in the schema (`#[schemars(range(min = 0.0, max = 1.0))]`, or `#[schemars(extend(\"exclusiveMinimum\" \
-                 = 0.0))]`), and refuse everything outside with a `Mistake::at(\"name\", …)`, written so that NaN fails: \
-                 `!(0.0..=1.0).contains(&x)`"
+                 = 0.0))]`), refuse everything outside with a `Mistake::at(\"name\", …)`, written so that NaN fails: \
+                 `!(0.0..=1.0).contains(&x)`, and run with everything inside"
             }
             Self::Deterministic => {
                 "take no time, no random number without a seed, no order of a hash map and no address into account"
@@ -110,6 +126,10 @@ impl Rule {
             Self::Infinity => {
                 "give NaN where a result is not finite, and keep no such value: begin again where `!value.is_finite()`"
             }
+            Self::Past => {
+                "state in `outputs` the span that a value summarises, or `is_endless` where it depends on all of the past; name in `reach` \
+                 all that a channel is made of; give no stamp that is later than `tick.now`"
+            }
             Self::Segments => {
                 "clear in `segment` all that `step` has gathered, the last instant included; what was learned may stay"
             }
@@ -120,12 +140,21 @@ impl Rule {
             Self::Allocation => {
                 "make room in `build` and `restore` (`vec![…; n]`, `reserve`), and use it again at every tick"
             }
+            Self::Votes => {
+                "combine `Votes::present` alone, and let `weights` be NaN for a vote that is not there and, for the others, the factors \
+                 of which `combine` is the sum"
+            }
+            Self::Uncertainty => {
+                "give NaN where no deviation or interval is known; else a deviation of 0 or more, and the lower end before the upper, \
+                 with the combination between them"
+            }
             Self::NoTrace => {
                 "let `predict` and `combine` change nothing, not even behind a `Cell`, that later answers depend on"
             }
             Self::Fits => {
                 "in `Trainer::finish`, answer `TrainingError` where there are too few rows or no solution, and start random numbers \
-                 from a seed; a feature that is fitted has an `Encoder`, a port `truth`, and nothing to say without a fit"
+                 from a seed; let `Predictor::uses` name regressors of `TrainingSetup`; a feature that is fitted has an `Encoder`, a \
+                 port `truth`, and nothing to say without a fit"
             }
             Self::Models => {
                 "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \

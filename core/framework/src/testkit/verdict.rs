@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use super::rules::{self, Subject};
-use super::tried::tried;
+use super::tried::{PANICS, tried};
 use super::{Case, Examined, Rule};
-use crate::node::{Kind, NodeSpec, kinds};
+use crate::node::{Kind, NodeSpec, kind, kinds};
 
 /// A rule that a kind breaks.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,7 +25,12 @@ impl fmt::Display for Broken {
         if let Some(case) = &self.case {
             writeln!(f, "  in the case: {}", indented(case))?;
         }
-        write!(f, "  to do: {}", self.rule.advice())
+        let advice = if self.found.starts_with(PANICS) {
+            "a node answers with absence or a `Mistake` where it cannot go on, and never panics; `RUST_BACKTRACE=1` shows where it does"
+        } else {
+            self.rule.advice()
+        };
+        write!(f, "  to do: {advice}")
     }
 }
 
@@ -37,20 +42,33 @@ fn indented(text: &str) -> String {
 #[must_use]
 pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
     let name = T::kind_name();
-    let same = kinds().get(name).map_or(&[][..], Vec::as_slice);
-    let [kind] = same else {
-        let packages: Vec<_> = same.iter().map(|kind| kind.package).collect();
-        let found = format!("`{name}` is registered by {packages:?}, and has to be by one crate");
-        return vec![broken_in(Rule::Explained, None, found)];
-    };
+    let kind = kind(name).expect("a type with a specification is registered");
+    let shared = rules::shared(kind);
+    if !shared.is_empty() {
+        // No graph with it can be compiled.
+        let told = shared.into_iter();
+        return told
+            .map(|found| broken_in(Rule::Names, None, found))
+            .collect();
+    }
     let mut broken: Vec<Broken> = rules::explained(kind)
         .into_iter()
         .map(|found| broken_in(Rule::Explained, None, found))
         .collect();
+    if cases.is_empty() {
+        broken.push(broken_in(
+            Rule::Answers,
+            None,
+            "there is no case to try it in".to_owned(),
+        ));
+    }
     let mut subjects = Vec::new();
     for case in cases {
         match tried(|| Subject::new(kind, case)) {
-            Ok(subject) => subjects.push(subject),
+            Ok(subject) => match subject.belongs() {
+                Ok(()) => subjects.push(subject),
+                Err(found) => broken.push(broken_in(Rule::Fits, Some(case), found)),
+            },
             Err(found) => broken.push(broken_in(Rule::Answers, Some(case), found)),
         }
     }

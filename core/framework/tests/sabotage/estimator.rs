@@ -11,7 +11,7 @@ use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{breaks, breaks_only};
+use super::{breaks, breaks_only, finds};
 
 /// Predicts the mean of the truths, or the quotient of it and the mean of the first feature times that feature.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -41,6 +41,10 @@ enum Fault {
     Misstated,
     /// Says so once it goes on learning.
     Mislearnt,
+    /// Is surer than sure.
+    Negative,
+    /// Predicts from what it was not given.
+    UsesOther,
 }
 
 impl Estimator for Ratio {
@@ -58,6 +62,10 @@ impl Estimator for Ratio {
             feature_lags: vec![Duration::ZERO],
             ..Regressors::default()
         }
+    }
+
+    fn deviates(&self) -> bool {
+        self.fault == Fault::Negative
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
@@ -95,7 +103,7 @@ impl Trainer for Averaging {
             .map_or(0.0, |first| self.spread.max((truth - first).abs()));
     }
 
-    fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+    fn finish(mut self: Box<Self>) -> Result<Trained, TrainingError> {
         static FITS: AtomicU64 = AtomicU64::new(0);
         assert!(self.fault != Fault::Panics || self.rows >= 10, "ten rows");
         if self.rows == 0 {
@@ -110,6 +118,9 @@ impl Trainer for Averaging {
         }
         let written = self.fault != Fault::Unwritten;
         let width = self.regressors.len();
+        if self.fault == Fault::UsesOther {
+            self.regressors[0].push('!');
+        }
         let fitted = Fitted {
             regressors: self.regressors,
             means: vec![if written { mean } else { 0.0 }],
@@ -151,6 +162,10 @@ impl Predictor for Fitted {
 
     fn predict(&self, _regressors: &[f64]) -> f64 {
         self.means[0] + self.unwritten
+    }
+
+    fn deviation(&self, _regressors: &[f64]) -> f64 {
+        -self.means[0].abs()
     }
 
     fn linear(&self) -> Option<LinearForm<'_>> {
@@ -246,6 +261,27 @@ fn a_model_that_was_edited_is_not_trusted() {
         with("trusting"),
         Rule::Edited,
         "with the last dropped of /fitted/node/means, it panics: index out of bounds",
+    );
+}
+
+#[test]
+fn a_deviation_is_not_negative() {
+    breaks_only::<Ratio>(with("negative"), &[Rule::Uncertainty]);
+    finds::<Ratio>(
+        with("negative"),
+        Rule::Uncertainty,
+        "`node:deviation.a` is -0.8019520665777313 at 8.189 s",
+    );
+}
+
+#[test]
+fn what_a_predictor_uses_is_among_what_it_was_given() {
+    breaks_only::<Ratio>(with("uses_other"), &[Rule::Fits]);
+    finds::<Ratio>(
+        with("uses_other"),
+        Rule::Fits,
+        "the fit of `node` uses `features.a!`, which the node does not have (it has features.a, features.b, features.c): fit the \
+         graph again",
     );
 }
 

@@ -6,15 +6,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use athermal_core::channel::ABSENT;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
+    Tick,
 };
-use athermal_core::testkit::{Case, Rule};
-use athermal_core::time::Instant;
+use athermal_core::testkit::{Bench, Case, Rule};
+use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{breaks, breaks_only};
+use super::{breaks, breaks_only, finds};
 
 /// The mean of each channel since the beginning of the segment.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -62,8 +63,22 @@ enum Fault {
     WrongUnit,
     /// Keeps a list of all it has seen.
     Hoards,
+    /// Allocates at a gap.
+    HoardsGaps,
     /// Panics at a gap.
     Panics,
+    /// Says to have no past.
+    ForgetsSpan,
+    /// Says that each channel goes its own way, which does not.
+    Mixes,
+    /// Bears a time that is yet to come.
+    Early,
+    /// Writes NaN in a way of its own.
+    OwnNan,
+    /// Asks for a port that it does not declare.
+    AsksElsewhere,
+    /// Points at a parameter that it does not have.
+    PointsElsewhere,
 }
 
 impl Feature for Averages {
@@ -78,10 +93,24 @@ impl Feature for Averages {
                 channel.unit = Unit::kelvin();
             }
         }
+        if self.fault == Fault::AsksElsewhere {
+            channels.extend_from_slice(inputs.port("sginal"));
+        }
+        if self.fault == Fault::PointsElsewhere {
+            return Err(vec![Mistake::at("no.such.parameter", "it is too long")]);
+        }
         Ok(vec![OutputPort {
             name: "mean",
             channels,
         }])
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
+    }
+
+    fn is_endless(&self) -> bool {
+        self.fault != Fault::ForgetsSpan
     }
 
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
@@ -133,6 +162,9 @@ impl Operator for Averaging {
             !(gap && self.fault == Fault::Panics),
             "there is nothing to average"
         );
+        if gap && self.fault == Fault::HoardsGaps {
+            self.seen.push(0.0);
+        }
         for (i, &value) in tick.port(0).iter().enumerate() {
             let value = match self.fault {
                 Fault::ZeroForAbsent if value.is_nan() => 0.0,
@@ -140,6 +172,10 @@ impl Operator for Averaging {
                 _ => value,
             };
             if value.is_nan() && self.fault != Fault::ZeroForAbsent {
+                if self.fault == Fault::OwnNan {
+                    let own = f64::NAN.to_bits() + self.instance + 1;
+                    outputs.set(i, f64::from_bits(own));
+                }
                 continue;
             }
             let mut mean = self.mean(i, value);
@@ -151,9 +187,13 @@ impl Operator for Averaging {
                         KNOWN.with_borrow_mut(|known| *known.entry((tick.now, i)).or_insert(mean));
                 }
                 Fault::Hoards => self.seen.push(value),
+                Fault::Mixes => mean += 0.1 * tick.port(0).iter().copied().fold(value, f64::max),
                 _ => {}
             }
-            if self.fault == Fault::Infinite && value > 1e200 {
+            if self.fault == Fault::Early {
+                let early = tick.now + Duration::from_ns(1_000_000_000);
+                outputs.set_stamped(i, mean, early);
+            } else if self.fault == Fault::Infinite && value > 1e200 {
                 outputs.fill_stamped(i..i + 1, tick.now)[0] = f64::INFINITY;
             } else {
                 outputs.set(i, mean);
@@ -263,13 +303,11 @@ fn a_state_of_another_version_kind_or_shape_is_not_taken() {
     breaks_only::<Averages>(with("takes_any_state"), &[Rule::Versions]);
     breaks::<Averages>(with("takes_any_state"), Rule::Versions, "another kind");
     breaks::<Averages>(with("unversioned"), Rule::Versions, "without a version");
-    let cases = [
+    finds::<Averages>(
         with("takes_any_shape"),
-        with("takes_any_shape").input("signal", 1, "nm"),
-    ];
-    let broken = athermal_core::testkit::broken::<Averages>(&cases);
-    let told = broken.iter().find(|broken| broken.rule == Rule::Versions);
-    assert!(told.unwrap().found.contains("panics"), "{broken:#?}");
+        Rule::Versions,
+        "it panics: index out of bounds: the len is 1 but the index is 1",
+    );
 }
 
 #[test]
@@ -311,6 +349,75 @@ fn other_units_of_the_inputs_change_nothing() {
 fn room_is_made_before_the_steady_state() {
     breaks_only::<Averages>(with("hoards"), &[Rule::Allocation]);
     breaks::<Averages>(with("hoards"), Rule::Allocation, "allocations");
+    breaks_only::<Averages>(with("hoards_gaps"), &[Rule::Allocation]);
+    breaks::<Averages>(with("hoards_gaps"), Rule::Allocation, "allocations");
+}
+
+#[test]
+fn a_value_is_made_of_what_its_kind_says() {
+    for fault in ["forgets_span", "mixes", "early"] {
+        breaks_only::<Averages>(with(fault), &[Rule::Past]);
+    }
+    finds::<Averages>(
+        with("forgets_span"),
+        Rule::Past,
+        "`node.a` is 1.9301235261335568 rather than -1.2125982615786046 at 2988.678 s with other values up to 2982.012 s, further \
+         back than the span of the channel",
+    );
+    finds::<Averages>(
+        with("mixes"),
+        Rule::Past,
+        "`node.b` is -49.53336295739379 rather than -38.97996201957864 at 13.428 s with other values of `signal.a`, of which \
+         `reach` says that it is not made",
+    );
+    finds::<Averages>(
+        with("early"),
+        Rule::Past,
+        "`node.a` bears the time 14.428 s at 13.428 s already",
+    );
+}
+
+#[test]
+fn a_nan_is_a_nan_however_it_is_written() {
+    breaks_only::<Averages>(with("own_nan"), &[]);
+}
+
+#[test]
+fn a_name_that_the_kind_does_not_declare_is_told() {
+    finds::<Averages>(
+        with("asks_elsewhere"),
+        Rule::Answers,
+        "it panics: it asks for the input port `sginal`, and declares [\"signal\"]",
+    );
+    finds::<Averages>(
+        with("points_elsewhere"),
+        Rule::Answers,
+        "it panics: it finds a mistake at `no.such.parameter`, which is none of its parameters and ports: it is too long",
+    );
+}
+
+#[test]
+fn what_panics_is_told_how_to_find_where() {
+    let broken = athermal_core::testkit::broken::<Averages>(&[with("panics")]);
+    assert_eq!(
+        broken[0].to_string(),
+        "answers: it panics: there is nothing to average\n  in the case: fault = \"panics\"\n  to do: a node answers with absence or \
+         a `Mistake` where it cannot go on, and never panics; `RUST_BACKTRACE=1` shows where it does"
+    );
+}
+
+#[test]
+#[should_panic(expected = "`nonsense` is none of [\"node.a\", \"node.b\"]")]
+fn a_bench_that_has_not_been_fed_knows_its_outputs() {
+    let bench = Bench::of(&Averages { fault: Fault::None });
+    assert_eq!(bench.output("node.a"), [0.0; 0]);
+    let _ = bench.output("nonsense");
+}
+
+#[test]
+#[should_panic(expected = "NaN is no time: a row begins with one in seconds, less than 9.2e9")]
+fn a_bench_takes_no_time_that_is_none() {
+    Bench::of(&Averages { fault: Fault::None }).feed([(f64::NAN, [1.0, 2.0])]);
 }
 
 #[test]

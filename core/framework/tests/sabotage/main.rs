@@ -25,6 +25,15 @@ fn breaks<T: NodeSpec>(case: Case, rule: Rule, words: &str) {
     assert!(told.to_string().contains("to do: "), "{told}");
 }
 
+/// Asserts that a rule is broken, and the whole of what is told to be found.
+#[track_caller]
+fn finds<T: NodeSpec>(case: Case, rule: Rule, found: &str) {
+    let broken = broken::<T>(&[case]);
+    let told = broken.iter().find(|broken| broken.rule == rule);
+    let told = told.map(|broken| broken.found.as_str());
+    assert_eq!(told, Some(found), "{broken:#?}");
+}
+
 /// Asserts that no rule is broken but those.
 #[track_caller]
 fn breaks_only<T: NodeSpec>(case: Case, rules: &[Rule]) {
@@ -34,11 +43,17 @@ fn breaks_only<T: NodeSpec>(case: Case, rules: &[Rule]) {
 }
 
 #[test]
+#[should_panic(expected = "answers: there is no case to try it in\n  to do: give the case what")]
+fn a_kind_that_is_tried_in_no_case_has_proved_nothing() {
+    athermal_core::testkit::assert_conforms::<Votes>(&[]);
+}
+
+#[test]
 #[should_panic(expected = "no `conformance!` for [\"sabotaged_estimator\", \"sabotaged_feature\"")]
 fn a_kind_that_is_registered_and_not_examined_is_told() {
     assert_every_kind_conforms(env!("CARGO_PKG_NAME"));
 }
 
-athermal_core::conformance!(Votes, Case::new(""));
+athermal_core::conformance!(combiner::Votes, Case::new(""));
 
 use combiner::Votes;

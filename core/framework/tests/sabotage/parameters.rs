@@ -8,7 +8,7 @@ use athermal_core::testkit::{Case, Rule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{breaks, breaks_only};
+use super::{breaks, breaks_only, finds};
 
 /// Makes a kind of a struct whose `mistakes` say what it refuses; it passes its input on.
 macro_rules! passes {
@@ -128,6 +128,8 @@ enum Care {
     WrongName,
     /// Less is taken than the schema says.
     Stricter,
+    /// What is taken is not always survived.
+    Fragile,
     /// All that can be checked is.
     Careful,
 }
@@ -141,7 +143,7 @@ impl Careless {
             Care::Anything => false,
             Care::NanPasses => share < 0.0 || share > 1.0,
             Care::Stricter => !(0.0..0.5).contains(&share),
-            Care::WrongName | Care::Careful => !(0.0..=1.0).contains(&share),
+            Care::WrongName | Care::Careful | Care::Fragile => !(0.0..=1.0).contains(&share),
         };
         let mut mistakes = Vec::new();
         if wrong && fault == Care::WrongName {
@@ -149,7 +151,11 @@ impl Careless {
         } else if wrong {
             mistakes.push(Mistake::at("share", "it must be a share"));
         }
-        if fault == Care::Careful {
+        assert!(
+            fault != Care::Fragile || share < 1.0,
+            "nothing is left of the rest"
+        );
+        if fault == Care::Careful || fault == Care::Fragile {
             for (place, _) in self
                 .parts
                 .iter()
@@ -200,6 +206,19 @@ fn what_the_schema_says_of_a_range_is_what_is_taken() {
     }
 }
 
+#[test]
+fn what_the_schema_allows_runs() {
+    breaks_only::<Careless>(careless("fragile"), &[Rule::Ranges]);
+    finds::<Careless>(
+        careless("fragile"),
+        Rule::Ranges,
+        "with `share = 1.0` it panics: nothing is left of the rest\n\
+         with `share = 2.0` it panics: nothing is left of the rest\n\
+         with `share = nan` it panics: nothing is left of the rest\n\
+         with `share = inf` it panics: nothing is left of the rest",
+    );
+}
+
 /// Passes its input on, and writes its parameter under a name that it does not read.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -238,6 +257,24 @@ impl Lossy {
 
 passes!(Lossy, "sabotaged_numbers", "what is passed on");
 
+/// Passes its input on, and keeps its parameter to itself.
+#[allow(dead_code)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Secret {
+    /// How often.
+    #[serde(default, skip_serializing)]
+    times: u32,
+}
+
+impl Secret {
+    fn mistakes(&self, _inputs: &Inputs) -> Vec<Mistake> {
+        Vec::new()
+    }
+}
+
+passes!(Secret, "sabotaged_secret", "what is passed on");
+
 #[test]
 fn parameters_read_back_as_they_were_written() {
     breaks::<Renamed>(
@@ -246,4 +283,47 @@ fn parameters_read_back_as_they_were_written() {
         "written out in full, the parameters are refused",
     );
     breaks::<Lossy>(Case::new("times = 7"), Rule::ReadsBack, "are read back as");
+    finds::<Secret>(
+        Case::new("times = 7"),
+        Rule::ReadsBack,
+        "Secret { times: 7 } is read back as Secret { times: 0 }",
+    );
+}
+
+/// Passes its input on, through a port and under names that no reference can write.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Misnamed {}
+
+impl Feature for Misnamed {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what is passed on")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let mut channels = inputs.port("signal").to_vec();
+        channels.truncate(1);
+        for channel in &mut channels {
+            channel.name = format!("{} (mean)", channel.name);
+        }
+        let name = "of.it";
+        Ok(vec![OutputPort { name, channels }])
+    }
+
+    fn build(&self, _inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
+        Box::new(Passing)
+    }
+}
+
+athermal_core::register!(Misnamed, Feature, "sabotaged_references");
+
+#[test]
+fn a_port_or_channel_that_no_reference_can_name_is_told() {
+    breaks_only::<Misnamed>(Case::new("").input("signal", 1, "K"), &[Rule::Names]);
+    breaks::<Misnamed>(
+        Case::new("").input("signal", 1, "K"),
+        Rule::Names,
+        "the output port `of.it` is not a letter followed by letters, digits, `_` and `-`\nthe channel `a (mean)` is not made of \
+         letters, digits and `_`, `-`, `@`, `.`, `/`",
+    );
 }

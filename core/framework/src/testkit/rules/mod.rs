@@ -5,14 +5,18 @@ mod allocation;
 mod edited;
 mod explained;
 mod fitting;
+mod names;
 mod parameters;
+mod past;
 mod repeat;
 mod schema;
 mod snapshots;
 mod traces;
 mod units;
+mod votes;
 
 pub(super) use explained::explained;
+pub(super) use names::shared;
 
 use super::case::Given;
 use super::compared::course;
@@ -43,7 +47,8 @@ pub(super) struct Subject<'a> {
 type Check = fn(&Subject<'_>, others: &[Subject<'_>]) -> Result<(), String>;
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 17] = [
+pub(super) const ALL: [(Rule, Check); 21] = [
+    (Rule::Names, |subject, _| names::names(subject)),
     (Rule::Answers, |subject, _| subject.answers()),
     (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
     (Rule::Ranges, |subject, _| parameters::ranges(subject)),
@@ -55,11 +60,14 @@ pub(super) const ALL: [(Rule, Check); 17] = [
     (Rule::Versions, snapshots::versions),
     (Rule::Absence, |subject, _| absence::absence(subject)),
     (Rule::Infinity, |subject, _| absence::infinity(subject)),
+    (Rule::Past, |subject, _| past::past(subject)),
     (Rule::Segments, |subject, _| repeat::segments(subject)),
     (Rule::Units, |subject, _| units::units(subject)),
     (Rule::Allocation, |subject, _| {
         allocation::allocation(subject)
     }),
+    (Rule::Votes, |subject, _| votes::votes(subject)),
+    (Rule::Uncertainty, |subject, _| votes::uncertainty(subject)),
     (Rule::NoTrace, |subject, _| traces::no_trace(subject)),
     (Rule::Fits, |subject, _| fitting::fits(subject)),
     (Rule::Models, |subject, _| fitting::models(subject)),
@@ -105,6 +113,12 @@ impl<'a> Subject<'a> {
             }
         }
         Ok(fitted)
+    }
+
+    /// Whether what was fitted can be put into the graph that it was fitted in.
+    pub(super) fn belongs(&self) -> Result<(), String> {
+        let made = Engine::new(self.fixture.plan.clone(), &self.fitted);
+        made.map(|_| ()).map_err(|error| error.to_string())
     }
 
     /// An engine, cold.

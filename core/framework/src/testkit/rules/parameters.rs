@@ -3,20 +3,36 @@
 use serde_json::Value as Json;
 use toml::Value;
 
+use super::super::compared::course;
 use super::super::fixture::Fixture;
+use super::super::tried::{PANICS, tried};
 use super::Subject;
 use super::schema::{Bound, Leaf, Sort, leaves};
+use crate::fit::{FitOptions, fit};
+use crate::recording::{Event, Table};
+
+/// How many ticks a node is fitted on and run for at each end of a range.
+const TICKS: usize = 120;
 
 pub(super) fn read_back(subject: &Subject<'_>) -> Result<(), String> {
-    let before = subject.fixture.plan.nodes[0].spec.parameters();
-    let table = in_full(subject);
-    let fixture = Fixture::new(subject.kind, &table, &subject.given)
-        .map_err(|error| format!("written out in full, the parameters are refused: {error}"))?;
-    let after = fixture.plan.nodes[0].spec.parameters();
+    reads_back(subject, &subject.fixture)
+}
+
+/// What is written of parameters is read as the same. What is not written at all shows only in how the specification is shown.
+fn reads_back(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
+    let written = in_full(subject, fixture);
+    let again = Fixture::new(subject.kind, &written, &subject.given)
+        .map_err(|told| format!("written out in full, the parameters are refused: {told}"))?;
+    let [before, after] = [fixture, &again].map(|fixture| &fixture.plan.nodes[0].spec);
+    if before.parameters() != after.parameters() {
+        let (before, after) = (before.parameters(), after.parameters());
+        return Err(format!("the parameters {before} are read back as {after}"));
+    }
+    let (before, after) = (format!("{before:?}"), format!("{after:?}"));
     if before == after {
         Ok(())
     } else {
-        Err(format!("the parameters {before} are read back as {after}"))
+        Err(format!("{before} is read back as {after}"))
     }
 }
 
@@ -32,20 +48,30 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
             .rfind(|part| part.parse::<usize>().is_err());
         let last = last.cloned().unwrap_or_default();
         for (value, allowed) in probes(&leaf) {
-            let mut table = in_full(subject);
+            let mut table = in_full(subject, &subject.fixture);
             if !set(&mut table, &leaf.path, value.clone()) {
                 continue;
             }
-            match (Fixture::new(subject.kind, &table, &subject.given), allowed) {
-                (Ok(_), true) => {}
-                (Ok(_), false) => found.push(format!("`{name} = {value}` is taken without a word")),
-                (Err(told), true) if told.contains(&last) => found.push(format!(
+            let read = tried(|| Fixture::new(subject.kind, &table, &subject.given));
+            match (read, allowed) {
+                (Ok(fixture), Allowed::Yes | Allowed::Maybe) => {
+                    if let Err(told) = tried(|| lives(subject, &fixture)) {
+                        found.push(format!("with `{name} = {value}` {told}"));
+                    }
+                }
+                (Err(told), _) if told.starts_with(PANICS) => {
+                    found.push(format!("with `{name} = {value}` {told}"));
+                }
+                (Ok(_), Allowed::No) => {
+                    found.push(format!("`{name} = {value}` is taken without a word"))
+                }
+                (Err(told), Allowed::Yes) if told.contains(&last) => found.push(format!(
                     "`{name} = {value}` is allowed by the schema, and refused: {told}"
                 )),
                 // Something else does not go together with it.
-                (Err(_), true) => {}
-                (Err(told), false) if told.contains(&last) => {}
-                (Err(told), false) => found.push(format!(
+                (Err(_), Allowed::Yes | Allowed::Maybe) => {}
+                (Err(told), Allowed::No) if told.contains(&last) => {}
+                (Err(told), Allowed::No) => found.push(format!(
                     "`{name} = {value}` is refused without naming `{last}`: {told}"
                 )),
             }
@@ -58,25 +84,58 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
     }
 }
 
-/// Values to try, each with whether the schema allows it.
-fn probes(leaf: &Leaf) -> Vec<(Value, bool)> {
+/// What is taken runs, and is written as it was read.
+fn lives(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
+    reads_back(subject, fixture)?;
+    let mut table = Table::default();
+    for (event, values) in subject.events().iter().take(TICKS) {
+        if let Event::Row(now) = event {
+            table.push(*now, values);
+        }
+    }
+    let (fitted, _) = fit(&fixture.plan, &table, &FitOptions::default(), &mut |_| ())
+        .map_err(|error| error.to_string())?;
+    let course = course(fixture, &mut fixture.engine(&fitted), table.events());
+    let infinite = |number| course.values(number).any(f64::is_infinite);
+    if (0..fixture.slots().len()).any(infinite) {
+        return Err("something infinite comes out".to_owned());
+    }
+    Ok(())
+}
+
+/// Whether the schema allows a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Allowed {
+    Yes,
+    No,
+    /// It does not say.
+    Maybe,
+}
+
+/// Values to try.
+fn probes(leaf: &Leaf) -> Vec<(Value, Allowed)> {
+    let text = |text: String, allowed| (Value::String(text), allowed);
     match leaf.sort {
-        Sort::Duration => vec![(Value::String("-1s".to_owned()), false)],
+        Sort::Duration => vec![
+            text("-1s".to_owned(), Allowed::No),
+            text("0s".to_owned(), Allowed::Maybe),
+        ],
         Sort::Quantity => {
             let unit = leaf.value.as_str().and_then(|text| text.split_once(' '));
             let unit = unit.map_or("nm", |(_, unit)| unit);
-            ["nan", "inf"]
-                .map(|number| format!("{number} {unit}"))
-                .into_iter()
-                .chain(["1 cd".to_owned(), "1".to_owned()])
-                .map(|text| (Value::String(text), false))
-                .collect()
+            vec![
+                text(format!("nan {unit}"), Allowed::No),
+                text(format!("inf {unit}"), Allowed::No),
+                text("1 cd".to_owned(), Allowed::No),
+                text("1".to_owned(), Allowed::No),
+                text(format!("0 {unit}"), Allowed::Maybe),
+            ]
         }
         Sort::Number { integer, low, high } => numbers(integer, low, high),
     }
 }
 
-fn numbers(integer: bool, low: Bound, high: Bound) -> Vec<(Value, bool)> {
+fn numbers(integer: bool, low: Bound, high: Bound) -> Vec<(Value, Allowed)> {
     let number = |value: f64| {
         if integer {
             Value::Integer(value as i64)
@@ -86,34 +145,42 @@ fn numbers(integer: bool, low: Bound, high: Bound) -> Vec<(Value, bool)> {
     };
     let mut probes = Vec::new();
     match low {
-        Bound::Inclusive(low) => probes.extend([(number(low), true), (number(low - 1.0), false)]),
-        Bound::Exclusive(low) => probes.extend([(number(low), false), (number(low - 1.0), false)]),
-        Bound::None => probes.extend([-1e6, -1.0, 0.0].map(|value| (number(value), true))),
+        Bound::Inclusive(low) => probes.extend([
+            (number(low), Allowed::Yes),
+            (number(low - 1.0), Allowed::No),
+        ]),
+        Bound::Exclusive(low) => {
+            probes.extend([(number(low), Allowed::No), (number(low - 1.0), Allowed::No)])
+        }
+        Bound::None => probes.extend([-1e6, -1.0, 0.0].map(|value| (number(value), Allowed::Yes))),
     }
     match high {
-        Bound::Inclusive(high) => {
-            probes.extend([(number(high), true), (number(high + 1.0), false)])
-        }
-        Bound::Exclusive(high) => {
-            probes.extend([(number(high), false), (number(high + 1.0), false)])
-        }
+        Bound::Inclusive(high) => probes.extend([
+            (number(high), Allowed::Yes),
+            (number(high + 1.0), Allowed::No),
+        ]),
+        Bound::Exclusive(high) => probes.extend([
+            (number(high), Allowed::No),
+            (number(high + 1.0), Allowed::No),
+        ]),
         // A count may stand for room that nobody has.
         Bound::None if integer => {}
-        Bound::None => probes.push((number(1e6), true)),
+        Bound::None => probes.push((number(1e6), Allowed::Yes)),
     }
     if !integer {
         let none = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
-        probes.extend(none.map(|value| (number(value), false)));
+        probes.extend(none.map(|value| (number(value), Allowed::No)));
     }
     probes
 }
 
-/// The parameters with defaults filled in, and what the framework reads beside them.
-fn in_full(subject: &Subject<'_>) -> toml::Table {
+/// The parameters with defaults filled in, as the specification has them, and what the framework reads beside them.
+fn in_full(subject: &Subject<'_>, fixture: &Fixture) -> toml::Table {
     let mut table = subject.parameters.clone();
-    if let Some(Value::Table(own)) =
-        crate::node::as_toml(&subject.fixture.plan.nodes[0].spec.parameters())
-    {
+    let elsewhere = subject.kind.framework_keys();
+    table.retain(|key, _| elsewhere.contains(&key));
+    let own = fixture.plan.nodes[0].spec.parameters();
+    if let Some(Value::Table(own)) = crate::node::as_toml(&own) {
         table.extend(own);
     }
     table

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::Case;
 use super::super::compared::course;
 use super::super::fixture::NODE;
 use super::Subject;
@@ -93,11 +94,36 @@ pub(super) fn versions(subject: &Subject<'_>, others: &[Subject<'_>]) -> Result<
         }
     }
     for other in others {
-        let mut engine = other.engine();
-        course(&other.fixture, &mut engine, other.events());
-        offered(subject, &engine.state());
+        offer(subject, other);
+    }
+    for case in of_other_widths(subject) {
+        // With other channels a case may be refused, or allow no fit.
+        if let Ok(other) = Subject::new(subject.kind, &case) {
+            offer(subject, &other);
+        }
     }
     Ok(())
+}
+
+/// The same case with a channel less or more at each port in turn.
+fn of_other_widths(subject: &Subject<'_>) -> Vec<Case> {
+    let others = subject.given.iter().flat_map(|given| {
+        let (low, high) = given.range();
+        let widths = [given.channels.saturating_sub(1), given.channels + 1];
+        widths.map(|channels| {
+            let case = subject.case.clone();
+            let case = case.input(&given.port, channels, &given.unit);
+            case.between(&given.port, low, high)
+        })
+    });
+    others.collect()
+}
+
+/// Offers what a node knows of one shape to one of another.
+fn offer(subject: &Subject<'_>, other: &Subject<'_>) {
+    let mut engine = other.engine();
+    course(&other.fixture, &mut engine, other.events());
+    offered(subject, &engine.state());
 }
 
 /// What the node answers to a state; then it has to live on.

@@ -1,0 +1,82 @@
+//! Decides whether what a kind names can be told apart from what others name, and be referred to.
+
+use super::Subject;
+use crate::compile::PlannedRole;
+use crate::document::is_name;
+use crate::node::{Kind, Role, kinds, taken_twice};
+
+/// What of a kind, and of its crate, has the name of something else, or one that no graph could write.
+pub(in super::super) fn shared(kind: &Kind) -> Vec<String> {
+    let mut found = Vec::new();
+    let same = kinds().get(kind.name).map_or(&[][..], Vec::as_slice);
+    if same.len() > 1 {
+        let packages = listed(same.iter().map(|kind| kind.package));
+        found.push(format!(
+            "the name of the kind `{}` is taken twice, by {packages}",
+            kind.name
+        ));
+    }
+    if let Some((of, name, packages)) = taken_twice(kind.package) {
+        let packages = listed(packages.into_iter());
+        found.push(format!(
+            "the name of the {of} `{name}` is taken twice, by {packages}"
+        ));
+    }
+    let ports = (kind.inputs)().iter().map(|port| port.name);
+    found.extend(unfit("the kind", std::iter::once(kind.name)));
+    found.extend(unfit("the input port", ports));
+    found
+}
+
+/// Output ports and channels that no reference could name.
+pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
+    let node = &subject.fixture.plan.nodes[0];
+    let mut found = Vec::new();
+    if let (Role::Feature(feature), PlannedRole::Feature { inputs, .. }) =
+        (node.spec.role(), &node.role)
+        && let Ok(ports) = feature.outputs(inputs)
+    {
+        found.extend(unfit("the output port", ports.iter().map(|port| port.name)));
+        let channels = ports.iter().flat_map(|port| &port.channels);
+        let strange = channels.filter(|channel| !is_channel(&channel.name));
+        found.extend(strange.map(|channel| {
+            let name = &channel.name;
+            format!(
+                "the channel `{name}` is not made of letters, digits and `_`, `-`, `@`, `.`, `/`"
+            )
+        }));
+    }
+    if found.is_empty() {
+        Ok(())
+    } else {
+        Err(found.join("\n"))
+    }
+}
+
+/// Names that break the rules, or stand twice.
+fn unfit<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let (mut found, mut seen) = (Vec::new(), Vec::new());
+    for name in names {
+        if !is_name(name, false) {
+            found.push(format!(
+                "{what} `{name}` is not a letter followed by letters, digits, `_` and `-`"
+            ));
+        }
+        if seen.contains(&name) {
+            found.push(format!("{what} `{name}` is there twice"));
+        }
+        seen.push(name);
+    }
+    found
+}
+
+/// Whether a reference can end in it, and no pattern is seen in it.
+fn is_channel(name: &str) -> bool {
+    let fits = |c: char| c.is_alphanumeric() || "_-@./".contains(c);
+    !name.is_empty() && name.chars().all(fits)
+}
+
+fn listed<'a>(packages: impl Iterator<Item = &'a str>) -> String {
+    let quoted: Vec<_> = packages.map(|package| format!("`{package}`")).collect();
+    quoted.join(" and ")
+}
