@@ -36,7 +36,7 @@ pub trait Predictor: InModel + Any + Debug + Send + Sync {
     }
 
     /// The standard deviation of the truth about the prediction from these regressors, in the unit of the truth; NaN where
-    /// it is not known. Only asked of kinds that say [`Estimator::deviates`].
+    /// it is not known. Only asked of kinds that say [`Estimator::deviates`](super::Estimator::deviates).
     fn deviation(&self, _regressors: &[f64]) -> f64 {
         f64::NAN
     }
