@@ -247,7 +247,7 @@ impl<'a> Course<'a> {
         }
         let path = watched.path.clone();
         *watched = Watched::of(&path);
-        let model = match load(&path, std::iter::once(&self.running), &self.terminal) {
+        let model = match load(&path, std::iter::once(&self.running), self.terminal) {
             Ok(model) => model,
             Err(failure) => {
                 self.terminal.error(&failure);

@@ -176,6 +176,7 @@ mod tests {
             ("Device;Logger;;\nSerial;12345;;\n;;;\n", ""),
             ("# made by hand\n", ""),
             ("Device;Logger\n# ", ""),
+            ("Device;Logger\n# ", ";°C;°C;nm\n"),
             ("", ";°C;°C;nm\n"),
             ("sep=;\n\n", "[s];[°C];[°C];[nm]\n"),
         ] {

@@ -4,6 +4,7 @@
 use crate::cell::is_number;
 use crate::columns::{Columns, DELIMITERS, choose_delimiter, names_in};
 use crate::lines::{Lines, is_content};
+use crate::units::are_units;
 use crate::{FileError, Layout};
 
 /// How many lines are looked at for a header.
@@ -168,6 +169,9 @@ fn longest_table(seen: &[Line], stated: Option<u8>) -> Option<(usize, u8)> {
             let fullest = of_names.rev().max_by_key(filled);
             let above = (0..at).rev().find(|&above| seen[above].is_comment());
             let above = above.filter(|&above| is_of_width(&rows[at], rows[above].len()));
+            // A row of units has no values either; the names stand above it.
+            let fullest =
+                fullest.filter(|&row| above.is_none() || row != at || !are_units(&rows[row]));
             if let Some(header) = fullest.or(above) {
                 longest = (length, width);
                 found = Some((header, delimiter));
