@@ -64,7 +64,7 @@ type = "pick"
 inputs.signal = ["m.{1,2}-X", "back"]
 [outputs]
 all = "m.*"
-back = { from = "sum", blend = "5 nm/s" }
+back = { from = "sum", blend = "5 nm/min/s" }
 "#;
 
 const TOKENS: [&str; 44] = [
