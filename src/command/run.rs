@@ -249,8 +249,8 @@ impl Run {
         columns: &[String],
     ) -> Result<Writer, Failure> {
         let Some(seen) = kept.seen() else {
-            let time = &read.time.column;
-            return Ok(Writer::create(&self.output, time, columns, self.flush())?);
+            let time = read.time.columns.title();
+            return Ok(Writer::create(&self.output, &time, columns, self.flush())?);
         };
         let writer = Writer::resume(&self.output, &read.time, columns, self.flush())?;
         if let Some(last) = writer.stood()

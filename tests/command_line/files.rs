@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::workbench::{Scratch, athermal, athermal_fed, athermal_unread};
+use super::workbench::{Scratch, athermal, athermal_fed, athermal_on, athermal_unread};
 use super::{csv, desk, rows};
 
 #[test]
@@ -180,6 +180,80 @@ fn times_of_a_form_of_their_own_are_read_and_named_as_they_are_written() {
     let plain = scratch.path("fitted.toml");
     let refused = athermal(&[&"fit", &plain, &"-o", &model, &"--data", &log]).ended(2);
     refused.tells(&["`[time]` reads dates and times by their `format`"]);
+}
+
+/// A graph, its model and a log: the time in one column, or date and time of day in two.
+fn dated_desk(scratch: &Scratch, columns: &str) -> (PathBuf, PathBuf, PathBuf) {
+    let names: Vec<&str> = columns
+        .split(['{', '}', ' '])
+        .filter(|name| !name.is_empty())
+        .collect();
+    let name = names.concat();
+    let row = |row: &String| {
+        let (seconds, rest) = row.split_once(',').unwrap();
+        let seconds: u32 = seconds.parse().unwrap();
+        let (minutes, seconds) = (seconds / 60, seconds % 60);
+        let between = if names.len() == 1 { " " } else { ";" };
+        let time = format!("{:02}:{:02}:{seconds:02},25", minutes / 60, minutes % 60);
+        let rest = rest.replace(',', ";").replace('.', ",");
+        format!("02.03.2026{between}{time};{rest}\n")
+    };
+    let rows: String = rows(0, 700).iter().map(row).collect();
+    let log = format!("{};room;Z\n{rows}", names.join(";"));
+    let log = scratch.file(&format!("{name}.csv"), log);
+    let graph = format!(
+        "schema = 1\nextends = \"fitted.toml\"\ntime = {{ column = \"{columns}\", format = \"%d.%m.%Y %H:%M:%S%.f\" }}\n"
+    );
+    let graph = scratch.file(&format!("{name}.toml"), graph);
+    athermal(&[&"check", &"--strict", &graph]).ended(0);
+    let model = scratch.path(&format!("{name}.json"));
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    (graph, model, log)
+}
+
+#[test]
+fn date_and_time_in_two_columns_give_what_both_in_one_give() {
+    let scratch = desk("two-columns").0;
+    let (_, model, log) = dated_desk(&scratch, "Stamp");
+    let whole = athermal(&[&"run", &model, &"-i", &log]).ended(0).out;
+    let scores = athermal_on("evaluate", &model, &log, &[&"--format", &"json"]).json();
+    let whole = whole.replacen("Stamp,", "Date Time,", 1);
+
+    let (graph, model, log) = dated_desk(&scratch, "{Date} {Time}");
+    let in_two = athermal_on("evaluate", &model, &log, &[&"--format", &"json"]).json();
+    assert_eq!(in_two["scores"][0]["n"], 700);
+    assert_eq!(in_two["scores"], scores["scores"]);
+    let page = scratch.path("page.html");
+    athermal_on("report", &model, &log, &[&"-o", &page]).ended(0);
+    let run = |more: &[&dyn AsRef<std::ffi::OsStr>]| {
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"run", &model];
+        arguments.extend(more);
+        athermal(&arguments).ended(0)
+    };
+    assert_eq!(run(&[&"-i", &log]).out, whole);
+    assert!(whole.contains("\n02.03.2026 00:00:10.25,"), "{whole}");
+
+    let text = std::fs::read_to_string(&log).unwrap();
+    let half = text.find("02.03.2026;01:00:00").unwrap();
+    let piped: [&dyn AsRef<std::ffi::OsStr>; 4] = [&"run", &model, &"-i", &"-"];
+    assert_eq!(athermal_fed(&piped, text.as_bytes()).ended(0).out, whole);
+
+    let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
+    let half = scratch.file("half.csv", &text[..half]);
+    for read in [&half, &log] {
+        run(&[&"-i", read, &"--state", &state, &"-o", &out]);
+    }
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), whole);
+
+    let swap = format!("02.03.2026 00:10:00.25={}", model.display());
+    let swapped = run(&[&"-i", &log, &"--swap-at", &swap]);
+    swapped.tells(&["took over before tick 61"]);
+    let refused = athermal(&[&"run", &model, &"-i", &scratch.path("data.csv")]).ended(2);
+    refused.tells(&["there are no columns `Date`, `Time`"]);
+    let one = std::fs::read_to_string(&graph).unwrap();
+    let one = scratch.file("one.toml", one.replace("{Date} {Time}", "Time"));
+    let refused = athermal_on("fit", &one, &log, &[&"-o", &model]).ended(2);
+    refused.tells(&["name both in `[time]`, e.g. `column = \"{Date} {Time}\"`"]);
 }
 
 #[test]

@@ -196,7 +196,7 @@ fn a_graph_that_reads_time_otherwise_is_refused_and_what_runs_goes_on() {
     let mut other = constant(7.0);
     let plan = std::sync::Arc::make_mut(&mut other.plan);
     let athermal::core::document::TimeBase::Column { column, .. } = &mut plan.time;
-    column.push_str("_ms");
+    *column = athermal::core::time::TimeColumns::one("t_ms");
     let refused = control.stage(&other, false).unwrap_err();
     assert_eq!(
         refused.to_string(),

@@ -6,8 +6,10 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+mod columns;
 mod format;
 
+pub use columns::{TimeColumns, TimeColumnsError};
 pub use format::{TimeFormat, TimeFormatError};
 
 const NS_PER_US: i64 = 1_000;

@@ -39,7 +39,7 @@ impl Begun {
             reason,
         };
         let ends = ends.ok_or_else(|| other("it has no whole line".to_owned()))?;
-        let expected = [std::slice::from_ref(&time.column), columns].concat();
+        let expected = [&[time.columns.title()], columns].concat();
         let found = match format {
             Format::Csv => ends.csv_names(),
             Format::JsonLines => ends.json_names(),
@@ -123,7 +123,7 @@ fn last_instant(
     time: &TimeColumn,
 ) -> Result<Option<i64>, FileError> {
     let layout = Layout {
-        time: time.clone(),
+        time: time.written(),
         channels: Vec::new(),
     };
     let options = Options {

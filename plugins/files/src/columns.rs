@@ -58,8 +58,8 @@ pub(crate) fn name(cell: &[u8]) -> String {
 /// Where the wanted columns stand.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Columns {
-    /// The column of the time, if it is there.
-    pub time: Option<usize>,
+    /// Each column of the time, if it is there.
+    pub time: Vec<Option<usize>>,
     /// The column of each channel, if it is there.
     pub channels: Vec<Option<usize>>,
 }
@@ -70,32 +70,39 @@ impl Columns {
         let places = names.iter().enumerate().rev();
         let places: HashMap<&str, usize> = places.map(|(at, name)| (name.as_str(), at)).collect();
         let place = |name: &str| places.get(name).copied();
+        let time = layout.time.columns.names().iter();
         let channels = layout.channels.iter();
         Self {
-            time: place(&layout.time.column),
+            time: time.map(|name| place(name)).collect(),
             channels: channels.map(|channel| place(&channel.column)).collect(),
         }
     }
 
     /// How many are there.
     pub fn count(&self) -> usize {
-        let channels = self.channels.iter().flatten().count();
-        channels + usize::from(self.time.is_some())
+        self.time.iter().chain(&self.channels).flatten().count()
+    }
+
+    /// Whether the time is there, with all its columns.
+    pub fn have_time(&self) -> bool {
+        self.time.iter().all(Option::is_some)
     }
 
     /// Whether so many of them are there that it is no chance: the time, or half of the channels and at least two.
     pub fn are_named(&self, layout: &Layout) -> bool {
         let channels = self.channels.iter().flatten().count();
-        self.time.is_some() || channels >= 2 && 2 * channels >= layout.channels.len()
+        self.have_time() || channels >= 2 && 2 * channels >= layout.channels.len()
     }
 
     /// The names of those that must be there and are not.
     pub fn lacking<'a>(&self, layout: &'a Layout) -> Vec<&'a str> {
-        let time = self.time.is_none().then_some(layout.time.column.as_str());
+        let time = layout.time.columns.names().iter().zip(&self.time);
+        let time = time.filter(|(_, at)| at.is_none());
+        let time = time.map(|(name, _)| name.as_str());
         let channels = layout.channels.iter().zip(&self.channels);
         let channels = channels.filter(|(channel, at)| at.is_none() && !channel.optional);
         let channels = channels.map(|(channel, _)| channel.column.as_str());
-        time.into_iter().chain(channels).collect()
+        time.chain(channels).collect()
     }
 }
 

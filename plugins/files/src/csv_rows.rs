@@ -2,7 +2,7 @@
 
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
-use crate::cell::{self, Cells, is_number};
+use crate::cell::{self, Cells, is_number, trim};
 use crate::columns::{self, Columns};
 use crate::header::{self, Head};
 use crate::ledger::{Ledger, Report};
@@ -29,6 +29,8 @@ pub(crate) struct CsvRows {
     ends_in_delimiter: bool,
     layout: Option<Layout>,
     columns: Columns,
+    /// The text of the time of the current row, where it is put together from several cells.
+    joined: Option<Vec<u8>>,
 }
 
 /// How a row came out of the stream.
@@ -101,6 +103,9 @@ impl CsvRows {
             ends_in_delimiter: false,
             layout: layout.cloned(),
             columns: Columns::default(),
+            joined: layout
+                .filter(|layout| !layout.time.columns.is_one())
+                .map(|_| Vec::new()),
         };
         let Record::Row { cells, .. } = rows.read_record()? else {
             return Err(FileError::Empty {
@@ -223,7 +228,7 @@ impl CsvRows {
             return Ok(true);
         }
         columns::check_unique(&names, || self.place())?;
-        let is_forgiven = ledger.is_lenient() && columns.time.is_some();
+        let is_forgiven = ledger.is_lenient() && columns.have_time();
         if !lacking.is_empty() && !is_forgiven {
             return Err(self.missing(lacking, &names));
         }
@@ -302,6 +307,21 @@ impl CsvRows {
         }
     }
 
+    /// Puts the time of the current row together.
+    fn join_time(&mut self) {
+        let mut text = self.joined.take().unwrap_or_default();
+        if let Some(layout) = &self.layout {
+            let cell = |column: usize| trim(self.cell(self.columns.time[column]));
+            layout.time.columns.join(&mut text, cell);
+        }
+        self.joined = Some(text);
+    }
+
+    /// The cell of a column, if that is there; else an empty one.
+    fn cell(&self, column: Option<usize>) -> &[u8] {
+        column.map_or(&[], |column| self.column(column))
+    }
+
     fn column(&self, index: usize) -> &[u8] {
         let start = if index == 0 { 0 } else { self.ends[index - 1] };
         &self.cells[start..self.ends[index]]
@@ -314,21 +334,28 @@ impl Cells for CsvRows {
             let Record::Row { cells, complete } = self.read_record()? else {
                 return Ok(false);
             };
-            if cells == self.width && !self.is_comment() {
-                return Ok(true);
-            }
-            if let Some(taken) = self.unusual(cells, complete, ledger)? {
+            let taken = match cells == self.width && !self.is_comment() {
+                true => Some(true),
+                false => self.unusual(cells, complete, ledger)?,
+            };
+            if let Some(taken) = taken {
+                if taken && self.joined.is_some() {
+                    self.join_time();
+                }
                 return Ok(taken);
             }
         }
     }
 
     fn time(&self) -> &[u8] {
-        self.columns.time.map_or(&[], |column| self.column(column))
+        match &self.joined {
+            Some(joined) => joined,
+            None => self.cell(self.columns.time.first().copied().flatten()),
+        }
     }
 
     fn channel(&self, index: usize) -> &[u8] {
-        self.columns.channels[index].map_or(&[], |column| self.column(column))
+        self.cell(self.columns.channels[index])
     }
 
     fn decimal_comma(&self) -> bool {

@@ -34,7 +34,7 @@ pub fn layout(plan: &Plan) -> Layout {
     let TimeBase::Column { column, form } = &plan.time;
     Layout {
         time: TimeColumn {
-            column: column.clone(),
+            columns: column.clone(),
             form: form.into(),
         },
         channels: plan

@@ -346,7 +346,8 @@ impl fmt::Display for FileError {
                 if is_time_of_day(found) {
                     return write!(
                         f,
-                        "; a time of day alone is no instant: write its date before it, in the same column"
+                        "; a time of day alone is no instant: where its date stands in another column, name both in `[time]`, e.g. `column = \"{{Date}} {{Time}}\"`, \
+                         else write it before the time"
                     );
                 }
                 if is_date(found) && !is_date(expected) {

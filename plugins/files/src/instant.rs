@@ -71,11 +71,14 @@ pub fn has_clock(text: &str) -> bool {
     around.any(|of| of[1] == b':' && of[0].is_ascii_digit() && of[2].is_ascii_digit())
 }
 
-/// Whether a text is a time of day such as `12:00:00,5`, without a date.
+/// Whether a text is a time of day such as `12:00:00,5` or `12:00 PM`, without a date.
 #[must_use]
 pub fn is_time_of_day(text: &str) -> bool {
+    let halves = ["am", "pm", "AM", "PM"];
+    let half = halves.iter().find_map(|half| text.strip_suffix(half));
+    let clock = half.map_or(text, str::trim_end);
     let is_part = |b: u8| b.is_ascii_digit() || b":.,".contains(&b);
-    has_clock(text) && text.bytes().all(is_part)
+    has_clock(clock) && clock.bytes().all(is_part)
 }
 
 fn timestamp(text: &[u8]) -> Option<Timestamp> {

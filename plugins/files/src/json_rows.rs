@@ -3,11 +3,12 @@
 use std::fmt;
 use std::ops::Range;
 
+use athermal_core::time::TimeColumns;
 use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
 use serde_json::Deserializer;
 use serde_json::value::RawValue;
 
-use crate::cell::Cells;
+use crate::cell::{Cells, trim};
 use crate::columns;
 use crate::format::begins_json_array;
 use crate::ledger::Ledger;
@@ -18,7 +19,11 @@ use crate::{FileError, Layout, Place};
 pub(crate) struct JsonRows {
     lines: Lines,
     keys: Vec<Key>,
-    /// For each channel of the layout, its key; the time has the first one.
+    /// What gives the time; it has the first keys.
+    time: TimeColumns,
+    /// The text of the time of the current row, where it is put together from several cells.
+    joined: Vec<u8>,
+    /// For each channel of the layout, its key.
     channels: Vec<usize>,
     /// The keys of the first object, for a message about those that lack.
     found: Option<Vec<String>>,
@@ -48,7 +53,9 @@ impl JsonRows {
         }
         let first = lines.take();
         lines.hold(vec![first]);
-        let mut keys = vec![Key::new(&layout.time.column, false)];
+        let time = layout.time.columns.clone();
+        let of_time = time.names().iter().map(|name| Key::new(name, false));
+        let mut keys: Vec<Key> = of_time.collect();
         let mut channels = Vec::with_capacity(layout.channels.len());
         for channel in &layout.channels {
             let known = keys.iter().position(|key| key.name == channel.column);
@@ -60,6 +67,8 @@ impl JsonRows {
         Ok(Self {
             lines,
             keys,
+            time,
+            joined: Vec::new(),
             channels,
             found: None,
             text: Vec::new(),
@@ -117,17 +126,21 @@ impl Cells for JsonRows {
         while self.lines.advance_to_content()? {
             let is_first = self.found.is_none();
             match self.read_object() {
-                Ok(()) if self.keys[0].ever_seen => {
+                Ok(()) if self.of_time().all(|key| key.ever_seen) => {
                     // Most likely misspelt, though a later object may have them.
                     if is_first && let Some(error) = self.never_seen() {
                         ledger.tell_early(|| error);
+                    }
+                    if !self.time.is_one() {
+                        self.join_time();
                     }
                     return Ok(true);
                 }
                 // The time must stand in every object; what else this one lacks may stand in the next.
                 Ok(()) => {
                     let found = self.found.as_deref().unwrap_or_default();
-                    let time = std::iter::once(self.keys[0].name.as_str());
+                    let time = self.of_time().filter(|key| !key.ever_seen);
+                    let time = time.map(|key| key.name.as_str());
                     return Err(columns::missing(self.lines.place(), time, found, false));
                 }
                 Err(_) if !self.lines.is_complete() => {
@@ -144,7 +157,10 @@ impl Cells for JsonRows {
     }
 
     fn time(&self) -> &[u8] {
-        self.cell(0)
+        match self.time.is_one() {
+            true => self.cell(0),
+            false => &self.joined,
+        }
     }
 
     fn channel(&self, index: usize) -> &[u8] {
@@ -161,6 +177,18 @@ impl Cells for JsonRows {
 }
 
 impl JsonRows {
+    /// The keys of the time.
+    fn of_time(&self) -> impl Iterator<Item = &Key> {
+        self.keys[..self.time.names().len()].iter()
+    }
+
+    /// Puts the time of the current row together.
+    fn join_time(&mut self) {
+        let mut text = std::mem::take(&mut self.joined);
+        self.time.join(&mut text, |key| trim(self.cell(key)));
+        self.joined = text;
+    }
+
     fn cell(&self, key: usize) -> &[u8] {
         match &self.keys[key].cell {
             Some(range) => &self.text[range.clone()],

@@ -1,23 +1,34 @@
-//! What is wanted from a recording: which column gives time, and which give channels. Not where they stand in a file.
+//! What is wanted from a recording: which columns give time, and which channels. Not where they stand in a file.
 
-use athermal_core::time::TimeFormat;
+use athermal_core::time::{TimeColumns, TimeFormat};
 
 /// The columns to read, by name; a column that is not named here is skipped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// The column that gives the instant of each row.
+    /// What gives the instant of each row.
     pub time: TimeColumn,
     /// The columns that give values, in the order of [`Row::values`](crate::Row::values).
     pub channels: Vec<ChannelColumn>,
 }
 
-/// The column that gives the instant of each row.
+/// What gives the instant of each row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TimeColumn {
-    /// The name of the column (CSV) or key (JSON lines).
-    pub column: String,
-    /// How its cells are written.
+    /// The column (CSV) or key (JSON lines), or several whose cells are put together.
+    pub columns: TimeColumns,
+    /// How the text of a time is written.
     pub form: TimeForm,
+}
+
+impl TimeColumn {
+    /// How what was written from such rows gives their instants: their whole text in one column.
+    #[must_use]
+    pub fn written(&self) -> Self {
+        Self {
+            columns: TimeColumns::one(self.columns.title()),
+            form: self.form.clone(),
+        }
+    }
 }
 
 /// How an instant is written.
@@ -57,7 +68,7 @@ pub struct ChannelColumn {
 }
 
 impl Layout {
-    /// A layout in which every channel column must be there.
+    /// A layout with one column of time, in which every channel column must be there.
     pub fn new<C: Into<String>>(
         time: impl Into<String>,
         form: TimeForm,
@@ -72,7 +83,7 @@ impl Layout {
             .collect();
         Self {
             time: TimeColumn {
-                column: time.into(),
+                columns: TimeColumns::one(time),
                 form,
             },
             channels,
@@ -81,7 +92,7 @@ impl Layout {
 
     /// The names of all columns wanted, time first.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> + Clone {
-        std::iter::once(self.time.column.as_str())
-            .chain(self.channels.iter().map(|c| c.column.as_str()))
+        let time = self.time.columns.names().iter().map(String::as_str);
+        time.chain(self.channels.iter().map(|c| c.column.as_str()))
     }
 }

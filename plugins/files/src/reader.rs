@@ -259,7 +259,7 @@ fn read_time<C: Cells>(
         }
         ledger.refuse_row(|| {
             let found = excerpt(cell::trim(rows.time()));
-            let (place, column) = (rows.place(), time.column.clone());
+            let (place, column) = (rows.place(), time.columns.to_string());
             if time.form.is_beyond(text.as_bytes()) {
                 return FileError::TimeBeyond {
                     place,
@@ -282,7 +282,7 @@ fn read_time<C: Cells>(
     } else if rows.decimal_comma()
         && let Some(mark) = ledger.other_time_mark(cell, || rows.place().line)
     {
-        ledger.refuse_row(|| mixed(rows.place(), &time.column, cell, mark))?;
+        ledger.refuse_row(|| mixed(rows.place(), &time.columns.to_string(), cell, mark))?;
         return Ok(None);
     }
     Ok(time_ns)

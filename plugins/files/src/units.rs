@@ -5,7 +5,7 @@ use athermal_core::unit::Unit;
 use crate::cell::is_number;
 
 /// Whether a row holds units, and nothing that could be a value: no number, nothing with a digit that is no unit, and at most one other
-/// text, as how times are written.
+/// text, as how times are written, or how dates are beside it.
 pub(crate) fn are_units(row: &[String]) -> bool {
     let cells = row.iter().map(|cell| bare(cell));
     let texts = cells.filter(|text| !matches!(*text, "" | "-"));
@@ -14,7 +14,8 @@ pub(crate) fn are_units(row: &[String]) -> bool {
     }
     let (units, others): (Vec<&str>, Vec<&str>) = texts.partition(|text| is_unit(text));
     let has_digit = |text: &&str| text.contains(|c: char| c.is_ascii_digit());
-    !units.is_empty() && others.len() <= 1 && !others.iter().any(has_digit)
+    let of_day = others.iter().any(|text| text.contains(':'));
+    !units.is_empty() && others.len() <= 1 + usize::from(of_day) && !others.iter().any(has_digit)
 }
 
 /// A unit as a cell says it, without brackets around it, save those that are its own, as of `[m_H2O]`.
@@ -56,6 +57,7 @@ mod tests {
             "[s];[°C];[µm];[-]",
             "hh:mm:ss;(°C);%;",
             "DD.MM.YYYY;[degF];W/m2;-",
+            "TT.MM.JJJJ;hh:mm:ss;°C;nm",
         ] {
             assert!(are(row), "{row}");
         }

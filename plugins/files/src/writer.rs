@@ -86,7 +86,7 @@ impl Writer {
         let path = path.as_ref();
         let format = format_of(path);
         let Some(begun) = Begun::of(path, format, time, columns)? else {
-            return Self::create(path, &time.column, columns, flush);
+            return Self::create(path, &time.columns.title(), columns, flush);
         };
         let open = || {
             let output = OpenOptions::new().append(true).open(path)?;
@@ -94,7 +94,7 @@ impl Writer {
             Ok(output)
         };
         let output = open().map_err(|source| FileError::cannot_open(path, source))?;
-        let mut writer = Self::to_file(path, output, &time.column, columns, flush)?;
+        let mut writer = Self::to_file(path, output, &time.columns.title(), columns, flush)?;
         writer.stood_ns = begun.last_ns;
         Ok(writer)
     }

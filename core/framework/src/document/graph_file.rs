@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use super::tree::Value;
 use crate::diagnostic::Place;
 use crate::quantity::Quantity;
-use crate::time::{Duration, TimeFormat};
+use crate::time::{Duration, TimeColumns, TimeFormat};
 use crate::unit::Unit;
 
 /// A whole graph file after merging, with every `each` expanded.
@@ -44,16 +44,16 @@ pub struct GraphFile {
 /// How tabular sources give time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TimeBase {
-    /// One column holds the time of each row.
+    /// One column holds the time of each row, or several together.
     Column {
-        /// The column's name.
-        column: String,
-        /// How its cells are read.
+        /// Which.
+        column: TimeColumns,
+        /// How their text is read.
         form: TimeForm,
     },
 }
 
-/// How a cell of the time column is read.
+/// How the time of a row is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TimeForm {
     /// A number; `unit` is the length of one.

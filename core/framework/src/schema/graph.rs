@@ -380,7 +380,12 @@ fn time(duration: &Value) -> Value {
         "type": "object",
         "additionalProperties": false,
         "properties": {
-            "column": { "description": "The column of the time of each row.", "type": "string", "default": "time_s" },
+            "column": {
+                "description": "The column of the time of each row, or several in braces whose cells are put together.",
+                "type": "string",
+                "default": "time_s",
+                "examples": ["time_ms", "{Date} {Time}"]
+            },
             "unit": {
                 "description": "The unit of its numbers, \"rfc3339\" for dates and times, or \"sample\" for sample numbers.",
                 "enum": TIME_UNITS,

@@ -74,7 +74,8 @@ fn messages_say_what_where_and_what_to_do() {
     assert_eq!(
         of_day.to_string(),
         "run.csv:12: column `Time`: expected a date and time such as 2013-07-04T00:00:00Z, found `12:00:00,5`; a time of day alone is \
-         no instant: write its date before it, in the same column"
+         no instant: where its date stands in another column, name both in `[time]`, e.g. `column = \"{Date} {Time}\"`, else write it \
+         before the time"
     );
     let count = FileError::CellCount {
         place: place(),

@@ -164,7 +164,7 @@ fn of_text(text: &str) -> String {
 pub(super) fn time(plan: &Plan) -> Facts {
     let mut facts = Facts::default();
     let TimeBase::Column { column, form } = &plan.time;
-    facts.plain("column", column.as_str());
+    facts.plain("column", column.to_string());
     match form {
         TimeForm::Numbers { unit } => facts.plain("unit", unit.to_string()),
         TimeForm::Rfc3339 => facts.plain("unit", "RFC 3339"),

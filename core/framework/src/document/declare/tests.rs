@@ -25,7 +25,7 @@ fn graph(text: &str) -> GraphFile {
 
 fn time(text: &str) -> (String, TimeForm) {
     let TimeBase::Column { column, form } = graph(text).time;
-    (column, form)
+    (column.to_string(), form)
 }
 
 #[test]
@@ -45,6 +45,10 @@ fn time_is_in_seconds_unless_the_file_says_otherwise() {
     assert_eq!(
         time("[time]\nunit = \"rfc3339\""),
         ("time".to_owned(), TimeForm::Rfc3339)
+    );
+    assert_eq!(
+        time("[time]\ncolumn = \"{Date}T{Time}Z\"\nunit = \"rfc3339\""),
+        ("{Date}T{Time}Z".to_owned(), TimeForm::Rfc3339)
     );
     let format = "%d.%m.%Y %H:%M";
     assert_eq!(

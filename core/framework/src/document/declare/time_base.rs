@@ -1,11 +1,14 @@
-//! `[time]`: which column holds the time and how its cells are read; reading them is left to the sources.
+//! `[time]`: which columns hold the time and how it is read; reading them is left to the sources.
+
+use std::fmt;
+use std::str::FromStr;
 
 use super::reading::{duration, known_keys, table, text, wrong_type};
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::{TimeBase, TimeForm};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Table, Value};
-use crate::time::{Duration, TimeFormat, TimeFormatError};
+use crate::time::{Duration, TimeColumns, TimeFormat};
 
 const SECOND: Duration = Duration::from_ns(1_000_000_000);
 /// What `unit` may be, beside the units of time.
@@ -19,7 +22,7 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
     let seconds = TimeForm::Numbers { unit: SECOND };
     let Some(time) = time.and_then(|time| table(time, "time", diagnostics)) else {
         return TimeBase::Column {
-            column: "time_s".to_owned(),
+            column: TimeColumns::one("time_s"),
             form: seconds,
         };
     };
@@ -37,14 +40,14 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
     };
     let column = match time
         .get("column")
-        .and_then(|value| text(value, "column", diagnostics))
+        .and_then(|value| parsed(value, "column", diagnostics))
     {
-        Some(column) => column.to_owned(),
+        Some(columns) => columns,
         None => match (&form, unit) {
-            (TimeForm::Samples { .. }, _) => SAMPLE.to_owned(),
-            (TimeForm::Rfc3339 | TimeForm::Format(_), _) => "time".to_owned(),
-            (TimeForm::Numbers { .. }, Some((name, _))) => format!("time_{name}"),
-            (TimeForm::Numbers { .. }, None) => "time_s".to_owned(),
+            (TimeForm::Samples { .. }, _) => TimeColumns::one(SAMPLE),
+            (TimeForm::Rfc3339 | TimeForm::Format(_), _) => TimeColumns::one("time"),
+            (TimeForm::Numbers { .. }, Some((name, _))) => TimeColumns::one(format!("time_{name}")),
+            (TimeForm::Numbers { .. }, None) => TimeColumns::one("time_s"),
         },
     };
     TimeBase::Column { column, form }
@@ -63,12 +66,19 @@ fn format(
         let key = "format";
         diagnostics.report(entry.key, DocumentProblem::TimeContradiction { key, with });
     }
-    let format = text(&entry.value, "format", diagnostics)?.parse();
-    if let Err(error) = &format {
-        let (key, reason) = (Some("format".to_owned()), TimeFormatError::to_string(error));
-        diagnostics.report(entry.value.place, DocumentProblem::Refused { key, reason });
+    parsed(&entry.value, "format", diagnostics)
+}
+
+fn parsed<T>(value: &Value, key: &str, diagnostics: &mut Diagnostics) -> Option<T>
+where
+    T: FromStr<Err: fmt::Display>,
+{
+    let parsed = text(value, key, diagnostics)?.parse();
+    if let Err(error) = &parsed {
+        let (key, reason) = (Some(key.to_owned()), T::Err::to_string(error));
+        diagnostics.report(value.place, DocumentProblem::Refused { key, reason });
     }
-    format.ok()
+    parsed.ok()
 }
 
 fn form(

@@ -137,6 +137,28 @@ error[A010]: "format" is refused: it does not give a whole date and time; write 
 }
 
 #[test]
+fn braces_in_the_column_of_time_name_columns_each_once() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[time]
+column = "{Date} {Time"
+format = "%d.%m.%Y %H:%M:%S"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A010]: "column" is refused: a brace is not closed in `{Time`; write the name of one column, or of several each in braces, e.g. "{Date} {Time}"
+ --> a.toml:3:10
+  |
+3 | column = "{Date} {Time"
+  |          ^^^^^^^^^^^^^^ refused
+"#
+    );
+}
+
+#[test]
 fn a_step_is_longer_than_zero() {
     let files = [(
         "a.toml",
