@@ -364,45 +364,59 @@ fn a_temperature_that_grows_is_no_time() {
 #[test]
 fn a_log_as_a_controller_exports_it_is_read_by_its_graph_as_it_is() {
     let folder = Folder::new("starter-exported");
-    let mut log =
-        "sep=;\r\nDevice;Controller 3000\r\nSerial;12345\r\n\r\nTime;Plate;Z\r\n;°C;nm\r\n"
-            .to_owned();
-    for (time_s, degc, _, z) in grinding(1000, 10.0) {
-        let (hour, minute, second) = (time_s / 3600.0, time_s / 60.0 % 60.0, time_s % 60.0);
-        let (hour, minute) = (hour.floor(), minute.floor());
-        let row = format!("{degc:.4};{z:.4};\r\n").replace('.', ",");
-        write!(
-            log,
-            "01.03.2026 {hour:02}:{minute:02}:{second:02},400;{row}"
-        )
-        .unwrap();
+    for (name, names, units, between) in [
+        ("one.csv", "Time", "", " "),
+        ("two.csv", "Datum;Uhrzeit", "TT.MM.JJJJ;hh:mm:ss", ";"),
+    ] {
+        let mut log = format!(
+            "sep=;\r\nDevice;Controller 3000\r\nSerial;12345\r\n\r\n{names};Plate;Z\r\n{units};°C;nm\r\n"
+        );
+        for (time_s, degc, _, z) in grinding(1000, 10.0) {
+            let (hour, minute, second) = (time_s / 3600.0, time_s / 60.0 % 60.0, time_s % 60.0);
+            let (hour, minute) = (hour.floor(), minute.floor());
+            let row = format!("{degc:.4};{z:.4};\r\n").replace('.', ",");
+            write!(
+                log,
+                "01.03.2026{between}{hour:02}:{minute:02}:{second:02},400;{row}"
+            )
+            .unwrap();
+        }
+        let told = folder.started(name, &log);
+        assert!(
+            told.contains("Plate: temperature, in Cel; by its unit"),
+            "{told}"
+        );
+        assert!(told.contains("Z: drifts, in nm; a length"), "{told}");
+        let graph = folder.graph(name);
+        assert!(!graph.contains("the names do not say"), "{graph}");
+        if between == ";" {
+            assert!(
+                told.contains("time: `{Datum} {Uhrzeit}`, put together, dates and times as"),
+                "{told}"
+            );
+            let time =
+                "[time]\ncolumn = \"{Datum} {Uhrzeit}\"\nformat = \"%d.%m.%Y %H:%M:%S%.f\"\n";
+            assert!(graph.contains(time), "{graph}");
+        }
+        let fitted = folder.run(&[
+            "fit",
+            &format!("{name}.toml"),
+            "--data",
+            name,
+            "-o",
+            "model.json",
+        ]);
+        let said = String::from_utf8(fitted.stderr).unwrap();
+        assert!(
+            fitted.status.success() && !said.contains("warning"),
+            "{said}"
+        );
+        let evaluated = folder.run(&["evaluate", "model.json", "--data", name]);
+        assert!(evaluated.status.success());
+        let run = folder.run(&["run", "model.json", "--input", name, "--output", "-"]);
+        let put_out = String::from_utf8(run.stdout).unwrap();
+        assert_eq!(put_out.lines().count(), 1001, "{put_out}");
     }
-    let told = folder.started("log.csv", &log);
-    assert!(
-        told.contains("Plate: temperature, in Cel; by its unit"),
-        "{told}"
-    );
-    assert!(told.contains("Z: drifts, in nm; a length"), "{told}");
-    let graph = folder.graph("log.csv");
-    assert!(!graph.contains("the names do not say"), "{graph}");
-    let fitted = folder.run(&[
-        "fit",
-        "log.csv.toml",
-        "--data",
-        "log.csv",
-        "-o",
-        "model.json",
-    ]);
-    let said = String::from_utf8(fitted.stderr).unwrap();
-    assert!(
-        fitted.status.success() && !said.contains("warning"),
-        "{said}"
-    );
-    let evaluated = folder.run(&["evaluate", "model.json", "--data", "log.csv"]);
-    assert!(evaluated.status.success());
-    let run = folder.run(&["run", "model.json", "--input", "log.csv", "--output", "-"]);
-    let put_out = String::from_utf8(run.stdout).unwrap();
-    assert_eq!(put_out.lines().count(), 1001, "{put_out}");
 }
 
 #[test]

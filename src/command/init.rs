@@ -31,7 +31,7 @@ pub struct Init {
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]
     output: PathBuf,
-    /// The column that gives the time
+    /// The column that gives the time, or several in braces: "{Date} {Time}"
     #[arg(long, value_name = "COLUMN")]
     time: Option<String>,
     /// How dates and times are written that are not as in RFC 3339, in the letters of strptime

@@ -1,19 +1,19 @@
-//! Decides which column of a log gives the time, and in which form.
+//! Decides which column of a log gives the time, or which two, and in which form.
 
-use athermal::core::time::Duration;
-use athermal::core::time::TimeFormat;
-use athermal::files::{Description, TimeForm, is_time_of_day, with_decimal_point};
+use athermal::core::time::{Duration, TimeColumns, TimeFormat};
+use athermal::files::{Description, TimeForm, is_time_of_day};
 
 use super::column::ends_in_unit;
 use super::dates::{self, Dates};
+use super::texts::Texts;
 use crate::figures::time;
 
 /// The time of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clock {
-    /// The column.
-    pub column: String,
-    /// How its cells are written.
+    /// The column, or those of dates and of times of day.
+    pub columns: TimeColumns,
+    /// How it is written.
     pub form: TimeForm,
     /// What a graph file says of it beside the column: a key of `[time]` and its value.
     pub declared: Option<(&'static str, String)>,
@@ -86,9 +86,9 @@ impl Clock {
         time(seconds)
     }
 
-    fn dated(column: String, dates: Dates) -> Self {
+    fn dated(columns: TimeColumns, dates: Dates) -> Self {
         Self {
-            column,
+            columns,
             form: dates.form,
             declared: Some(dates.declared),
             why: dates.why,
@@ -98,7 +98,11 @@ impl Clock {
     /// What was found, for people.
     #[must_use]
     pub fn remark(&self) -> String {
-        format!("time: `{}`, {}", self.column, self.why)
+        let together = match self.columns.is_one() {
+            true => "",
+            false => " put together,",
+        };
+        format!("time: `{}`,{together} {}", self.columns, self.why)
     }
 }
 
@@ -111,42 +115,41 @@ pub fn find(
     named: Option<&str>,
     format: Option<&TimeFormat>,
 ) -> Result<Clock, String> {
-    let clock = |index: usize| match format {
-        Some(format) => by_format(described, index, format),
-        None => clock(described, index),
+    let clock = |texts: &Texts| match format {
+        Some(format) => by_format(texts, format),
+        None => clock(described, texts),
     };
     if let Some(name) = named {
-        let index = described.columns.iter().position(|column| column == name);
-        let index = index.ok_or_else(|| {
-            format!(
-                "there is no column `{name}`; there are {}",
-                described.columns.join(", ")
-            )
-        })?;
-        return clock(index).ok_or_else(|| no_clock(described, index, format));
+        let texts = Texts::named(described, name)?;
+        return clock(&texts).ok_or_else(|| no_clock(&texts, format));
     }
-    // What is in degrees or in nanometres is no time, however steadily it grows.
-    let measured = |index: &usize| ends_in_unit(&described.columns[*index]);
-    let mut likely: Vec<usize> = (0..described.columns.len()).collect();
-    likely.retain(|index| !measured(index));
+    // What is in degrees or in nanometres is no time, however steadily it grows. A name with braces cannot be that of a graph's
+    // column of time.
+    let may_be = |index: &usize| {
+        let name = &described.columns[*index];
+        !(ends_in_unit(name) || name.contains(['{', '}']))
+    };
     let rank = |index: usize| {
         let name = described.columns[index].to_lowercase();
         let first = words(&name).into_iter().next().unwrap_or_default();
         let known = NAMES.iter().position(|known| *known == first);
         known.unwrap_or(NAMES.len())
     };
-    likely.sort_by_key(|&index| rank(index));
-    let looks_like_times = |index: &usize| dates::look_like_times(&cells(described, *index));
-    let mut unread = likely.iter().copied().filter(looks_like_times);
-    let unread = unread.find(|&index| clock(index).is_none());
+    let likely = (0..described.columns.len()).filter(may_be);
+    let likely = likely.map(|index| (rank(index), Texts::of(described, index)));
+    let mut likely: Vec<(usize, Texts)> = likely.collect();
+    likely.sort_by_key(|(rank, _)| *rank);
+    let texts = likely.iter().map(|(_, texts)| texts);
+    let mut unread = texts.filter(|texts| dates::look_like_times(&texts.read()));
+    let unread = unread.find(|texts| clock(texts).is_none());
+    // Beside what is meant to be a time, no other column that happens to grow is one.
     let mut found = likely
         .iter()
-        .filter_map(|&index| Some((index, clock(index)?)));
-    // Beside what is meant to be a time, no other column that happens to grow is one.
-    let is_meant = |index: usize| unread.is_none() || rank(index) < NAMES.len();
-    match (found.find(|(index, _)| is_meant(*index)), unread) {
-        (Some((_, clock)), _) => Ok(clock),
-        (None, Some(unread)) => Err(no_clock(described, unread, format)),
+        .filter(|(rank, _)| unread.is_none() || *rank < NAMES.len())
+        .filter_map(|(_, texts)| clock(texts));
+    match (found.next(), unread) {
+        (Some(clock), _) => Ok(clock),
+        (None, Some(unread)) => Err(no_clock(unread, format)),
         (None, None) => Err(format!(
             "no column advances from row to row as a time does, and a log needs one: a time, or a number that counts its \
              samples; name it with --time (there are {})",
@@ -155,52 +158,30 @@ pub fn find(
     }
 }
 
-/// Why a column is not the time.
-fn no_clock(described: &Description, index: usize, format: Option<&TimeFormat>) -> String {
-    let column = &described.columns[index];
-    match (written(described, index).next(), format) {
+/// Why texts are not the time.
+fn no_clock(texts: &Texts, format: Option<&TimeFormat>) -> String {
+    let columns = &texts.columns;
+    match (texts.first(), format) {
         (Some(first), Some(format)) => {
-            format!("`{column}` has no time as `{format}` says, but such as `{first}`")
+            format!("`{columns}` has no time as `{format}` says, but such as `{first}`")
         }
-        (Some(first), None) if is_time_of_day(first) => of_day_alone(described, index, first),
-        (Some(first), None) if dates::look_like_times(&cells(described, index)) => format!(
-            "`{column}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
+        (Some(first), None) if is_time_of_day(first) => format!(
+            "`{columns}` has times of day such as `{first}`, and no other column their dates: log these too"
+        ),
+        (Some(first), None) if dates::look_like_times(&texts.read()) => format!(
+            "`{columns}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
              e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
         ),
-        _ => format!("`{column}` does not advance from row to row as a time does"),
+        _ => format!("`{columns}` does not advance from row to row as a time does"),
     }
 }
 
-/// Why times of day are not the time, and what to do where their dates stand beside them.
-fn of_day_alone(described: &Description, index: usize, first: &str) -> String {
-    let column = &described.columns[index];
-    let of_date = |&other: &usize| {
-        let mut cells = written(described, other).peekable();
-        cells.peek().is_some() && cells.all(dates::is_date)
-    };
-    let (Some(date), Some(between)) = (
-        (0..described.columns.len()).find(of_date),
-        described.delimiter.map(char::from),
-    ) else {
-        return format!(
-            "`{column}` has times of day such as `{first}`, and no date: log date and time in one column"
-        );
-    };
-    format!(
-        "`{column}` has times of day such as `{first}` and `{}` their dates, and both must stand in one column: join them, e.g. by \
-         awk -F '{between}' -v 'OFS={between}' '{{ ${at} = ${at} \" \" ${}; print }}'",
-        described.columns[date],
-        index + 1,
-        at = date + 1,
-    )
-}
-
-/// A column whose cells have a format.
-fn by_format(described: &Description, index: usize, format: &TimeFormat) -> Option<Clock> {
+/// Texts that have a format.
+fn by_format(texts: &Texts, format: &TimeFormat) -> Option<Clock> {
     let dates = dates::by(format.clone());
-    let mut cells = cells(described, index).into_iter();
+    let mut cells = texts.read().into_iter();
     let read = cells.any(|cell| dates.form.read(cell.as_bytes()).is_some());
-    read.then(|| Clock::dated(described.columns[index].clone(), dates))
+    read.then(|| Clock::dated(texts.columns.clone(), dates))
 }
 
 /// The parts of a column's name.
@@ -210,27 +191,8 @@ pub fn words(name: &str) -> Vec<&str> {
         .collect()
 }
 
-/// The cells of a column that are not empty.
-fn written(described: &Description, index: usize) -> impl Iterator<Item = &str> {
-    let cells = described.rows.iter().filter_map(move |row| row.get(index));
-    cells
-        .map(|cell| cell.trim())
-        .filter(|cell| !cell.is_empty())
-}
-
-/// The cells of a column that are not empty, as a reader takes them: a decimal comma may be a point.
-fn cells(described: &Description, index: usize) -> Vec<String> {
-    let comma = described.delimiter.is_some_and(|between| between != b',');
-    let read = |cell| match comma {
-        true => with_decimal_point(cell).into_owned(),
-        false => str::to_owned(cell),
-    };
-    written(described, index).map(read).collect()
-}
-
-fn clock(described: &Description, index: usize) -> Option<Clock> {
-    let column = described.columns[index].clone();
-    let cells = cells(described, index);
+fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
+    let cells = texts.read();
     if cells.len() < 2 {
         return None;
     }
@@ -240,8 +202,10 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         let again = cells.windows(2).filter(|pair| pair[0] == pair[1]).count();
         let is_clock = !(again * 2 >= cells.len() && cells.iter().all(|cell| dates::is_date(cell)));
         let dates = dates::of(&cells).filter(|_| is_clock);
-        return dates.map(|dates| Clock::dated(column, dates));
+        return dates.map(|dates| Clock::dated(texts.columns.clone(), dates));
     };
+    let columns = texts.columns.clone();
+    let column = columns.title();
     // A clock that steps back once is still a clock.
     let steps = numbers.windows(2).filter(|pair| pair[1] > pair[0]).count();
     if steps * 100 < (numbers.len() - 1) * 95 {
@@ -259,7 +223,7 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
     };
     if let Some(&(_, name, ns_per_unit)) = unit.filter(fits) {
         return Some(Clock {
-            column,
+            columns,
             form: TimeForm::Numbers { ns_per_unit },
             declared: declared(name),
             why: match known(&below) {
@@ -274,7 +238,7 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
     if numbered {
         return Some(Clock {
-            column,
+            columns,
             form: TimeForm::Samples { step_ns: SAMPLE_NS },
             declared: Some(("step", "1s".to_owned())),
             why: "a sample number; how long a sample takes the log does not say".to_owned(),
@@ -282,7 +246,7 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
     }
     if counts_days(&numbers) {
         return Some(Clock {
-            column,
+            columns,
             form: TimeForm::Numbers {
                 ns_per_unit: 86_400_000_000_000,
             },
@@ -310,7 +274,7 @@ fn clock(described: &Description, index: usize) -> Option<Clock> {
         ),
     };
     Some(Clock {
-        column,
+        columns,
         form: TimeForm::Numbers { ns_per_unit },
         declared: declared(name),
         why,
@@ -417,7 +381,7 @@ mod tests {
             ),
         ] {
             let clock = found(text).unwrap();
-            assert_eq!((clock.column.as_str(), clock.form), (column, form));
+            assert_eq!((&*clock.columns.to_string(), clock.form), (column, form));
         }
     }
 
@@ -458,7 +422,7 @@ mod tests {
         }
         let format: TimeFormat = "%H:%M on %d.%m.%Y".parse().unwrap();
         let clock = find(&described, None, Some(&format)).unwrap();
-        assert_eq!(clock.column, "when");
+        assert_eq!(clock.columns, TimeColumns::one("when"));
         let other: TimeFormat = "%d.%m.%Y %H:%M".parse().unwrap();
         for named in [None, Some("when")] {
             let refused = find(&described, named, Some(&other)).unwrap_err();
@@ -490,21 +454,86 @@ mod tests {
     }
 
     #[test]
-    fn a_time_of_day_is_told_as_the_log_has_it_and_joined_with_its_date() {
+    fn a_time_of_day_is_put_together_with_the_date_beside_it() {
+        for (log, columns, declared) in [
+            (
+                "Date;a;Time\n01.03.2026;1;8:00:00,5\n01.03.2026;2;8:00:10,5\n",
+                "{Date} {Time}",
+                "%d.%m.%Y %H:%M:%S%.f",
+            ),
+            (
+                "Uhrzeit;Datum;a\n08:00:00;01.03.26;1\n08:00:10;01.03.26;2\n",
+                "{Datum} {Uhrzeit}",
+                "%d.%m.%y %H:%M:%S%.f",
+            ),
+            (
+                "a,Date,Time\n1,3/13/2026,8:00:00 AM\n2,3/13/2026,8:00:10 AM\n",
+                "{Date} {Time}",
+                "%m/%d/%Y %I:%M:%S%.f %p",
+            ),
+            (
+                "Date,Time,a\n2026-03-01,08:00,1\n2026-03-01,08:01,2\n",
+                "{Date} {Time}",
+                "rfc3339",
+            ),
+            (
+                "Date,Time,a\n2026-03-01,8:00:00,1\n2026-03-01,8:00:10,2\n",
+                "{Date} {Time}",
+                "%Y-%m-%d %H:%M:%S%.f",
+            ),
+            (
+                "Date;Time;a\n20260301;08:00:00;1\n20260301;08:00:10;2\n",
+                "{Date} {Time}",
+                "rfc3339",
+            ),
+            (
+                "Date;Time;a\n01 Mar 2026;08:00:00;1\n01 Mar 2026;08:00:10;2\n",
+                "{Date} {Time}",
+                "%d %b %Y %H:%M:%S%.f",
+            ),
+            // One row a day: the date alone advances too.
+            (
+                "Day,Clock,a\n2026-03-01,08:00,1\n2026-03-02,08:00,2\n2026-03-03,09:00,2\n",
+                "{Day} {Clock}",
+                "rfc3339",
+            ),
+            // What was calibrated once stands further away.
+            (
+                "calibrated;a;Date;Time\n01.01.2025;1;01.03.2026;08:00:00\n01.01.2025;2;01.03.2026;08:00:10\n",
+                "{Date} {Time}",
+                "%d.%m.%Y %H:%M:%S%.f",
+            ),
+        ] {
+            let clock = found(log).unwrap();
+            assert_eq!(clock.columns.to_string(), columns, "{log}");
+            assert_eq!(clock.declared.unwrap().1, declared, "{log}");
+        }
         assert_eq!(
             found("Time;a\n12:00:00,400;1\n12:00:10,400;2\n").unwrap_err(),
-            "`Time` has times of day such as `12:00:00,400`, and no date: log date and time in one column"
+            "`Time` has times of day such as `12:00:00,400`, and no other column their dates: log these too"
         );
-        for date in ["01.03.2026", "2026-03-01", "3/1/2026"] {
-            let text = format!("Date;a;Time\n{date};1;12:00:00\n{date};2;12:00:10\n");
-            let text = std::io::Cursor::new(text);
-            let described = Description::of_read("log", text, None, 10).unwrap();
-            assert_eq!(
-                find(&described, None, None).unwrap_err(),
-                "`Time` has times of day such as `12:00:00` and `Date` their dates, and both must stand in one column: join them, e.g. \
-                 by awk -F ';' -v 'OFS=;' '{ $1 = $1 \" \" $3; print }'"
+    }
+
+    #[test]
+    fn columns_of_date_and_time_may_be_named_each_or_both_with_their_format() {
+        let text = "D;T;other;a\n1.13.2026;08:00:00;12:00:00;1\n1.13.2026;08:00:10;12:00:00;2\n";
+        let described = Description::of_read("log", text.as_bytes(), None, 10).unwrap();
+        assert!(found(text).unwrap_err().contains(
+            "`{D} {T}` has times such as `1.13.2026 08:00:00`, in a form that is not known"
+        ));
+        let format: TimeFormat = "%m.%d.%Y %H:%M:%S".parse().unwrap();
+        for named in [None, Some("D"), Some("T"), Some("{D} {T}")] {
+            let clock = find(&described, named, Some(&format)).unwrap();
+            assert_eq!(clock.columns.to_string(), "{D} {T}", "{named:?}");
+            let told = clock.remark();
+            assert!(
+                told.starts_with("time: `{D} {T}`, put together, dates and times as `%m.%d.%Y %H:%M:%S` without a zone"),
+                "{told}"
             );
         }
+        let told = |named| find(&described, Some(named), None).unwrap_err();
+        assert!(told("{D} {x}").starts_with("there is no column `x`; there are D, T, other, a"));
+        assert!(told("{D} {T").starts_with("--time \"{D} {T\": a brace is not closed in `{T`"));
     }
 
     #[test]

@@ -122,10 +122,10 @@ impl Column {
 
 /// The columns of a log other than its time, with a first guess of what each is.
 #[must_use]
-pub fn columns(described: &Description, time: &str) -> Vec<Column> {
+pub fn columns(described: &Description, time: &[String]) -> Vec<Column> {
     let columns = described.columns.iter();
     columns
-        .filter(|name| *name != time)
+        .filter(|name| !time.contains(name))
         .map(|name| guess(name, described.unit(name)))
         .collect()
 }
@@ -336,7 +336,7 @@ mod tests {
 
     fn kinds(header: &'static str) -> Result<Vec<(String, Kind, String)>, String> {
         let described = Description::of_read("log", header.as_bytes(), None, 10).unwrap();
-        let mut columns = columns(&described, "time_s");
+        let mut columns = columns(&described, &["time_s".to_owned()]);
         assign(&mut columns, &Told::default())?;
         Ok(columns
             .into_iter()

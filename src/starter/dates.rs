@@ -9,7 +9,7 @@ pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
 /// month that does, where only the numbers could tell them apart.
-const FORMATS: [&str; 22] = [
+const FORMATS: [&str; 25] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
     "%d.%m.%y %H:%M:%S%.f",
@@ -17,6 +17,8 @@ const FORMATS: [&str; 22] = [
     "%Y/%m/%d %H:%M:%S%.f",
     "%Y/%m/%d %H:%M",
     "%Y.%m.%d %H:%M:%S%.f",
+    "%Y-%m-%d %H:%M:%S%.f",
+    "%d-%m-%Y %H:%M:%S%.f",
     "%d-%b-%Y %H:%M:%S%.f",
     "%d %b %Y %H:%M:%S%.f",
     "%d/%m/%Y %H:%M:%S%.f",
@@ -29,6 +31,7 @@ const FORMATS: [&str; 22] = [
     "%m/%d/%y %H:%M",
     "%m/%d/%Y %I:%M:%S%.f %p",
     "%m/%d/%Y %I:%M %p",
+    "%m/%d/%y %I:%M:%S%.f %p",
     "%m/%d/%y %I:%M %p",
     "%Y-%m-%d_%H-%M-%S",
     "%Y%m%d_%H%M%S",
@@ -93,15 +96,34 @@ pub fn look_like_times(cells: &[String]) -> bool {
 
 /// Whether a cell is a date without a time of day.
 pub fn is_date(cell: &str) -> bool {
-    let parts: Vec<&str> = cell.split(['.', '-', '/']).collect();
-    parts.len() == 3 && parts.iter().all(|part| part.parse::<u16>().is_ok())
+    let is_number = |part: &str| part.parse::<u16>().is_ok();
+    let is_month = |part: &str| part.len() == 3 && part.bytes().all(|b| b.is_ascii_alphabetic());
+    let parts: Vec<&str> = cell.split(['.', '-', '/', ' ']).collect();
+    match parts[..] {
+        [first, month, last] => {
+            is_number(first) && is_number(last) && (is_number(month) || is_month(month))
+        }
+        [day] => day.len() == 8 && day.bytes().all(|b| b.is_ascii_digit()),
+        _ => false,
+    }
+}
+
+/// Whether so many are such that the others may be mistakes.
+pub fn nearly_all<'a>(
+    cells: impl Iterator<Item = &'a str>,
+    is_such: impl Fn(&str) -> bool,
+) -> bool {
+    let (mut such, mut all) = (0, 0);
+    for cell in cells {
+        such += usize::from(is_such(cell));
+        all += 1;
+    }
+    such * 100 >= all * 95
 }
 
 fn fits(form: &TimeForm, cells: &[String]) -> bool {
-    let read = cells
-        .iter()
-        .filter(|cell| form.read(cell.as_bytes()).is_some());
-    read.count() * 100 >= cells.len() * 95
+    let is_read = |cell: &str| form.read(cell.as_bytes()).is_some();
+    nearly_all(cells.iter().map(String::as_str), is_read)
 }
 
 fn reads_otherwise(form: &TimeForm, other: &TimeFormat, cells: &[String]) -> bool {

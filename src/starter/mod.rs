@@ -6,6 +6,7 @@ mod dates;
 mod group;
 mod survey;
 mod text;
+mod texts;
 mod window;
 
 pub use dates::WITHOUT_ZONE;
@@ -68,7 +69,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
         .map_err(NoStarter::Unfit)?;
     remarks.push(clock.remark());
-    let mut columns = column::columns(&described, &clock.column);
+    let mut columns = column::columns(&described, clock.columns.names());
     let mut survey = Survey::of(path, &clock, &columns)?;
     survey.judge(&mut columns);
     column::assign(&mut columns, told).map_err(NoStarter::Unfit)?;

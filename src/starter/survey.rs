@@ -142,7 +142,7 @@ impl Survey {
     pub fn of(path: &Path, clock: &Clock, columns: &[Column]) -> Result<Self, NoStarter> {
         let layout = Layout {
             time: TimeColumn {
-                columns: athermal::core::time::TimeColumns::one(clock.column.clone()),
+                columns: clock.columns.clone(),
                 form: clock.form.clone(),
             },
             channels: columns

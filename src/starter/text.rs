@@ -126,7 +126,7 @@ impl Writer<'_> {
         let _ = writeln!(
             text,
             "\n[time]\ncolumn = {}",
-            toml_string(&self.clock.column)
+            toml_string(&self.clock.columns.to_string())
         );
         if let Some((key, value)) = &self.clock.declared {
             let _ = write!(text, "{key} = {}", toml_string(value));
