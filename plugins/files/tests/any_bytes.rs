@@ -4,7 +4,7 @@
 
 use std::io::{self, Read};
 
-use athermal_files::{Format, Layout, Options, Reader, Row, TimeForm};
+use athermal_files::{Format, Layout, Options, Reader, Row, TimeColumn, TimeForm};
 use proptest::prelude::*;
 
 /// Gives the bytes in pieces of the given lengths, over and over.
@@ -26,14 +26,17 @@ impl Read for Pieces {
 }
 
 /// Everything that reading gives, as text.
-fn outcome(bytes: &[u8], lengths: Vec<usize>, form: &TimeForm, options: &Options) -> String {
+fn outcome(bytes: &[u8], lengths: Vec<usize>, time: &TimeColumn, options: &Options) -> String {
     let input = Pieces {
         bytes: bytes.to_vec(),
         at: 0,
         lengths,
         turn: 0,
     };
-    let layout = Layout::new("t", form.clone(), ["a", "b"]);
+    let layout = Layout {
+        time: time.clone(),
+        ..Layout::new("", TimeForm::SECONDS, ["a", "b"])
+    };
     let mut reader = match Reader::from_read("any", input, layout, options.clone()) {
         Ok(reader) => reader,
         Err(error) => return error.to_string(),
@@ -49,13 +52,18 @@ fn outcome(bytes: &[u8], lengths: Vec<usize>, form: &TimeForm, options: &Options
     }
 }
 
-fn forms() -> impl Strategy<Value = TimeForm> {
-    prop_oneof![
+fn times() -> impl Strategy<Value = TimeColumn> {
+    let columns = prop_oneof![Just("t"), Just("{t} {a}"), Just("1{b}{t}")];
+    let forms = prop_oneof![
         Just(TimeForm::SECONDS),
         Just(TimeForm::Rfc3339),
         Just(TimeForm::Format("%d.%m.%Y %H:%M".parse().unwrap())),
         any::<i64>().prop_map(|step_ns| TimeForm::Samples { step_ns }),
-    ]
+    ];
+    (columns, forms).prop_map(|(columns, form)| TimeColumn {
+        columns: columns.parse().unwrap(),
+        form,
+    })
 }
 
 fn options() -> impl Strategy<Value = Options> {
@@ -111,20 +119,20 @@ fn nearly_recordings() -> impl Strategy<Value = Vec<u8>> {
 proptest! {
     #[test]
     fn any_bytes_end_in_rows_or_an_error(
-        bytes in prop::collection::vec(any::<u8>(), 0..300), form in forms(), options in options(),
+        bytes in prop::collection::vec(any::<u8>(), 0..300), time in times(), options in options(),
     ) {
-        outcome(&bytes, vec![64], &form, &options);
+        outcome(&bytes, vec![64], &time, &options);
         let with_header = [b"t,a,b\n", bytes.as_slice()].concat();
-        outcome(&with_header, vec![64], &form, &options);
+        outcome(&with_header, vec![64], &time, &options);
     }
 
     #[test]
     fn the_pieces_in_which_bytes_come_change_nothing(
-        bytes in nearly_recordings(), form in forms(), options in options(),
+        bytes in nearly_recordings(), time in times(), options in options(),
         lengths in prop::collection::vec(1..20_usize, 1..5),
     ) {
-        let whole = outcome(&bytes, vec![usize::MAX], &form, &options);
-        prop_assert_eq!(outcome(&bytes, lengths, &form, &options), whole);
+        let whole = outcome(&bytes, vec![usize::MAX], &time, &options);
+        prop_assert_eq!(outcome(&bytes, lengths, &time, &options), whole);
     }
 
     #[test]
