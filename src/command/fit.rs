@@ -159,12 +159,10 @@ impl Fit {
                     (Outcome::Fitted(_), None) => json!({ "node": fit.node }),
                 })
                 .collect();
-            let told = json!({
-                "ticks": report.ticks,
-                "segments": report.segments,
-                "leaps": leaps,
-                "estimators": estimators,
-            });
+            let mut told = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
+            if !leaps.is_empty() {
+                told["leaps"] = json!(leaps);
+            }
             println!("{:#}", data::with_overlaps(told, &dataset.reports()));
             return;
         }
