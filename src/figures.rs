@@ -76,15 +76,6 @@ pub fn time(seconds: f64) -> String {
     format!("{number} {}", unit.symbol)
 }
 
-/// How often something happened of which the first is told next: `once`, `3 times, first`.
-#[must_use]
-pub fn times_first(count: usize) -> String {
-    match count {
-        1 => "once".to_owned(),
-        many => format!("{many} times, first"),
-    }
-}
-
 /// Instants from here on, in s, are dates: 1980, by a clock that began in 1970. A machine does not run for ten years.
 pub const DATES_S: f64 = 315_532_800.0;
 

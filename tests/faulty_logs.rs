@@ -166,7 +166,7 @@ fn a_report_says_which_sensors_leap_or_lie_where_the_fit_saw_none() {
     let told = in_one_line(&report.out);
     assert!(
         told.contains("Sensors to look at: temperature.plate: the same value 60 times; leaps 2 times, first from 21.")
-            && told.contains("to 850 within one sample; from 20.0 to 850, far outside of what the fit saw, 20.0 to 24.0"),
+            && told.contains("to 850.0 within one sample; from 20.0 to 850, far outside of what the fit saw, 20.0 to 24.0"),
         "{told}"
     );
     let page = std::fs::read_to_string(&page).unwrap();

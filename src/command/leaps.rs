@@ -4,12 +4,11 @@ use std::cell::RefCell;
 
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::recording::{Event, Recording, RecordingError, Rows};
-use athermal::core::unit::Unit;
-use athermal::diagnosis::leap::{Finder, Leap, Leaps};
+use athermal::diagnosis::leap::{Finder, Leaps, finders};
 use athermal::diagnosis::of_truths;
 use serde::Serialize;
 
-use crate::figures::{instant, number, times_first};
+use crate::figures::{instant, number};
 use crate::terminal::Terminal;
 
 /// Leaps of a channel.
@@ -86,19 +85,18 @@ impl Recording for LeapWatch<'_> {
 }
 
 fn looked(plan: &Plan) -> Vec<Looked> {
-    let channels = plan.sources.iter().zip(of_truths(plan)).enumerate();
-    channels
-        .filter(|(place, (_, of_truth))| {
-            let unit = &plan.channels[*place].channel.unit;
-            *of_truth || unit.measures_same(&Unit::kelvin())
-        })
-        .map(|(place, (source, of_truth))| Looked {
-            place,
-            source: source.clone(),
-            of_truth,
-            finder: Finder::default(),
-        })
-        .collect()
+    let channels = plan.sources.iter().zip(of_truths(plan)).zip(finders(plan));
+    let looked = channels
+        .enumerate()
+        .filter_map(|(place, ((source, of_truth), finder))| {
+            Some(Looked {
+                place,
+                source: source.clone(),
+                of_truth,
+                finder: finder?,
+            })
+        });
+    looked.collect()
 }
 
 struct Looking<'a> {
@@ -130,15 +128,9 @@ pub fn tell(terminal: &Terminal, all: &[Leaping]) {
         channel,
         signal,
         of_truth,
-        leaps: Leaps {
-            count,
-            first,
-            usual,
-        },
+        leaps,
     } in all
     {
-        let Leap { at_s, from, to } = *first;
-        let times = times_first(*count);
         let then = if *of_truth {
             "was it moved, or zeroed anew? That is learned as drift: begin another file there, or leave the rows of the \
              largest drifts out by `train.abs_truth`"
@@ -147,15 +139,13 @@ pub fn tell(terminal: &Terminal, all: &[Leaping]) {
             format!(
                 "did the sensor fail? That is learned too: leave such samples out by a `range` in [signals.{signal}]; nine in \
                  ten are between {} and {}",
-                number(usual.0),
-                number(usual.1)
+                number(leaps.usual.0),
+                number(leaps.usual.1)
             )
         };
         terminal.warning(format_args!(
-            "{channel} leaps {times} from {} to {} within one sample, at {}: {then}",
-            number(from),
-            number(to),
-            instant(at_s),
+            "{channel} {leaps}, at {}: {then}",
+            instant(leaps.first.at_s),
         ));
     }
 }

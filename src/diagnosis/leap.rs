@@ -5,7 +5,14 @@
 //! of the changes between two samples, and stands alone: the changes before and after it are less than a tenth of it, or take it
 //! back. A heater that is switched on makes large changes too, but many of them, one after the other.
 
+use std::fmt;
+
+use athermal_core::compile::Plan;
+use athermal_core::unit::Unit;
 use serde::Serialize;
+
+use super::of_truths;
+use crate::figures::number;
 
 /// So many times as large as nineteen in twenty changes is a leap. In the largest measured and simulated sets of data without one,
 /// what stands alone is at most 2.1 times as large.
@@ -47,6 +54,27 @@ pub struct Leaps {
     pub first: Leap,
     /// Nine tenths of all samples lie between these.
     pub usual: (f64, f64),
+}
+
+impl fmt::Display for Leaps {
+    /// `leaps 2 times, first from 21.50 to 850.0 within one sample`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let times = match self.count {
+            1 => "once".to_owned(),
+            many => format!("{many} times, first"),
+        };
+        let (from, to) = (number(self.first.from), number(self.first.to));
+        write!(f, "leaps {times} from {from} to {to} within one sample")
+    }
+}
+
+/// For each measured channel a finder where a leap says that something is wrong: in a temperature, and in what a truth is made of.
+#[must_use]
+pub fn finders(plan: &Plan) -> Vec<Option<Finder>> {
+    let channels = plan.channels.iter().zip(of_truths(plan));
+    let may_leap =
+        channels.map(|(of, of_truth)| of_truth || of.channel.unit.measures_same(&Unit::kelvin()));
+    may_leap.map(|may| may.then(Finder::default)).collect()
 }
 
 /// Finds leaps while samples come, in memory that does not grow with them.

@@ -3,15 +3,14 @@
 
 use std::collections::BTreeMap;
 
-use athermal_core::compile::{Plan, PlannedRole};
+use athermal_core::compile::{Plan, PlannedRole, SourceChannel};
 use athermal_core::engine::{Engine, SampleRange};
-use athermal_core::unit::Unit;
 use serde::Serialize;
 
 use super::figure;
-use crate::diagnosis::leap::{Finder, Leaps};
+use crate::diagnosis::leap::{Finder, Leaps, finders};
 use crate::diagnosis::of_truths;
-use crate::figures::{counted, time, times_first};
+use crate::figures::{counted, time};
 
 /// As many samples with the very same value look stuck, where the channel changes otherwise.
 const STUCK: u64 = 20;
@@ -86,9 +85,8 @@ struct Looking {
 pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
     let reasons = reasons(plan);
     let of_truths = of_truths(plan);
-    let facts = |(slot, source): (usize, &athermal_core::compile::SourceChannel)| {
+    let facts = |(slot, (source, finder)): (usize, (&SourceChannel, Option<Finder>))| {
         let channel = &plan.channels[slot].channel;
-        let may_leap = of_truths[slot] || channel.unit.measures_same(&Unit::kelvin());
         SensorFacts {
             name: source.name.clone(),
             unit: channel.unit.to_string(),
@@ -97,14 +95,15 @@ pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
                 limits: source.range,
                 optional: source.optional,
                 reason: reasons.get(&slot).copied(),
-                finder: may_leap.then(Finder::default),
+                finder,
                 wanders: of_truths[slot],
                 ..Looking::default()
             },
             ..SensorFacts::default()
         }
     };
-    plan.sources.iter().enumerate().map(facts).collect()
+    let sources = plan.sources.iter().zip(finders(plan)).enumerate();
+    sources.map(facts).collect()
 }
 
 /// Has every `health` node say what is wrong and every `compensate` what holds it back, whether or not the graph reads it.
@@ -255,14 +254,7 @@ impl SensorFacts {
         if !self.looking.optional && self.looks_stuck() {
             remarks.push(format!("the same value {} times", self.most_unchanged));
         }
-        if let Some(Leaps { count, first, .. }) = &self.leaps {
-            remarks.push(format!(
-                "leaps {} from {} to {} within one sample",
-                times_first(*count),
-                figure(Some(first.from)),
-                figure(Some(first.to))
-            ));
-        }
+        remarks.extend(self.leaps.iter().map(Leaps::to_string));
         if let (Some((low, high)), Some((fit_low, fit_high))) = (self.range, self.exceeds) {
             remarks.push(format!(
                 "from {} to {}, far outside of what the fit saw, {} to {}",

@@ -138,7 +138,7 @@ fn guess(name: &str, below: &str) -> Column {
         .skip(1)
         .rev()
         .find_map(|word| Unit::in_name(word));
-    let below = Unit::in_name(below).or_else(|| Unit::parse(below).ok());
+    let below = Unit::in_words(below);
     let unit = below.as_ref().or(by_name.as_ref());
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
     let has = |known: &[&str]| {

@@ -9,7 +9,7 @@ use athermal::diagnosis::leap::{Finder, Leaps};
 use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
-use crate::figures::{counted, number, times_first};
+use crate::figures::counted;
 
 /// The values of a log, column by column.
 #[derive(Debug)]
@@ -249,32 +249,23 @@ impl Survey {
             if column.kind == Kind::Unused || !(is_temperature || drifts) {
                 continue;
             }
-            let Some(Leaps {
-                count,
-                first,
-                usual,
-            }) = series.leaps()
-            else {
+            let Some(leaps) = series.leaps() else {
                 continue;
             };
-            let leaps = format!(
-                "it leaps {} from {} to {} within one sample",
-                times_first(count),
-                number(first.from),
-                number(first.to)
-            );
             let left_out = if is_temperature {
-                series.keep_within(beyond(usual))
+                series.keep_within(beyond(leaps.usual))
             } else {
                 0
             };
             column.warn(match left_out {
                 0 if drifts => {
-                    format!("{leaps}: was it moved, or zeroed anew? That would be learned as drift")
+                    format!(
+                        "it {leaps}: was it moved, or zeroed anew? That would be learned as drift"
+                    )
                 }
-                0 => format!("{leaps}: did the sensor fail?"),
+                0 => format!("it {leaps}: did the sensor fail?"),
                 n => format!(
-                    "{leaps}: did the sensor fail? {} far from all others are taken for faults",
+                    "it {leaps}: did the sensor fail? {} far from all others are taken for faults",
                     counted(n, "value")
                 ),
             });

@@ -86,7 +86,7 @@ fn what_learns_from_a_truth_while_it_runs_is_made_of_it() {
         let told = problems(&behind_a_learner(node, ["5min", "0s"]));
         assert!(told.contains("contains part of the answer"), "{told}");
         assert!(
-            told.contains("`follow.Z` reads `drift.Z`") || told.contains("drift.Z"),
+            told.contains("`follow.Z` from `drift.Z` from `position.Z`"),
             "{told}"
         );
         for ahead in ["0s", "150s", "5min"] {

@@ -29,16 +29,12 @@ pub(crate) fn bare(cell: &str) -> &str {
 
 /// The unit that a cell says.
 pub(crate) fn unit(cell: &str) -> Option<Unit> {
-    read(bare(cell))
-}
-
-fn read(text: &str) -> Option<Unit> {
-    Unit::in_name(text).or_else(|| Unit::parse(text).ok())
+    Unit::in_words(bare(cell))
 }
 
 /// Numbers are none, though 1 is the unit of what has no dimension.
 fn is_unit(text: &str) -> bool {
-    !is_number(text) && read(text).is_some()
+    !is_number(text) && Unit::in_words(text).is_some()
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ fn of_name(column: &str) -> Option<Unit> {
     if ending.chars().count() < 2 && !["K", "%"].contains(&ending) {
         return None;
     }
-    Unit::in_name(ending).or_else(|| Unit::parse(ending).ok())
+    Unit::in_words(ending)
 }
 
 /// The unit that columns are named for, where it measures the same as the signal's and is another one.

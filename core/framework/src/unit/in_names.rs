@@ -46,4 +46,10 @@ impl Unit {
         let (_, code) = WORDS.iter().find(|(known, _)| same(known))?;
         Self::parse(code).ok()
     }
+
+    /// The unit that a text says which is meant to be one: a word as in names, or a spelling as in graph files.
+    #[must_use]
+    pub fn in_words(text: &str) -> Option<Self> {
+        Self::in_name(text).or_else(|| Self::parse(text).ok())
+    }
 }

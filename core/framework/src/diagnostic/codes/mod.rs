@@ -236,7 +236,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A052",
         "part of the answer",
-        "A regressor, or a vote that is no prediction, overlaps the value that is predicted. Windows of neighbouring truths overlap, so a recent truth, or a feature made of the truth's signal, contains part of the answer, and scores would flatter. A lag of at least the truth's span less `ahead` is free of it."
+        "A regressor, or a vote that is no prediction, overlaps the value that is predicted. Windows of neighbouring truths overlap, so a recent truth, a feature made of the truth's signal, or what learns from the truth while it runs, contains part of the answer, and scores would flatter. A lag of at least the truth's span less `ahead` is free of it."
     ),
     code!(
         "A053",
