@@ -32,9 +32,10 @@ pub(crate) fn unit(cell: &str) -> Option<Unit> {
     Unit::in_words(bare(cell))
 }
 
-/// Numbers are none, though 1 is the unit of what has no dimension.
+/// Numbers are none, though 1 is the unit of what has no dimension; nor are dates, which read as a product of such.
 fn is_unit(text: &str) -> bool {
-    !is_number(text) && Unit::in_words(text).is_some()
+    let is_of_value = |c: char| c.is_ascii_digit() || "., :/+-".contains(c);
+    !is_number(text) && !text.chars().all(is_of_value) && Unit::in_words(text).is_some()
 }
 
 #[cfg(test)]
@@ -62,6 +63,8 @@ mod tests {
             ";21;nm",
             "0;;A;",
             "2026-03-01 12:00;;A;",
+            "01.03.2026;;A;",
+            "01.03.2026;;;",
             "Time;Plate;Room;Z",
             ";NaN;nm",
             ";true;nm",
