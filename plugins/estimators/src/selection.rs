@@ -200,10 +200,15 @@ impl Selection {
         report.selection = selected.steps.iter().map(of_step).collect();
         report.refused = selected.refused.as_ref().map(of_step);
         if let Some(start) = &selected.start {
-            report.figure("r2_of_all_regressors", start.mean);
-            report
-                .notes
-                .push(format!("all regressors together have R² {:.4}", start.mean));
+            let (figure, of) = match direction {
+                Direction::Backward => ("r2_of_all_regressors", "all regressors together have"),
+                _ => (
+                    "r2_without_sensors",
+                    "regressors that read no sensor are always there and alone have",
+                ),
+            };
+            report.figure(figure, start.mean);
+            report.notes.push(format!("{of} R² {:.4}", start.mean));
             if !start.left_out.is_empty() {
                 let names: Vec<&str> = start
                     .left_out

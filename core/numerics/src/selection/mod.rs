@@ -61,7 +61,8 @@ pub struct SelectionStep {
 /// What a selection did, and why it stopped.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Selection {
-    /// The score of all units together, where the search started from them.
+    /// The score of what was there before the first step: of all units together on the way back, else of the columns that
+    /// need none; nothing where there are no such columns.
     pub start: Option<Start>,
     /// The steps taken, in order.
     pub steps: Vec<SelectionStep>,
@@ -75,7 +76,7 @@ pub struct Selection {
     too_large: usize,
 }
 
-/// The score from which a search backwards starts.
+/// The score from which a search starts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Start {
     /// The mean over the folds.

@@ -107,7 +107,7 @@ impl Search {
             },
         };
         if self.direction != Direction::Backward {
-            candidates.free().for_each(|column| state.include(column));
+            state.start_with_free();
         }
         match self.direction {
             Direction::Forward => while state.add() {},
@@ -242,6 +242,16 @@ impl State<'_> {
         }
     }
 
+    /// Columns that cost nothing are there from the start, so that the first unit too is worth only what it adds to them.
+    fn start_with_free(&mut self) {
+        self.candidates
+            .free()
+            .for_each(|column| self.include(column));
+        if !self.columns.is_empty() {
+            self.start(Vec::new());
+        }
+    }
+
     fn start_with_all(&mut self) {
         let mut left_out = Vec::new();
         for column in 0..self.candidates.width() {
@@ -255,6 +265,11 @@ impl State<'_> {
             let columns = self.candidates.of_unit(unit);
             self.units[unit] = columns.iter().any(|column| self.columns.contains(column));
         }
+        self.start(left_out);
+    }
+
+    /// Notes the score of what is there before the first step.
+    fn start(&mut self, left_out: Vec<usize>) {
         let score = self.how.score;
         let folds: Vec<f64> = self.folds.iter().map(|f| f.present_score(score)).collect();
         let mean = folds.iter().sum::<f64>() / folds.len() as f64;

@@ -449,6 +449,30 @@ fn a_copy_of_a_chosen_column_is_never_chosen_and_the_lower_index_wins_the_tie() 
 }
 
 #[test]
+fn the_first_unit_too_must_add_to_the_columns_that_need_none() {
+    let mut blocks = GramBlocks::new(2);
+    for i in 0..600 {
+        let (own, useless) = (sine(i, 0.37), sine(i, 0.11));
+        blocks.push(&[own, useless], own + 0.1 * sine(i, 1.9));
+    }
+    let splits = blocks.splits(&thirds()).unwrap();
+    let of_units = Candidates::of_units(vec![vec![], vec![0]]);
+    for direction in [Direction::Forward, Direction::Floating] {
+        let search = Search {
+            direction,
+            tolerance: Some(1e-3),
+            ..Search::forward()
+        };
+        let found = search.over(&splits, &[1.0; 2], &of_units).unwrap();
+        assert_eq!(found.columns, [0], "{direction:?}");
+        assert!(found.start.as_ref().unwrap().mean > 0.98);
+        assert!(found.refused.is_some());
+        let smallest = found.within_one_standard_error().unwrap();
+        assert_eq!((smallest.columns, smallest.steps), (vec![0], 0));
+    }
+}
+
+#[test]
 fn a_column_that_is_constant_in_one_training_set_counts_nothing_there() {
     let mut blocks = GramBlocks::new(2);
     for i in 0..600 {
