@@ -84,6 +84,10 @@ impl TryFrom<Saved> for Rls {
         let width = coefficients.len();
         check_length("coefficients", width.max(1), width)?;
         check_length("covariance", width * width, covariance.len())?;
+        // Its diagonal may be what rounding left of 0, where a row told all that was to be known.
+        if !finite_and_symmetric(&coefficients, &covariance) {
+            return Err(NumericsError::NotFinite);
+        }
         Ok(Self {
             options,
             projected: Scratch(vec![0.0; width]),
@@ -92,6 +96,14 @@ impl TryFrom<Saved> for Rls {
             seen,
         })
     }
+}
+
+/// Of a covariance with a row and a column per coefficient.
+fn finite_and_symmetric(coefficients: &[f64], covariance: &[f64]) -> bool {
+    let width = coefficients.len();
+    let symmetric = |i: usize, j: usize| covariance[i * width + j] == covariance[j * width + i];
+    let mut numbers = coefficients.iter().chain(covariance);
+    numbers.all(|value| value.is_finite()) && (0..width).all(|i| (0..i).all(|j| symmetric(i, j)))
 }
 
 impl RlsOptions {
@@ -170,12 +182,10 @@ impl Rls {
     ) -> Result<Self, NumericsError> {
         options.check()?;
         let width = coefficients.len();
-        let symmetric = |i: usize, j: usize| covariance[i * width + j] == covariance[j * width + i];
         let sound = covariance.len() == width * width
-            && covariance.iter().all(|value| value.is_finite())
-            && (0..width).all(|i| covariance[i * width + i] > 0.0)
-            && (0..width).all(|i| (0..i).all(|j| symmetric(i, j)));
-        if !sound || coefficients.iter().any(|value| !value.is_finite()) {
+            && finite_and_symmetric(&coefficients, &covariance)
+            && (0..width).all(|i| covariance[i * width + i] > 0.0);
+        if !sound {
             return Err(NumericsError::NotFinite);
         }
         Ok(Self {

@@ -66,12 +66,34 @@ pub struct SgdOptions {
 
 /// A linear model that learns row by row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Saved")]
 pub struct Sgd {
     options: SgdOptions,
     weights: Vec<f64>,
     intercept: f64,
     seen: u64,
+}
+
+/// A model as it is read, before it is known whether it can be one.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Saved {
+    options: SgdOptions,
+    weights: Vec<f64>,
+    intercept: f64,
+    seen: u64,
+}
+
+impl TryFrom<Saved> for Sgd {
+    type Error = NumericsError;
+
+    fn try_from(saved: Saved) -> Result<Self, NumericsError> {
+        let started = Self::starting_at(saved.weights, saved.intercept, saved.options)?;
+        Ok(Self {
+            seen: saved.seen,
+            ..started
+        })
+    }
 }
 
 impl Sgd {
@@ -193,6 +215,19 @@ mod tests {
     use crate::{Gram, Standardization, oracle};
 
     const EVERY: LearningRate = LearningRate::Constant { eta0: 0.01 };
+
+    #[test]
+    fn what_could_not_have_been_started_is_not_read() {
+        let rate = EVERY;
+        let model = Sgd::new(2, SgdOptions { alpha: 0.0, rate }).unwrap();
+        let text = serde_json::to_string(&model).unwrap();
+        assert_eq!(serde_json::from_str::<Sgd>(&text).unwrap(), model);
+        for (right, wrong) in [("0.01", "-0.01"), ("\"alpha\":0.0", "\"alpha\":-1.0")] {
+            let broken = text.replace(right, wrong);
+            assert_ne!(broken, text);
+            serde_json::from_str::<Sgd>(&broken).unwrap_err();
+        }
+    }
 
     #[test]
     fn epochs_follow_the_oracle() {

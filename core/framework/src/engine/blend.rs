@@ -49,6 +49,10 @@ impl Blending {
         if std::mem::take(&mut self.begins) {
             self.offset = self.shown.map_or(0.0, |(_, shown)| shown - value);
         }
+        if !self.offset.is_finite() {
+            // No rate would ever take such a difference away.
+            self.offset = 0.0;
+        }
         let elapsed = self.shown.map_or(Duration::ZERO, |(at, _)| now - at);
         let most = rate * elapsed.max(Duration::ZERO).secs();
         self.offset = if self.offset.abs() <= most {
@@ -93,6 +97,15 @@ mod tests {
     }
 
     const RATE: f64 = 5.0;
+
+    #[test]
+    fn a_difference_too_large_for_a_number_is_stepped_over() {
+        let (mut old, mut new) = (Blending::default(), Blending::default());
+        old.pass(s(0), f64::MAX, RATE);
+        new.pass(s(0), f64::MIN, RATE);
+        new.hand_over(&old);
+        assert_eq!(new.pass(s(1), 1.0, RATE), 1.0);
+    }
 
     #[test]
     fn the_difference_at_the_hand_over_falls_at_the_rate() {

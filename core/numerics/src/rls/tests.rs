@@ -277,6 +277,9 @@ fn a_recursion_that_was_written_and_read_goes_on_with_the_same_bits_if_its_parts
         let told = "the length of covariance is";
         assert!(error.to_string().starts_with(told), "{error}");
     }
+    let mut lopsided = saved.clone();
+    lopsided["covariance"][1] = serde_json::json!(7.0);
+    serde_json::from_value::<Rls>(lopsided).unwrap_err();
     let mut back: Rls = serde_json::from_value(saved).unwrap();
     assert_eq!(back, rls);
     for _ in 0..20 {
