@@ -56,7 +56,12 @@ fn log(fault: impl Fn(usize, &mut [f64; 3])) -> String {
         let mut values = [plate, room, 400.0 * plate - 150.0 * room + noise(row, 3.0)];
         fault(row, &mut values);
         let [plate, room, z] = values;
-        let _ = writeln!(text, "{},{plate:.3},{room:.3},{z:.1}", 60 * row);
+        let room = if room.is_nan() {
+            String::new()
+        } else {
+            format!("{room:.3}")
+        };
+        let _ = writeln!(text, "{},{plate:.3},{room},{z:.1}", 60 * row);
     }
     text
 }
@@ -171,6 +176,85 @@ fn a_report_says_which_sensors_leap_or_lie_where_the_fit_saw_none() {
     );
     let page = std::fs::read_to_string(&page).unwrap();
     assert_eq!(page.matches("in order</td>").count(), 2);
+}
+
+/// The room's sensor that says the same from a third of the log on.
+fn frozen(row: usize, values: &mut [f64; 3]) {
+    values[1] = temperatures(row.min(960)).1;
+}
+
+/// The same that says nothing from there on.
+fn dead(row: usize, values: &mut [f64; 3]) {
+    if row > 960 {
+        values[1] = f64::NAN;
+    }
+}
+
+#[test]
+fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
+    let scratch = Scratch::new("faulty-silent");
+    let graph = scratch.file("graph.toml", GRAPH);
+    let file = |name: &str, text: String| scratch.file(name, text);
+    let sound = file("sound.csv", log(|_, _| ()));
+    let (sound_model, model) = (scratch.path("sound.json"), scratch.path("model.json"));
+    athermal_on("fit", &graph, &sound, &[&"-o", &sound_model]).ended(0);
+    for (name, fault, expected, in_fit, in_scores) in [
+        (
+            "frozen.csv",
+            frozen as fn(usize, &mut [f64; 3]),
+            "warning: temperature.room is 20.04 in 1,920 samples one after the other, from 57600 s to 172740 s: \
+             is the sensor stuck?",
+            "That is learned too: leave these rows out",
+            "Predictions from that mean little",
+        ),
+        (
+            "dead.csv",
+            dead,
+            "warning: temperature.room has no sample in 1,919 of 2,880 rows, from 57660 s to 172740 s: did the sensor fail?",
+            "What needs it learns nothing there",
+            "What needs it predicts nothing there",
+        ),
+    ] {
+        let data = file(name, log(fault));
+        let fitted = athermal_on("fit", &graph, &data, &[&"-o", &model]).ended(0);
+        fitted.tells(&[expected, in_fit]);
+        for command in ["evaluate", "diagnose"] {
+            athermal_on(command, &sound_model, &data, &[])
+                .ended(0)
+                .tells(&[expected, in_scores]);
+        }
+        let other = file("other.toml", GRAPH.replace("linear", "rls"));
+        let compared =
+            athermal_on("compare", &graph, &sound, &[&"--on", &data, &"--", &other]).ended(0);
+        assert_eq!(
+            compared.told.matches(expected).count(),
+            1,
+            "{}",
+            compared.told
+        );
+        let told = athermal_on("evaluate", &sound_model, &data, &[&"--format", &"json"]).ended(0);
+        let told = told.json();
+        let found = [&told["stuck"], &told["silent"]].map(|found| found[0]["channel"].as_str());
+        let of = (name == "frozen.csv", name == "dead.csv");
+        assert_eq!((found[0].is_some(), found[1].is_some()), of, "{told}");
+    }
+    let watched = GRAPH.replace(
+        "inputs.features = \"temperature\"",
+        "inputs.features = \"watched\"",
+    );
+    let watched = watched.replace(
+        "[nodes.thermal]",
+        "[nodes.watched]\ntype = \"health\"\ninputs.signal = \"temperature\"\nstuck_after = \"10min\"\n[nodes.thermal]",
+    );
+    let watched = file("watched.toml", watched);
+    let fitted = athermal_on(
+        "fit",
+        &watched,
+        &scratch.path("frozen.csv"),
+        &[&"-o", &model],
+    );
+    let fitted = fitted.ended(0);
+    assert!(!fitted.told.contains("stuck"), "{}", fitted.told);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `athermal compare`: several graphs, fitted and scored on the same data, in one table.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -13,7 +14,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::beyond;
-use super::data::{self, Data};
+use super::data::{self, Data, recording};
+use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
 use super::model::{self, check_limit};
 use crate::figures::{count, counted, digits, matrix, number, or_dash, stated};
@@ -40,7 +42,7 @@ pub struct Compare {
     #[command(flatten)]
     data: Data,
     /// The recording to score on; several files are joined as with --data
-    #[arg(long, required = true, num_args = 1.., value_name = "FILE")]
+    #[arg(long, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     on: Vec<PathBuf>,
     /// Only truths whose absolute value is below count, such as "250 nm/min"
     #[arg(long, value_name = "QUANTITY")]
@@ -83,15 +85,19 @@ impl Compare {
         let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
         let mut in_fits = Vec::new();
+        let mut faults = BTreeSet::new();
         for ((path, mut model), name) in models.into_iter().zip(names) {
             let began = Instant::now();
             let options = FitOptions::default();
-            let report = fit_without_card(&mut model, &self.data, &options, terminal)?.report;
+            let told = fit_without_card(&mut model, &self.data, &options, terminal)?;
+            let mut words = faults::in_words(&told.faults, Purpose::Fit);
+            let report = told.report;
             let seconds = began.elapsed().as_secs_f64();
             let dataset = on.dataset();
             let mut progress = terminal.progress("scoring");
             let mut ticks = 0;
-            let trace = trace(&model.plan, &model.fitted, &dataset, &mut |_, _| {
+            let watch = FaultWatch::new(&dataset);
+            let trace = trace(&model.plan, &model.fitted, &watch, &mut |_, _| {
                 ticks += 1;
                 if ticks % 4096 == 0 {
                     progress.tell(ticks);
@@ -109,6 +115,13 @@ impl Compare {
             let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
             beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));
             in_fits.extend(new);
+            words.extend(faults::in_words(&watch.found(), Purpose::Scores));
+            for words in words {
+                // The graphs read the same channels.
+                if faults.insert(words.clone()) {
+                    terminal.warning(words);
+                }
+            }
             fits.push(Fitted {
                 graph: name.clone(),
                 path,

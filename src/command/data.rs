@@ -12,6 +12,7 @@ use athermal::core::engine::Fnv1a;
 use athermal::core::model::DataCard;
 use athermal::files::{Dataset, Format, Options, Report};
 use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use serde_json::{Value, json};
 
 use crate::figures::{count, counted};
@@ -23,11 +24,20 @@ use crate::terminal::{Failure, Terminal};
 #[derive(Debug, Args)]
 pub struct Data {
     /// CSV or JSON lines; several files are joined in the order of time, or are segments when their times start again
-    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE")]
+    #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     files: Vec<PathBuf>,
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
+}
+
+/// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
+pub fn recording() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        let is_graph = path.extension().is_some_and(|ending| ending == "toml");
+        let told = "this is a graph and holds no data; name graphs before this option";
+        if is_graph { Err(told) } else { Ok(path) }
+    })
 }
 
 impl Data {

@@ -11,6 +11,7 @@ use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
+use super::faults::{self, FaultWatch, Purpose};
 use super::model::{check_limit, load_fitted};
 use super::numbers;
 use crate::figures::{counted, number, or_dash, table};
@@ -106,15 +107,13 @@ impl Evaluate {
             frozen: self.frozen,
             mode,
         };
+        let watch = FaultWatch::new(&dataset);
         let mut progress = terminal.progress("evaluating");
-        let scores = score(
-            &model.plan,
-            &model.fitted,
-            &dataset,
-            &options,
-            &mut |ticks| progress.tell(ticks),
-        )?;
+        let scores = score(&model.plan, &model.fitted, &watch, &options, &mut |ticks| {
+            progress.tell(ticks)
+        })?;
         drop(progress);
+        let faults = watch.found();
         let outside_fit = beyond::beyond(model.sample_ranges(), &scores.ranges);
         if terminal.format == Format::Json {
             let files: Vec<_> = dataset
@@ -125,7 +124,7 @@ impl Evaluate {
             let period = scores.period.map(|(from, to)| {
                 json!({ "from_s": from.as_ns() as f64 / 1e9, "to_s": to.as_ns() as f64 / 1e9, "ticks": scores.ticks })
             });
-            let told = json!({
+            let mut told = json!({
                 "data": files,
                 "mode": self.mode.name(),
                 "steps": self.steps,
@@ -134,6 +133,7 @@ impl Evaluate {
                 "lacks": scores.lacks,
                 "outside_fit": outside_fit,
             });
+            faults::to_json(&faults, &mut told);
             println!("{:#}", data::with_overlaps(told, &dataset.reports()));
         } else {
             print!("{}", describe(&scores, mode));
@@ -146,6 +146,7 @@ impl Evaluate {
             &scores.rejected,
         );
         beyond::tell(terminal, &outside_fit);
+        faults::tell(terminal, &faults, Purpose::Scores);
         self.data.tell_fitted_on(terminal, &model);
         data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {

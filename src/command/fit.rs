@@ -16,7 +16,7 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
-use super::leaps::{self, LeapWatch, Leaping};
+use super::faults::{self, FaultWatch, Faulty, Purpose};
 use super::model;
 use super::numbers;
 use super::threads::Threads;
@@ -144,7 +144,7 @@ impl Fit {
         let Told {
             dataset,
             report,
-            leaps,
+            faults,
         } = told;
         let to_stdout = self.output.as_os_str() == "-";
         if terminal.format == Format::Json && !to_stdout {
@@ -160,9 +160,7 @@ impl Fit {
                 })
                 .collect();
             let mut told = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
-            if !leaps.is_empty() {
-                told["leaps"] = json!(leaps);
-            }
+            faults::to_json(faults, &mut told);
             println!("{:#}", data::with_overlaps(told, &dataset.reports()));
             return;
         }
@@ -186,8 +184,8 @@ pub struct Told {
     pub dataset: Dataset,
     /// How it went.
     pub report: FitReport,
-    /// Which channels leap.
-    pub leaps: Vec<Leaping>,
+    /// What is wrong with channels.
+    pub faults: Vec<Faulty>,
 }
 
 /// Fits a model on data, fills in its card, and tells what was left out of the data, or may be wrong in them.
@@ -201,6 +199,7 @@ pub fn fit_on(
     terminal: &Terminal,
 ) -> Result<Told, Failure> {
     let told = fit_without_card(model, data, options, terminal)?;
+    faults::tell(terminal, &told.faults, Purpose::Fit);
     let (dataset, report) = (&told.dataset, &told.report);
     data::note_zone(terminal, &dataset.reports());
     model.card = Some(Card {
@@ -218,7 +217,7 @@ pub fn fit_on(
     Ok(told)
 }
 
-/// The same for a model that is not kept: a card has the checksums of all data.
+/// The same for a model that is not kept: a card has the checksums of all data. What is wrong with channels is not told.
 ///
 /// # Errors
 /// When the data cannot be read.
@@ -229,13 +228,13 @@ pub fn fit_without_card(
     terminal: &Terminal,
 ) -> Result<Told, Failure> {
     let dataset = data.dataset();
-    let watch = LeapWatch::new(&dataset);
+    let watch = FaultWatch::new(&dataset);
     let mut progress = terminal.progress("fitting");
     let (fitted, report) = fit(&model.plan, &watch, options, &mut |ticks| {
         progress.tell(ticks);
     })?;
     drop(progress);
-    let leaps = watch.found();
+    let faults = watch.found();
     model.fitted = fitted;
     data::tell(
         terminal,
@@ -244,11 +243,10 @@ pub fn fit_without_card(
         report.refused,
         &report.rejected,
     );
-    leaps::tell(terminal, &leaps);
     Ok(Told {
         dataset,
         report,
-        leaps,
+        faults,
     })
 }
 

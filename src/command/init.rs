@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::aside::{check_apart, write_aside};
+use super::data::recording;
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 use crate::starter::{NoStarter, Told, starter};
@@ -27,6 +28,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, print};
 Names help: plate_degC, room_degF, Z1_nm, gap_um, heater_W, time_s, time_ms.")]
 pub struct Init {
     /// The log
+    #[arg(value_parser = recording())]
     data: PathBuf,
     /// Where the graph goes; `-` is standard output
     #[arg(long, short, value_name = "GRAPH", default_value = "graph.toml")]

@@ -16,6 +16,8 @@ pub mod residual;
 pub mod response;
 mod rest;
 pub mod sensor;
+pub mod silence;
+pub mod standstill;
 pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
@@ -177,6 +179,22 @@ fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
     }
     of_slot.truncate(plan.sources.len());
     of_slot
+}
+
+/// The measured channels that a `health` node watches over, which takes out what is wrong with them.
+#[must_use]
+pub fn watched(plan: &Plan) -> Vec<bool> {
+    let mut watched = vec![false; plan.sources.len()];
+    for node in plan.nodes.iter().filter(|node| node.kind.name == "health") {
+        let slots = node
+            .role
+            .inputs()
+            .flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
+        slots
+            .filter(|slot| *slot < plan.sources.len())
+            .for_each(|slot| watched[slot] = true);
+    }
+    watched
 }
 
 /// The measured channels that a truth is made of. Whatever else is measured is a sensor that may explain it.

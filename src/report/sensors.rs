@@ -10,15 +10,8 @@ use serde::Serialize;
 use super::figure;
 use crate::diagnosis::leap::{Finder, Leaps, finders};
 use crate::diagnosis::of_truths;
+use crate::diagnosis::standstill;
 use crate::figures::{counted, time};
-
-/// As many samples with the very same value look stuck, where the channel changes otherwise.
-const STUCK: u64 = 20;
-/// The share of samples that differ from the one before in a channel that changes.
-const CHANGES: f64 = 0.9;
-/// The same value so many times as often as it ever was else looks stuck too, in a channel of so many changes.
-const LONGER: u64 = 5;
-const ENOUGH_CHANGES: u64 = 50;
 
 /// What can be said of a measured channel.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -63,10 +56,9 @@ struct Looking {
     last: Option<(f64, f64)>,
     /// The difference between the last two samples.
     difference: Option<f64>,
-    unchanged: u64,
-    /// The longest runs of one value that are over.
-    runs: [u64; 2],
-    changes: u64,
+    stillness: standstill::Finder,
+    /// Whether it stands still for much longer than ever else.
+    is_stuck: bool,
     finder: Option<Finder>,
     /// Whether a truth is made of it.
     wanders: bool,
@@ -137,19 +129,6 @@ fn reasons(plan: &Plan) -> BTreeMap<usize, usize> {
     reasons
 }
 
-impl Looking {
-    /// The samples that come next are not a run with those before.
-    fn end_run(&mut self) {
-        let run = std::mem::take(&mut self.unchanged);
-        let [longest, second] = &mut self.runs;
-        if run > *longest {
-            (*longest, *second) = (run, *longest);
-        } else {
-            *second = run.max(*second);
-        }
-    }
-}
-
 impl SensorFacts {
     pub(super) fn look(&mut self, now_s: f64, value: f64, engine: &Engine) {
         if let Some(slot) = self.looking.reason {
@@ -181,12 +160,8 @@ impl SensorFacts {
                 looking.squares.0 += (difference - before).powi(2);
                 looking.squares.1 += 1;
             }
-            if value != last {
-                looking.changes += 1;
-                looking.end_run();
-            }
         }
-        looking.unchanged += 1;
+        looking.stillness.push(now_s, value);
         self.samples += 1;
         let (lowest, highest) = self.range.unwrap_or((value, value));
         self.range = Some((lowest.min(value), highest.max(value)));
@@ -196,7 +171,7 @@ impl SensorFacts {
     /// Another segment begins.
     pub(super) fn segment(&mut self) {
         (self.looking.last, self.looking.difference) = (None, None);
-        self.looking.end_run();
+        self.looking.stillness.interrupt();
         if let Some(finder) = &mut self.looking.finder {
             finder.interrupt();
         }
@@ -204,8 +179,8 @@ impl SensorFacts {
 
     /// Counts what can be counted only once all is known; `fit` is where samples lay in the fit.
     pub(super) fn finish(&mut self, fit: &[SampleRange]) {
-        self.looking.end_run();
-        self.most_unchanged = self.looking.runs[0];
+        let (longest, is_stuck) = std::mem::take(&mut self.looking.stillness).longest();
+        (self.most_unchanged, self.looking.is_stuck) = (longest.samples, is_stuck);
         self.leaps = self.looking.finder.take().and_then(|of| of.found());
         let usual = fit.iter().find(|usual| usual.channel == self.name);
         let usual = usual.filter(|_| !self.looking.wanders);
@@ -218,17 +193,6 @@ impl SensorFacts {
         self.gaps = lengths.iter().filter(|gap| **gap > limit).count() as u64;
         let (sum, count) = self.looking.squares;
         self.noise = (count > 0).then(|| (sum / (6.0 * count as f64)).sqrt());
-    }
-
-    fn looks_stuck(&self) -> bool {
-        let Looking {
-            changes,
-            runs: [longest, second],
-            ..
-        } = self.looking;
-        let changes_else = (changes + longest) as f64 > CHANGES * self.samples as f64;
-        let never_else = changes >= ENOUGH_CHANGES && longest > LONGER * second;
-        longest >= STUCK && (changes_else || never_else)
     }
 
     /// What somebody should look at.
@@ -251,7 +215,7 @@ impl SensorFacts {
                 time(self.longest_gap_s)
             ));
         }
-        if !self.looking.optional && self.looks_stuck() {
+        if !self.looking.optional && self.looking.is_stuck {
             remarks.push(format!("the same value {} times", self.most_unchanged));
         }
         remarks.extend(self.leaps.iter().map(Leaps::to_string));

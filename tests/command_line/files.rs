@@ -422,3 +422,18 @@ fn names_that_stand_within_a_log_are_told_once_for_each_log_and_beside_a_machine
         assert_eq!(fed.told.matches(&told).count(), 1, "{}", fed.told);
     }
 }
+
+#[test]
+fn a_graph_that_an_option_of_several_recordings_swallows_is_told_to_come_before_it() {
+    let (_scratch, graph, data, _model) = desk("graph-as-data");
+    for option in ["--data", "--on"] {
+        let other = if option == "--on" { "--data" } else { "--on" };
+        let compared = athermal(&[&"compare", &graph, &other, &data, &option, &data, &graph]);
+        compared
+            .ended(2)
+            .tells(&["this is a graph and holds no data; name graphs before this option"]);
+    }
+    athermal(&[&"init", &graph])
+        .ended(2)
+        .tells(&["holds no data"]);
+}

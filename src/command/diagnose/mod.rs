@@ -19,6 +19,7 @@ use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
+use super::faults::{self, FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::report::write_plots;
 use crate::figures::counted;
@@ -93,15 +94,19 @@ impl Diagnose {
             bar.get_or_insert_with(|| terminal.progress_to("fitting", "fits", Some(total)))
                 .tell(done);
         };
-        let (diagnosis, observation) = diagnose(&model, &dataset, &options, &mut progress)?;
+        let watch = FaultWatch::new(&dataset);
+        let (diagnosis, observation) = diagnose(&model, &watch, &options, &mut progress)?;
         drop(bar);
+        let faults = watch.found();
         let tables = Tables::new(&diagnosis, &self.of);
         if terminal.format == Format::Json {
             let files = dataset.paths().iter();
             let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
             let mut asked = diagnosis.clone();
             asked.keep_only(&self.of);
-            println!("{:#}", json!({ "data": files, "diagnosis": asked }));
+            let mut told = json!({ "data": files, "diagnosis": asked });
+            faults::to_json(&faults, &mut told);
+            println!("{told:#}");
         } else {
             print!("{}", tables.text());
         }
@@ -115,6 +120,7 @@ impl Diagnose {
         );
         let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
         beyond::tell(terminal, &outside_fit);
+        faults::tell(terminal, &faults, Purpose::Scores);
         for told in Lack::told(&diagnosis.lacks) {
             terminal.warning(told);
         }

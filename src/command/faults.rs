@@ -1,0 +1,282 @@
+//! Decides of which faults of sensors in recorded data people are told, and in what words; what a fault is, is decided elsewhere.
+
+use std::cell::RefCell;
+
+use athermal::core::compile::{Plan, SourceChannel};
+use athermal::core::recording::{Event, Recording, RecordingError, Rows};
+use athermal::diagnosis::leap::{self, Leaps};
+use athermal::diagnosis::silence::{self, Silence};
+use athermal::diagnosis::standstill::{self, Standstill};
+use athermal::diagnosis::{of_truths, watched};
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::figures::{count, instant, number};
+use crate::terminal::Terminal;
+
+/// What a recording is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// Models learn from it.
+    Fit,
+    /// Models are set against it.
+    Scores,
+}
+
+/// What is wrong with a channel.
+#[derive(Debug)]
+pub struct Faulty {
+    channel: String,
+    /// Whether a truth is made of it, so that its faults look like drift.
+    of_truth: bool,
+    leaps: Option<Leaps>,
+    stuck: Option<Standstill>,
+    silent: Option<Silence>,
+}
+
+impl Faulty {
+    fn is_sound(&self) -> bool {
+        self.leaps.is_none() && self.stuck.is_none() && self.silent.is_none()
+    }
+
+    fn signal(&self) -> &str {
+        let name = self.channel.split_once('.');
+        name.map_or(&self.channel, |(signal, _)| signal)
+    }
+}
+
+/// A recording whose channels are looked at when it is first read.
+pub struct FaultWatch<'a> {
+    recording: &'a dyn Recording,
+    state: RefCell<State>,
+}
+
+enum State {
+    Unread,
+    Read(Vec<Looked>),
+}
+
+/// A channel that is looked at, with what is looked for.
+struct Looked {
+    source: SourceChannel,
+    of_truth: bool,
+    leaps: Option<leap::Finder>,
+    stuck: Option<standstill::Finder>,
+    silent: Option<silence::Finder>,
+}
+
+impl<'a> FaultWatch<'a> {
+    /// Watches over this recording.
+    pub fn new(recording: &'a dyn Recording) -> Self {
+        Self {
+            recording,
+            state: RefCell::new(State::Unread),
+        }
+    }
+
+    /// The channels of which something is wrong, in the order of the plan.
+    pub fn found(self) -> Vec<Faulty> {
+        let State::Read(looked) = self.state.into_inner() else {
+            return Vec::new();
+        };
+        let all = looked.into_iter().map(|of| Faulty {
+            channel: of.source.name,
+            of_truth: of.of_truth,
+            leaps: of.leaps.and_then(|finder| finder.found()),
+            stuck: of.stuck.and_then(standstill::Finder::found),
+            silent: of.silent.and_then(silence::Finder::found),
+        });
+        all.filter(|of| !of.is_sound()).collect()
+    }
+}
+
+impl Recording for FaultWatch<'_> {
+    fn open(&self, plan: &Plan) -> Result<Box<dyn Rows + '_>, RecordingError> {
+        let rows = self.recording.open(plan)?;
+        let mut state = self.state.borrow_mut();
+        if let State::Read(_) = *state {
+            return Ok(rows);
+        }
+        *state = State::Read(looked(plan));
+        Ok(Box::new(Looking {
+            rows,
+            state: &self.state,
+        }))
+    }
+}
+
+fn looked(plan: &Plan) -> Vec<Looked> {
+    let facts = of_truths(plan).into_iter().zip(watched(plan));
+    let channels = plan.sources.iter().zip(leap::finders(plan)).zip(facts);
+    let looked = channels.map(|((source, leaps), (of_truth, watched))| {
+        let rests = source.optional;
+        Looked {
+            source: source.clone(),
+            of_truth,
+            leaps,
+            stuck: (!rests && !watched).then(Default::default),
+            // A position that is only measured now and then is none that fails.
+            silent: (!rests && !of_truth).then(Default::default),
+        }
+    });
+    looked.collect()
+}
+
+impl Looked {
+    fn row(&mut self, at_s: f64, value: f64) {
+        let admitted = self.source.admits(value);
+        if let Some(silent) = &mut self.silent {
+            silent.push(at_s, admitted);
+        }
+        if admitted {
+            if let Some(leaps) = &mut self.leaps {
+                leaps.push(at_s, value);
+            }
+            if let Some(stuck) = &mut self.stuck {
+                stuck.push(at_s, value);
+            }
+        }
+    }
+
+    fn interrupt(&mut self) {
+        if let Some(leaps) = &mut self.leaps {
+            leaps.interrupt();
+        }
+        if let Some(stuck) = &mut self.stuck {
+            stuck.interrupt();
+        }
+        if let Some(silent) = &mut self.silent {
+            silent.interrupt();
+        }
+    }
+}
+
+struct Looking<'a> {
+    rows: Box<dyn Rows + 'a>,
+    state: &'a RefCell<State>,
+}
+
+impl Rows for Looking<'_> {
+    fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
+        let event = self.rows.next(values)?;
+        if let State::Read(looked) = &mut *self.state.borrow_mut() {
+            match event {
+                Some(Event::Row(now)) => {
+                    let at_s = now.as_ns() as f64 / 1e9;
+                    for (of, &value) in looked.iter_mut().zip(&*values) {
+                        of.row(at_s, value);
+                    }
+                }
+                Some(Event::Segment) => looked.iter_mut().for_each(Looked::interrupt),
+                None => {}
+            }
+        }
+        Ok(event)
+    }
+}
+
+/// Tells of them.
+pub fn tell(terminal: &Terminal, all: &[Faulty], purpose: Purpose) {
+    for words in in_words(all, purpose) {
+        terminal.warning(words);
+    }
+}
+
+/// What is told of them, a sentence for each fault.
+pub fn in_words(all: &[Faulty], purpose: Purpose) -> Vec<String> {
+    let mut words = Vec::new();
+    for faulty in all {
+        let channel = &faulty.channel;
+        if let Some(leaps) = &faulty.leaps {
+            let (at, then) = (instant(leaps.first.at_s), of_leaps(faulty, leaps, purpose));
+            words.push(format!("{channel} {leaps}, at {at}: {then}"));
+        }
+        if let Some(stuck) = &faulty.stuck {
+            words.push(format!(
+                "{channel} is {} in {} samples one after the other, from {} to {}: {}",
+                number(stuck.value),
+                count(stuck.samples),
+                instant(stuck.from_s),
+                instant(stuck.to_s),
+                of_standstill(faulty, purpose)
+            ));
+        }
+        if let Some(silent) = &faulty.silent {
+            words.push(format!(
+                "{channel} has no sample in {} of {} rows, from {} to {}: did the sensor fail? What needs it {} there",
+                count(silent.rows),
+                count(silent.of_rows),
+                instant(silent.from_s),
+                instant(silent.to_s),
+                match purpose {
+                    Purpose::Fit => "learns nothing",
+                    Purpose::Scores => "predicts nothing",
+                }
+            ));
+        }
+    }
+    words
+}
+
+fn of_leaps(faulty: &Faulty, leaps: &Leaps, purpose: Purpose) -> String {
+    if faulty.of_truth {
+        let then = match purpose {
+            Purpose::Fit => {
+                "That is learned as drift: begin another file there, or leave the rows of the largest drifts out by \
+                 `train.abs_truth`"
+            }
+            Purpose::Scores => "That counts as drift: begin another file there",
+        };
+        return format!("was it moved, or zeroed anew? {then}");
+    }
+    let then = match purpose {
+        Purpose::Fit => "That is learned too",
+        Purpose::Scores => "Predictions from that mean nothing",
+    };
+    format!(
+        "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {} and {}",
+        faulty.signal(),
+        number(leaps.usual.0),
+        number(leaps.usual.1)
+    )
+}
+
+fn of_standstill(faulty: &Faulty, purpose: Purpose) -> &'static str {
+    match (faulty.of_truth, purpose) {
+        (true, Purpose::Fit) => {
+            "is its measurement stuck? That is learned as no drift: leave these rows out"
+        }
+        (true, Purpose::Scores) => "is its measurement stuck? That counts as no drift",
+        (false, Purpose::Fit) => {
+            "is the sensor stuck? That is learned too: leave these rows out, or have a `health` node take them out"
+        }
+        (false, Purpose::Scores) => {
+            "is the sensor stuck? Predictions from that mean little; a `health` node takes such samples out"
+        }
+    }
+}
+
+/// The same for programs: the channels that leap, are stuck or silent, each where there are any.
+pub fn to_json(all: &[Faulty], told: &mut Value) {
+    let mut put = |key: &str, found: Vec<Value>| {
+        if !found.is_empty() {
+            told[key] = found.into();
+        }
+    };
+    put("leaps", each(all, |of| of.leaps.as_ref()));
+    put("stuck", each(all, |of| of.stuck.as_ref()));
+    put("silent", each(all, |of| of.silent.as_ref()));
+}
+
+fn each<T: Serialize>(all: &[Faulty], fault: impl Fn(&Faulty) -> Option<&T>) -> Vec<Value> {
+    let of = |faulty: &Faulty| {
+        let mut facts = Map::new();
+        facts.insert("channel".to_owned(), json!(faulty.channel));
+        facts.insert("of_truth".to_owned(), json!(faulty.of_truth));
+        if let Value::Object(found) = json!(fault(faulty)?) {
+            facts.extend(found);
+        }
+        Some(Value::Object(facts))
+    };
+    all.iter().filter_map(of).collect()
+}

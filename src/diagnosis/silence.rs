@@ -1,0 +1,98 @@
+//! Decides where a channel has no sample for much longer than ever else while rows come, as that of a sensor does which is
+//! disconnected; not what follows from it.
+
+use serde::Serialize;
+
+/// A shorter part of all rows is nothing to speak of.
+const LEAST_SHARE: f64 = 0.1;
+/// So many times as many rows as come for each sample else are long.
+const TIMES: u64 = 20;
+
+/// Rows one after the other that have no sample of a channel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Silence {
+    /// How many.
+    pub rows: u64,
+    /// Of how many in all.
+    pub of_rows: u64,
+    /// The instant of the first of them, in s.
+    pub from_s: f64,
+    /// The instant of the last of them, in s.
+    pub to_s: f64,
+}
+
+/// Finds the longest silence while rows come.
+#[derive(Debug, Clone, Default)]
+pub struct Finder {
+    rows: u64,
+    samples: u64,
+    now: Silence,
+    longest: Silence,
+}
+
+impl Finder {
+    /// Takes the next row, and whether it has a sample.
+    pub fn push(&mut self, at_s: f64, has_sample: bool) {
+        self.rows += 1;
+        if has_sample {
+            self.samples += 1;
+            self.interrupt();
+            return;
+        }
+        if self.now.rows == 0 {
+            self.now.from_s = at_s;
+        }
+        self.now.rows += 1;
+        self.now.to_s = at_s;
+    }
+
+    /// What follows is not set against what was.
+    pub fn interrupt(&mut self) {
+        let over = std::mem::take(&mut self.now);
+        if over.rows > self.longest.rows {
+            self.longest = over;
+        }
+    }
+
+    /// The silence; none where there is none that is longer than usual. A channel without any sample is none that fell silent.
+    #[must_use]
+    pub fn found(mut self) -> Option<Silence> {
+        self.interrupt();
+        let rows = self.longest.rows;
+        let is_long = rows as f64 >= LEAST_SHARE * self.rows as f64
+            && self.samples > 0
+            && rows * self.samples > TIMES * (self.rows - rows);
+        is_long.then_some(Silence {
+            of_rows: self.rows,
+            ..self.longest
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(rows: impl IntoIterator<Item = bool>) -> Option<Silence> {
+        let mut finder = Finder::default();
+        for (nth, has_sample) in rows.into_iter().enumerate() {
+            finder.push(nth as f64, has_sample);
+        }
+        finder.found()
+    }
+
+    #[test]
+    fn a_sensor_that_dies_is_silent_from_then_on() {
+        let found = of((0..100).map(|nth| nth < 70)).unwrap();
+        assert_eq!((found.rows, found.of_rows), (30, 100));
+        assert_eq!((found.from_s, found.to_s), (70.0, 99.0));
+    }
+
+    #[test]
+    fn what_is_rarely_measured_is_not_silent_in_between() {
+        assert_eq!(of((0..200).map(|nth| nth % 50 == 0)), None);
+        assert_eq!(of((0..2000).map(|nth| nth % 8 == 0)), None);
+        assert!(of((0..2000).map(|nth| nth % 8 == 0 && nth > 300)).is_some());
+        assert_eq!(of([false; 100]), None);
+    }
+}
