@@ -90,13 +90,13 @@ impl Compare {
             let began = Instant::now();
             let options = FitOptions::default();
             let told = fit_without_card(&mut model, &self.data, &options, terminal)?;
-            let mut words = faults::in_words(&told.faults, Purpose::Fit);
+            let mut words = faults::in_words(&told.faults);
             let report = told.report;
             let seconds = began.elapsed().as_secs_f64();
             let dataset = on.dataset();
             let mut progress = terminal.progress("scoring");
             let mut ticks = 0;
-            let watch = FaultWatch::new(&dataset);
+            let watch = FaultWatch::new(&dataset, Purpose::Scores);
             let trace = trace(&model.plan, &model.fitted, &watch, &mut |_, _| {
                 ticks += 1;
                 if ticks % 4096 == 0 {
@@ -115,7 +115,7 @@ impl Compare {
             let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
             beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));
             in_fits.extend(new);
-            words.extend(faults::in_words(&watch.found(), Purpose::Scores));
+            words.extend(faults::in_words(&watch.found()));
             for words in words {
                 // The graphs read the same channels.
                 if faults.insert(words.clone()) {

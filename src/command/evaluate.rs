@@ -107,7 +107,7 @@ impl Evaluate {
             frozen: self.frozen,
             mode,
         };
-        let watch = FaultWatch::new(&dataset);
+        let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let mut progress = terminal.progress("evaluating");
         let scores = score(&model.plan, &model.fitted, &watch, &options, &mut |ticks| {
             progress.tell(ticks)
@@ -146,7 +146,7 @@ impl Evaluate {
             &scores.rejected,
         );
         beyond::tell(terminal, &outside_fit);
-        faults::tell(terminal, &faults, Purpose::Scores);
+        faults::tell(terminal, &faults);
         self.data.tell_fitted_on(terminal, &model);
         data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {

@@ -26,6 +26,7 @@ pub enum Purpose {
 /// What is wrong with a channel.
 #[derive(Debug)]
 pub struct Faulty {
+    purpose: Purpose,
     channel: String,
     /// Whether a truth is made of it, so that its faults look like drift.
     of_truth: bool,
@@ -48,6 +49,7 @@ impl Faulty {
 /// A recording whose channels are looked at when it is first read.
 pub struct FaultWatch<'a> {
     recording: &'a dyn Recording,
+    purpose: Purpose,
     state: RefCell<State>,
 }
 
@@ -67,9 +69,10 @@ struct Looked {
 
 impl<'a> FaultWatch<'a> {
     /// Watches over this recording.
-    pub fn new(recording: &'a dyn Recording) -> Self {
+    pub fn new(recording: &'a dyn Recording, purpose: Purpose) -> Self {
         Self {
             recording,
+            purpose,
             state: RefCell::new(State::Unread),
         }
     }
@@ -80,10 +83,16 @@ impl<'a> FaultWatch<'a> {
             return Vec::new();
         };
         let all = looked.into_iter().map(|of| Faulty {
+            purpose: self.purpose,
             channel: of.source.name,
             of_truth: of.of_truth,
             leaps: of.leaps.and_then(|finder| finder.found()),
-            stuck: of.stuck.and_then(standstill::Finder::found),
+            stuck: of.stuck.and_then(|finder| {
+                // What never changes is named by a fit, and as a truth by its scores.
+                let counts =
+                    finder.changes() > 0 || (self.purpose == Purpose::Scores && !of.of_truth);
+                finder.found().filter(|_| counts)
+            }),
             silent: of.silent.and_then(silence::Finder::found),
         });
         all.filter(|of| !of.is_sound()).collect()
@@ -176,19 +185,19 @@ impl Rows for Looking<'_> {
 }
 
 /// Tells of them.
-pub fn tell(terminal: &Terminal, all: &[Faulty], purpose: Purpose) {
-    for words in in_words(all, purpose) {
+pub fn tell(terminal: &Terminal, all: &[Faulty]) {
+    for words in in_words(all) {
         terminal.warning(words);
     }
 }
 
 /// What is told of them, a sentence for each fault.
-pub fn in_words(all: &[Faulty], purpose: Purpose) -> Vec<String> {
+pub fn in_words(all: &[Faulty]) -> Vec<String> {
     let mut words = Vec::new();
     for faulty in all {
         let channel = &faulty.channel;
         if let Some(leaps) = &faulty.leaps {
-            let (at, then) = (instant(leaps.first.at_s), of_leaps(faulty, leaps, purpose));
+            let (at, then) = (instant(leaps.first.at_s), of_leaps(faulty, leaps));
             words.push(format!("{channel} {leaps}, at {at}: {then}"));
         }
         if let Some(stuck) = &faulty.stuck {
@@ -198,7 +207,7 @@ pub fn in_words(all: &[Faulty], purpose: Purpose) -> Vec<String> {
                 count(stuck.samples),
                 instant(stuck.from_s),
                 instant(stuck.to_s),
-                of_standstill(faulty, purpose)
+                of_standstill(faulty)
             ));
         }
         if let Some(silent) = &faulty.silent {
@@ -208,7 +217,7 @@ pub fn in_words(all: &[Faulty], purpose: Purpose) -> Vec<String> {
                 count(silent.of_rows),
                 instant(silent.from_s),
                 instant(silent.to_s),
-                match purpose {
+                match faulty.purpose {
                     Purpose::Fit => "learns nothing",
                     Purpose::Scores => "predicts nothing",
                 }
@@ -218,9 +227,9 @@ pub fn in_words(all: &[Faulty], purpose: Purpose) -> Vec<String> {
     words
 }
 
-fn of_leaps(faulty: &Faulty, leaps: &Leaps, purpose: Purpose) -> String {
+fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
     if faulty.of_truth {
-        let then = match purpose {
+        let then = match faulty.purpose {
             Purpose::Fit => {
                 "That is learned as drift: begin another file there, or leave the rows of the largest drifts out by \
                  `train.abs_truth`"
@@ -229,7 +238,7 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps, purpose: Purpose) -> String {
         };
         return format!("was it moved, or zeroed anew? {then}");
     }
-    let then = match purpose {
+    let then = match faulty.purpose {
         Purpose::Fit => "That is learned too",
         Purpose::Scores => "Predictions from that mean nothing",
     };
@@ -241,8 +250,8 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps, purpose: Purpose) -> String {
     )
 }
 
-fn of_standstill(faulty: &Faulty, purpose: Purpose) -> &'static str {
-    match (faulty.of_truth, purpose) {
+fn of_standstill(faulty: &Faulty) -> &'static str {
+    match (faulty.of_truth, faulty.purpose) {
         (true, Purpose::Fit) => {
             "is its measurement stuck? That is learned as no drift: leave these rows out"
         }

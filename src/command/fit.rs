@@ -199,7 +199,7 @@ pub fn fit_on(
     terminal: &Terminal,
 ) -> Result<Told, Failure> {
     let told = fit_without_card(model, data, options, terminal)?;
-    faults::tell(terminal, &told.faults, Purpose::Fit);
+    faults::tell(terminal, &told.faults);
     let (dataset, report) = (&told.dataset, &told.report);
     data::note_zone(terminal, &dataset.reports());
     model.card = Some(Card {
@@ -228,7 +228,7 @@ pub fn fit_without_card(
     terminal: &Terminal,
 ) -> Result<Told, Failure> {
     let dataset = data.dataset();
-    let watch = FaultWatch::new(&dataset);
+    let watch = FaultWatch::new(&dataset, Purpose::Fit);
     let mut progress = terminal.progress("fitting");
     let (fitted, report) = fit(&model.plan, &watch, options, &mut |ticks| {
         progress.tell(ticks);

@@ -68,6 +68,12 @@ impl Finder {
         }
     }
 
+    /// How often the next sample had another value.
+    #[must_use]
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
     /// The most samples in a row with the very same value, and whether that is a standstill.
     #[must_use]
     pub fn longest(mut self) -> (Standstill, bool) {

@@ -94,7 +94,7 @@ impl Diagnose {
             bar.get_or_insert_with(|| terminal.progress_to("fitting", "fits", Some(total)))
                 .tell(done);
         };
-        let watch = FaultWatch::new(&dataset);
+        let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let (diagnosis, observation) = diagnose(&model, &watch, &options, &mut progress)?;
         drop(bar);
         let faults = watch.found();
@@ -120,7 +120,7 @@ impl Diagnose {
         );
         let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
         beyond::tell(terminal, &outside_fit);
-        faults::tell(terminal, &faults, Purpose::Scores);
+        faults::tell(terminal, &faults);
         for told in Lack::told(&diagnosis.lacks) {
             terminal.warning(told);
         }
