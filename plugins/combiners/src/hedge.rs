@@ -167,17 +167,12 @@ impl Hedging {
             .present()
             .map(|(voter, vote)| weights[voter] * (loss(vote) - least))
             .sum();
-        let mixed = if rate.is_finite() {
-            let left = votes
-                .present()
-                .map(|(voter, vote)| weights[voter] * (-rate * (loss(vote) - least)).exp());
-            // What is lost by no voter is not lost by their mixture, however the logarithm rounds.
-            (-left.sum::<f64>().ln() / rate).max(0.0)
-        } else {
-            let leading = votes.present().filter(|&(voter, _)| weights[voter] > 0.0);
-            let losses = leading.map(|(_, vote)| loss(vote) - least);
-            losses.fold(f64::INFINITY, f64::min)
-        };
+        let sums = &self.losses.sums;
+        let before = mix(votes.present().map(|(voter, _)| sums[voter]), rate);
+        let lost = |(voter, vote)| sums[voter] + (loss(vote) - least);
+        let after = mix(votes.present().map(lost), rate);
+        // What is lost by no voter is not lost by their mixture, however the logarithms round.
+        let mixed = (after - before).max(0.0);
         self.losses.gap += (mean - mixed).max(0.0);
         let sums = &mut self.losses.sums;
         for (sum, vote) in sums.iter_mut().zip(votes.0) {
@@ -189,6 +184,24 @@ impl Hedging {
         }
         let best = sums.iter().copied().fold(f64::INFINITY, f64::min);
         sums.iter_mut().for_each(|sum| *sum -= best);
+    }
+}
+
+/// `−ln(Σ exp(−rate · sum)) / rate` of at least one sum, taken relative to the least, so that not all terms underflow; with an
+/// infinite rate the least.
+fn mix(sums: impl Iterator<Item = f64> + Clone, rate: f64) -> f64 {
+    let least = sums.clone().fold(f64::INFINITY, f64::min);
+    let terms = sums.map(|sum| match sum - least {
+        0.0 => 1.0,
+        behind => (-rate * behind).exp(),
+    });
+    least - terms.sum::<f64>().ln() / rate
+}
+
+impl Losses {
+    fn is_sound(&self) -> bool {
+        let mut all = self.sums.iter().chain([&self.gap, &self.widest]);
+        all.all(|value| value.is_finite() && *value >= 0.0)
     }
 }
 
@@ -230,11 +243,16 @@ impl Combine for Hedging {
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
         match state.known::<Losses>() {
-            Ok(losses) if losses.sums.len() == self.losses.sums.len() => {
+            Ok(losses) if losses.sums.len() != self.losses.sums.len() => {
+                Restored::cold("the number of voters differs")
+            }
+            Ok(losses) if !losses.is_sound() => {
+                Restored::cold("its losses are not all numbers from 0 on")
+            }
+            Ok(losses) => {
                 self.losses = losses;
                 Restored::Accepted
             }
-            Ok(_) => Restored::cold("the number of voters differs"),
             Err(cold) => cold,
         }
     }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use athermal_combiners::Hedge;
-use athermal_core::node::{Combine, Combiner, Votes};
+use athermal_core::node::{Combine, Combiner, Restored, State, Votes};
 use athermal_core::time::{Duration, Instant};
 
 fn hedge(rate: Option<f64>, half_life: Option<Duration>, floor: f64) -> Hedge {
@@ -155,6 +155,37 @@ fn a_voter_that_was_away_is_owed_what_it_was() {
     let after = weights(&*running);
     assert!((after[2] - before[2]).abs() < 1e-12, "{before:?} {after:?}");
     assert!(after[0] > before[0] + 0.05, "{before:?} {after:?}");
+}
+
+#[test]
+fn a_voter_that_was_away_when_all_others_were_wrong_comes_back() {
+    let mut running = hedge(None, None, 0.0).build(3);
+    for row in 0..1500 {
+        running.observe(Votes(&[1.0, 100.0, 3.0]), 0.0, s(row));
+    }
+    running.observe(Votes(&[20_000.0, 100.0, f64::NAN]), 0.0, s(1500));
+    assert_eq!(running.combine(Votes(&[f64::NAN, f64::NAN, 5.0])), 5.0);
+    for row in 1501..3000 {
+        running.observe(Votes(&[20_000.0, 100.0, 3.0]), 0.0, s(row));
+    }
+    let mut weights = [0.0; 3];
+    running.weights(Votes(&[0.0; 3]), &mut weights);
+    assert!(weights[2] > 0.5, "{weights:?}");
+}
+
+#[test]
+fn losses_that_cannot_have_been_are_not_taken_up() {
+    let parameters = hedge(None, None, 0.0);
+    let mut running = parameters.build(3);
+    running.observe(Votes(&[1.0, 2.0, 3.0]), 0.0, s(0));
+    let kept = serde_json::to_string(&running.snapshot().unwrap()).unwrap();
+    for wrong in ["-3.0", "-1e-9"] {
+        let broken = kept.replacen("\"sums\":[0.0", &format!("\"sums\":[{wrong}"), 1);
+        assert_ne!(broken, kept);
+        let state: Box<dyn State> = serde_json::from_str(&broken).unwrap();
+        let restored = parameters.build(3).restore(state);
+        assert!(matches!(restored, Restored::Cold { .. }), "{restored:?}");
+    }
 }
 
 #[test]

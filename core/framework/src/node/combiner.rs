@@ -160,7 +160,7 @@ pub struct Votes<'a>(pub &'a [f64]);
 
 impl<'a> Votes<'a> {
     /// The votes that are there, each with its voter's index.
-    pub fn present(self) -> impl Iterator<Item = (usize, f64)> + 'a {
+    pub fn present(self) -> impl Iterator<Item = (usize, f64)> + Clone + 'a {
         self.0
             .iter()
             .copied()
