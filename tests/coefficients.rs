@@ -320,3 +320,25 @@ fn polynomials_and_their_standard_errors_are_those_of_the_oracle_in_the_units_of
         assert_eq!(found.terms.len(), list("errors").len());
     }
 }
+
+#[test]
+fn a_penalty_next_to_nothing_gives_a_kalman_filter_the_coefficients_of_none() {
+    let mut table = Table::default();
+    for (second, [room, column, volts, _]) in rows().into_iter().enumerate() {
+        let alike = room + 0.01 * (column - 25.0);
+        let z = 2.0 * room - alike + 0.1 * volts;
+        table.push(secs(second as f64), &[room, alike, z]);
+    }
+    let of = |penalty: &str| -> Vec<f64> {
+        let node = format!(
+            "type = \"kalman\"\nlearn = false\npenalty = {penalty}\ninputs.features = \"x\""
+        );
+        let (predictor, _) = fitted(&plan(&regression(&["room", "alike"], &node)), &table);
+        let terms = predictor.coefficients().unwrap().terms;
+        terms.iter().map(|term| term.value).collect()
+    };
+    let none = of("0.0");
+    for penalty in ["1e-12", "1e-14", "1e-16", "1e-30"] {
+        assert_eq!(of(penalty), none, "{penalty}");
+    }
+}

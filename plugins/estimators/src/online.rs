@@ -130,8 +130,15 @@ impl Recursion {
     fn mistakes(&self, width: usize) -> Vec<Mistake> {
         match self {
             Self::Sgd(sgd) => Mistake::of_lengths(width, &[("weights", sgd.weights().len())]),
-            Self::Rls { rls, .. } => {
-                Mistake::of_lengths(width + 1, &[("coefficients", rls.coefficients().len())])
+            Self::Rls { rls, noise } => {
+                let coefficients = [("coefficients", rls.coefficients().len())];
+                let mut mistakes = Mistake::of_lengths(width + 1, &coefficients);
+                // Not a number where rows were too few to tell.
+                if *noise < 0.0 || noise.is_infinite() {
+                    let message = format!("`noise` is {noise} and must be from 0 on");
+                    mistakes.push(Mistake::at("noise", message));
+                }
+                mistakes
             }
         }
     }

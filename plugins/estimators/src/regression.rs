@@ -361,10 +361,20 @@ impl Predictor for LinearPredictor {
         let width = self.regressors.len();
         let lists = [("coefficients", self.coefficients.len())];
         let mut mistakes = Mistake::of_lengths(width, &lists);
-        if let Some(PredictionVariance { centre, root, .. }) = &self.variance {
+        if let Some(variance) = &self.variance {
+            let PredictionVariance {
+                noise,
+                centre,
+                root,
+                ..
+            } = variance;
             mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
             let triangle = width * (width + 1) / 2;
             mistakes.extend(Mistake::of_lengths(triangle, &[("root", root.len())]));
+            if *noise < 0.0 || noise.is_infinite() {
+                let message = format!("`noise` is {noise} and must be from 0 on");
+                mistakes.push(Mistake::at("noise", message));
+            }
         }
         mistakes
     }

@@ -66,6 +66,12 @@ impl TryFrom<Saved> for Kalman {
         if unknown > 0 || !diffuse.is_empty() {
             check_length("diffuse", order * order, diffuse.len())?;
         }
+        let sound = state.iter().all(|value| value.is_finite())
+            && is_covariance(&covariance, order)
+            && is_covariance(&diffuse, order);
+        if !sound {
+            return Err(NumericsError::NotFinite);
+        }
         Ok(Self {
             model,
             state,
@@ -75,6 +81,21 @@ impl TryFrom<Saved> for Kalman {
             room: Scratch(vec![0.0; 2 * order]),
         })
     }
+}
+
+/// Whether a matrix, where there is one, may be a covariance, but for rounding.
+fn is_covariance(matrix: &[f64], order: usize) -> bool {
+    let largest = matrix
+        .iter()
+        .fold(0.0, |most: f64, value| most.max(value.abs()));
+    let rounding = 1e-9 * largest;
+    let rows = matrix.chunks_exact(order.max(1)).enumerate();
+    matrix.iter().all(|value| value.is_finite())
+        && rows.into_iter().all(|(i, row)| {
+            let symmetric =
+                |(j, value): (usize, &f64)| (value - matrix[j * order + i]).abs() <= rounding;
+            row[i] >= -rounding && row.iter().enumerate().all(symmetric)
+        })
 }
 
 /// What an observation brought.

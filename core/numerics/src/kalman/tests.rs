@@ -484,6 +484,14 @@ fn a_filter_is_read_back_as_it_was_and_refused_where_its_parts_do_not_fit() {
         ("state", serde_json::json!([1.0])),
         ("diffuse", serde_json::json!([])),
         ("unknown", serde_json::json!(4)),
+        (
+            "covariance",
+            serde_json::json!([-1.0, 0, 0, 0, 1, 0, 0, 0, 1]),
+        ),
+        (
+            "covariance",
+            serde_json::json!([1, 2.0, 0, 0, 1, 0, 0, 0, 1]),
+        ),
         ("other", serde_json::json!(0)),
     ] {
         assert!(with(part, instead).is_err(), "{part}");

@@ -154,7 +154,7 @@ impl KalmanTrainer {
             times: &times,
             observations: &truths,
             regressors: &scaled,
-            prior: 1.0 / self.parameters.penalty,
+            prior: prior(self.parameters.penalty),
             shared: self.every.secs(),
         };
         let movement = if self.parameters.trend {
@@ -321,6 +321,16 @@ impl Trainer for KalmanTrainer {
             predictor: Box::new(predictor),
             report,
         })
+    }
+}
+
+/// The prior variance of coefficients; beyond a bound nothing is known of them, since the filter takes differences of variances.
+fn prior(penalty: f64) -> f64 {
+    const LEAST: f64 = 1e-10;
+    if penalty < LEAST {
+        f64::INFINITY
+    } else {
+        1.0 / penalty
     }
 }
 

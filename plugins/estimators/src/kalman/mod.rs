@@ -46,7 +46,8 @@ pub struct Kalman {
     #[serde(default)]
     pub noises: Option<Noises>,
     /// The penalty on the coefficients of standardised features, at least 0, as in ridge: their prior variance is the sum
-    /// of the model's variances over a typical step divided by it.
+    /// of the model's variances over a typical step divided by it. 0 says that nothing is known of them; a smaller one than
+    /// 1e-10 counts as that, since differences of larger variances would be rounding alone.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0))]
     pub penalty: f64,
