@@ -11,7 +11,7 @@ use athermal_core::engine::Fitted;
 use athermal_core::fit::{FitError, FitOptions, fit};
 use athermal_core::model::Model;
 use athermal_core::recording::{Event, Recording, RecordingError, Rows};
-use athermal_core::score::{PredictionTrace, Trace, trace};
+use athermal_core::score::{PredictionTrace, Trace, TruthTrace, trace};
 use athermal_core::time::{Duration, Instant};
 use serde::Serialize;
 
@@ -70,9 +70,9 @@ pub struct CurvePoint {
 pub struct DayScore {
     /// The prediction: `vote.Z1`.
     pub prediction: String,
-    /// Instants.
+    /// Instants at which both this fit and that on all days but the one predicted had a prediction.
     pub count: usize,
-    /// Root mean square error; none without an instant.
+    /// Root mean square error on these; none without an instant.
     pub rmse: Option<f64>,
     /// The same of fits on all days but the one predicted, on the same instants: what more days are worth.
     pub all_others: Option<f64>,
@@ -125,6 +125,14 @@ impl Calendar {
 
     fn count(&self) -> usize {
         self.begins.len()
+    }
+
+    /// The day of each instant of a truth.
+    fn days_of(&self, truth: &TruthTrace) -> Vec<usize> {
+        let instants = truth.times.iter();
+        instants
+            .map(|&(segment, at)| self.day_of(segment, at))
+            .collect()
     }
 
     fn day_of(&self, segment: u32, at: Instant) -> usize {
@@ -204,49 +212,70 @@ pub fn days(
         done += 1;
         let (fitted, dropped) = fit_on(model, recording, &calendar, &kept)?;
         let trace = trace(&model.plan, &fitted, recording, &mut |_, _| {})?;
-        let errors = errors(&trace, &calendar);
+        let errors = errors(&trace);
         Ok(Run { errors, dropped })
     };
-    let (mut each, mut dropped_of_each) = (Vec::new(), Vec::new());
+    let (plan, of) = (&*model.plan, &observation.trace);
+    let truths = of.truths.iter();
+    let days_of: Vec<Vec<usize>> = truths.map(|truth| calendar.days_of(truth)).collect();
+    // Of each day the errors of the fit on all others.
+    let mut others: Vec<Vec<f64>> = errors(of);
+    others.iter_mut().for_each(|all| all.fill(f64::NAN));
+    let mut dropped_of_each = Vec::new();
     for out in 0..count {
         let run = run(&|day| day != out)?;
-        each.extend(run.errors.into_iter().nth(out));
+        for ((to, from), days) in others.iter_mut().zip(&run.errors).zip(each(of, &days_of)) {
+            let instants = to.iter_mut().zip(from).zip(days);
+            let out = instants.filter(|(_, day)| **day == out);
+            out.for_each(|((to, from), _)| *to = *from);
+        }
         dropped_of_each.push(run.dropped);
     }
-    let (plan, of) = (&*model.plan, &observation.trace);
-    let left_out = each.iter().enumerate().map(|(out, errors)| LeftOut {
-        day: calendar.numbers[out],
-        from_s: (calendar.begins[out].1 - Instant::from_ns(0)).secs(),
-        scores: scores(plan, of, errors, errors),
-        dropped: dropped_of_each[out].clone(),
+    let on = |sums: &mut Vec<Sums>, own: &[Vec<f64>], counts: &dyn Fn(usize) -> bool| {
+        sums.resize(own.len(), Sums::default());
+        let predictions = sums.iter_mut().zip(own.iter().zip(&others));
+        let truths = each(of, &of.truths).zip(each(of, &days_of));
+        for ((sums, (own, others)), (truth, days)) in predictions.zip(truths) {
+            let errors = own.iter().zip(others).zip(&truth.values).zip(days);
+            for (((own, others), y), _) in errors.filter(|(_, day)| counts(**day)) {
+                sums.add(*own, *others, *y);
+            }
+        }
+    };
+    let left_out = dropped_of_each.iter().enumerate().map(|(out, dropped)| {
+        let mut sums = Vec::new();
+        on(&mut sums, &others, &|day| day == out);
+        LeftOut {
+            day: calendar.numbers[out],
+            from_s: (calendar.begins[out].1 - Instant::from_ns(0)).secs(),
+            scores: scores(plan, of, &sums),
+            dropped: dropped.clone(),
+        }
     });
     let left_out = left_out.collect();
     let mut curve = Vec::new();
     for days in numbers {
-        let (mut sums, mut all_others, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut sums, mut dropped) = (Vec::new(), Vec::new());
         let placings = placings(days, count);
         for &from in &placings {
             let seen = from..from + days;
             let run = run(&|day| seen.contains(&day))?;
+            on(&mut sums, &run.errors, &|day| !seen.contains(&day));
             dropped.extend(run.dropped);
-            for day in (0..count).filter(|day| !seen.contains(day)) {
-                add(&mut sums, &run.errors[day]);
-                add(&mut all_others, &each[day]);
-            }
         }
         curve.push(CurvePoint {
             days,
             fits: placings.len(),
-            scores: scores(plan, of, &sums, &all_others),
+            scores: scores(plan, of, &sums),
             dropped: once(dropped),
         });
     }
-    let mut all = Vec::new();
-    each.iter().for_each(|day| add(&mut all, day));
+    let mut sums = Vec::new();
+    on(&mut sums, &others, &|_| true);
     curve.push(CurvePoint {
         days: count - 1,
         fits: count,
-        scores: scores(plan, of, &all, &all),
+        scores: scores(plan, of, &sums),
         dropped: once(dropped_of_each.into_iter().flatten()),
     });
     Ok(Some(Days {
@@ -267,8 +296,8 @@ fn placings(days: usize, count: usize) -> Vec<usize> {
 
 /// What a fit on some days came to.
 struct Run {
-    /// For each day and prediction.
-    errors: Vec<Vec<Errors>>,
+    /// For each prediction and instant of its truth; NaN where there was no prediction.
+    errors: Vec<Vec<f64>>,
     dropped: Vec<String>,
 }
 
@@ -278,58 +307,56 @@ fn once(names: impl IntoIterator<Item = String>) -> Vec<String> {
     names.into_iter().collect()
 }
 
-/// Squared errors and squared truths of one prediction, and how many.
+/// Squares at the instants at which a fit and those on all other days predicted, and how many these are.
 #[derive(Debug, Clone, Copy, Default)]
-struct Errors {
-    squares: f64,
+struct Sums {
+    own: f64,
+    others: f64,
     zero: f64,
     count: usize,
 }
 
-/// For each day and prediction.
-fn errors(trace: &Trace, calendar: &Calendar) -> Vec<Vec<Errors>> {
-    let mut errors = vec![Vec::new(); calendar.count()];
-    for truth in &trace.truths {
-        for prediction in &truth.predictions {
-            errors
-                .iter_mut()
-                .for_each(|day: &mut Vec<Errors>| day.push(Errors::default()));
-            let instants = truth.times.iter().zip(&truth.values);
-            for ((&(segment, at), &y), &p) in instants.zip(&prediction.values) {
-                let day = &mut errors[calendar.day_of(segment, at)];
-                if let Some(sums) = day.last_mut().filter(|_| !p.is_nan()) {
-                    sums.squares += (p - y) * (p - y);
-                    sums.zero += y * y;
-                    sums.count += 1;
-                }
-            }
+impl Sums {
+    fn add(&mut self, own: f64, others: f64, truth: f64) {
+        if !(own.is_nan() || others.is_nan()) {
+            self.own += own * own;
+            self.others += others * others;
+            self.zero += truth * truth;
+            self.count += 1;
         }
     }
-    errors
 }
 
-fn add(sums: &mut Vec<Errors>, more: &[Errors]) {
-    sums.resize(more.len(), Errors::default());
-    for (sum, more) in sums.iter_mut().zip(more) {
-        sum.squares += more.squares;
-        sum.zero += more.zero;
-        sum.count += more.count;
-    }
+/// For each prediction its errors, at all instants of its truth.
+fn errors(trace: &Trace) -> Vec<Vec<f64>> {
+    let predictions = trace.truths.iter().flat_map(|truth| {
+        truth.predictions.iter().map(|prediction| {
+            let pairs = prediction.values.iter().zip(&truth.values);
+            pairs.map(|(p, y)| p - y).collect()
+        })
+    });
+    predictions.collect()
 }
 
-fn scores(plan: &Plan, trace: &Trace, errors: &[Errors], all_others: &[Errors]) -> Vec<DayScore> {
+/// For each prediction what there is for each truth.
+fn each<'a, T>(trace: &'a Trace, of_truths: &'a [T]) -> impl Iterator<Item = &'a T> {
+    let truths = trace.truths.iter().zip(of_truths);
+    truths.flat_map(|(truth, of)| truth.predictions.iter().map(move |_| of))
+}
+
+fn scores(plan: &Plan, trace: &Trace, sums: &[Sums]) -> Vec<DayScore> {
     let predictions = trace.truths.iter().flat_map(|truth| &truth.predictions);
-    let rms =
-        |squares: f64, of: &Errors| (of.count > 0).then(|| (squares / of.count as f64).sqrt());
-    let figures = predictions.zip(errors.iter().zip(all_others));
-    let score = |(of, (errors, others)): (&PredictionTrace, (&Errors, &Errors))| DayScore {
-        prediction: plan.channels[of.slot].name.clone(),
-        count: errors.count,
-        rmse: rms(errors.squares, errors),
-        all_others: rms(others.squares, others),
-        zero: rms(errors.zero, errors),
+    let score = |(of, sums): (&PredictionTrace, &Sums)| {
+        let rms = |squares: f64| (sums.count > 0).then(|| (squares / sums.count as f64).sqrt());
+        DayScore {
+            prediction: plan.channels[of.slot].name.clone(),
+            count: sums.count,
+            rmse: rms(sums.own),
+            all_others: rms(sums.others),
+            zero: rms(sums.zero),
+        }
     };
-    figures.map(score).collect()
+    predictions.zip(sums).map(score).collect()
 }
 
 fn fit_on(
@@ -419,7 +446,6 @@ mod tests {
 
     use super::super::gap::Gaps;
     use super::*;
-    use athermal_core::score::TruthTrace;
 
     #[test]
     fn fits_on_a_few_days_come_from_the_whole_recording() {

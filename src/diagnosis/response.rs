@@ -72,7 +72,7 @@ pub struct Response {
     /// Where the step response comes to rest, in the unit of the truth: the static gain. None where it comes back to nothing, and
     /// where it does not come to rest.
     pub gain: Option<f64>,
-    /// The time in s at which the step response is largest in size.
+    /// The time in s at which the step response is first as large in size as it gets, within the times that are told.
     pub peak_s: f64,
     /// The step response there.
     pub peak: f64,
@@ -89,7 +89,18 @@ impl Response {
         for series in [&mut self.time_s, &mut self.step, &mut self.impulse] {
             series.truncate(count);
         }
+        if let Some(largest) = largest(&self.step) {
+            (self.peak_s, self.peak) = (self.time_s[largest], self.step[largest]);
+        }
     }
+}
+
+/// Where a step response is first as large as it gets, but for rounding.
+fn largest(step: &[f64]) -> Option<usize> {
+    const ROUNDING: f64 = 1e-9;
+    let most = step.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    step.iter()
+        .position(|value| value.abs() >= (1.0 - ROUNDING) * most)
 }
 
 /// The responses of every estimator that answers any sensor.
@@ -403,7 +414,7 @@ impl Answer<'_> {
             .collect();
         let asymmetric = pairs.map(|(up, down)| (up + down).abs() / (2.0 * self.size));
         let asymmetric = asymmetric.fold(0.0, f64::max);
-        let largest = (0..step.len()).max_by(|&a, &b| step[a].abs().total_cmp(&step[b].abs()))?;
+        let largest = largest(&step)?;
         let peak = step[largest];
         if !step.iter().all(|value| value.is_finite()) || peak == 0.0 {
             return None;

@@ -88,15 +88,13 @@ pub fn windows(model: &Model, recording: &dyn Recording) -> Result<Vec<Windows>,
         let per_second = plan.channels[slot].channel.unit.difference();
         let per_second = per_second.per(&Unit::second());
         let factor = per_second.factor_to(&truth.channel.unit);
+        // What is measured may have a span of its own, of which no wider or narrower window is made.
+        let own = truth.channel.span - plan.channels[slot].channel.span;
         Windows {
             truth: truth.name.clone(),
             unit: truth.channel.unit.to_string(),
-            window_s: truth.channel.span.secs(),
-            widths: widths(
-                segments,
-                truth.channel.span.secs(),
-                factor.unwrap_or(f64::NAN),
-            ),
+            window_s: own.secs(),
+            widths: widths(segments, own.secs(), factor.unwrap_or(f64::NAN)),
         }
     });
     Ok(facts.collect())

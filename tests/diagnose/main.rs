@@ -156,7 +156,7 @@ fn an_answer_that_lasts_has_a_gain_and_no_sum() {
     let [of] = &found[0].sensors[..] else {
         panic!("{found:?}")
     };
-    assert_eq!((of.total, of.settled_s), (None, Some(0.0)));
+    assert_eq!((of.total, of.settled_s, of.peak_s), (None, Some(0.0), 0.0));
     assert!(of.gain.is_some_and(|gain| (gain - 3.0).abs() < 1e-9));
     assert!(of.step.iter().all(|step| (step - 3.0).abs() < 1e-9));
 }
@@ -182,6 +182,7 @@ fn an_estimator_that_reads_past_truths_answers_as_its_transfer_function() {
         assert!((step - expected).abs() < 1e-6, "{nth}: {step} {expected}");
     }
     assert!(of.gain.is_some_and(|gain| (gain - 10.0).abs() < 1e-3));
+    assert!(of.time_s.contains(&of.peak_s), "{}", of.peak_s);
     // Nine tenths have come when `0.8ⁿ` is a tenth, at the eleventh sample.
     assert_eq!((of.total, of.settled_s), (None, Some(100.0)));
     assert!(of.asymmetry < 1e-9, "{}", of.asymmetry);
@@ -435,6 +436,52 @@ fn a_day_left_out_is_scored_by_a_fit_that_has_not_seen_it() {
         (score.rmse.unwrap() / rmse(&whole) - 1.0).abs() > 1e-6,
         "the day was seen"
     );
+}
+
+#[test]
+fn a_graph_is_tried_with_its_own_window_though_what_is_measured_has_a_span_too() {
+    let text = TWO_SENSORS.replace("inputs.signal = \"position\"", "inputs.signal = \"means\"")
+        + "[nodes.means]\ntype = \"resample\"\ninputs.signal = \"position\"\nevery = \"1min\"\n";
+    let thermal = linear(&[("gradients.a@150s", 1.0)], 0.0);
+    let model = model("own-window", &text, &[("thermal", thermal)]);
+    let table = wandering(3000, |_, row| 1000.0 * (row as f64 / 300.0).sin());
+    let found = window::windows(&model, &table).unwrap();
+    assert_eq!(found[0].window_s, 300.0);
+    assert!(found[0].widths.iter().all(|of| of.window_s != 420.0));
+}
+
+#[test]
+fn fits_on_a_few_days_are_set_against_those_on_all_others_where_both_predict() {
+    let text = TWO_SENSORS
+        .replace("\"drift.z\"", "\"position.z\"")
+        .replace("\"gradients\"", "\"temperature\"")
+        .replace("max_age = \"1min\"", "max_age = \"5s\"");
+    let scratch = Scratch::new("both-predict");
+    let model = Model::load(scratch.file("graph.toml", text)).unwrap();
+    let (mut table, mut random) = (Table::default(), Prng::stream(4, "days"));
+    let rows = 4 * 500;
+    for row in 0..rows {
+        let [a, b, noise, chance] = [(); 4].map(|()| random.normal());
+        let (day, of_day) = (row / 500, row % 500);
+        // On the third day the sensor is often silent, so that fits with it do without the sensor and predict the disturbed rows
+        // too, in which it is silent else.
+        let silent = if day == 2 { chance > 0.0 } else { of_day < 35 };
+        let disturbed = if day != 2 && of_day < 35 { 100.0 } else { 0.1 };
+        let b_or_none = if silent { f64::NAN } else { b };
+        table.push(
+            secs(10.0 * f64::from(row)),
+            &[a, b_or_none, a + b + disturbed * noise],
+        );
+    }
+    let observation = observe(&model, &table).unwrap();
+    let day: Duration = "5000s".parse().unwrap();
+    let days = day::days(&model, &table, &observation, day, &mut |_, _| {});
+    let days = days.unwrap().unwrap();
+    assert!(!days.left_out[0].dropped.is_empty(), "{days:?}");
+    let point = &days.curve[0];
+    assert!(point.dropped.is_empty(), "{point:?}");
+    let [rmse, others] = [point.scores[0].rmse, point.scores[0].all_others];
+    assert!(rmse.unwrap() < 0.2 && others.unwrap() < 1.2, "{point:?}");
 }
 
 #[test]

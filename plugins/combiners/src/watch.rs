@@ -74,8 +74,8 @@ pub struct PageHinkley {
 /// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual error: the
 /// root mean square of all that have been taken, of which one larger than five times that counts as five (among the `first`, at
 /// most 100, five times 1.4826 times the median of their sizes). There is an alarm, and the window begins anew, where it has two
-/// sides with means that are farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths of the sides
-/// (Bifet and Gavaldà 2007, ADWIN2). It takes the errors for independent; those of truths that overlap are not, so let it take
+/// sides with means that are farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m = 1/(n₁ − s + 1) + 1/(n₂ − s + 1)`
+/// of the sides' lengths with `s` for `shortest` (Bifet and Gavaldà 2007, ADWIN2, where `s` is 1; with the others as river has it). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
 ///
 #[doc = reasons!()]
@@ -97,7 +97,8 @@ pub struct Adwin {
     #[serde(default = "eight")]
     #[schemars(range(min = 1))]
     pub clock: u64,
-    /// The fewest truths on either side of a cut; 1 or more.
+    /// The fewest truths on either side of a cut; 1 or more. A side counts as if it had `shortest` − 1 fewer, so that a larger number
+    /// needs longer sides or larger changes.
     #[serde(default = "five")]
     #[schemars(range(min = 1))]
     pub shortest: u64,

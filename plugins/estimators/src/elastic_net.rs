@@ -16,7 +16,7 @@ use crate::regression::{LinearPredictor, told};
 /// Linear regression of the truth on features, many coefficients being exactly zero.
 ///
 /// Minimises `1/(2n) Σ(y − ŷ)² + α (ρ Σ|w_j| + (1 − ρ)/2 Σ w_j²)` over the coefficients `w`, the intercept free, with features
-/// and truth standardised (Zou and Hastie 2005; coordinate descent as in Friedman, Hastie and Tibshirani 2010), so that `α`
+/// and truth standardised (Zou and Hastie 2005; exactly, by an active set as in Osborne, Presnell and Turlach 2000), so that `α`
 /// means the same in all units; `ρ = l1_ratio`. Of features
 /// that hang together the lasso keeps one or the other; here the second term lets them share. Note that `α` stands against
 /// the *mean* of squares, that of ridge against their sum.
@@ -249,7 +249,7 @@ impl SparseTrainer {
         report.figure("converged", fit.converged);
         if !fit.converged {
             report.notes.push(
-                "the descent did not come to its end: a larger penalty or fewer features would help"
+                "the search did not come to its end: a larger penalty or fewer features would help"
                     .to_owned(),
             );
         }

@@ -144,7 +144,7 @@ impl<'a> Node<'a> {
             or_no_end(of.settled_s.map(|settled_s| settled_s / unit.seconds))
         });
         format!(
-            "{}: time until nine tenths of that have come, in {}\n{}",
+            "{}: time from which on it stays within a tenth of that, in {}\n{}",
             self.name,
             unit.symbol,
             matrix("sensor", &self.columns, &rows)

@@ -38,8 +38,9 @@ impl Default for AdwinOptions {
 
 /// Adaptive windowing (Bifet and Gavaldà 2007, ADWIN2): the values since the last change of their mean, in an exponential
 /// histogram. There is an alarm where the window has a cut whose sides have means farther apart than chance allows,
-/// `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m` the sum of the inverse lengths; the window then begins
-/// anew, so that one change gives one alarm.
+/// `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m = 1/(n₁ − s + 1) + 1/(n₂ − s + 1)` of their lengths, `s` being
+/// the shortest that is allowed; the window then begins anew, so that one change gives one alarm. Bifet and Gavaldà take the
+/// lengths themselves, `s = 1`; river has them less `s − 1`, which makes short sides stand back, and so have the alarms here.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Adwin {
