@@ -346,3 +346,48 @@ fn scores_on_the_data_of_the_fit_are_told_to_be_that() {
     let scored = athermal_on("evaluate", &model, &other, &[]).ended(0);
     assert!(!scored.told.contains("fitted on"), "{}", scored.told);
 }
+
+#[test]
+fn scores_say_how_much_they_leave_out_where_one_of_several_predictions_fell_silent() {
+    let scratch = Scratch::new("faulty-left-out");
+    let several = GRAPH.replace(
+        "[outputs]",
+        "[nodes.last]\ntype = \"persistence\"\ninputs.truth = \"position.Z\"\nahead = \"0s\"\n\
+         [nodes.fall]\ntype = \"fallback\"\ninputs.voters = [\"thermal\", \"last\"]\n[outputs]",
+    );
+    let several = several.replace("predicted = \"thermal\"", "predicted = \"fall\"");
+    let graph = scratch.file("graph.toml", several);
+    let silent_late = |row: usize, values: &mut [f64; 3]| {
+        if row >= 1600 {
+            values[1] = f64::NAN;
+        }
+    };
+    let (sound, data) = (
+        scratch.file("sound.csv", log(|_, _| ())),
+        scratch.file("silent.csv", log(silent_late)),
+    );
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &sound, &[&"-o", &model]).ended(0);
+    let mut scored = athermal_on("evaluate", &model, &data, &[]).ended(0);
+    scored.told = in_one_line(&scored.out);
+    scored.tells(&["1,280 of 2,880 instants at which fall.Z is there are left out, since others are not, such as thermal.Z"]);
+    let rmse = |more: &[&dyn AsRef<std::ffi::OsStr>]| {
+        let scores = athermal_on("evaluate", &model, &data, more).ended(0).json();
+        let scores = scores["scores"].as_array().unwrap().clone();
+        let fall = scores.iter().find(|score| score["node"] == "fall").unwrap();
+        fall["rmse"].as_f64().unwrap()
+    };
+    let together = rmse(&[&"--format", &"json"]);
+    let alone = rmse(&[&"--each-on-its-own", &"--format", &"json"]);
+    assert!(alone > 2.0 * together, "{together} {alone}");
+    let facts = athermal_on("report", &model, &data, &[&"--format", &"json"]).ended(0);
+    assert_eq!(
+        facts.json()["verdicts"][0]["error"].as_f64().unwrap(),
+        alone
+    );
+    athermal_on("compare", &graph, &sound, &[&"--on", &data])
+        .ended(0)
+        .tells(&[
+            "position.Z: 1,280 instants are left out at which others predict and thermal of ",
+        ]);
+}

@@ -9,7 +9,7 @@ use athermal::core::engine::SampleRange;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
 use athermal::core::score::{Lack, trace};
-use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, compare};
+use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, Row, compare};
 use clap::Args;
 use serde_json::json;
 
@@ -163,6 +163,9 @@ impl Compare {
         if comparisons.is_empty() {
             terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
         }
+        for comparison in &comparisons {
+            tell_left_out(terminal, comparison);
+        }
         for column in comparisons.iter().flat_map(|of| &of.truths) {
             if !column.otherwise.is_empty() {
                 terminal.warning(format_args!(
@@ -204,6 +207,21 @@ fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -
         names.extend(free.find(|name| !names.contains(name)));
     }
     names
+}
+
+/// Tells where the scores hide what happens while a prediction has no value.
+fn tell_left_out(terminal: &Terminal, comparison: &Comparison) {
+    for column in &comparison.truths {
+        if let Some((left_out, row)) = column.left_out {
+            let Row { graph, node, .. } = &comparison.rows[row];
+            terminal.warning(format_args!(
+                "{}: {} instants are left out at which others predict and {node} of {graph} does not; what each does there is not told: \
+                 score it alone by `athermal evaluate --each-on-its-own`",
+                column.truth,
+                count(left_out)
+            ));
+        }
+    }
 }
 
 /// Whether a node could not be fitted; each is told.
@@ -320,12 +338,13 @@ mod tests {
                 truth: "drift.Z".to_owned(),
                 name: "Z".to_owned(),
                 count,
+                left_out: None,
                 no_model: Some(2.39),
                 persistence: None,
                 best: Some(0),
                 otherwise: Vec::new(),
             }],
-            rows: vec![athermal::diagnosis::comparison::Row {
+            rows: vec![Row {
                 channel: None,
                 graph: "a".to_owned(),
                 node: "vote".to_owned(),

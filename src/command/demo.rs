@@ -292,6 +292,7 @@ mod tests {
             baseline_persistence: None,
             truth_noise: Some(3.85),
             own_instants: false,
+            left_out: 0,
             interval: None,
         };
         let (x1, z1) = (score("vote.X1", 8.0, 10.0), score("vote.Z1", 25.0, 50.0));

@@ -1,5 +1,6 @@
 //! `athermal evaluate`: scores a model's predictions on recorded data.
 
+use std::cmp::Ordering;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -14,7 +15,7 @@ use super::data::{self, Data};
 use super::faults::{self, FaultWatch, Purpose};
 use super::model::{check_limit, load_fitted};
 use super::numbers;
-use crate::figures::{counted, number, or_dash, table};
+use crate::figures::{count, counted, number, or_dash, paragraph, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -237,6 +238,7 @@ fn describe(scores: &Scores, mode: Mode) -> String {
             or_dash(first.baseline_persistence),
             or_dash(first.truth_noise)
         );
+        text.push_str(&left_out(&rows));
         let header = [
             "  prediction",
             "ahead",
@@ -258,6 +260,30 @@ fn describe(scores: &Scores, mode: Mode) -> String {
         text.push('\n');
     }
     text
+}
+
+/// What is told where many instants are not scored, since some prediction has no value there.
+fn left_out(rows: &[&Score]) -> String {
+    let scored_together = || rows.iter().filter(|row| !row.own_instants);
+    let Some(most) = scored_together().max_by_key(|row| row.left_out) else {
+        return String::new();
+    };
+    let lacking =
+        scored_together().min_by(|a, b| a.valid.partial_cmp(&b.valid).unwrap_or(Ordering::Equal));
+    match lacking {
+        Some(lacking) if most.leaves_many_out() => {
+            let words = format!(
+                "{} of {} instants at which {} is there are left out, since others are not, such as {}; --each-on-its-own scores each \
+                 wherever it is",
+                count(most.left_out),
+                count(most.n + most.left_out),
+                most.output,
+                lacking.output
+            );
+            paragraph("  ", 2, &words)
+        }
+        _ => String::new(),
+    }
 }
 
 fn interval(score: &Score) -> Option<Vec<String>> {

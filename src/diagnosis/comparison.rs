@@ -54,6 +54,9 @@ pub struct Column {
     pub name: String,
     /// Instants scored: those at which every prediction of it that is valid at half of them or more has a value.
     pub count: usize,
+    /// Instants at which the prediction that is there most often is not scored, since another is not there, and the row that is there
+    /// least often of those that count; none where these are few, at most one in twenty.
+    pub left_out: Option<(usize, usize)>,
     /// Root mean square of the truth: the error of no model.
     pub no_model: Option<f64>,
     /// The error of the truth at the smallest lag that sees nothing of the answer.
@@ -312,12 +315,23 @@ fn column(
             otherwise.push(name.clone());
         }
     }
+    let there = |row: &usize| rows[*row].valid[nth].unwrap_or(0.0);
+    let by_valid = |a: &usize, b: &usize| there(a).total_cmp(&there(b));
+    let scored = || errors.iter().map(|(row, _)| *row);
+    let most = scored().max_by(by_valid).map_or(0.0, |row| there(&row));
+    let most = (most * counted.len() as f64).round() as usize;
+    let left_out = most.saturating_sub(common.len());
+    let left_out = scored()
+        .min_by(by_valid)
+        .map(|row| (left_out, row))
+        .filter(|_| 20 * left_out > most);
     let persistence = first.truth.persistence.get(&first.of.ahead);
     let lasting = |places: &Vec<usize>| persistence.map_or(f64::NAN, |values| values[places[0]]);
     Column {
         truth: first.truth_name().to_owned(),
         name: channel.name.clone(),
         count: common.len(),
+        left_out,
         no_model: rms(common.iter().map(|at| truth(at))),
         persistence: rms(common.iter().map(|at| lasting(at) - truth(at))),
         best: best.filter(|&best| rows[best].rmse[nth].is_some()),

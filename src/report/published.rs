@@ -95,11 +95,15 @@ const TABLES: [Table; 3] = [
     },
 ];
 
-/// The tables about machines with the axes of this one, and drifts in the same unit.
+/// The tables about machines with the axes of this one, drifts in the same unit, and all kinds of nodes that they compare.
 pub(super) fn published(course: &Course) -> Vec<Published> {
     let of_same_kind = |table: &&Table| {
         let found = course.axes.iter().map(|axis| axis.name.as_str());
-        found.eq(table.axes.iter().copied()) && course.axes.iter().all(|axis| axis.unit == "nm/min")
+        let voters = course.axes.first().map_or(&[][..], |axis| &axis.voters);
+        let has = |kind: &str| kind.is_empty() || voters.iter().any(|voter| voter.kind == kind);
+        found.eq(table.axes.iter().copied())
+            && course.axes.iter().all(|axis| axis.unit == "nm/min")
+            && table.rows.iter().all(|(_, kind, _)| has(kind))
     };
     TABLES
         .iter()

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Departure, Facts, Hours, Published, Worth, figure, spelled};
-use crate::figures::{paragraph, table};
+use crate::figures::{paragraph, table, time};
 
 /// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
 #[must_use]
@@ -15,7 +15,7 @@ pub fn text(facts: &Facts) -> String {
     }
     let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
     for table in &facts.published {
-        let _ = writeln!(text, "\n{}; here {} min ahead", table.source, ahead / 60.0);
+        let _ = writeln!(text, "\n{}; here {} ahead", table.source, time(ahead));
         published(&mut text, table);
     }
     if let Some(worth) = &facts.worth {

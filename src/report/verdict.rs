@@ -7,6 +7,9 @@ use serde::Serialize;
 
 use super::{Axis, Worth, figure, rms};
 
+/// The share of predictions from which on those that lack are not spoken of; the first windows of a recording are among them.
+const NEARLY_ALWAYS: f64 = 0.95;
+
 /// What a model is worth on an axis. Figures are root mean squares in the unit of the axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
@@ -16,12 +19,15 @@ pub struct Verdict {
     pub node: String,
     /// The unit.
     pub unit: String,
-    /// Error of the prediction, on the instants on which it is scored; none where it gave nothing.
+    /// Error of the prediction on the instants on which it is scored, or, where these leave many out, wherever there is one; none
+    /// where it gave nothing.
     pub error: Option<f64>,
     /// The drift itself on the same instants: the error of no model.
     pub no_model: Option<f64>,
     /// Whether the drift was measured at any instant.
     pub measured: bool,
+    /// The share of the instants at which it was measured that have a prediction.
+    pub valid: f64,
     /// The standard error of the measured drift, in which scatter and curvature within its windows both count.
     pub noise: Option<f64>,
     /// Drift over all that is corrected, without the correction.
@@ -44,10 +50,12 @@ impl Verdict {
         let score = scores
             .iter()
             .find(|score| score.node == *node && is_channel(&score.truth, &axis.name));
-        // Where all predictions of the truth are valid, as the table of scores has it; where they never are at once, on its own.
-        let scored = score.and_then(|score| Some((score.rmse?, score.baseline_zero?)));
+        // As the table of scores has it, unless it hides much of what happened where other predictions have no value.
+        let scored = score.filter(|score| !score.leaves_many_out());
+        let scored = scored.and_then(|score| Some((score.rmse?, score.baseline_zero?)));
         let own = || rms(both().map(|(_, e)| *e)).zip(rms(both().map(|(y, _)| *y)));
         let figures = scored.or_else(own);
+        let measured = axis.truth.value.iter().filter(|y| !y.is_nan()).count();
         let corrected = worth.and_then(|worth| {
             let i = worth.axes.iter().position(|name| *name == axis.name)?;
             let pairs = worth.drift_without[i]
@@ -63,7 +71,8 @@ impl Verdict {
             unit: axis.unit.clone(),
             error: figures.map(|of| of.0),
             no_model: figures.map(|of| of.1),
-            measured: axis.truth.value.iter().any(|y| !y.is_nan()),
+            measured: measured > 0,
+            valid: both().count() as f64 / measured.max(1) as f64,
             noise: score.and_then(|score| score.truth_noise),
             without_correction: corrected.map(|both| both.0),
             with_correction: corrected.map(|both| both.1),
@@ -105,6 +114,10 @@ impl Verdict {
         } else {
             write!(text, ", worse than no model")
         };
+        if self.valid < NEARLY_ALWAYS {
+            let none = 100.0 * (1.0 - self.valid);
+            let _ = write!(text, ", and gives no prediction {none:.0} % of the time");
+        }
         if let Some(noise) = self.noise {
             let _ = write!(
                 text,
@@ -149,6 +162,7 @@ mod tests {
             error: Some(20.0),
             no_model: Some(50.0),
             measured: true,
+            valid: 0.97,
             noise: Some(3.85),
             without_correction: Some(60.0),
             with_correction: Some(15.0),
@@ -158,6 +172,12 @@ mod tests {
             verdict.sentence(),
             "vote predicts the drift of 50.0 nm/min RMS to 20.0, 60 % less than no model (the standard error of what was measured is 3.85); \
              corrected, 15.0 of 60.0 remain, 75 % less."
+        );
+        verdict.valid = 0.6;
+        let sentence = verdict.sentence();
+        assert!(
+            sentence.contains("less than no model, and gives no prediction 40 % of the time (the"),
+            "{sentence}"
         );
         verdict.with_correction = Some(61.0);
         assert!(

@@ -7,6 +7,7 @@ use athermal_core::score::Score;
 
 use super::super::{Departure, Hours, Published, SensorFacts, Worth, figure, spelled};
 use crate::chart::escaped;
+use crate::figures::count;
 
 fn table(header: &[&str], rows: &str) -> String {
     let header: String = header
@@ -29,7 +30,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
             .map_or("–".to_owned(), |valid| format!("{:.1} %", 100.0 * valid));
         let _ = write!(
             rows,
-            "<tr><td>{}</td><td>{}</td><td{worse}>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{valid}</td></tr>",
+            "<tr><td>{}</td><td>{}</td><td{worse}>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{valid}</td><td>{}</td></tr>",
             escaped(&score.output),
             escaped(&score.unit),
             figure(score.rmse),
@@ -39,6 +40,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
             figure(score.r2_zero),
             figure(score.bias),
             figure(score.max_abs),
+            count(score.n),
         );
     }
     let header = [
@@ -52,6 +54,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
         "bias",
         "largest",
         "valid",
+        "instants scored",
     ];
     table(&header, &rows)
 }

@@ -75,11 +75,19 @@ pub struct Score {
     pub truth_noise: Option<f64>,
     /// Whether it is scored on instants of its own.
     pub own_instants: bool,
+    /// Instants with a truth and this prediction that are not scored, since another prediction of the truth has no value there.
+    pub left_out: usize,
     /// How well its intervals hold, where it gives any.
     pub interval: Option<IntervalScore>,
 }
 
 impl Score {
+    /// Whether so many instants are left out, more than one in twenty, that the scores may hide what happened there.
+    #[must_use]
+    pub fn leaves_many_out(&self) -> bool {
+        20 * self.left_out > self.n + self.left_out
+    }
+
     /// Whether the prediction is worse than predicting zero.
     #[must_use]
     pub fn is_worse_than_nothing(&self) -> bool {
@@ -119,18 +127,16 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
     let counted: Vec<usize> = (0..truth.values.len())
         .filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit))
         .collect();
-    let valid: Vec<f64> = truth
+    let there: Vec<usize> = truth
         .predictions
         .iter()
         .map(|prediction| {
-            let there = counted
-                .iter()
-                .filter(|&&i| !prediction.values[i].is_nan())
-                .count();
-            there as f64 / counted.len() as f64
+            let there = counted.iter().filter(|&&i| !prediction.values[i].is_nan());
+            there.count()
         })
         .collect();
-    let restricting = |nth: usize| valid[nth] >= RESTRICTS;
+    let valid = |nth: usize| there[nth] as f64 / counted.len() as f64;
+    let restricting = |nth: usize| valid(nth) >= RESTRICTS;
     let common: Vec<usize> = counted
         .iter()
         .copied()
@@ -189,7 +195,7 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                     .map(|of| 100.0 * (1.0 - (squared / of).sqrt())),
                 bias: self::mean(errors()),
                 max_abs: errors().map(f64::abs).reduce(f64::max),
-                valid: (!counted.is_empty()).then_some(valid[nth]),
+                valid: (!counted.is_empty()).then(|| valid(nth)),
                 baseline_zero: root_mean_square(truths()),
                 baseline_persistence: root_mean_square(
                     instants
@@ -205,6 +211,7 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                         .filter(|e| !e.is_nan()),
                 ),
                 own_instants,
+                left_out: there[nth] - n,
                 interval: prediction.intervals.and_then(|intervals| {
                     let ends = instants
                         .iter()
