@@ -8,13 +8,13 @@ use athermal::core::compile::Wanted;
 use athermal::core::engine::SampleRange;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::quantity::Quantity;
-use athermal::core::score::{Lack, trace};
+use athermal::core::score::{Lack, Trace, trace};
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, Row, compare};
 use clap::Args;
 use serde_json::json;
 
 use super::beyond;
-use super::data::{self, Data, recording};
+use super::data::{self, Data, FITS, recording, tell_overlap};
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
 use super::model::{self, check_limit};
@@ -116,6 +116,9 @@ impl Compare {
             beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));
             in_fits.extend(new);
             words.extend(faults::in_words(&watch.found()));
+            if fits.is_empty() {
+                self.tell_fitted_on(terminal, &report, &trace);
+            }
             for words in words {
                 // The graphs read the same channels.
                 if faults.insert(words.clone()) {
@@ -186,6 +189,32 @@ impl Compare {
         } else {
             Answer::Fine
         })
+    }
+}
+
+impl Compare {
+    /// Tells where graphs are scored on what they were fitted on.
+    fn tell_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
+        let same = |on: &&PathBuf| self.data.paths().any(|data| data == **on);
+        if let Some(path) = self.on.iter().find(same) {
+            terminal.warning(format_args!(
+                "{}: the graphs are fitted on this file and scored on it, so {FITS}",
+                path.display()
+            ));
+            return;
+        }
+        let seconds = |at: athermal::Instant| at.as_ns() as f64 / 1e9;
+        let times = || {
+            trace
+                .truths
+                .iter()
+                .flat_map(|truth| truth.times.iter().map(|of| of.1))
+        };
+        let scored = times().min().zip(times().max());
+        if let Some(((from, to), (first, last))) = report.period.zip(scored) {
+            let fit = (seconds(from), seconds(to));
+            tell_overlap(terminal, fit, (seconds(first), seconds(last)));
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use serde_json::{Value, json};
 
-use crate::figures::{count, counted};
+use crate::figures::{DATES_S, count, counted, instant};
 use crate::invocation::{program, quoted};
 use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal};
@@ -121,8 +121,9 @@ impl Data {
         format!("OTHER.{kind}")
     }
 
-    /// Tells of files on which a model was fitted, so that its scores on them say little.
-    pub fn tell_fitted_on(&self, terminal: &Terminal, model: &Model) {
+    /// Tells of files on which a model was fitted, and of data of the time of its fit, so that its scores on them say little. `period`
+    /// is from when to when the data are, in s.
+    pub fn tell_fitted_on(&self, terminal: &Terminal, model: &Model, period: Option<(f64, f64)>) {
         let cards = || model.card.iter().flat_map(|card| &card.data);
         let seen = |path: &&Path| {
             // Only a file of the same length is read for its checksum.
@@ -134,11 +135,17 @@ impl Data {
             let (bytes, hash) = content_of(path).ok()?;
             cards().find(|card| card.bytes == bytes && card.hash == hash)
         };
+        let mut again = false;
         for path in self.paths().filter(|path| seen(path).is_some()) {
+            again = true;
             terminal.warning(format_args!(
-                "{}: the model was fitted on this file, so it is told how well it fits, not how well it predicts",
+                "{}: the model was fitted on this file, so {FITS}",
                 path.display()
             ));
+        }
+        let of_fit = model.card.as_ref().and_then(|card| card.period);
+        if !again && let Some((fit, data)) = of_fit.zip(period) {
+            tell_overlap(terminal, (fit.from_s, fit.to_s), data);
         }
     }
 
@@ -166,6 +173,24 @@ impl Data {
             });
         }
         Ok(cards)
+    }
+}
+
+/// What scores on the data of a fit tell.
+pub const FITS: &str = "it is told how well it fits, not how well it predicts";
+
+/// Tells of dated data that lie in the time of those of a fit, both in s.
+pub fn tell_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
+    let shared = (fit.0.max(data.0), fit.1.min(data.1));
+    let length = |(from, to): (f64, f64)| to - from;
+    // Other times begin anew with each recording.
+    let dated = shared.0 >= DATES_S;
+    if dated && length(shared) > 0.01 * length(data) {
+        terminal.warning(format_args!(
+            "the data of the fit are of the time from {} to {} too: there {FITS}",
+            instant(shared.0),
+            instant(shared.1)
+        ));
     }
 }
 

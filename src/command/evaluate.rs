@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
+use athermal::Instant;
 use athermal::core::compile::Wanted;
 use athermal::core::quantity::Quantity;
 use athermal::core::score::{Lack, Mode, Score, ScoreOptions, Scores, score};
@@ -123,7 +124,7 @@ impl Evaluate {
                 .map(|path| path.display().to_string())
                 .collect();
             let period = scores.period.map(|(from, to)| {
-                json!({ "from_s": from.as_ns() as f64 / 1e9, "to_s": to.as_ns() as f64 / 1e9, "ticks": scores.ticks })
+                json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
             });
             let mut told = json!({
                 "data": files,
@@ -148,7 +149,8 @@ impl Evaluate {
         );
         beyond::tell(terminal, &outside_fit);
         faults::tell(terminal, &faults);
-        self.data.tell_fitted_on(terminal, &model);
+        let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
+        self.data.tell_fitted_on(terminal, &model, period);
         data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);
@@ -196,6 +198,10 @@ impl Horizon {
             Self::FreeRun => "free-run",
         }
     }
+}
+
+fn seconds(at: Instant) -> f64 {
+    at.as_ns() as f64 / 1e9
 }
 
 fn describe(scores: &Scores, mode: Mode) -> String {

@@ -145,13 +145,19 @@ impl Rest<'_> {
 
     /// Tells of an input that has come to its end while all of it was passed over: a clock may once have been ahead.
     fn tell_of_nothing(&self) {
-        if let Some(before) = self.passed_over
-            && before > athermal::Duration::ZERO
-        {
+        let Some(before) = self.passed_over else {
+            return;
+        };
+        if before > athermal::Duration::ZERO {
             self.terminal.warning(format_args!(
                 "the last row is {before} before what the run before saw last: nothing was predicted; if a clock was ahead then, a \
                  run with another `--state` file begins cold and goes on from there"
             ));
+        } else {
+            self.terminal.note(
+                "no row is after what the run before saw last: nothing was predicted; where times begin anew with each file, a run \
+                 with another `--state` file takes them",
+            );
         }
     }
 }

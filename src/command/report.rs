@@ -6,6 +6,7 @@ use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
 use athermal::core::fit::FitError;
 use athermal::core::score::Lack;
+use athermal::diagnosis::feedback;
 use athermal::report::{gather, page, plots, text};
 use clap::Args;
 
@@ -70,7 +71,10 @@ impl Report {
             course.refused,
             &course.rejected,
         );
-        self.data.tell_fitted_on(terminal, &model);
+        self.data.tell_fitted_on(terminal, &model, course.period_s);
+        if let Some(told) = feedback::in_words(&model.plan) {
+            terminal.warning(told);
+        }
         for told in Lack::told(&facts.lacks) {
             terminal.warning(told);
         }

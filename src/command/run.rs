@@ -7,6 +7,7 @@ use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
+use athermal::diagnosis::feedback;
 use athermal::files::{
     FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, layout,
 };
@@ -91,6 +92,9 @@ impl Run {
         let model = model::load(&self.model, Wanted::default(), terminal)?;
         self.tell_unread(terminal, &model);
         check_fitted(&model, &self.model)?;
+        if let Some(told) = feedback::in_words(&model.plan) {
+            terminal.warning(told);
+        }
         if self.swap.any() {
             return self.run_replaceable(terminal, model);
         }

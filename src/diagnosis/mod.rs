@@ -5,6 +5,7 @@
 
 pub mod comparison;
 pub mod day;
+pub mod feedback;
 mod gap;
 pub mod lag;
 pub mod leap;

@@ -29,6 +29,9 @@ use crate::stability::StabilityState;
 /// removed the drift itself: the correction starts again from 0 at once, which is no motion but a new reference. When the graph is
 /// replaced, the correction goes on from where it stands, whatever predicts the rate then.
 ///
+/// A correction moves the positions that are measured. What predicts the rate and goes by past positions, with lags, by votes or as it
+/// learns, must not take that for drift: an `uncorrected` node between position and drift puts it back.
+///
 /// The port `why` says what held it back: 0 nothing, 1 no valid prediction, 2 stable, 3 below the deadband, 4 rate cut,
 /// 5 at the end of the range, 6 slewing. Runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
