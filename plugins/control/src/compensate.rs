@@ -53,7 +53,7 @@ pub struct Compensate {
     #[serde(default)]
     pub stop_in: Vec<StabilityState>,
     /// The longest time between two ticks that is integrated over.
-    #[serde(default = "minute")]
+    #[serde(default = "limit::minute")]
     pub max_gap: Duration,
 }
 
@@ -65,10 +65,6 @@ pub struct Stop {
     pub below: Quantity,
     /// Goes on when the absolute rate exceeds this; not less than `below`.
     pub above: Quantity,
-}
-
-fn minute() -> Duration {
-    Duration::from_ns(60_000_000_000)
 }
 
 /// Why a correction did not follow the prediction, as numbers of the port `why`.

@@ -36,6 +36,11 @@ pub(crate) fn size_or_none(
     }
 }
 
+/// The longest pause that is bridged, where nothing else is said.
+pub(crate) fn minute() -> Duration {
+    Duration::from_ns(60_000_000_000)
+}
+
 /// The unit of a change per second of values in `unit`.
 pub(crate) fn per_second(unit: &Unit) -> Unit {
     unit.difference().per(&Unit::second())

@@ -6,7 +6,7 @@ use athermal_core::node::{
     Tick,
 };
 use athermal_core::quantity::Quantity;
-use athermal_core::time::Instant;
+use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,6 +33,10 @@ pub struct SafeState {
     pub after: u32,
     /// The fastest way to the refuge and back, such as `"50 nm/s"`.
     pub max_slew: Quantity,
+    /// The longest time between two ticks that counts for that way: after a longer pause the output goes on from where it is and
+    /// does not make up for the pause at once.
+    #[serde(default = "limit::minute")]
+    pub max_gap: Duration,
 }
 
 /// A safe output.
@@ -122,13 +126,15 @@ impl Feature for SafeState {
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let signal = inputs.port("signal");
         let distrust = inputs.port("distrust");
-        if !matches!(distrust.len(), 0 | 1)
-            && let Some(mistake) = limit::same_count("distrust", distrust, "signal", signal)
-        {
-            return Err(vec![mistake]);
+        let mut mistakes = Vec::new();
+        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
+        if !matches!(distrust.len(), 0 | 1) {
+            mistakes.extend(limit::same_count("distrust", distrust, "signal", signal));
         }
-        for channel in signal {
-            self.limits(channel)?;
+        let of_limits = signal.iter().find_map(|channel| self.limits(channel).err());
+        mistakes.extend(of_limits.into_iter().flatten());
+        if !mistakes.is_empty() {
+            return Err(mistakes);
         }
         Ok(vec![
             OutputPort {
@@ -158,6 +164,7 @@ impl Feature for SafeState {
             .collect();
         Box::new(Guarding {
             after: self.after,
+            max_gap: self.max_gap,
             limits,
             known: Known {
                 last: None,
@@ -174,6 +181,7 @@ impl Feature for SafeState {
 
 struct Guarding {
     after: u32,
+    max_gap: Duration,
     limits: Vec<(Option<f64>, f64)>,
     known: Known,
 }
@@ -226,7 +234,11 @@ impl Output {
 impl Operator for Guarding {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let (signal, distrust) = (tick.port(0), tick.port(1));
-        let dt = self.known.last.map_or(0.0, |last| (tick.now - last).secs());
+        let passed = self
+            .known
+            .last
+            .map_or(Duration::ZERO, |last| tick.now - last);
+        let dt = passed.min(self.max_gap).secs();
         self.known.last = Some(tick.now);
         let count = signal.len();
         for (i, (output, &(refuge, slew))) in

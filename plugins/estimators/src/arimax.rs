@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::identified::{Asked, Differences, PerInput, identified};
 use crate::order::Order;
 
-/// ARMAX whose noise is integrated: it has no level to return to, so that an offset that comes to stay is followed.
+/// ARMAX whose noise may be integrated: it then has no level to return to, so that an offset that comes to stay is followed.
 ///
 /// `A(q) y = Σ B_i(q) u_i(t − nk) + C(q)/(1 − q⁻¹)^d e`, `d` the `differences` (Box and Jenkins 1970; Ljung 1999, section
 /// 4.2). Without features it is ARIMA. The sum of squared one-step prediction errors is made least by damped Gauss–Newton
@@ -16,7 +16,8 @@ use crate::order::Order;
 /// circle.
 ///
 /// Noise that has a level is not integrated: its differences are more noise than it is. Which of the two there is, is told
-/// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 tell the order).
+/// from one-step predictions of the same rows by an information criterion (as Hyndman and Khandakar 2008 tell the order), unless
+/// `differences` says so: without any it is ARMAX, and an offset that the rows of the fit did not have stays an error.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
 /// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins

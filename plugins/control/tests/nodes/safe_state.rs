@@ -41,6 +41,28 @@ fn it_bridges_two_ticks_goes_to_its_refuge_and_comes_back_without_a_step() {
 }
 
 #[test]
+fn after_a_pause_it_goes_on_from_where_it_is_and_does_not_make_up_for_it_at_once() {
+    let mut machine = Machine::new(GRAPH);
+    at(&mut machine, 0.0, 5000.0, 0.0);
+    for t in [2.0, 4.0] {
+        at(&mut machine, t, NONE, NONE);
+    }
+    assert_eq!(at(&mut machine, 5.0, NONE, NONE).0, 4990.0);
+    let minute = 60.0 * 10.0;
+    assert_eq!(at(&mut machine, 3605.0, NONE, NONE).0, 4990.0 - minute);
+    let text = GRAPH.replace(
+        "max_slew = \"10 nm/s\"",
+        "max_slew = \"10 nm/s\"\nmax_gap = \"2s\"",
+    );
+    let mut machine = Machine::new(&text);
+    at(&mut machine, 0.0, 5000.0, 0.0);
+    at(&mut machine, 2.0, NONE, NONE);
+    at(&mut machine, 4.0, NONE, NONE);
+    assert_eq!(at(&mut machine, 9.0, NONE, NONE).0, 4980.0);
+    assert!(compiled(&text.replace("\"2s\"", "\"0s\"")).0.is_err());
+}
+
+#[test]
 fn what_is_distrusted_is_not_put_out() {
     let mut machine = Machine::new(GRAPH);
     at(&mut machine, 0.0, 25.0, 0.0);
