@@ -46,7 +46,8 @@ pub struct RlsOptions {
 /// forgotten likewise, row by row.
 ///
 /// An intercept is a regressor that is 1 throughout. The covariance stays symmetric to the last bit, which keeps rounding
-/// errors from growing (Verhaegen 1989).
+/// errors from growing (Verhaegen 1989) as long as it is not singular but for rounding: a row in whose direction it has become
+/// negative tells nothing any more, and is passed over.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Saved")]
 pub struct Rls {
@@ -329,8 +330,9 @@ pub fn covariance_of(
 ) -> Result<Vec<f64>, NumericsError> {
     let moments = gram.moments();
     let share = rows / gram.weight();
-    // What the rows do not determine at all must not make the whole unsolvable.
-    let alpha = alpha.max(1e-9 * rows);
+    // What the rows do not determine at all must not make the whole unsolvable, nor so wide that the recursion's differences lose
+    // their sign within some 10⁵ rows.
+    let alpha = alpha.max(1e-7 * rows);
     let order = columns.len() + 1;
     let known = Mat::from_fn(order, order, |i, j| {
         match (columns.get(i), columns.get(j)) {
