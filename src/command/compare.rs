@@ -116,7 +116,7 @@ impl Compare {
             beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));
             in_fits.extend(new);
             words.extend(faults::in_words(&watch.found()));
-            if fits.is_empty() {
+            if fits.is_empty() && !report.estimators.is_empty() {
                 self.tell_fitted_on(terminal, &report, &trace);
             }
             for words in words {

@@ -95,15 +95,17 @@ const TABLES: [Table; 3] = [
     },
 ];
 
-/// The tables about machines with the axes of this one, drifts in the same unit, and all kinds of nodes that they compare.
+/// The tables about machines with the axes of this one, drifts in the same unit, and two or more of the kinds of nodes that they
+/// compare.
 pub(super) fn published(course: &Course) -> Vec<Published> {
     let of_same_kind = |table: &&Table| {
         let found = course.axes.iter().map(|axis| axis.name.as_str());
         let voters = course.axes.first().map_or(&[][..], |axis| &axis.voters);
-        let has = |kind: &str| kind.is_empty() || voters.iter().any(|voter| voter.kind == kind);
+        let has = |kind: &str| voters.iter().any(|voter| voter.kind == kind);
+        let compared = table.rows.iter().filter(|(_, kind, _)| has(kind));
         found.eq(table.axes.iter().copied())
             && course.axes.iter().all(|axis| axis.unit == "nm/min")
-            && table.rows.iter().all(|(_, kind, _)| has(kind))
+            && compared.count() > 1
     };
     TABLES
         .iter()
@@ -190,14 +192,19 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_with_other_axes_has_no_published_figures() {
-        let course = |names: &[&str]| Course {
-            axes: names.iter().map(|name| axis(name, &[], &[])).collect(),
-            ..Course::default()
+    fn a_machine_with_other_axes_or_models_has_no_published_figures() {
+        let course = |names: &[&str], kinds: &[&'static str]| {
+            let voters: Vec<_> = kinds.iter().map(|kind| (*kind, &[][..])).collect();
+            Course {
+                axes: names.iter().map(|name| axis(name, &[], &voters)).collect(),
+                ..Course::default()
+            }
         };
-        assert!(published(&course(&["Z"])).is_empty());
-        assert!(published(&course(&["X", "Z", "Y"])).is_empty());
-        assert_eq!(published(&course(&["X", "Y", "Z"])).len(), 1);
+        let both = ["linear", "arx"];
+        assert!(published(&course(&["Z"], &both)).is_empty());
+        assert!(published(&course(&["X", "Z", "Y"], &both)).is_empty());
+        assert!(published(&course(&["X", "Y", "Z"], &["arx", "median"])).is_empty());
+        assert_eq!(published(&course(&["X", "Y", "Z"], &both)).len(), 1);
     }
 
     #[test]

@@ -290,7 +290,10 @@ mod tests {
         for (settled_s, unit, number) in [(90.0, "s", "90.00"), (43_200.0, "h", "12.00")] {
             let of = instance("X", "nm/min", vec![answer("a", Some(2.0), settled_s)]);
             let told = text(&[&of]);
-            assert!(told.contains(&format!("have come, in {unit}\n")), "{told}");
+            assert!(
+                told.contains(&format!("a tenth of that, in {unit}\n")),
+                "{told}"
+            );
             assert!(told.trim_end().ends_with(number), "{told}");
         }
     }
