@@ -190,9 +190,7 @@ impl Compare {
             Answer::Fine
         })
     }
-}
 
-impl Compare {
     /// Tells where graphs are scored on what they were fitted on.
     fn tell_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
         let same = |on: &&PathBuf| self.data.paths().any(|data| data == **on);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use athermal_core::compile::Plan;
 use athermal_core::quantity::Quantity;
-use athermal_core::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace};
+use athermal_core::score::{PredictionTrace, RESTRICTS, Trace, TruthTrace, hide_much};
 use athermal_core::time::{Duration, Instant};
 use serde::Serialize;
 
@@ -324,7 +324,7 @@ fn column(
     let left_out = scored()
         .min_by(by_valid)
         .map(|row| (left_out, row))
-        .filter(|_| 20 * left_out > most);
+        .filter(|_| hide_much(left_out, most));
     let persistence = first.truth.persistence.get(&first.of.ahead);
     let lasting = |places: &Vec<usize>| persistence.map_or(f64::NAN, |values| values[places[0]]);
     Column {

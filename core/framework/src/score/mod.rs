@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub use crate::engine::Mode;
 pub use evidence::Lack;
 pub use interval::IntervalScore;
-pub use table::{RESTRICTS, Score, Scores};
+pub use table::{RESTRICTS, Score, Scores, hide_much};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
 pub(crate) use watch::{Prediction, Watch};
 

@@ -81,11 +81,18 @@ pub struct Score {
     pub interval: Option<IntervalScore>,
 }
 
+/// Whether so many instants are left out of those at which a prediction is there, more than one in twenty, that its scores may hide
+/// what happened at them.
+#[must_use]
+pub fn hide_much(left_out: usize, there: usize) -> bool {
+    20 * left_out > there
+}
+
 impl Score {
-    /// Whether so many instants are left out, more than one in twenty, that the scores may hide what happened there.
+    /// Whether it leaves so much out that it may [hide](hide_much) what happened there.
     #[must_use]
     pub fn leaves_many_out(&self) -> bool {
-        20 * self.left_out > self.n + self.left_out
+        hide_much(self.left_out, self.n + self.left_out)
     }
 
     /// Whether the prediction is worse than predicting zero.
