@@ -339,6 +339,11 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
                 "row whose time is out of order",
                 "left out",
             ),
+            (
+                &report.repeated_time,
+                "row whose time is that of the row before",
+                "left out",
+            ),
         ];
         match (report.headers.count, &report.headers.first) {
             (more @ 2.., Some(first)) => told.push(format!("{first}; {} in all", count(more))),

@@ -100,10 +100,7 @@ impl Run {
         }
         let mut engine = model.engine()?;
         let plan = std::sync::Arc::clone(engine.plan());
-        let options = Options {
-            lenient: self.lenient,
-            ..Options::default()
-        };
+        let options = self.reading();
         let mut reader = self.open(terminal, layout(&plan), options)?;
         let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
         engine.freeze(self.frozen);
@@ -127,10 +124,7 @@ impl Run {
     fn run_replaceable(&self, terminal: &Terminal, model: Model) -> Result<Answer, Failure> {
         let swaps = self.swap.schedule(&model, terminal)?;
         let (feed, mut columns) = swap::union(&model, &swaps);
-        let options = Options {
-            lenient: self.lenient,
-            ..Options::default()
-        };
+        let options = self.reading();
         let read = swap::reading(&model, &swaps, &feed);
         let mut reader = self.open(terminal, layout(&read), options)?;
         let mut engine = model.engine()?;
@@ -220,6 +214,15 @@ impl Run {
             sections.join(", "),
             instead.join("; ")
         ));
+    }
+
+    /// What was recorded is read as it is for fitting; of what is still being written no row waits for the next.
+    fn reading(&self) -> Options {
+        Options {
+            lenient: self.lenient,
+            joins: self.ends(),
+            ..Options::default()
+        }
     }
 
     fn open(

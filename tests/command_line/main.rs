@@ -367,7 +367,12 @@ fn times_that_step_back_or_leap_once_are_refused_and_counted_with_the_first_plac
     lines.insert(50, "4102444800,150,999".to_owned());
     let back = scratch.file("back.csv", csv(&lines));
     let run = athermal(&[&"run", &plain, &"--input", &back]).ended(0);
-    run.tells(&["3 × row whose time is out of order", "back.csv:32"]);
+    run.tells(&[
+        "2 × row whose time is out of order",
+        "1 × row whose time is that of the row before",
+        "back.csv:32",
+        "back.csv:42",
+    ]);
     assert_eq!(run.out, whole.out, "what was refused leaves no trace");
 }
 

@@ -36,6 +36,17 @@ pub struct MissingColumn {
     pub nearest: Option<String>,
 }
 
+/// Why a row is not put together with the one before, whose time it has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Again {
+    /// Rows are taken as they come, and the one before has been given.
+    Live,
+    /// It has nothing that the one before has not.
+    Nothing,
+    /// Both have a value of this column, and not the same.
+    Other(String),
+}
+
 /// What went wrong while a recording was read or written.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -147,7 +158,16 @@ pub enum FileError {
         /// What the cell should look like.
         expected: String,
     },
-    /// An instant that is not after the one before.
+    /// An instant that is that of the row before.
+    TimeAgain {
+        /// The row.
+        place: Place,
+        /// Its time, as the file gives it.
+        time: String,
+        /// Why the two are not one.
+        why: Again,
+    },
+    /// An instant that is before the one before.
     TimeNotAfter {
         /// The row.
         place: Place,
@@ -363,6 +383,22 @@ impl fmt::Display for FileError {
                     f,
                     "; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
                 )
+            }
+            Self::TimeAgain { place, time, why } => {
+                write!(f, "{place}: the time `{time}` is that of the row before")?;
+                match why {
+                    Again::Live => write!(
+                        f,
+                        "; the row was left out: where rows are taken as they come, what belongs to one time must stand in one"
+                    ),
+                    Again::Nothing => {
+                        write!(f, ", which has all that it has; the row was left out")
+                    }
+                    Again::Other(column) => write!(
+                        f,
+                        ", and the two have different values of `{column}`; the row was left out"
+                    ),
+                }
             }
             Self::TimeNotAfter {
                 place,

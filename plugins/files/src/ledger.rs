@@ -4,16 +4,20 @@ use athermal_core::unit::Unit;
 
 use crate::cell::decimal_mark;
 use crate::error::excerpt;
-use crate::{FileError, Place};
+use crate::{Again, FileError, Place};
 
 /// What a reader met on its way; complete once the reader has come to the end.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Rows given.
     pub rows: u64,
-    /// Rows left out because their time was not after the one before ([`FileError::TimeNotAfter`]), or far after it and after the next
+    /// Rows left out because their time was before the one before ([`FileError::TimeNotAfter`]), or far after it and after the next
     /// one too ([`FileError::TimeLeaps`]).
     pub refused_time: Count,
+    /// Rows left out because their time was that of the row before ([`FileError::TimeAgain`]).
+    pub repeated_time: Count,
+    /// Rows put together with the row before, which had their time.
+    pub joined: u64,
     /// Cells taken as absent because they could not be read; only when reading leniently.
     pub bad_cells: Count,
     /// The same for each channel of the layout; empty where there was none.
@@ -75,7 +79,9 @@ pub(crate) enum Follows {
     Next,
     /// So far after it that either there is a gap or the time is wrong.
     Leaping,
-    /// Not after it.
+    /// At the same time.
+    Again,
+    /// Before it.
     Behind,
 }
 
@@ -87,6 +93,8 @@ const LEAP_STEPS: i64 = 30;
 pub(crate) struct Ledger {
     pub report: Report,
     pub tell: Option<Tell>,
+    /// Whether rows of one time are put together.
+    pub joins: bool,
     lenient: bool,
     last_ns: Option<i64>,
     /// How long after the one before it that was.
@@ -106,6 +114,7 @@ impl Ledger {
         Self {
             report: Report::default(),
             tell: None,
+            joins: false,
             lenient,
             last_ns: None,
             step_ns: 0,
@@ -121,7 +130,8 @@ impl Ledger {
     pub fn follows(&self, time_ns: i64) -> Follows {
         match self.last_ns {
             None => Follows::Next,
-            Some(last_ns) if time_ns <= last_ns => Follows::Behind,
+            Some(last_ns) if time_ns < last_ns => Follows::Behind,
+            Some(last_ns) if time_ns == last_ns => Follows::Again,
             Some(last_ns) => {
                 let leap = LEAP_NS.max(self.step_ns.saturating_mul(LEAP_STEPS));
                 if time_ns.saturating_sub(last_ns) > leap {
@@ -130,6 +140,16 @@ impl Ledger {
                     Follows::Next
                 }
             }
+        }
+    }
+
+    /// Whether a row that follows so is left out.
+    #[inline]
+    pub fn refuses(&self, follows: Follows) -> bool {
+        match follows {
+            Follows::Next | Follows::Leaping => false,
+            Follows::Again => !self.joins,
+            Follows::Behind => true,
         }
     }
 
@@ -146,10 +166,24 @@ impl Ledger {
         self.report.rows += 1;
     }
 
+    /// Leaves out a row that is not put together with the last one, whose time it has.
+    #[cold]
+    pub fn refuse_again(&mut self, cell: &[u8], place: impl FnOnce() -> Place, why: Again) {
+        let error = || FileError::TimeAgain {
+            place: place(),
+            time: excerpt(cell),
+            why,
+        };
+        self.report.repeated_time.add(error, &mut self.tell);
+    }
+
     /// Leaves out a row that is not after the last one.
     #[cold]
-    pub fn refuse_behind(&mut self, cell: &[u8], place: impl FnOnce() -> Place) {
+    pub fn refuse(&mut self, follows: Follows, cell: &[u8], place: impl FnOnce() -> Place) {
         self.behind += 1;
+        if follows == Follows::Again && (self.tell.is_none() || !stays_behind(self.behind)) {
+            return self.refuse_again(cell, place, Again::Live);
+        }
         let (time, previous) = (excerpt(cell), excerpt(&self.last_time));
         let (place, rows) = (place(), self.behind);
         if let Some(tell) = &mut self.tell
@@ -276,12 +310,16 @@ mod tests {
         assert_eq!(
             *told.lock().unwrap(),
             [
-                "pipe:3: the time `0` is not after `0`; the row was left out".to_owned(),
+                "pipe:3: the time `0` is that of the row before; the row was left out: where rows are taken as they come, what belongs to \
+                 one time must stand in one"
+                    .to_owned(),
+                "pipe:6: the time `1` is not after `5000`; the row was left out".to_owned(),
                 behind(15, 10),
                 behind(105, 100),
             ]
         );
-        assert_eq!(reader.report().refused_time.count, 151);
+        assert_eq!(reader.report().refused_time.count, 150);
+        assert_eq!(reader.report().repeated_time.count, 1);
         assert_eq!(reader.report().rows, 5);
     }
 }

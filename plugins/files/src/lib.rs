@@ -4,8 +4,8 @@
 //! done with a line that cannot be used. A flag may stand as `true` or `false`, in any case, and is 1 or 0; where something else
 //! than a comma separates cells (`;`, tab, `|`), a number may have a decimal comma. Text is UTF-8, or UTF-16 with the mark that says
 //! so; cells that are not UTF-8 are taken for Windows-1252, so that `Wärme [°C]` is a name whoever wrote it. A table may have other
-//! lines above its names and a row of units below them, and may name its columns again, in another order. It does not decide what a
-//! channel is for, its unit, or when a value is too old.
+//! lines above its names and a row of units below them, and may name its columns again, in another order. Rows of one time are one
+//! where a recording is read and they do not contradict each other. It does not decide what a channel is for, its unit, or when a value is too old.
 //!
 //! ```
 //! use athermal_files::{Layout, Options, Reader, Row, TimeForm};
@@ -35,6 +35,7 @@ mod error;
 mod format;
 mod header;
 mod instant;
+mod joined;
 mod json_objects;
 mod json_rows;
 mod layout;
@@ -50,7 +51,7 @@ mod writer;
 pub use cell::with_decimal_point;
 pub use dataset::{Dataset, layout};
 pub use description::Description;
-pub use error::{FileError, MissingColumn, Place};
+pub use error::{Again, FileError, MissingColumn, Place};
 pub use format::Format;
 pub use instant::{has_clock, has_zone, is_time_of_day};
 pub use layout::{ChannelColumn, Layout, TimeColumn, TimeForm};

@@ -6,10 +6,11 @@ use std::path::Path;
 use crate::cell::{self, Cells};
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
+use crate::joined::{self, Held, Joined};
 use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
-use crate::{FileError, Format, Layout, Place, Report};
+use crate::{Again, FileError, Format, Layout, Place, Report};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -20,6 +21,9 @@ pub struct Options {
     pub delimiter: Option<u8>,
     /// Take a cell that cannot be read as absent and leave a broken row out, counted, instead of stopping with an error.
     pub lenient: bool,
+    /// Put rows of one time together, where no two have different values of a channel. A row then waits for the time of the next
+    /// one: for what was recorded, not for what is still being written.
+    pub joins: bool,
 }
 
 /// One row of a recording. Reused from row to row, so that reading does not allocate.
@@ -35,7 +39,8 @@ pub struct Row {
 
 /// Reads a recording row by row, each as soon as its line is there.
 ///
-/// A row is left out and counted when its time is not after the one before. One that leaps, by more than five minutes and more than
+/// A row is left out and counted when its time is not after the one before, save one of the same time that is put together with it
+/// ([`Options::joins`]). One that leaps, by more than five minutes and more than
 /// thirty times the step before, waits for the next row: it is left out and counted when that lies between the two, since then
 /// its time is wrong and no row after it is to be lost. A last line without an end that lacks cells
 /// (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never an error.
@@ -44,6 +49,8 @@ pub struct Reader {
     layout: Layout,
     ledger: Ledger,
     ahead: Option<Ahead>,
+    /// Where rows of one time are put together.
+    held: Option<Held>,
 }
 
 /// What was read to find out whether the row before it is to be taken.
@@ -107,11 +114,14 @@ impl Reader {
             Format::Csv => Rows::Csv(Box::new(CsvRows::new(lines, &layout, options.delimiter)?)),
             Format::JsonLines => Rows::Json(Box::new(JsonRows::new(lines, &layout)?)),
         };
+        let mut ledger = Ledger::new(options.lenient);
+        ledger.joins = options.joins;
         Ok(Self {
             rows,
             layout,
-            ledger: Ledger::new(options.lenient),
+            ledger,
             ahead: None,
+            held: options.joins.then(Held::default),
         })
     }
 
@@ -126,10 +136,11 @@ impl Reader {
             layout,
             ledger,
             ahead,
+            held,
         } = self;
         match rows {
-            Rows::Csv(rows) => next(rows.as_mut(), layout, ledger, ahead, row),
-            Rows::Json(rows) => next(rows.as_mut(), layout, ledger, ahead, row),
+            Rows::Csv(rows) => next_joined(rows.as_mut(), layout, ledger, ahead, held, row),
+            Rows::Json(rows) => next_joined(rows.as_mut(), layout, ledger, ahead, held, row),
         }
     }
 
@@ -149,6 +160,52 @@ impl Reader {
     }
 }
 
+/// Reads the next row with all those of its time that can be put together with it.
+fn next_joined<C: Cells>(
+    rows: &mut C,
+    layout: &Layout,
+    ledger: &mut Ledger,
+    ahead: &mut Option<Ahead>,
+    held: &mut Option<Held>,
+    row: &mut Row,
+) -> Result<bool, FileError> {
+    let Some(held) = held else {
+        return next(rows, layout, ledger, ahead, row);
+    };
+    if let Some(given) = held.give(row) {
+        if !matches!(given, Ok(true)) {
+            return given;
+        }
+    } else if !next(rows, layout, ledger, ahead, row)? {
+        return Ok(false);
+    }
+    loop {
+        // Where the next row stands, if that was read before.
+        let stands = match ahead {
+            Some(Ahead::Row(read)) if read.row.time_ns == row.time_ns => Some(read.place.clone()),
+            _ => None,
+        };
+        let read = next(rows, layout, ledger, ahead, &mut held.row);
+        if matches!(read, Ok(true)) && held.row.time_ns == row.time_ns {
+            let place = || stands.unwrap_or_else(|| rows.place());
+            match joined::join(&mut row.values, &held.row.values) {
+                Joined::More => ledger.report.joined += 1,
+                Joined::Nothing => {
+                    ledger.refuse_again(held.row.time_text.as_bytes(), place, Again::Nothing);
+                }
+                Joined::Contradicts(channel) => {
+                    let column = layout.channels[channel].column.clone();
+                    let other = Again::Other(column);
+                    ledger.refuse_again(held.row.time_text.as_bytes(), place, other);
+                }
+            }
+            continue;
+        }
+        held.read = Some(read);
+        return Ok(true);
+    }
+}
+
 fn next<C: Cells>(
     rows: &mut C,
     layout: &Layout,
@@ -161,11 +218,12 @@ fn next<C: Cells>(
             Ahead::Row(read_ahead) => read_ahead,
             Ahead::Error(error) => return Err(error),
         };
-        if ledger.follows(read_ahead.row.time_ns) != Follows::Behind {
+        let follows = ledger.follows(read_ahead.row.time_ns);
+        if !ledger.refuses(follows) {
             next_doubted(rows, layout, ledger, ahead, read_ahead, row);
             return Ok(true);
         }
-        ledger.refuse_behind(&read_ahead.cell, || read_ahead.place);
+        ledger.refuse(follows, &read_ahead.cell, || read_ahead.place);
     }
     match read(rows, layout, ledger, row)? {
         None => return Ok(false),
@@ -173,6 +231,7 @@ fn next<C: Cells>(
             let doubted = Stamped::new(row, rows);
             next_doubted(rows, layout, ledger, ahead, doubted, row);
         }
+        Some(Follows::Again) => {}
         Some(_) => ledger.take(row.time_ns, cell::trim(rows.time())),
     }
     Ok(true)
@@ -204,11 +263,14 @@ fn next_doubted<C: Cells>(
         ledger.refuse_leap(&doubted.cell, doubted.place, &next.cell);
         doubted = next;
     }
-    ledger.take(doubted.row.time_ns, &doubted.cell);
+    if ledger.follows(doubted.row.time_ns) != Follows::Again {
+        ledger.take(doubted.row.time_ns, &doubted.cell);
+    }
     *row = doubted.row;
 }
 
-/// Reads the next row that is after the last one taken, and how it follows that; none at the end.
+/// Reads the next row that is after the last one taken, or where rows are put together at its time, and how it follows that; none at
+/// the end.
 fn read<C: Cells>(
     rows: &mut C,
     layout: &Layout,
@@ -220,8 +282,8 @@ fn read<C: Cells>(
             continue;
         };
         let follows = ledger.follows(time_ns);
-        if follows == Follows::Behind {
-            ledger.refuse_behind(cell::trim(rows.time()), || rows.place());
+        if ledger.refuses(follows) {
+            ledger.refuse(follows, cell::trim(rows.time()), || rows.place());
             continue;
         }
         row.time_ns = time_ns;

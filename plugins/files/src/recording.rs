@@ -46,7 +46,8 @@ pub struct Recording {
 const DATED_NS: i64 = 1_000_000_000_000_000_000;
 
 impl Recording {
-    /// Opens each file once to check its columns and to see its first row, and puts them in order.
+    /// Opens each file once to check its columns and to see its first row, and puts them in order. Rows of one time are put
+    /// together ([`Options::joins`]).
     ///
     /// `-` is standard input and cannot be read twice; it is taken as it comes when it stands alone.
     ///
@@ -57,6 +58,10 @@ impl Recording {
         layout: Layout,
         options: Options,
     ) -> Result<Self, FileError> {
+        let options = Options {
+            joins: true,
+            ..options
+        };
         let mut paths: Vec<PathBuf> = paths.into_iter().map(|p| p.as_ref().to_owned()).collect();
         if paths.len() > 1 {
             if paths.iter().any(|path| path == Path::new("-")) {

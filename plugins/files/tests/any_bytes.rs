@@ -72,10 +72,11 @@ fn options() -> impl Strategy<Value = Options> {
         Just(Some(Format::Csv)),
         Just(Some(Format::JsonLines))
     ];
-    (formats, any::<bool>()).prop_map(|(format, lenient)| Options {
+    (formats, any::<bool>(), any::<bool>()).prop_map(|(format, lenient, joins)| Options {
         format,
         delimiter: None,
         lenient,
+        joins,
     })
 }
 

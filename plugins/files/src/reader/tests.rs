@@ -38,12 +38,96 @@ fn a_row_whose_time_repeats_or_steps_back_is_left_out_and_counted() {
         .map(|(_, text)| text)
         .collect();
     assert_eq!(times, ["0", "10", "10.5"]);
-    let refused = &reader.report().refused_time;
-    assert_eq!(refused.count, 2);
+    let told = |count: &crate::Count| (count.count, count.first.as_ref().unwrap().to_string());
+    let report = reader.report();
     assert_eq!(
-        refused.first.as_ref().unwrap().to_string(),
-        "f.csv:4: the time `10` is not after `10`; the row was left out"
+        told(&report.repeated_time),
+        (
+            1,
+            "f.csv:4: the time `10` is that of the row before; the row was left out: where rows are taken as they come, what belongs to \
+             one time must stand in one"
+                .to_owned()
+        )
     );
+    assert_eq!(
+        told(&report.refused_time),
+        (
+            1,
+            "f.csv:5: the time `5` is not after `10`; the row was left out".to_owned()
+        )
+    );
+}
+
+/// Rows of two channels as they are given where those of one time are put together, and what was met.
+fn joined(text: &'static str) -> (String, crate::Report, Option<String>) {
+    let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
+    let options = Options {
+        joins: true,
+        ..Options::default()
+    };
+    let mut reader = Reader::from_read("f.csv", text.as_bytes(), layout, options).unwrap();
+    let (mut row, mut given, mut error) = (Row::default(), Vec::new(), None);
+    loop {
+        match reader.next_into(&mut row) {
+            Ok(true) => given.push(format!(
+                "{}={},{}",
+                row.time_text, row.values[0], row.values[1]
+            )),
+            Ok(false) => break,
+            Err(failed) => error = Some(failed.to_string()),
+        }
+    }
+    assert!(
+        !reader.next_into(&mut row).unwrap(),
+        "the end stays the end"
+    );
+    (given.join(" "), reader.report().clone(), error)
+}
+
+#[test]
+fn rows_of_one_time_are_one_where_no_two_contradict_each_other() {
+    let (given, report, _) =
+        joined("t,a,b\n0,1,\n0,,2\n10,3,\n10.0,3,4\n20,5,6\n20,,\n30,,7\n30,8,\n");
+    assert_eq!(given, "0=1,2 10=3,4 20=5,6 30=8,7");
+    assert_eq!((report.rows, report.joined), (4, 3));
+    assert_eq!(
+        (report.refused_time.count, report.repeated_time.count),
+        (0, 1)
+    );
+    assert_eq!(
+        report.repeated_time.first.unwrap().to_string(),
+        "f.csv:7: the time `20` is that of the row before, which has all that it has; the row was left out"
+    );
+}
+
+#[test]
+fn a_row_that_contradicts_the_one_of_its_time_is_left_out_whole() {
+    let (given, report, _) = joined("t,a,b\n0,1,\n0,1.5,2\n0,,3\n10,4,\n5,4,4\n10,,5\n");
+    assert_eq!(given, "0=1,3 10=4,5");
+    assert_eq!((report.rows, report.joined), (2, 2));
+    assert_eq!(
+        report.repeated_time.first.unwrap().to_string(),
+        "f.csv:3: the time `0` is that of the row before, and the two have different values of `a`; the row was left out"
+    );
+    assert_eq!(report.refused_time.count, 1);
+}
+
+#[test]
+fn rows_of_one_time_are_one_behind_a_gap_and_behind_a_wrong_time_too() {
+    let (given, report, _) =
+        joined("t,a,b\n0,1,\n10,1,\n40000,2,\n40000,,3\n40000,4,\n40010,5,\n90000,6,\n40010,,7\n");
+    assert_eq!(given, "0=1,NaN 10=1,NaN 40000=2,3 40010=5,7");
+    assert_eq!((report.rows, report.joined), (4, 2));
+    let first = report.repeated_time.first.unwrap().to_string();
+    assert!(first.starts_with("f.csv:6: the time `40000`"), "{first}");
+    assert_eq!(report.refused_time.count, 1, "the wrong time");
+}
+
+#[test]
+fn the_row_before_an_error_is_given_first_where_rows_are_put_together() {
+    let (given, _, error) = joined("t,a,b\n0,1,\n0,,off\n10,2,\n");
+    assert_eq!(given, "0=1,NaN 10=2,NaN");
+    assert!(error.unwrap().starts_with("f.csv:3: column `b`"));
 }
 
 #[test]
@@ -234,9 +318,9 @@ fn rows_after_a_gap_are_all_given_up_to_the_last_one() {
     assert!(told.is_empty(), "{told:?}");
     let (times, told, _) = given("t,a\n0,1\n10,2\n40000,3\n40000,4\n40010,5\n");
     assert_eq!(times, "0=1 10=2 40000=3 40010=5");
-    assert_eq!(
-        told,
-        ["f.csv:5: the time `40000` is not after `40000`; the row was left out"]
+    assert!(
+        told[0].starts_with("f.csv:5: the time `40000` is that of the row before"),
+        "{told:?}"
     );
     let (times, _, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,off\n");
     assert_eq!(
