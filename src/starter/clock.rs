@@ -150,6 +150,13 @@ pub fn find(
     match (found.next(), unread) {
         (Some(clock), _) => Ok(clock),
         (None, Some(unread)) => Err(no_clock(unread, format)),
+        (None, None)
+            if let Some(back) = likely
+                .iter()
+                .find(|(rank, texts)| *rank < NAMES.len() && goes_back(texts)) =>
+        {
+            Err(no_clock(&back.1, format))
+        }
         (None, None) => Err(format!(
             "no column advances from row to row as a time does, and a log needs one: a time, or a number that counts its \
              samples; name it with --time (there are {})",
@@ -172,8 +179,20 @@ fn no_clock(texts: &Texts, format: Option<&TimeFormat>) -> String {
             "`{columns}` has times such as `{first}`, in a form that is not known; name it with --time-format as strptime does, \
              e.g. --time-format \"%d.%m.%Y %H:%M:%S\". A time of day alone is not enough: log the date too"
         ),
+        _ if goes_back(texts) => {
+            format!("`{columns}` goes back from row to row: sort the log, oldest first")
+        }
         _ => format!("`{columns}` does not advance from row to row as a time does"),
     }
+}
+
+/// Whether these are numbers that fall from row to row.
+fn goes_back(texts: &Texts) -> bool {
+    let cells = texts.read();
+    let numbers = cells.iter().map(|cell| cell.parse::<f64>());
+    let numbers: Vec<f64> = numbers.filter_map(Result::ok).collect();
+    let fall = numbers.windows(2).filter(|pair| pair[1] < pair[0]).count();
+    numbers.len() > 2 && numbers.len() == cells.len() && fall * 100 >= (numbers.len() - 1) * 95
 }
 
 /// Texts that have a format.
@@ -206,13 +225,19 @@ fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
     };
     let columns = texts.columns.clone();
     let column = columns.title();
-    // A clock that steps back once is still a clock.
-    let steps = numbers.windows(2).filter(|pair| pair[1] > pair[0]).count();
-    if steps * 100 < (numbers.len() - 1) * 95 {
-        return None;
-    }
     let lower = column.to_lowercase();
     let parts = words(&lower);
+    // A clock that steps back once is still a clock; one that is called so may also stand still, where rows share a time.
+    let steps = |is: fn(&f64, &f64) -> bool| {
+        let pairs = numbers.windows(2);
+        pairs.filter(|pair| is(&pair[1], &pair[0])).count()
+    };
+    let (all, advance) = (numbers.len() - 1, steps(f64::gt));
+    let is_called = parts.first().is_some_and(|first| NAMES.contains(first));
+    let stands = is_called && steps(f64::ge) * 100 >= all * 95 && advance * 10 >= all;
+    if advance * 100 < all * 95 && !stands {
+        return None;
+    }
     let known = |word: &&str| UNITS.iter().find(|(name, ..)| name == word);
     let below = described.unit(&column);
     let unit = known(&below).or_else(|| parts.iter().skip(1).rev().find_map(known));

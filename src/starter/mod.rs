@@ -3,6 +3,7 @@
 mod clock;
 mod column;
 mod dates;
+mod dropped;
 mod group;
 mod survey;
 mod text;
@@ -70,15 +71,21 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
         .map_err(NoStarter::Unfit)?;
     remarks.push(clock.remark());
     let mut columns = column::columns(&described, clock.columns.names());
+    if let Some(why) = dropped::newest_first(&described, &clock) {
+        return Err(NoStarter::Unfit(why));
+    }
     let mut survey = Survey::of(path, &clock, &columns)?;
+    remarks.extend(survey.dropped.iter().cloned());
     survey.judge(&mut columns);
-    column::assign(&mut columns, told).map_err(NoStarter::Unfit)?;
+    let dropped = survey.dropped.clone();
+    let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
+    column::assign(&mut columns, told).map_err(&unfit)?;
     survey.leave_out_faults(&mut columns);
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     let choice = Choice::of(&survey, &columns);
     let choice = choice.map_err(|why| match clock.form {
-        TimeForm::Numbers { .. } => NoStarter::Unfit(format!("{why}; {}", clock.remark())),
-        _ => NoStarter::Unfit(why),
+        TimeForm::Numbers { .. } => unfit(format!("{why}; {}", clock.remark())),
+        _ => unfit(why),
     })?;
     remarks.extend(choice.remarks(&clock, &columns));
     Ok(Starter {

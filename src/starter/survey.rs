@@ -9,6 +9,7 @@ use athermal::diagnosis::leap::{Finder, Leaps};
 use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
+use super::dropped::{self, Steps};
 use crate::figures::counted;
 
 /// The values of a log, column by column.
@@ -20,6 +21,10 @@ pub struct Survey {
     pub duration_s: f64,
     /// Rows.
     pub rows: u64,
+    /// What is told of rows that are not taken, or not alone.
+    pub dropped: Vec<String>,
+    /// Whether there are rows that only a lenient reader passes over.
+    has_broken_rows: bool,
 }
 
 /// The values of one column.
@@ -155,15 +160,18 @@ impl Survey {
         };
         let options = Options {
             lenient: true,
+            joins: true,
             ..Options::default()
         };
         let mut reader = Reader::open(path, layout, options)?;
         let mut series: Vec<Series> = columns.iter().map(|_| Series::default()).collect();
         let (mut row, mut first, mut last, mut rows) = (Row::default(), None, 0, 0);
+        let mut steps = Steps::default();
         while reader.next_into(&mut row)? {
             let first = *first.get_or_insert(row.time_ns);
             last = row.time_ns;
             rows += 1;
+            steps.push(last);
             let time_s = (row.time_ns - first) as f64 / 1e9;
             for (series, &value) in series.iter_mut().zip(&row.values) {
                 if value.is_finite() {
@@ -180,6 +188,7 @@ impl Survey {
         if rows < 2 || duration_s <= 0.0 {
             let report = reader.report();
             let first = report.refused_rows.first.as_ref();
+            let first = first.or(report.repeated_time.first.as_ref());
             let first = first.or(report.refused_time.first.as_ref());
             let first = first.map_or_else(String::new, |error| format!("; {error}"));
             return Err(NoStarter::Unfit(format!(
@@ -190,6 +199,8 @@ impl Survey {
             series,
             duration_s,
             rows,
+            dropped: dropped::remarks(reader.report(), steps, clock),
+            has_broken_rows: reader.report().refused_rows.count > 0,
         })
     }
 
@@ -272,10 +283,11 @@ impl Survey {
         }
     }
 
-    /// Whether a column that is used has cells that only a lenient reader passes over.
+    /// Whether there are rows, or cells in a column that is used, that only a lenient reader passes over.
     #[must_use]
     pub fn needs_lenience(&self, columns: &[Column]) -> bool {
         let mut pairs = self.series.iter().zip(columns);
-        pairs.any(|(series, column)| column.kind != Kind::Unused && series.unreadable > 0)
+        self.has_broken_rows
+            || pairs.any(|(series, column)| column.kind != Kind::Unused && series.unreadable > 0)
     }
 }

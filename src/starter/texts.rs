@@ -47,7 +47,8 @@ impl Texts {
         })
     }
 
-    fn from(described: &Description, columns: TimeColumns) -> Self {
+    /// Those of columns that are put together.
+    pub fn from(described: &Description, columns: TimeColumns) -> Self {
         let place = |name| described.columns.iter().position(|column| column == name);
         let places: Vec<Option<usize>> = columns.names().iter().map(place).collect();
         let texts = described.rows.iter().map(|row| {

@@ -1,0 +1,145 @@
+//! Decides what is told of the rows that a log has and no command takes, with the likely cause. Not which rows these are.
+
+use athermal::files::{
+    Again, Description, FileError, Report, TimeForm, has_zone, with_decimal_point,
+};
+
+use super::clock::Clock;
+use super::texts::Texts;
+use crate::figures::{count, counted};
+
+/// So many rows whose time is out of order are no slips: the clock was set back.
+const SET_BACK: u64 = 10;
+
+/// The finest step of the times that were read.
+#[derive(Debug, Clone, Copy)]
+pub struct Steps {
+    minutes: bool,
+    seconds: bool,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            minutes: true,
+            seconds: true,
+        }
+    }
+}
+
+impl Steps {
+    /// Looks at another instant, in ns.
+    pub fn push(&mut self, time_ns: i64) {
+        self.minutes &= time_ns % 60_000_000_000 == 0;
+        self.seconds &= time_ns % 1_000_000_000 == 0;
+    }
+}
+
+/// What is told of the rows of a log that were not taken, and of those that were put together.
+pub fn remarks(report: &Report, steps: Steps, clock: &Clock) -> Vec<String> {
+    let left_out = [
+        &report.repeated_time,
+        &report.refused_time,
+        &report.refused_rows,
+    ];
+    let all = report.rows + report.joined + left_out.map(|found| found.count).iter().sum::<u64>();
+    let mut told = Vec::new();
+    if report.joined > 0 {
+        told.push(format!(
+            "{} of {} have the time of the row before them, and are put together with it",
+            count(report.joined),
+            counted(all, "row")
+        ));
+    }
+    let causes = [
+        (
+            "have the time of the row before",
+            same_time(report, all, steps).to_owned(),
+        ),
+        ("are out of order", out_of_order(report, clock)),
+        ("cannot be read", String::new()),
+    ];
+    for (found, (what, cause)) in left_out.iter().zip(causes) {
+        if let Some(first) = &found.first {
+            told.push(format!(
+                "{} of {} {what}, and are left out; the first: {first}{cause}",
+                count(found.count),
+                counted(all, "row")
+            ));
+        }
+    }
+    if let Some(place) = &report.truncated {
+        told.push(format!("{place}: the last line is cut off and left out"));
+    }
+    told
+}
+
+/// Why rows may have the time of the one before, and what to do. Where one in a hundred has it, it is the rule.
+fn same_time(report: &Report, all: u64, steps: Steps) -> &'static str {
+    let differ = matches!(
+        report.repeated_time.first,
+        Some(FileError::TimeAgain {
+            why: Again::Other(_),
+            ..
+        })
+    );
+    match (steps.minutes, steps.seconds) {
+        _ if !differ || report.repeated_time.count * 100 < all => "",
+        (true, _) => "; all times are whole minutes: log the seconds too",
+        (_, true) => "; all times are whole seconds: log fractions of a second too",
+        _ => "",
+    }
+}
+
+/// Why times may be out of order, and what to do.
+fn out_of_order(report: &Report, clock: &Clock) -> String {
+    let Some(FileError::TimeNotAfter {
+        place,
+        time,
+        previous,
+    }) = &report.refused_time.first
+    else {
+        return String::new();
+    };
+    let read = |text: &str| clock.form.read(with_decimal_point(text).as_bytes());
+    let (Some(now), Some(before)) = (read(time), read(previous)) else {
+        return String::new();
+    };
+    if report.refused_time.count < SET_BACK {
+        return String::new();
+    }
+    let back_s = before.saturating_sub(now) as f64 / 1e9;
+    let is_civil = match &clock.form {
+        TimeForm::Rfc3339 => !has_zone(time.as_bytes()),
+        TimeForm::Format(format) => !format.has_offset(),
+        TimeForm::Numbers { .. } | TimeForm::Samples { .. } => false,
+    };
+    if is_civil && (3000.0..=3600.0).contains(&back_s) {
+        return "; did the clocks go back in autumn? Log in UTC, or with an offset such as +01:00"
+            .to_owned();
+    }
+    format!(
+        "; the times start again at line {}: give what stands before it and what stands from it on as two files, of which \
+         each is a segment of its own",
+        place.line
+    )
+}
+
+/// Why a log has no rows that follow each other, where its newest rows come first.
+pub fn newest_first(described: &Description, clock: &Clock) -> Option<String> {
+    let texts = Texts::from(described, clock.columns.clone()).read();
+    let mut times: Vec<(&str, i64)> = Vec::new();
+    for text in &texts {
+        times.extend(clock.form.read(text.as_bytes()).map(|time| (&**text, time)));
+    }
+    let back = |pair: &&[(&str, i64)]| pair[1].1 < pair[0].1;
+    let all = times.len().saturating_sub(1);
+    let first = times.windows(2).find(back)?;
+    let many = times.windows(2).filter(back).count();
+    (all >= 2 && many * 100 >= all * 95).then(|| {
+        format!(
+            "its times go back from row to row, `{}` before `{}`: sort it, oldest first",
+            first[0].0, first[1].0
+        )
+    })
+}

@@ -1,0 +1,179 @@
+//! What `init` tells of a log that was exported or written otherwise than meant: before a graph is made of half of it, unseen.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::fmt::Write as _;
+
+use workbench::Folder;
+
+/// What a command says, its lines joined, and whether it was content.
+fn said(folder: &Folder, arguments: &[&str]) -> (bool, String) {
+    let output = folder.run(arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    let words: Vec<&str> = told.split_whitespace().collect();
+    (output.status.success(), words.join(" "))
+}
+
+/// What `init` says of a log, and the graph that it writes.
+fn init(folder: &Folder, name: &str, log: &str) -> (bool, String, String) {
+    let graph = format!("{name}.toml");
+    std::fs::write(folder.0.join(name), log).unwrap();
+    let (fine, told) = said(folder, &["init", name, "-o", &graph]);
+    let graph = std::fs::read_to_string(folder.0.join(graph)).unwrap_or_default();
+    (fine, told, graph)
+}
+
+/// Rows of a machine, ten seconds apart: its temperature in °C and its position in µm.
+fn machine(rows: usize) -> impl Iterator<Item = (usize, f64, f64)> {
+    (0..rows).map(|row| {
+        let x = row as f64;
+        let noise = |of: f64| {
+            let wild = (x * 12.9898 + of).sin() * 43_758.545_3;
+            2.0 * (wild - wild.floor()) - 1.0
+        };
+        let plate = 22.0 + 2.0 * (x / 170.0).sin() + 0.3 * (x / 31.0).sin() + 0.005 * noise(1.0);
+        (10 * row, plate, 4.0 * plate + 0.05 * noise(2.0))
+    })
+}
+
+/// The drift window that was chosen.
+fn window(told: &str) -> &str {
+    let (_, rest) = told.split_once("drift window: ").unwrap();
+    rest.split_once(',').unwrap().0
+}
+
+#[test]
+fn positions_in_rows_of_their_own_at_the_time_of_others_are_not_lost() {
+    let folder = Folder::new("tells-joined");
+    let (mut one, mut two) = (String::new(), String::new());
+    for text in [&mut one, &mut two] {
+        text.push_str("time_s,plate_degC,Z_um\n");
+    }
+    for (time, plate, z) in machine(3000) {
+        let _ = writeln!(one, "{time},{plate:.4},{z:.4}");
+        let _ = writeln!(two, "{time},{plate:.4},\n{time},,{z:.4}");
+    }
+    let (fine, together, _) = init(&folder, "one.csv", &one);
+    assert!(fine, "{together}");
+    let (fine, told, _) = init(&folder, "two.csv", &two);
+    assert!(fine, "{told}");
+    assert!(
+        told.contains(
+            "3,000 of 6,000 rows have the time of the row before them, and are put together with it"
+        ),
+        "{told}"
+    );
+    assert_eq!(window(&told), window(&together));
+    let figures = |log: &str| {
+        let (fine, told) = said(
+            &folder,
+            &["fit", "one.csv.toml", "--data", log, "-o", "m.json"],
+        );
+        assert!(fine && !told.contains("left out;"), "{told}");
+        let scored = folder.run(&["evaluate", "m.json", "--data", log, "--format", "json"]);
+        let mut facts: serde_json::Value = serde_json::from_slice(&scored.stdout).unwrap();
+        let run = folder.run(&["run", "m.json", "--input", log]);
+        assert!(run.status.success());
+        (
+            facts["scores"].take(),
+            String::from_utf8(run.stdout).unwrap(),
+        )
+    };
+    assert_eq!(figures("two.csv"), figures("one.csv"));
+}
+
+#[test]
+fn rows_whose_seconds_were_cut_off_are_counted_with_the_cause() {
+    let folder = Folder::new("tells-minutes");
+    let mut text = "Zeit;plate_degC;Z_um\n".to_owned();
+    for (time, plate, z) in machine(8000) {
+        let (day, minute) = (1 + time / 86_400, time / 60 % 1440);
+        let _ = writeln!(
+            text,
+            "{day:02}.03.2026 {:02}:{:02};{};{}",
+            minute / 60,
+            minute % 60,
+            format!("{plate:.4}").replace('.', ","),
+            format!("{z:.4}").replace('.', ",")
+        );
+    }
+    let (fine, told, _) = init(&folder, "minutes.csv", &text);
+    assert!(fine, "{told}");
+    assert!(told.contains("6,666 of 8,000 rows have the time of the row before, and are left out; the first: minutes.csv:3: the time `01.03.2026 00:00` is that of the row before, and the two have different values of `plate_degC`; the row was left out; all times are whole minutes: log the seconds too"), "{told}");
+    let (_, told) = said(
+        &folder,
+        &[
+            "fit",
+            "minutes.csv.toml",
+            "--data",
+            "minutes.csv",
+            "-o",
+            "m.json",
+        ],
+    );
+    assert!(
+        told.contains("6,666 × row whose time is that of the row before, left out"),
+        "{told}"
+    );
+}
+
+#[test]
+fn times_that_start_again_within_a_log_are_told_with_the_line() {
+    let folder = Folder::new("tells-again");
+    let mut text = "time_s,plate_degC,Z_um\n".to_owned();
+    for (time, plate, z) in machine(5000) {
+        let _ = writeln!(text, "{},{plate:.4},{z:.4}", time % 30_000);
+    }
+    let (fine, told, _) = init(&folder, "again.csv", &text);
+    assert!(fine, "{told}");
+    assert!(
+        told.contains("2,000 of 5,000 rows are out of order, and are left out; the first: again.csv:3002: the time `0` is not after `29990`; the row was left out; the times start again at line 3002: give what stands before it and what stands from it on as two files"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_log_whose_newest_row_comes_first_is_told_to_be_sorted() {
+    let folder = Folder::new("tells-back");
+    let rows: Vec<_> = machine(3000).collect();
+    for (name, header, dated) in [("n.csv", "time_s", false), ("d.csv", "Time", true)] {
+        let mut text = format!("{header},plate_degC,Z_um\n");
+        for (time, plate, z) in rows.iter().rev() {
+            let time = match dated {
+                true => format!(
+                    "2026-03-01T{:02}:{:02}:{:02}Z",
+                    time / 3600,
+                    time / 60 % 60,
+                    time % 60
+                ),
+                false => time.to_string(),
+            };
+            let _ = writeln!(text, "{time},{plate:.4},{z:.4}");
+        }
+        let (fine, told, _) = init(&folder, name, &text);
+        assert!(!fine && told.contains("oldest first"), "{told}");
+    }
+}
+
+#[test]
+fn rows_with_too_many_cells_are_told_by_init_and_read_by_the_command_that_it_names() {
+    let folder = Folder::new("tells-cells");
+    let mut text = "time_s,plate_degC,Z_um,Alarm\n".to_owned();
+    for (time, plate, z) in machine(3000) {
+        let alarm = if time % 5000 == 0 {
+            "Door open,E12"
+        } else {
+            ""
+        };
+        let _ = writeln!(text, "{time},{plate:.4},{z:.4},{alarm}");
+    }
+    let (fine, told, _) = init(&folder, "cells.csv", &text);
+    assert!(fine, "{told}");
+    assert!(
+        told.contains("6 of 3,000 rows cannot be read, and are left out; the first: cells.csv:2: 5 cells where the header has 4"),
+        "{told}"
+    );
+    assert!(told.contains("--lenient -o model.json"), "{told}");
+}
