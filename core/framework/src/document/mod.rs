@@ -13,6 +13,7 @@ mod merge;
 mod problem;
 mod read;
 mod salvage;
+mod slip;
 mod toml_text;
 mod tree;
 
@@ -30,6 +31,7 @@ pub use lacks::Lacks;
 pub use problem::DocumentProblem;
 pub(crate) use read::unreadable;
 pub use read::{Disk, Document, FileReader, Memory, load, load_text};
+pub use slip::Slip;
 pub use tree::{Data, Entry, Table, Value};
 
 #[cfg(test)]

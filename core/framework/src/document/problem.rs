@@ -5,6 +5,7 @@ mod told;
 use std::sync::Arc;
 
 use super::lacks::Lacks;
+use super::slip::Slip;
 use crate::diagnostic::{Names, Place};
 use crate::quantity::QuantityError;
 use crate::time::DurationError;
@@ -19,6 +20,8 @@ pub enum DocumentProblem {
         reason: String,
         /// The value without quotes that it stumbled over, where it is one.
         bare: Option<String>,
+        /// What is usual elsewhere and stands there instead of TOML.
+        slip: Option<Slip>,
     },
     /// A file cannot be read.
     Unreadable {

@@ -5,6 +5,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::problem::DocumentProblem;
 use super::salvage::{self, Lost, SyntaxError, salvage};
+use super::slip;
 use super::tree::{Data, Entry, Table, Value};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 
@@ -38,7 +39,8 @@ pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics)
             reason,
             bare,
         } = error;
-        let problem = DocumentProblem::Syntax { reason, bare };
+        let slip = slip::of(text, &bytes);
+        let problem = DocumentProblem::Syntax { reason, bare, slip };
         diagnostics.report(at(source, &bytes), problem);
     }
     let left = left?;

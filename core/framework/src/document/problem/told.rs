@@ -251,6 +251,9 @@ impl Problem for DocumentProblem {
             Self::SchemaMissing | Self::SchemaUnknown { .. } => {
                 Some("begin the file with `schema = 1`".to_owned())
             }
+            Self::Syntax {
+                slip: Some(slip), ..
+            } => Some(slip.help()),
             Self::Syntax { bare, .. } => {
                 bare.as_ref()
                     .map(|bare| match bare.to_ascii_lowercase().as_str() {

@@ -64,6 +64,39 @@ error[A001]: this is not TOML: unclosed array table, expected `]`
 }
 
 #[test]
+fn what_is_usual_elsewhere_and_no_toml_is_told_with_what_to_write() {
+    for (line, help) in [
+        ("a = 0,001", "a number has a decimal point: 0.001"),
+        (
+            "a = { b = 3, c = -1,5 }",
+            "a number has a decimal point: -1.5",
+        ),
+        ("a = \u{201c}Cel\u{201d}", "quotes are straight: \"Cel\""),
+        ("a = \u{201e}Cel\u{201c}", "quotes are straight: \"Cel\""),
+        (
+            r#"extends = "C:\athermal\a.toml""#,
+            "in a text a backslash begins a special sign; write a path with slashes: \"C:/athermal/a.toml\"",
+        ),
+        (
+            r#"extends = "C:\Users\a.toml""#,
+            "in a text a backslash begins a special sign; write a path with slashes: \"C:/Users/a.toml\"",
+        ),
+    ] {
+        let text = format!("schema = 1\n{line}\n");
+        let told = rendered(&[("a.toml", &text)]);
+        assert!(told.contains("error[A001]"), "{told}");
+        assert!(told.contains(&format!("= help: {help}\n")), "{told}");
+    }
+    for line in ["a = [1,2", "a = { b = 1, c = ", "a = \"x\\\\y\" z"] {
+        let text = format!("schema = 1\n{line}\n");
+        let told = rendered(&[("a.toml", &text)]);
+        for help in ["decimal point", "quotes are", "backslash"] {
+            assert!(!told.contains(help), "{told}");
+        }
+    }
+}
+
+#[test]
 fn a_file_that_is_not_there_is_named_where_it_is_extended() {
     let files = [(
         "m/a.toml",
