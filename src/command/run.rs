@@ -29,7 +29,7 @@ use crate::terminal::{Answer, Failure, Terminal, outside};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  athermal run model.json --input test.csv --output predicted.csv\n  \
-                        tail -f log.csv | athermal run model.json --input - --output -"
+                        tail -n +1 -f log.csv | athermal run model.json --input - --output -"
 )]
 pub struct Run {
     /// The model, or a graph in which nothing needs fitting

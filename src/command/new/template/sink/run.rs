@@ -1,6 +1,6 @@
 //! A live program: rows of a log in, what the graph makes of them as lines on standard output.
 //!
-//! `tail -f log.csv | cargo run --release --example run -- model.json - | my-controller`
+//! `tail -n +1 -f log.csv | cargo run --release --example run -- model.json - | my-controller`
 
 use std::error::Error;
 use std::io::stdout;
