@@ -177,3 +177,36 @@ fn rows_with_too_many_cells_are_told_by_init_and_read_by_the_command_that_it_nam
     );
     assert!(told.contains("--lenient -o model.json"), "{told}");
 }
+
+#[test]
+fn dates_that_the_whole_log_decides_are_read_so() {
+    let folder = Folder::new("tells-us");
+    let log = |days: std::ops::Range<usize>| {
+        let mut text = "Time,plate_degC,Z_um\n".to_owned();
+        for (row, (_, plate, z)) in machine(2000 * days.len()).enumerate() {
+            let (day, second) = (days.start + row / 2000, row % 2000 * 43);
+            let _ = writeln!(
+                text,
+                "03/{day:02}/2026 {:02}:{:02}:{:02},{plate:.4},{z:.4}",
+                second / 3600,
+                second / 60 % 60,
+                second % 60
+            );
+        }
+        text
+    };
+    for (name, days) in [("beyond.csv", 11..14), ("leaps.csv", 8..11)] {
+        let (fine, told, graph) = init(&folder, name, &log(days));
+        assert!(fine, "{told}");
+        assert!(
+            graph.contains("format = \"%m/%d/%Y %H:%M:%S%.f\""),
+            "{graph}"
+        );
+        assert!(!told.contains("may as well"), "{told}");
+    }
+    let (fine, told, _) = init(&folder, "one.csv", &log(8..9));
+    assert!(
+        fine && told.contains("they may as well be `%m/%d/%Y %H:%M:%S%.f`"),
+        "{told}"
+    );
+}

@@ -45,6 +45,8 @@ pub struct Dates {
     pub declared: (&'static str, String),
     /// Why it was taken.
     pub why: String,
+    /// Another form that reads these cells as well, and otherwise.
+    pub other: Option<TimeFormat>,
 }
 
 /// The form of these cells, if one is known that nearly all of them have: a log may have been written into by hand.
@@ -60,6 +62,7 @@ pub fn of(cells: &[String]) -> Option<Dates> {
             form: TimeForm::Rfc3339,
             declared: ("unit", "rfc3339".to_owned()),
             why: format!("dates and times {which}"),
+            other: None,
         });
     }
     let known = FORMATS.iter().filter_map(|format| format.parse().ok());
@@ -67,11 +70,7 @@ pub fn of(cells: &[String]) -> Option<Dates> {
         known.filter(|format| fits(&TimeForm::Format(TimeFormat::clone(format)), cells));
     let format = fitting.next()?;
     let mut found = by(format);
-    if let Some(other) = fitting.find(|other| reads_otherwise(&found.form, other, cells)) {
-        found.why.push_str(&format!(
-            "; they may as well be `{other}`: if so, give that with --time-format"
-        ));
-    }
+    found.other = fitting.find(|other| reads_otherwise(&found.form, other, cells));
     Some(found)
 }
 
@@ -84,6 +83,7 @@ pub fn by(format: TimeFormat) -> Dates {
     Dates {
         declared: ("format", format.to_string()),
         why,
+        other: None,
         form: TimeForm::Format(format),
     }
 }
@@ -167,7 +167,7 @@ mod tests {
         ] {
             let found = found(&[cell]).unwrap();
             assert_eq!(found.declared, ("format", format.to_owned()), "{cell}");
-            assert!(!found.why.contains("as well"), "{}", found.why);
+            assert_eq!(found.other, None, "{cell}");
         }
     }
 
@@ -175,11 +175,8 @@ mod tests {
     fn a_day_that_may_be_a_month_is_told() {
         let found = found(&["01/03/2026 12:00:00", "01/03/2026 12:00:10"]).unwrap();
         assert_eq!(found.declared.1, "%d/%m/%Y %H:%M:%S%.f");
-        assert!(
-            found.why.contains("`%m/%d/%Y %H:%M:%S%.f`"),
-            "{}",
-            found.why
-        );
+        let other = found.other.unwrap().to_string();
+        assert_eq!(other, "%m/%d/%Y %H:%M:%S%.f");
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod group;
 mod survey;
 mod text;
 mod texts;
+mod undecided;
 mod window;
 
 pub use dates::WITHOUT_ZONE;
@@ -69,6 +70,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let mut remarks = Vec::new();
     let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
         .map_err(NoStarter::Unfit)?;
+    let clock = undecided::decided(path, clock)?;
     remarks.push(clock.remark());
     let mut columns = column::columns(&described, clock.columns.names());
     if let Some(why) = dropped::newest_first(&described, &clock) {
