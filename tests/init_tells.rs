@@ -210,3 +210,30 @@ fn dates_that_the_whole_log_decides_are_read_so() {
         "{told}"
     );
 }
+
+#[test]
+fn lengths_in_inches_and_mils_are_taken_for_what_they_are() {
+    let folder = Folder::new("tells-inch");
+    for (name, unit, um) in [("inch", "[in_i]", 25_400.0), ("mil", "[mil_i]", 25.4)] {
+        let mut text = format!("time_s,plate_degC,X_{name}\n");
+        for (time, plate, z) in machine(3000) {
+            let _ = writeln!(text, "{time},{plate:.4},{:.10}", z / um);
+        }
+        let (fine, told, graph) = init(&folder, name, &text);
+        assert!(fine, "{told}");
+        assert!(
+            told.contains(&format!("X_{name}: drifts, in {unit}; a length")),
+            "{told}"
+        );
+        assert!(graph.contains(&format!("unit = \"{unit}\"")), "{graph}");
+        let (fine, told) = said(&folder, &["check", "--strict", &format!("{name}.toml")]);
+        assert!(fine, "{told}");
+        let told = graph.replace(&format!("unit = \"{unit}\""), "unit = \"mil\"");
+        std::fs::write(folder.0.join("word.toml"), told).unwrap();
+        let (fine, told) = said(&folder, &["check", "word.toml"]);
+        assert!(
+            !fine && told.contains("write the unit as \"[mil_i]\""),
+            "{told}"
+        );
+    }
+}

@@ -67,11 +67,41 @@ const DRIVES: [&str; 11] = [
     "rpm",
 ];
 
-/// Whether a name of several words ends in a unit, none of them one of time.
+/// Whether a name ends in a unit, other than of time: `Z_nm`, `Z [nm]`, `Z/nm`.
 pub fn ends_in_unit(name: &str) -> bool {
     let words = words(name);
-    let unit = words.split_first().and_then(|(_, rest)| rest.last());
-    unit.is_some_and(|unit| Unit::in_name(unit).is_some())
+    let last = words.iter().enumerate().next_back();
+    last.and_then(unit_of_word).is_some() || inches(name).is_some()
+}
+
+/// The last unit in a name.
+fn unit_in(name: &str) -> Option<Unit> {
+    let words = words(name);
+    let unit = words.iter().enumerate().rev().find_map(unit_of_word);
+    unit.or_else(|| inches(name))
+}
+
+/// The unit that a word of a name says which is not the first, or that stands behind its slash.
+fn unit_of_word((place, word): (usize, &&str)) -> Option<Unit> {
+    let whole = (place > 0).then(|| Unit::in_name(word)).flatten();
+    whole.or_else(|| {
+        let (quantity, unit) = word.rsplit_once('/')?;
+        // A unit per another is no quantity in a unit.
+        Unit::in_name(quantity)
+            .is_none()
+            .then(|| Unit::in_name(unit))?
+    })
+}
+
+/// The inch, where `in` can be nothing else: in brackets, or behind the name of a position. `T_in` is that of an inlet.
+fn inches(name: &str) -> Option<Unit> {
+    let lower = name.trim().to_lowercase();
+    let in_brackets = lower.ends_with("[in]") || lower.ends_with("(in)");
+    let words = words(&lower);
+    let (last, rest) = words.split_last()?;
+    let is_position = |word: &&str| POSITIONS.contains(&word.trim_end_matches(char::is_numeric));
+    let is_unit = in_brackets || *last == "in" && rest.iter().any(is_position);
+    is_unit.then(|| Unit::parse("[in_i]").ok())?
 }
 
 impl Column {
@@ -133,11 +163,7 @@ pub fn columns(described: &Description, time: &[String]) -> Vec<Column> {
 /// The guess of a column by its name and by what stands for its unit below it.
 fn guess(name: &str, below: &str) -> Column {
     let parts = words(name);
-    let by_name = parts
-        .iter()
-        .skip(1)
-        .rev()
-        .find_map(|word| Unit::in_name(word));
+    let by_name = unit_in(name);
     let below = Unit::in_words(below);
     let unit = below.as_ref().or(by_name.as_ref());
     let lower: Vec<String> = parts.iter().map(|word| word.to_lowercase()).collect();
@@ -385,6 +411,26 @@ mod tests {
         assert_eq!(guess("Temp Plate [°F]", "").unit, "[degF]");
         assert_eq!(guess("Pos Z (µm)", "").unit, "um");
         assert_eq!(guess("Probe Z [mm]", "").guess, Guess::Position);
+    }
+
+    #[test]
+    fn inches_and_units_behind_a_slash_are_read_where_nothing_else_can_be_meant() {
+        for (name, unit) in [
+            ("X_inch", "[in_i]"),
+            ("X_in", "[in_i]"),
+            ("Gap [in]", "[in_i]"),
+            ("X_mil", "[mil_i]"),
+            ("X_thou", "[mil_i]"),
+            ("X_micron", "um"),
+            ("X/mm", "mm"),
+            ("Probe 1/µm", "um"),
+            ("Plate/°C", "Cel"),
+            ("T_in", "Cel"),
+            ("power_in", "1"),
+            ("Z_nm/min", "um"),
+        ] {
+            assert_eq!(guess(name, "").unit, unit, "{name}");
+        }
     }
 
     #[test]

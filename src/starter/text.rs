@@ -294,7 +294,9 @@ impl Writer<'_> {
         let spread = self.choice.spread.iter().copied().fold(0.0, f64::max);
         let difference = unit.difference();
         let smaller = match difference.text() {
-            "m" | "mm" | "um" => &["nm", "um", "mm", "m"][..],
+            "m" | "mm" | "um" | "[in_i]" | "[mil_i]" | "10*-6.[in_i]" => {
+                &["nm", "um", "mm", "m"][..]
+            }
             "K" => &["mK", "K"],
             "V" => &["mV", "V"],
             _ => &[],

@@ -1,9 +1,10 @@
 //! Decides which unit a word in the name of a column says; where in a name a unit may stand is for whoever reads the name.
 
 use super::Unit;
+use super::spelling::MICROINCH;
 
 /// Words, and the UCUM codes that they mean; the case counts for single letters.
-const WORDS: [(&str, &str); 29] = [
+const WORDS: [(&str, &str); 42] = [
     ("degC", "Cel"),
     ("°C", "Cel"),
     ("celsius", "Cel"),
@@ -20,6 +21,19 @@ const WORDS: [(&str, &str); 29] = [
     ("μm", "um"),
     ("mm", "mm"),
     ("m", "m"),
+    ("micron", "um"),
+    ("microns", "um"),
+    ("inch", "[in_i]"),
+    ("inches", "[in_i]"),
+    ("mil", "[mil_i]"),
+    ("mils", "[mil_i]"),
+    ("thou", "[mil_i]"),
+    ("uin", MICROINCH),
+    ("µin", MICROINCH),
+    ("μin", MICROINCH),
+    ("microinch", MICROINCH),
+    ("microinches", MICROINCH),
+    ("uinch", MICROINCH),
     ("V", "V"),
     ("mV", "mV"),
     ("A", "A"),

@@ -47,11 +47,23 @@ pub(super) const COMMON: [&str; 60] = [
     "um/min", "L", "L/min", "Ohm",
 ];
 
+/// The millionth of an inch, which takes no prefix.
+pub(super) const MICROINCH: &str = "10*-6.[in_i]";
+
 /// Units as words, without a prefix, and their codes.
-const WORDS: [(&str, &str); 32] = [
+const WORDS: [(&str, &str); 41] = [
     ("meter", "m"),
     ("metre", "m"),
     ("micron", "um"),
+    ("inch", "[in_i]"),
+    ("inches", "[in_i]"),
+    ("mil", "[mil_i]"),
+    ("thou", "[mil_i]"),
+    ("uin", MICROINCH),
+    ("\u{b5}in", MICROINCH),
+    ("\u{3bc}in", MICROINCH),
+    ("microinch", MICROINCH),
+    ("microinches", MICROINCH),
     ("second", "s"),
     ("sec", "s"),
     ("minute", "min"),

@@ -46,6 +46,8 @@ fn factors_of_decimal_units_are_exact() {
     assert_eq!(factor("nm", "m"), Some(1e-9));
     assert_eq!(factor("um", "nm"), Some(1_000.0));
     assert_eq!(factor("[in_i]", "nm"), Some(25_400_000.0));
+    assert_eq!(factor("[mil_i]", "nm"), Some(25_400.0));
+    assert_eq!(factor("10*-6.[in_i]", "nm"), Some(25.4));
     assert_eq!(factor("d", "min"), Some(1_440.0));
     assert_eq!(factor("km/h", "m/s"), Some(1.0 / 3.6));
     assert_eq!(factor("m2", "mm2"), Some(1e6));
@@ -199,8 +201,33 @@ fn units_in_words_are_not_taken_and_the_codes_are_suggested() {
         ("micrometres", "um"),
         ("millikelvin/second", "mK/s"),
         ("percent", "%"),
+        ("mil", "[mil_i]"),
+        ("thou/h", "[mil_i]/h"),
+        ("\u{b5}in/min", "10*-6.[in_i]/min"),
+        ("microns", "um"),
     ] {
         let error = Unit::parse(words).unwrap_err();
         assert_eq!(error.advice(), Some(code), "{words}: {error}");
     }
+}
+
+#[test]
+fn a_name_may_say_inches_and_their_parts() {
+    for (word, nm) in [
+        ("inch", 25_400_000.0),
+        ("Inches", 25_400_000.0),
+        ("mil", 25_400.0),
+        ("thou", 25_400.0),
+        ("\u{b5}in", 25.4),
+        ("uin", 25.4),
+        ("micron", 1_000.0),
+    ] {
+        let found = Unit::in_name(word).and_then(|unit| unit.factor_to(&unit_of_nm()));
+        assert_eq!(found, Some(nm), "{word}");
+    }
+    assert!(Unit::in_name("in").is_none(), "an inlet has that name too");
+}
+
+fn unit_of_nm() -> Unit {
+    unit("nm")
 }
