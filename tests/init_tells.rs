@@ -179,6 +179,55 @@ fn rows_with_too_many_cells_are_told_by_init_and_read_by_the_command_that_it_nam
 }
 
 #[test]
+fn columns_with_times_of_their_own_are_refused_with_a_way_out() {
+    let folder = Folder::new("tells-own");
+    let dated = |time: usize| {
+        format!(
+            "01.03.2026 {:02}:{:02}:{:02}",
+            time / 3600,
+            time / 60 % 60,
+            time % 60
+        )
+    };
+    let rows: Vec<_> = machine(3000).collect();
+    let mut text = "plate_degC Time;plate_degC Value;Z_um Time;Z_um Value\n".to_owned();
+    let mut same = text.clone();
+    for (at, (time, plate, z)) in rows.iter().enumerate() {
+        let (time, plate, z) = (dated(*time), comma(*plate), comma(*z));
+        let _ = writeln!(same, "{time};{plate};{time};{z}");
+        let own = match rows.get(6 * at) {
+            Some((time, _, z)) => format!("{};{}", dated(*time), comma(*z)),
+            None => ";".to_owned(),
+        };
+        let _ = writeln!(text, "{time};{plate};{own}");
+    }
+    let (fine, told, _) = init(&folder, "own.csv", &text);
+    assert!(!fine, "{told}");
+    assert!(
+        told.contains(
+            "`Z_um Time` is a time of its own, other than `plate_degC Time`: in one row stand"
+        ),
+        "{told}"
+    );
+    assert!(
+        told.contains("export it with one time for all columns"),
+        "{told}"
+    );
+    let (fine, told, _) = init(&folder, "same.csv", &same);
+    assert!(fine, "{told}");
+    let numbers = text.replace("01.03.2026 ", "").replace(':', "");
+    let (fine, told, _) = init(&folder, "numbers.csv", &numbers.replace("Time", "time"));
+    assert!(
+        !fine && told.contains("`Z_um time` is a time of its own"),
+        "{told}"
+    );
+}
+
+fn comma(value: f64) -> String {
+    format!("{value:.4}").replace('.', ",")
+}
+
+#[test]
 fn dates_that_the_whole_log_decides_are_read_so() {
     let folder = Folder::new("tells-us");
     let log = |days: std::ops::Range<usize>| {

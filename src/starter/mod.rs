@@ -5,6 +5,7 @@ mod column;
 mod dates;
 mod dropped;
 mod group;
+mod own_times;
 mod survey;
 mod text;
 mod texts;
@@ -74,6 +75,10 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     remarks.push(clock.remark());
     let mut columns = column::columns(&described, clock.columns.names());
     if let Some(why) = dropped::newest_first(&described, &clock) {
+        return Err(NoStarter::Unfit(why));
+    }
+    let own_times = own_times::told(&described, &clock).filter(|_| told.time.is_none());
+    if let Some(why) = own_times {
         return Err(NoStarter::Unfit(why));
     }
     let mut survey = Survey::of(path, &clock, &columns)?;

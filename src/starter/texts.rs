@@ -10,6 +10,8 @@ pub struct Texts {
     /// Where they are from.
     pub columns: TimeColumns,
     written: Vec<String>,
+    /// The row of each.
+    rows: Vec<usize>,
     decimal_comma: bool,
 }
 
@@ -59,8 +61,11 @@ impl Texts {
             });
             String::from_utf8_lossy(&text).into_owned()
         });
+        let texts = texts.enumerate().filter(|(_, text)| !text.is_empty());
+        let (rows, written) = texts.unzip();
         Self {
-            written: texts.filter(|text| !text.is_empty()).collect(),
+            written,
+            rows,
             columns,
             decimal_comma: described.delimiter.is_some_and(|between| between != b','),
         }
@@ -69,6 +74,11 @@ impl Texts {
     /// The first, as the log has it.
     pub fn first(&self) -> Option<&str> {
         self.written.first().map(String::as_str)
+    }
+
+    /// The same with the number of the row of each.
+    pub fn by_row(&self) -> impl Iterator<Item = (usize, String)> {
+        self.rows.iter().copied().zip(self.read())
     }
 
     /// All, as a reader takes them: a decimal comma may be a point.
