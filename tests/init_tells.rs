@@ -261,6 +261,29 @@ fn dates_that_the_whole_log_decides_are_read_so() {
 }
 
 #[test]
+fn a_log_in_long_format_that_is_sorted_by_names_is_seen_too() {
+    let folder = Folder::new("tells-long");
+    let mut text = "VarName;TimeString;VarValue\n".to_owned();
+    for name in ["plate_degC", "Z_um"] {
+        for (time, plate, _) in machine(1000) {
+            let _ = writeln!(
+                text,
+                "{name};01.03.2026 {:02}:{:02}:{:02};{}",
+                time / 3600,
+                time / 60 % 60,
+                time % 60,
+                comma(plate)
+            );
+        }
+    }
+    let (fine, told, _) = init(&folder, "long.csv", &text);
+    assert!(
+        !fine && told.contains("the log is in long format"),
+        "{told}"
+    );
+}
+
+#[test]
 fn lengths_in_inches_and_mils_are_taken_for_what_they_are() {
     let folder = Folder::new("tells-inch");
     for (name, unit, um) in [("inch", "[in_i]", 25_400.0), ("mil", "[mil_i]", 25.4)] {

@@ -90,6 +90,20 @@ impl LongFormat {
     }
 }
 
+impl LongFormat {
+    /// The column of names, and the name, where columns are called as in long format and all rows have one name.
+    pub(crate) fn of_one_name(columns: &[String], rows: &[Vec<String>]) -> Option<(usize, String)> {
+        let called = |known: &[&str]| {
+            let mut names = columns.iter();
+            names.position(|name| known.contains(&&*name.to_lowercase()))
+        };
+        let (names, _) = (called(&NAMES)?, called(&VALUES)?);
+        let mut cells = rows.iter().filter_map(|row| row.get(names));
+        let first = cells.next().filter(|first| !is_number(first))?;
+        (columns.len() <= WIDEST && cells.all(|cell| cell == first)).then(|| (names, first.clone()))
+    }
+}
+
 impl fmt::Display for LongFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
