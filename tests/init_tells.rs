@@ -261,6 +261,84 @@ fn dates_that_the_whole_log_decides_are_read_so() {
 }
 
 #[test]
+fn marks_between_thousands_are_named() {
+    let folder = Folder::new("tells-thousands");
+    let number = |mark: &str, z: f64| {
+        let whole = (1000.0 * z - 90_000.0).round() as i64;
+        match whole.abs() {
+            small if small < 1000 => whole.to_string(),
+            large => format!(
+                "{}{}{mark}{:03}",
+                if whole < 0 { "-" } else { "" },
+                large / 1000,
+                large % 1000
+            ),
+        }
+    };
+    let log = |mark: &str, comma: bool| {
+        let mut text = "time_s;plate_degC;Z_nm\n".to_owned();
+        for (time, plate, z) in machine(3000) {
+            let plate = match comma {
+                true => format!("{plate:.4}").replace('.', ","),
+                false => format!("{:.0}", 1000.0 * plate),
+            };
+            let _ = writeln!(text, "{time};{plate};{}", number(mark, z));
+        }
+        text
+    };
+    let (fine, told, _) = init(&folder, "whole.csv", &log(".", false));
+    assert!(
+        fine && told.contains("if that is a mark between thousands, write the numbers without it"),
+        "{told}"
+    );
+    for (name, text, mark) in [
+        ("comma.csv", log(".", true), "a point"),
+        ("space.csv", log(" ", true), "a space"),
+    ] {
+        let (fine, told, _) = init(&folder, name, &text);
+        assert!(!fine, "{told}");
+        assert!(
+            told.contains(&format!("with {mark} between thousands, such as")),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+fn cells_that_stand_for_no_value_do_not_cost_the_column() {
+    let folder = Folder::new("tells-none");
+    let mut text = "time_s,plate_degC,Z_um\n".to_owned();
+    for (time, plate, z) in machine(6000) {
+        let z = if time % 30 == 0 {
+            format!("{z:.4}")
+        } else {
+            "#N/A".to_owned()
+        };
+        let _ = writeln!(text, "{time},{plate:.4},{z}");
+    }
+    let (fine, told, _) = init(&folder, "none.csv", &text);
+    assert!(fine, "{told}");
+    assert!(
+        told.contains("4,000 cells of 6,000 cannot be read, the first `#N/A` in line 3, which is no number: --lenient takes them as missing"),
+        "{told}"
+    );
+    assert!(told.contains("--lenient -o model.json"), "{told}");
+    let (fine, told) = said(
+        &folder,
+        &[
+            "fit",
+            "none.csv.toml",
+            "--data",
+            "none.csv",
+            "--lenient",
+            "-o",
+            "m.json",
+        ],
+    );
+    assert!(fine, "{told}");
+}
+
+#[test]
 fn a_log_in_long_format_that_is_sorted_by_names_is_seen_too() {
     let folder = Folder::new("tells-long");
     let mut text = "VarName;TimeString;VarValue\n".to_owned();

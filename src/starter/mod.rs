@@ -9,6 +9,7 @@ mod own_times;
 mod survey;
 mod text;
 mod texts;
+mod thousands;
 mod undecided;
 mod window;
 
@@ -88,6 +89,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, told).map_err(&unfit)?;
     survey.leave_out_faults(&mut columns);
+    survey.tell_of_thousands(path, &described, &mut columns)?;
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
     let choice = Choice::of(&survey, &columns);
     let choice = choice.map_err(|why| match clock.form {

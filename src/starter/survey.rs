@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use athermal::files::{ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn};
+use athermal::files::{
+    ChannelColumn, FileError, Layout, Options, Reader, Row, TimeColumn, has_clock, thousands_mark,
+};
 
 use athermal::diagnosis::leap::{Finder, Leaps};
 
@@ -10,7 +12,7 @@ use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::dropped::{self, Steps};
-use crate::figures::counted;
+use crate::figures::{count, counted};
 
 /// The values of a log, column by column.
 #[derive(Debug)]
@@ -45,6 +47,8 @@ pub struct Series {
 pub struct Unreadable {
     /// Its text and its line.
     told: String,
+    /// Its text.
+    found: String,
     /// For a number with another decimal mark than those before it, their mark and the line of the first.
     mark: Option<(char, u64)>,
 }
@@ -65,8 +69,43 @@ impl Unreadable {
         let found = found.replace(char::is_control, "\u{fffd}");
         Some(Self {
             told: format!("`{found}` in line {line}"),
+            found,
             mark,
         })
+    }
+}
+
+/// What programs write where they have no value, in small letters.
+const NO_VALUES: [&str; 23] = [
+    "-",
+    "--",
+    "---",
+    "?",
+    "*",
+    "na",
+    "n/a",
+    "n.a.",
+    "k.a.",
+    "#n/a",
+    "#nv",
+    "#wert!",
+    "#value!",
+    "#num!",
+    "#div/0!",
+    "none",
+    "bad",
+    "no data",
+    "nodata",
+    "no value",
+    "overrange",
+    "i/o timeout",
+    "1.#qnan",
+];
+
+impl Unreadable {
+    /// Whether it is what stands for no value.
+    fn is_none(&self) -> bool {
+        NO_VALUES.contains(&&*self.found.to_lowercase())
     }
 }
 
@@ -214,21 +253,30 @@ impl Survey {
                 .first_unreadable
                 .as_ref()
                 .map_or("", |first| first.told.as_str());
-            let mark = series
-                .first_unreadable
-                .as_ref()
-                .and_then(|first| first.mark);
+            let first = series.first_unreadable.as_ref();
+            let mark = first.and_then(|first| first.mark);
+            let has_none = first.is_some_and(Unreadable::is_none);
+            let thousands = first.and_then(|first| thousands_mark(&first.found));
             if column.name.contains(['{', '}']) {
                 column.leave_out(
                     "in a graph, braces in the name of a column stand for something else; rename it".to_owned(),
                 );
-            } else if series.unreadable * TEXT_ONE_IN >= cells.max(1) {
+            } else if series.unreadable * TEXT_ONE_IN >= cells.max(1)
+                && !(has_none && values >= FEWEST_VALUES)
+            {
                 let all = if values == 0 { "" } else { "in part " };
                 column.leave_out(match mark {
+                    _ if let Some(thousands) = thousands => {
+                        let n = counted(series.unreadable, "number");
+                        format!("it has {n} with {thousands} between thousands, such as {example}; write numbers without it")
+                    }
                     Some((mark, since)) => format!(
                         "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write \
                          all numbers of a file with one mark"
                     ),
+                    None if first.is_some_and(|first| has_clock(&first.found)) => {
+                        format!("it has other times, such as {example}")
+                    }
                     None => format!(
                         "it is {all}text, such as {example}; write numbers, 1 and 0 or true and false for a flag"
                     ),
@@ -243,11 +291,19 @@ impl Survey {
             } else if series.unreadable > 0 {
                 let (many, the_first) = match series.unreadable {
                     1 => ("1 cell".to_owned(), ""),
-                    more => (format!("{more} cells"), ", the first"),
+                    more => (counted(more, "cell"), ", the first"),
                 };
-                column.warn(format!(
-                    "{many} of {cells} cannot be read{the_first} {example}: mend the log, or read it with --lenient"
-                ));
+                let many = format!(
+                    "{many} of {} cannot be read{the_first} {example}",
+                    count(cells)
+                );
+                column.warn(match thousands {
+                    _ if has_none => {
+                        format!("{many}, which is no number: --lenient takes them as missing")
+                    }
+                    Some(mark) => format!("{many}: write numbers without {mark} between thousands"),
+                    None => format!("{many}: mend the log, or read it with --lenient"),
+                });
             }
         }
     }

@@ -330,20 +330,46 @@ impl fmt::Display for FileError {
                 place,
                 column,
                 found,
-            } => write!(
-                f,
-                "{place}: column `{column}`: expected a number, found `{found}`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
-            ),
+            } => {
+                write!(
+                    f,
+                    "{place}: column `{column}`: expected a number, found `{found}`; "
+                )?;
+                match cell::thousands_mark(found) {
+                    Some(mark) => write!(
+                        f,
+                        "write numbers without {mark} between thousands, or read leniently (`--lenient`) to take such as absent"
+                    ),
+                    None => write!(
+                        f,
+                        "leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
+                    ),
+                }
+            }
             Self::MixedMarks {
                 place,
                 column,
                 found,
                 mark,
                 since,
-            } => write!(
-                f,
-                "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
-            ),
+            } => {
+                write!(
+                    f,
+                    "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; "
+                )?;
+                if let Some(thousands) = cell::thousands_mark(found) {
+                    write!(
+                        f,
+                        "write numbers without {thousands} between thousands, and "
+                    )?;
+                } else {
+                    write!(f, "write ")?;
+                }
+                write!(
+                    f,
+                    "all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
+                )
+            }
             Self::TimeBeyond {
                 place,
                 column,

@@ -48,7 +48,7 @@ mod stream;
 mod units;
 mod writer;
 
-pub use cell::with_decimal_point;
+pub use cell::{thousands_mark, with_decimal_point};
 pub use dataset::{Dataset, layout};
 pub use description::Description;
 pub use error::{Again, FileError, MissingColumn, Place};
