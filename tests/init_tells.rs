@@ -228,6 +228,37 @@ fn comma(value: f64) -> String {
 }
 
 #[test]
+fn windows_are_chosen_by_the_changes_of_a_position_that_a_register_holds() {
+    let folder = Folder::new("tells-held");
+    let header = "time_s,plate_degC,Z_um\n";
+    let (mut rare, mut held, mut last) = (header.to_owned(), header.to_owned(), 0.0);
+    for (time, plate, z) in machine(6000) {
+        let is_new = time % 90 == 0;
+        last = if is_new { z } else { last };
+        let _ = writeln!(held, "{time},{plate:.4},{last:.4}");
+        let z = if is_new {
+            format!("{z:.4}")
+        } else {
+            String::new()
+        };
+        let _ = writeln!(rare, "{time},{plate:.4},{z}");
+    }
+    let (_, expected, _) = init(&folder, "rare.csv", &rare);
+    let (fine, told, graph) = init(&folder, "held.csv", &held);
+    assert!(fine, "{told}");
+    assert!(
+        told.contains("Z_um: drifts, in um; a length; each value stands 9 times, as in a register that is read oftener than it is written; windows are chosen for its changes, one every 90 s"),
+        "{told}"
+    );
+    assert_eq!(window(&told), window(&expected));
+    let (fine, said) = said(
+        &folder,
+        &["fit", "held.csv.toml", "--data", "held.csv", "-o", "m.json"],
+    );
+    assert!(fine, "{said}\n{graph}");
+}
+
+#[test]
 fn dates_that_the_whole_log_decides_are_read_so() {
     let folder = Folder::new("tells-us");
     let log = |days: std::ops::Range<usize>| {
@@ -258,6 +289,31 @@ fn dates_that_the_whole_log_decides_are_read_so() {
         fine && told.contains("they may as well be `%m/%d/%Y %H:%M:%S%.f`"),
         "{told}"
     );
+}
+
+#[test]
+fn an_axis_that_is_measured_rarely_does_not_widen_the_windows_of_the_others() {
+    let folder = Folder::new("tells-slow");
+    let mut text = "time_s,plate_degC,X_um,Y_um,Z_um\n".to_owned();
+    for (time, plate, z) in machine(9000) {
+        let x = if time % 3600 == 0 {
+            format!("{z:.4}")
+        } else {
+            String::new()
+        };
+        let _ = writeln!(text, "{time},{plate:.4},{x},{:.4},{z:.4}", 2.0 * z);
+    }
+    let (fine, told, _) = init(&folder, "slow.csv", &text);
+    assert!(fine, "{told}");
+    assert!(
+        told.contains(
+            "X_um: left out, it has a value every 60 min, most others that drift one every 10 s"
+        ),
+        "{told}"
+    );
+    assert!(told.contains("give --drifts \"X_um\""), "{told}");
+    let seconds = window(&told).strip_suffix('s').map(str::parse::<u32>);
+    assert!(matches!(seconds, Some(Ok(..120))), "{told}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod dates;
 mod dropped;
 mod group;
 mod own_times;
+mod spacing;
 mod survey;
 mod text;
 mod texts;
@@ -88,6 +89,8 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let dropped = survey.dropped.clone();
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, told).map_err(&unfit)?;
+    survey.take_changes(&mut columns, &clock);
+    survey.leave_out_slow(&mut columns, &clock, told);
     survey.leave_out_faults(&mut columns);
     survey.tell_of_thousands(path, &described, &mut columns)?;
     remarks.extend(columns.iter().filter_map(|column| column.remark()));
