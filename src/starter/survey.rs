@@ -266,14 +266,15 @@ impl Survey {
             {
                 let all = if values == 0 { "" } else { "in part " };
                 column.leave_out(match mark {
-                    _ if let Some(thousands) = thousands => {
-                        let n = counted(series.unreadable, "number");
-                        format!("it has {n} with {thousands} between thousands, such as {example}; write numbers without it")
-                    }
                     Some((mark, since)) => format!(
                         "it has numbers such as {example}, but since line {since} the decimal mark is `{mark}`; write \
-                         all numbers of a file with one mark"
+                         all numbers of a file with one mark{}",
+                        if thousands.is_some() { " and none between thousands" } else { "" }
                     ),
+                    None if let Some(mark) = thousands => {
+                        let n = counted(series.unreadable, "number");
+                        format!("it has {n} with {mark} between thousands, such as {example}; write numbers without it")
+                    }
                     None if first.is_some_and(|first| has_clock(&first.found)) => {
                         format!("it has other times, such as {example}")
                     }

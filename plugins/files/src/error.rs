@@ -357,17 +357,13 @@ impl fmt::Display for FileError {
                     f,
                     "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; "
                 )?;
-                if let Some(thousands) = cell::thousands_mark(found) {
-                    write!(
-                        f,
-                        "write numbers without {thousands} between thousands, and "
-                    )?;
-                } else {
-                    write!(f, "write ")?;
-                }
+                let thousands = match cell::thousands_mark(found) {
+                    Some(_) => " and none between thousands",
+                    None => "",
+                };
                 write!(
                     f,
-                    "all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
+                    "write all numbers of a file with one mark{thousands}, or read leniently (`--lenient`) to leave out those with another"
                 )
             }
             Self::TimeBeyond {

@@ -83,7 +83,7 @@ fn a_file_has_one_decimal_mark() {
     let mixed = "t;a;b\n0;1,5;2\n1;1;1.234\n2;7;2,5\n";
     assert_eq!(
         error(mixed),
-        "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark, or read leniently (`--lenient`) to leave out those with another"
+        "f.csv:3: column `b`: expected a number with the decimal mark `,`, as in line 2, found `1.234`; write all numbers of a file with one mark and none between thousands, or read leniently (`--lenient`) to leave out those with another"
     );
     let (rows, reader) = read_with(mixed, lenient());
     assert_eq!(rows, "0 [1.5, 2.0]; 1 [1.0, NaN]; 2 [7.0, 2.5]");

@@ -18,6 +18,15 @@ fn messages_say_what_where_and_what_to_do() {
         bad.to_string(),
         "run.csv:12: column `room`: expected a number, found `off`; leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
     );
+    let thousands = FileError::BadCell {
+        place: place(),
+        column: "room".into(),
+        found: "1.004,5".into(),
+    };
+    assert_eq!(
+        thousands.to_string(),
+        "run.csv:12: column `room`: expected a number, found `1.004,5`; write numbers without a point between thousands, or read leniently (`--lenient`) to take such as absent"
+    );
     let time = FileError::BadTime {
         place: place(),
         column: "time_s".into(),
