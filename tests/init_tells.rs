@@ -213,6 +213,18 @@ fn columns_with_times_of_their_own_are_refused_with_a_way_out() {
         told.contains("export it with one time for all columns"),
         "{told}"
     );
+    let (fine, told) = said(
+        &folder,
+        &[
+            "init",
+            "own.csv",
+            "--time",
+            "plate_degC Time",
+            "-o",
+            "named.toml",
+        ],
+    );
+    assert!(fine, "{told}");
     let (fine, told, _) = init(&folder, "same.csv", &same);
     assert!(fine, "{told}");
     let numbers = text.replace("01.03.2026 ", "").replace(':', "");

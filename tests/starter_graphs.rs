@@ -279,7 +279,7 @@ fn a_sensor_with_a_cell_that_cannot_be_read_is_kept() {
         });
         let told = folder.started(&name, &logged);
         let reason = format!(
-            "1 cell of 3000 cannot be read `#\u{fffd}EF` in line {}: mend",
+            "1 cell of 3,000 cannot be read `#\u{fffd}EF` in line {}: mend",
             row + 2
         );
         assert!(told.contains("grinding: input"), "{told}");

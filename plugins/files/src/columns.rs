@@ -219,5 +219,10 @@ mod tests {
             "f:1: the name `a` stands at columns 1 and 5; give each column a name of its own"
         );
         assert!(check_unique(&names[..4], place).is_ok());
+        let pairs = ["Time", "a", "Time", "b"].map(str::to_owned);
+        assert_eq!(
+            check_unique(&pairs, place).unwrap_err().to_string(),
+            "f:1: the name `Time` stands at columns 1 and 3; export the log with one time for all columns"
+        );
     }
 }

@@ -316,10 +316,17 @@ impl fmt::Display for FileError {
                 place,
                 column,
                 positions: [first, second],
-            } => write!(
-                f,
-                "{place}: the name `{column}` stands at columns {first} and {second}; give each column a name of its own"
-            ),
+            } => {
+                let is_time = ["time", "timestamp", "datetime", "zeit"];
+                let advice = match is_time.contains(&&*column.to_lowercase()) {
+                    true => "export the log with one time for all columns",
+                    false => "give each column a name of its own",
+                };
+                write!(
+                    f,
+                    "{place}: the name `{column}` stands at columns {first} and {second}; {advice}"
+                )
+            }
             Self::MissingColumns {
                 place,
                 missing,
