@@ -61,7 +61,7 @@ fn positions_in_rows_of_their_own_at_the_time_of_others_are_not_lost() {
     assert!(fine, "{told}");
     assert!(
         told.contains(
-            "3,000 of 6,000 rows have the time of the row before them, and are put together with it"
+            "3,000 of 6,000 rows have the time of the row before, and are put together with it"
         ),
         "{told}"
     );
@@ -129,7 +129,7 @@ fn times_that_start_again_within_a_log_are_told_with_the_line() {
     let (fine, told, _) = init(&folder, "again.csv", &text);
     assert!(fine, "{told}");
     assert!(
-        told.contains("2,000 of 5,000 rows are out of order, and are left out; the first: again.csv:3002: the time `0` is not after `29990`; the row was left out; the times start again at line 3002: give what stands before it and what stands from it on as two files"),
+        told.contains("2,000 of 5,000 rows are out of order, and are left out; the first: again.csv:3002: the time `0` is not after `29990`; the row was left out; if the times start again at line 3002, give what stands before it and what stands from it on as two files"),
         "{told}"
     );
 }
@@ -263,6 +263,7 @@ fn windows_are_chosen_by_the_changes_of_a_position_that_a_register_holds() {
         "{told}"
     );
     assert_eq!(window(&told), window(&expected));
+    assert!(graph.contains("# a new value every 90 s"), "{graph}");
     let (fine, said) = said(
         &folder,
         &["fit", "held.csv.toml", "--data", "held.csv", "-o", "m.json"],

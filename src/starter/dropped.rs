@@ -45,24 +45,26 @@ pub fn remarks(report: &Report, steps: Steps, clock: &Clock) -> Vec<String> {
     let all = report.rows + report.joined + left_out.map(|found| found.count).iter().sum::<u64>();
     let mut told = Vec::new();
     if report.joined > 0 {
+        let [have, are] = verbs(report.joined);
         told.push(format!(
-            "{} of {} have the time of the row before them, and are put together with it",
+            "{} of {} {have} the time of the row before, and {are} put together with it",
             count(report.joined),
             counted(all, "row")
         ));
     }
-    let causes = [
-        (
-            "have the time of the row before",
-            same_time(report, all, steps).to_owned(),
-        ),
-        ("are out of order", out_of_order(report, clock)),
-        ("cannot be read", String::new()),
-    ];
-    for (found, (what, cause)) in left_out.iter().zip(causes) {
+    for (place, found) in left_out.iter().enumerate() {
         if let Some(first) = &found.first {
+            let [have, are] = verbs(found.count);
+            let (what, cause) = match place {
+                0 => (
+                    format!("{have} the time of the row before"),
+                    same_time(report, all, steps).to_owned(),
+                ),
+                1 => (format!("{are} out of order"), out_of_order(report, clock)),
+                _ => ("cannot be read".to_owned(), String::new()),
+            };
             told.push(format!(
-                "{} of {} {what}, and are left out; the first: {first}{cause}",
+                "{} of {} {what}, and {are} left out; the first: {first}{cause}",
                 count(found.count),
                 counted(all, "row")
             ));
@@ -72,6 +74,14 @@ pub fn remarks(report: &Report, steps: Steps, clock: &Clock) -> Vec<String> {
         told.push(format!("{place}: the last line is cut off and left out"));
     }
     told
+}
+
+/// What so many rows do.
+fn verbs(rows: u64) -> [&'static str; 2] {
+    match rows {
+        1 => ["has", "is"],
+        _ => ["have", "are"],
+    }
 }
 
 /// Why rows may have the time of the one before, and what to do. Where one in a hundred has it, it is the rule.
@@ -119,8 +129,8 @@ fn out_of_order(report: &Report, clock: &Clock) -> String {
             .to_owned();
     }
     format!(
-        "; the times start again at line {}: give what stands before it and what stands from it on as two files, of which \
-         each is a segment of its own",
+        "; if the times start again at line {}, give what stands before it and what stands from it on as two files, each a segment \
+         of its own; if `{previous}` before it is wrong, correct that",
         place.line
     )
 }

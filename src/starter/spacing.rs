@@ -47,6 +47,7 @@ impl Survey {
             let times = series.values.len() as f64 / starts.len() as f64;
             series.time_s = starts.iter().map(|&at| series.time_s[at]).collect();
             series.values = starts.iter().map(|&at| series.values[at]).collect();
+            series.changes = true;
             let every = clock.about(series.interval_s().unwrap_or(0.0));
             column.warn(format!(
                 "each value stands {:.0} times, as in a register that is read oftener than it is written; windows are chosen for its \
@@ -90,7 +91,7 @@ mod tests {
 
     #[test]
     fn values_that_a_register_holds_are_told_from_those_of_a_coarse_scale() {
-        let wild = |at: usize| ((at * 7919) % 1009) as f64 / 1009.0;
+        let wild = |at: usize| ((at as f64 * 12.9898).sin() * 43_758.545_3).fract().abs();
         let register: Vec<f64> = (0..900).map(|at| wild(at / 9)).collect();
         assert_eq!(held(&register).unwrap().len(), 100);
         let coarse: Vec<f64> = (0..900).map(|at| (at as f64 / 9.0).round()).collect();

@@ -36,6 +36,8 @@ pub struct Series {
     pub time_s: Vec<f64>,
     /// What.
     pub values: Vec<f64>,
+    /// Whether these are only the changes of what stands in more rows.
+    pub changes: bool,
     /// How many cells are neither numbers nor empty.
     pub unreadable: u64,
     /// The first of them, for people.

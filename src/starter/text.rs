@@ -164,13 +164,18 @@ impl Writer<'_> {
                 .map(|name| toml_string(name))
                 .collect();
             let known = self.columns[group.columns[0]].unit_known();
+            let new = if members().any(|s| s.changes) {
+                "new "
+            } else {
+                ""
+            };
             let _ = writeln!(
                 text,
                 "\n{}",
                 beside(
                     &format!("[signals.{}]", group.signal),
                     &format!(
-                        "a value every {}; longest gap {}",
+                        "a {new}value every {}; longest gap {}",
                         self.clock.about(interval),
                         self.clock.about(longest)
                     )
