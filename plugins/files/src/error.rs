@@ -563,6 +563,12 @@ fn lacking(
         "{place}: there {is} {}; found {there}{read}; ",
         quoted(missing.iter().map(|column| column.name.as_str()))
     )?;
+    let mut named = found.iter().filter(|name| !name.is_empty());
+    if !found.is_empty() && named.all(|name| cell::is_number(name) || has_clock(name)) {
+        return f.write_str(
+            "these are values: give the log with the line that names its columns, with which `tail -n +1 -f` begins",
+        );
+    }
     let near = missing
         .iter()
         .filter_map(|column| Some((column, column.nearest.as_deref()?)));

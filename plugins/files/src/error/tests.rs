@@ -141,3 +141,22 @@ fn an_excerpt_is_short_and_never_cuts_a_character() {
     let long = "é".repeat(500);
     assert_eq!(excerpt(long.as_bytes()), "é".repeat(EXCERPT) + "…");
 }
+
+#[test]
+fn a_log_without_its_header_is_told_to_have_lost_it() {
+    let missing = FileError::MissingColumns {
+        place: place(),
+        missing: vec![MissingColumn {
+            name: "time_s".to_owned(),
+            nearest: None,
+        }],
+        found: ["2026-03-01T00:00:00Z", "21.5", "", "-0.3"]
+            .map(str::to_owned)
+            .to_vec(),
+        windows_1252: false,
+    };
+    assert_eq!(
+        missing.to_string(),
+        "run.csv:12: there is no column `time_s`; found `2026-03-01T00:00:00Z`, `21.5`, ``, `-0.3`; these are values: give the log with the line that names its columns, with which `tail -n +1 -f` begins"
+    );
+}
