@@ -42,7 +42,7 @@ pub enum NumericsError {
         /// How many there are.
         found: u64,
     },
-    /// Too few stretches of rows without a gap, each so long that it has a past and a future.
+    /// Too few stretches of rows without a gap, each so long that it has a past and a future, and the next row those too.
     TooFewStretches {
         /// How many rows a stretch has.
         length: usize,

@@ -57,7 +57,7 @@ pub struct StateSpace {
     #[serde(default)]
     pub states: States,
     /// How many steps past and future have each, 2 to 100; as many as there are states where that is more. Without it ten, or
-    /// fewer where rows without a gap would not make twice as many windows of both as a past has values, or where a past would
+    /// fewer where rows without a gap would not make twice as many windows of both, each with one a step later, as a past has values, or where a past would
     /// have more than 1000 values, one of the truth and one of each feature at every step.
     #[serde(default)]
     #[schemars(range(min = 2, max = 100))]
@@ -423,7 +423,7 @@ mod tests {
 
     #[test]
     fn the_horizon_is_shorter_where_rows_without_a_gap_are_and_the_report_says_so() {
-        // Windows of 14 samples are 11 in each of 16 stretches: 7 steps of 10 values need 140, 8 steps 160 of the 144 there are.
+        // Pairs of windows of 14 samples are 10 in each of 16 stretches: 7 steps of 10 values need 140, 8 steps 160 of 128.
         let notes = told(16, None).unwrap();
         assert!(
             notes

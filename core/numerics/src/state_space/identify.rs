@@ -79,25 +79,22 @@ pub struct Identification {
 }
 
 impl Subspace {
-    /// The longest horizon among these that records with `width` inputs have enough windows for.
+    /// The longest horizon among these of which records with `width` inputs have enough windows that another follows directly.
     #[must_use]
     pub fn longest(
         horizons: RangeInclusive<usize>,
         records: &[Record<'_>],
         width: usize,
     ) -> Option<usize> {
-        let found = |horizon: usize| -> usize {
-            let windows = records.iter().map(|record| windows(record, horizon));
-            windows.map(|windows| windows.len()).sum()
-        };
         let mut longest = horizons.rev();
-        longest.find(|&horizon| found(horizon) >= needed(horizon, width))
+        longest.find(|&horizon| followed(records, horizon) >= needed(horizon, width))
     }
 
     /// Identifies a model from records that have `width` inputs. Inputs and outputs should vary about 0 on one scale.
     ///
     /// # Errors
-    /// [`NumericsError::Parameter`], [`NumericsError::TooFewStretches`] when there are not twice as many as a past has values,
+    /// [`NumericsError::Parameter`], [`NumericsError::TooFewStretches`] when there are not twice as many pairs of windows, one a
+    /// sample after the other, as a past has values,
     /// [`NumericsError::NotFinite`], [`NumericsError::NoStates`] for outputs that the inputs of the same time explain but for
     /// rounding, [`NumericsError::NoConvergence`].
     pub fn identify(
@@ -106,15 +103,15 @@ impl Subspace {
         width: usize,
     ) -> Result<Identification, NumericsError> {
         self.check(records)?;
-        let lagged = Lagged::of(records, width, self.horizon);
-        let needed = needed(self.horizon, width);
-        if lagged.windows < needed {
+        let (needed, found) = (needed(self.horizon, width), followed(records, self.horizon));
+        if found < needed {
             return Err(NumericsError::TooFewStretches {
-                length: 2 * self.horizon,
+                length: 2 * self.horizon + 1,
                 needed,
-                found: lagged.windows,
+                found,
             });
         }
+        let lagged = Lagged::of(records, width, self.horizon);
         let projected = lagged.projected()?;
         if !projected.leaves_outputs() {
             return Err(NumericsError::NoStates);
@@ -242,7 +239,14 @@ impl Subspace {
     }
 }
 
-/// The fewest windows that tell what so many inputs and the output do: twice as many as a past has values.
+/// How many windows another follows directly: only of such a pair is it seen how the states go on. A record that is just as long as
+/// a window has none.
+fn followed(records: &[Record<'_>], horizon: usize) -> usize {
+    let windows = records.iter().map(|record| windows(record, horizon));
+    windows.map(|windows| windows.len().saturating_sub(1)).sum()
+}
+
+/// The fewest of them that tell what so many inputs and the output do: twice as many as a past has values.
 fn needed(horizon: usize, width: usize) -> usize {
     2 * horizon * (width + 1)
 }

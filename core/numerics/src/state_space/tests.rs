@@ -261,6 +261,37 @@ fn errors_are_those_of_forecasts_and_not_of_where_short_records_begin() {
 }
 
 #[test]
+fn of_records_as_long_as_a_window_a_shorter_horizon_is_taken_and_the_longer_one_refused() {
+    let (mut draw, mut state) = (draws::normal(8), 0.0);
+    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
+    for _ in 0..1200 {
+        let input = draw();
+        inputs.push(input);
+        outputs.push(state + 0.1 * draw());
+        state = 0.8 * state + 0.5 * input;
+    }
+    let parts = inputs.chunks(12).zip(outputs.chunks(12));
+    let records: Vec<Record<'_>> = parts
+        .map(|(inputs, outputs)| Record { inputs, outputs })
+        .collect();
+    let of = |horizon: usize| Subspace {
+        horizon,
+        order: StateOrder::Given(1),
+        ..PLAIN
+    };
+    let refused = of(6).identify(&records, 1).unwrap_err();
+    let needed = NumericsError::TooFewStretches {
+        length: 13,
+        needed: 24,
+        found: 0,
+    };
+    assert_eq!(refused, needed);
+    assert_eq!(Subspace::longest(2..=10, &records, 1), Some(5));
+    let found = of(5).identify(&records, 1).unwrap();
+    near(found.model.a[(0, 0)], 0.8, 0.05);
+}
+
+#[test]
 fn wrong_requests_are_refused() {
     let (inputs, outputs, _) = scaled();
     let record = Record {
@@ -272,7 +303,7 @@ fn wrong_requests_are_refused() {
         outputs: &outputs[..20],
     };
     // A record of 20 rows has one less than 20 of 2 rows, and so on.
-    let length = 2 * PLAIN.horizon;
+    let length = 2 * PLAIN.horizon + 1;
     let whole = PLAIN.identify(&[short], 2);
     let found = 21 - length;
     assert!(
