@@ -99,11 +99,8 @@ fn the_error_of_a_fit_of_an_identified_model_is_that_of_evaluating_it_on_the_sam
             let (fit, score) = fitted_and_scored(&scratch, &node);
             let told = fit["in_sample_rmse"].as_f64().unwrap();
             let scored = score["rmse"].as_f64().unwrap();
-            // A fit finds where the filters of `oe` begin, and a run does not know it.
-            let begins = kind == "oe" && learn.is_empty();
-            let close = if begins { 0.05 } else { 1e-9 };
             assert!(
-                (told / scored - 1.0).abs() < close,
+                (told / scored - 1.0).abs() < 1e-9,
                 "{kind} {learn}: {told}, and {scored} as it is scored"
             );
         }

@@ -29,11 +29,12 @@ use crate::order::Order;
 /// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
 /// and counts as found in criteria and errors; the noise begins without a past. Running, a segment begins with its first
 /// truth, as if that and the features had always been what they are; what they do not explain of it the filters and the
-/// noise share by how much each varies. So does what comes after as many steps without features; with `learn = false` it
-/// stays at rest. The port `deviation` is the standard deviation of the truth about its prediction, larger after truths
-/// that are missing. Features that are missing are taken for the last ones; what that adds to the error is not in it, nor
-/// what the filters may be off by at the beginning of a segment. Since the answer changes with time alone, the node runs
-/// at every tick.
+/// noise share by how much each varies. The truths that follow tell the better what is the one and what the other, as in a
+/// Kalman filter of the model (Harvey 1989, section 3.2), until the filters go by the features alone. So does what comes
+/// after as many steps without features; with `learn = false` it stays at rest. The port `deviation` is the standard
+/// deviation of the truth about its prediction, larger after truths that are missing and until it is known where the
+/// filters are. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the
+/// answer changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bj {

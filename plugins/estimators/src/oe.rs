@@ -14,7 +14,7 @@ use crate::order::Order;
 /// of the simulated output is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz
 /// and McBride (1965) end; where several features have filters, one of them of more than one pole, from other starts too,
 /// among them the best model with shorter filters, and the best end is kept. Roots of each `F` stay inside the unit
-/// circle. Other truths than the first are not read: it is as good in a free run as beside a machine.
+/// circle. Once it is known where the filters are, truths are not read: it is as good in a free run as beside a machine.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
 /// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a
@@ -25,11 +25,13 @@ use crate::order::Order;
 /// than ten, or than the model reaches back where that is more, as in each segment, they start again: what they gave
 /// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
 /// and counts as found in criteria and errors. Running, a segment begins at rest, as if the features had always been what
-/// they are first, until the first truth says where the filters are: each has its share of what that differs by, which
-/// dies away. So does what comes after as many steps without features. With `learn = false` it stays at rest. The port
-/// `deviation` is the standard deviation of the truth about its prediction. Features that are missing are taken for the
-/// last ones; what that adds to the error is not in it, nor what the filters may be off by at the beginning of a segment.
-/// Since the answer changes with time alone, the node runs at every tick.
+/// they are first, or where such features leave filters on average, and how unsure that is, is known from the fit. Truths
+/// then tell where the filters are, as in a Kalman filter of the model (Harvey 1989, section 3.2): the better that is
+/// known, the less a truth moves them, until they go by the features alone. So does what comes after as many steps without
+/// features; a free run is told as many truths as the filters have past values. With `learn = false` it stays at rest. The
+/// port `deviation` is the standard deviation of the truth about its prediction, larger until it is known where the filters
+/// are. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the answer
+/// changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Oe {

@@ -1,17 +1,21 @@
 //! Decides how unsure a stepper is of the past that it goes by; what it takes that past for is decided by the stepper.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::Polynomials;
+use super::roots::alike;
 use super::stepper::product;
 use crate::scratch::Scratch;
 
-/// The covariance `P` of the past `z` that a model goes by, in the variance of an innovation: of past values, of past values of
-/// the noise and of past innovations, the newest first in each. Inputs are taken for known.
+/// The covariance `P` of the past `z` that a model goes by, in the variance of an innovation: of past values, of what the filter of
+/// each input gave, of past values of the noise and of past innovations, the newest first in each. Inputs are taken for known.
 ///
-/// With the next innovation `e` the next value is `H z + e` and the next of the noise is `H z + e`, `H` without its places for
-/// past values; each goes before the others of its kind, of which the oldest is forgotten. What follows is the Kalman filter of
-/// that (Harvey 1989, section 3.2; Jones 1980 for samples that are missing), in as many steps as `P` has places.
+/// With the next innovation `e` the next value is `H z + e`, the next of a filter is `H z` of its own places and the next of the
+/// noise `H z + e` of those of noise and innovations; each goes before the others of its kind, of which the oldest is forgotten.
+/// What follows is the Kalman filter of that (Harvey 1989, section 3.2; Jones 1980 for samples that are missing), in as many steps
+/// as `P` has places. Nothing that is not known moves a filter, so that what is in doubt of it only ever becomes less.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(into = "Vec<f64>")]
 pub(super) struct Doubt {
@@ -19,21 +23,34 @@ pub(super) struct Doubt {
     covariance: Vec<f64>,
     /// Whether all of it is 0.
     sure: bool,
-    blocks: Blocks,
+    kinds: Vec<Kind>,
     /// `H`.
     next: Vec<f64>,
+    /// How alike the newest that a filter gave and each of its others are taken to be where nothing is known of them.
+    alike: Vec<f64>,
     /// `P H`.
     shared: Scratch,
-    /// The covariance of the next of the noise with the past.
     of_noise: Scratch,
+    /// What the newest of each kind has in common with the past, kind after kind, and with the newest of the others.
+    with_past: Scratch,
+    newest: Scratch,
 }
 
-/// How many of each kind the past consists of.
+/// What a part of the past consists of.
+#[derive(Debug, Clone, PartialEq)]
+struct Kind {
+    of: Of,
+    places: Range<usize>,
+    /// The places of the past that lead to the next one.
+    leads: Range<usize>,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Blocks {
-    values: usize,
-    noise: usize,
-    innovations: usize,
+enum Of {
+    Values,
+    Filter,
+    Noise,
+    Innovations,
 }
 
 impl From<Doubt> for Vec<f64> {
@@ -47,24 +64,57 @@ impl From<Doubt> for Vec<f64> {
     }
 }
 
+impl Kind {
+    /// Whether the next innovation is in the next of its kind.
+    fn innovates(&self) -> bool {
+        self.of != Of::Filter
+    }
+}
+
 impl Doubt {
     /// All of the past is known.
     pub(super) fn none(model: &Polynomials, whitening: &[f64]) -> Self {
+        let filters: Vec<&[f64]> = model.inputs.iter().map(|of| &of.f[..]).collect();
+        Self::among(model, whitening, &filters)
+    }
+
+    /// The same of a model the filters of whose inputs are known at all times.
+    pub(super) fn of_noise(model: &Polynomials, whitening: &[f64]) -> Self {
+        Self::among(model, whitening, &[])
+    }
+
+    fn among(model: &Polynomials, whitening: &[f64], filters: &[&[f64]]) -> Self {
         let Polynomials { a, c, .. } = model;
-        let known = a.iter().chain(whitening).map(|p| -p);
+        let of_filters = || filters.iter().flat_map(|f| f.iter());
+        let known = a.iter().chain(of_filters()).chain(whitening).map(|p| -p);
         let next: Vec<f64> = known.chain(c.iter().copied()).collect();
         let count = next.len();
+        let mut kinds = Vec::with_capacity(3 + filters.len());
+        let mut from = 0;
+        let mut put = |of: Of, length: usize, leads: Option<Range<usize>>| {
+            let places = from..from + length;
+            from = places.end;
+            kinds.push(Kind {
+                of,
+                leads: leads.unwrap_or(places.clone()),
+                places,
+            });
+        };
+        let noise = count - c.len() - whitening.len();
+        put(Of::Values, a.len(), Some(0..count));
+        filters.iter().for_each(|f| put(Of::Filter, f.len(), None));
+        put(Of::Noise, whitening.len(), Some(noise..count));
+        put(Of::Innovations, c.len(), Some(0..0));
         Self {
             covariance: vec![0.0; count * count],
             sure: true,
-            blocks: Blocks {
-                values: a.len(),
-                noise: whitening.len(),
-                innovations: c.len(),
-            },
             next,
+            alike: filters.iter().flat_map(|f| alike(f)).collect(),
             shared: Scratch(vec![0.0; count]),
             of_noise: Scratch(vec![0.0; count]),
+            with_past: Scratch(vec![0.0; count * kinds.len()]),
+            newest: Scratch(vec![0.0; kinds.len() * kinds.len()]),
+            kinds,
         }
     }
 
@@ -96,33 +146,114 @@ impl Doubt {
         self.sure
     }
 
-    /// Of the innovations nothing is known but their variance; all else is known.
-    pub(super) fn begin(&mut self) {
-        let (count, first) = (self.next.len(), self.blocks.values + self.blocks.noise);
+    /// Of the innovations nothing is known but their variance, and what each filter gave has the variance that `filter` says, as
+    /// alike as if innovations had driven it; all else is known.
+    pub(super) fn begin(&mut self, filter: impl Fn(usize) -> f64) {
+        let count = self.next.len();
         self.covariance.fill(0.0);
-        let own = self.covariance.iter_mut().step_by(count + 1);
-        own.skip(first).for_each(|own| *own = 1.0);
-        self.sure = self.blocks.innovations == 0;
+        let filters = self.kinds.iter().filter(|kind| kind.of == Of::Filter);
+        let first = self.kinds[0].places.end;
+        for (nth, Kind { places, .. }) in filters.enumerate() {
+            let variance = filter(nth);
+            for i in places.clone() {
+                for j in places.clone() {
+                    let alike = self.alike[places.start - first + i.abs_diff(j)];
+                    self.covariance[i * count + j] = variance * alike;
+                }
+            }
+        }
+        self.begin_innovations();
+    }
+
+    /// Of the innovations nothing is known but their variance.
+    fn begin_innovations(&mut self) {
+        let count = self.next.len();
+        let innovations = self.kinds.last().map_or(0..0, |kind| kind.places.clone());
+        for i in innovations {
+            self.covariance[i * count..][..count].fill(0.0);
+            for j in 0..count {
+                self.covariance[j * count + i] = 0.0;
+            }
+            self.covariance[i * count + i] = 1.0;
+        }
+        self.sure = self.all_below(0.0);
+    }
+
+    /// A value was there, which is what the filters gave and noise of such a variance, infinite where that may be anywhere; the
+    /// past of values and noise is taken to have always been like it. [`shared`](Self::shared) is then by how much each place of
+    /// the filters is to be put right, as a share of what the value is off by: the noise is what they leave of it.
+    pub(super) fn settle(&mut self, variance_of_noise: f64) {
+        let count = self.next.len();
+        let Self {
+            kinds,
+            covariance,
+            shared: Scratch(shared),
+            of_noise: Scratch(of_noise),
+            ..
+        } = self;
+        let filters = || kinds.iter().filter(|kind| kind.of == Of::Filter);
+        let places = || filters().flat_map(|kind| kind.places.clone());
+        let newest = || filters().filter_map(|kind| kind.places.clone().next());
+        shared.fill(0.0);
+        for i in places() {
+            shared[i] = newest().map(|j| covariance[i * count + j]).sum();
+        }
+        let all = newest().map(|i| shared[i]).sum::<f64>() + variance_of_noise;
+        let share = if all > 0.0 { 1.0 / all } else { 0.0 };
+        for i in places() {
+            for j in places() {
+                covariance[i * count + j] -= share * shared[i] * shared[j];
+            }
+        }
+        shared.iter_mut().for_each(|shared| *shared *= share);
+        let is_filter = |place: usize| filters().any(|kind| kind.places.contains(&place));
+        for i in 0..count {
+            for j in 0..count {
+                if !(is_filter(i) && is_filter(j)) {
+                    covariance[i * count + j] = 0.0;
+                }
+            }
+        }
+        of_noise.fill(0.0);
+        for i in places() {
+            let sum: f64 = newest().map(|j| covariance[i * count + j]).sum();
+            of_noise[i] = -sum;
+        }
+        let own = -newest().map(|i| of_noise[i]).sum::<f64>();
+        for noise in kinds.iter().filter(|kind| kind.of == Of::Noise) {
+            for i in noise.places.clone() {
+                for j in places() {
+                    covariance[i * count + j] = of_noise[j];
+                    covariance[j * count + i] = of_noise[j];
+                }
+                for j in noise.places.clone() {
+                    covariance[i * count + j] = own;
+                }
+            }
+        }
+        self.begin_innovations();
     }
 
     /// Goes on by a sample that is missing.
     pub(super) fn miss(&mut self) {
         let count = self.next.len();
-        if count == 0 {
+        let innovates = |kind: &Kind| kind.innovates() && !kind.places.is_empty();
+        if self.sure && !self.kinds.iter().any(innovates) {
             return;
         }
-        let values = self.blocks.values;
-        let (shared, of_noise) = (&mut self.shared.0, &mut self.of_noise.0);
-        let rows = self.covariance.chunks_exact(count);
-        for ((row, shared), of_noise) in rows.zip(&mut *shared).zip(&mut *of_noise) {
-            *of_noise = product(&self.next[values..], &row[values..]);
-            *shared = product(&self.next[..values], row) + *of_noise;
+        for (kind, with) in self
+            .kinds
+            .iter()
+            .zip(self.with_past.0.chunks_exact_mut(count))
+        {
+            let leads = kind.leads.clone();
+            let rows = self.covariance.chunks_exact(count);
+            for (row, with) in rows.zip(with) {
+                *with = product(&self.next[leads.clone()], &row[leads.clone()]);
+            }
         }
-        let value = 1.0 + product(&self.next, shared);
-        let noise = 1.0 + product(&self.next[values..], &of_noise[values..]);
-        let both = 1.0 + product(&self.next, of_noise);
-        let newest = [[value, both, 1.0], [both, noise, 1.0], [1.0, 1.0, 1.0]];
-        self.pass(newest, 1.0, 0.0);
+        self.among_newest(|kind| (kind.leads.clone(), 1.0), |_, _| 1.0);
+        self.pass();
         self.sure = false;
     }
 
@@ -152,21 +283,39 @@ impl Doubt {
                 *doubt -= own * with / variance;
             }
         }
-        // The noise is what the value leaves once past values are allowed for, and the value is known.
-        let (a, of_noise) = (&self.next[..self.blocks.values], &mut self.of_noise.0);
-        of_noise.fill(0.0);
-        for (a, row) in a.iter().zip(self.covariance.chunks_exact(count)) {
-            for (of_noise, with) in of_noise.iter_mut().zip(row) {
-                *of_noise -= a * with;
+        // The value is known, and the noise is what it leaves once past values and filters are allowed for.
+        let told = |kind: &Kind| match kind.of {
+            Of::Values | Of::Innovations => (0..0, 0.0),
+            Of::Filter => (kind.leads.clone(), 1.0),
+            Of::Noise => (0..kind.places.start, -1.0),
+        };
+        for (kind, with) in self
+            .kinds
+            .iter()
+            .zip(self.with_past.0.chunks_exact_mut(count))
+        {
+            if kind.of == Of::Innovations {
+                let both = with.iter_mut().zip(&self.shared.0);
+                both.for_each(|(with, shared)| *with = -shared / variance);
+                continue;
+            }
+            let (leads, sign) = told(kind);
+            let rows = self.covariance.chunks_exact(count);
+            for (row, with) in rows.zip(with) {
+                *with = sign * product(&self.next[leads.clone()], &row[leads.clone()]);
             }
         }
-        let noise = -product(a, of_noise);
-        let both = product(a, shared) / variance;
         let innovation = 1.0 - 1.0 / variance;
-        let newest = [[0.0, 0.0, 0.0], [0.0, noise, both], [0.0, both, innovation]];
-        self.pass(newest, 0.0, -1.0 / variance);
-        let mut own = self.covariance.iter().step_by(count + 1);
-        if own.all(|&own| own < 4.0 * f64::EPSILON) {
+        self.among_newest(told, |of, other| {
+            let both = [of, other].map(|kind| kind.of == Of::Innovations);
+            if both == [true, true] {
+                innovation
+            } else {
+                0.0
+            }
+        });
+        self.pass();
+        if self.all_below(4.0 * f64::EPSILON) {
             self.forget();
         }
         variance
@@ -184,22 +333,28 @@ impl Doubt {
         if self.sure {
             return 0.0;
         }
-        let Blocks { values, noise, .. } = self.blocks;
         w.copy_from_slice(&self.next);
+        let first = |w: &[f64], of: Of| -> f64 {
+            let mut kinds = self.kinds.iter().filter(|kind| kind.of == of);
+            let places = kinds.next().map_or(0..0, |kind| kind.places.clone());
+            places.clone().next().map_or(0.0, |first| w[first])
+        };
         for _ in 1..steps {
-            let by_value = if values > 0 { w[0] } else { 0.0 };
-            let by_noise = if noise > 0 { w[values] } else { 0.0 };
-            let ends = [values, values + noise, w.len()];
-            let mut from = 0;
-            for (end, newest) in
-                ends.into_iter()
-                    .zip([by_value, by_value + by_noise, by_value + by_noise])
-            {
-                for nth in from..end {
-                    let later = if nth + 1 < end { w[nth + 1] } else { 0.0 };
+            let (by_value, by_noise) = (first(w, Of::Values), first(w, Of::Noise));
+            for Kind { of, places, .. } in &self.kinds {
+                let newest = match of {
+                    Of::Values => by_value,
+                    Of::Filter => by_value + places.clone().next().map_or(0.0, |first| w[first]),
+                    Of::Noise | Of::Innovations => by_value + by_noise,
+                };
+                for nth in places.clone() {
+                    let later = if nth + 1 < places.end {
+                        w[nth + 1]
+                    } else {
+                        0.0
+                    };
                     w[nth] = newest * self.next[nth] + later;
                 }
-                from = end;
             }
         }
         let rows = self.covariance.chunks_exact(w.len().max(1));
@@ -213,38 +368,63 @@ impl Doubt {
         self.sure = true;
     }
 
-    /// Puts the newest value, noise and innovation before the others of their kind: how unsure they are, each with each; with the
-    /// past the value and the innovation have so many times [`shared`](Self::shared) in common, the noise what was worked out.
-    fn pass(&mut self, newest: [[f64; 3]; 3], of_value: f64, of_innovation: f64) {
+    /// Whether no variance is above this.
+    fn all_below(&self, most: f64) -> bool {
+        let mut own = self.covariance.iter().step_by(self.next.len() + 1);
+        own.all(|&own| own <= most)
+    }
+
+    /// Works out what the newest of each kind have in common with each other, of which it is known what they have in common with
+    /// the past: `told` says which places lead to that of a kind and with which sign, and `beside` what is common beside the past.
+    fn among_newest(
+        &mut self,
+        told: impl Fn(&Kind) -> (Range<usize>, f64),
+        beside: impl Fn(&Kind, &Kind) -> f64,
+    ) {
+        let (count, kinds) = (self.next.len(), &self.kinds);
+        for (i, kind) in kinds.iter().enumerate() {
+            // An innovation comes last, and nothing leads to it.
+            for (j, other) in kinds.iter().enumerate().skip(i) {
+                let (leads, sign) = told(kind);
+                let with = &self.with_past.0[j * count..][..count];
+                let by_past = sign * product(&self.next[leads.clone()], &with[leads]);
+                let beside = if kind.innovates() && other.innovates() {
+                    beside(kind, other)
+                } else {
+                    0.0
+                };
+                self.newest.0[i * kinds.len() + j] = by_past + beside;
+                self.newest.0[j * kinds.len() + i] = by_past + beside;
+            }
+        }
+    }
+
+    /// Puts the newest of each kind before the others of its kind.
+    fn pass(&mut self) {
         let count = self.next.len();
-        let (shared, of_noise) = (&self.shared.0, &self.of_noise.0);
-        let Blocks {
-            values,
-            noise,
-            innovations,
-        } = self.blocks;
         // One row and one column further; what stands in the first of each kind is written anew.
         if let Some(rest) = self.covariance.len().checked_sub(count + 1) {
             self.covariance.copy_within(..rest, count + 1);
         }
-        let kinds = [
-            (0, values, of_value, shared),
-            (values, noise, 1.0, of_noise),
-            (values + noise, innovations, of_innovation, shared),
-        ];
-        for (first, length, times, with) in kinds {
-            for nth in 1..if length > 0 { count } else { 0 } {
-                let doubt = times * with[nth - 1];
-                self.covariance[first * count + nth] = doubt;
-                self.covariance[nth * count + first] = doubt;
+        let firsts = || {
+            let kinds = self.kinds.iter().enumerate();
+            kinds.filter_map(|(nth, kind)| Some((nth, kind.places.clone().next()?)))
+        };
+        for (kind, first) in firsts() {
+            let with = &self.with_past.0[kind * count..][..count];
+            for nth in 1..count {
+                self.covariance[first * count + nth] = with[nth - 1];
+                self.covariance[nth * count + first] = with[nth - 1];
             }
         }
-        for (row, (first, length, ..)) in newest.iter().zip(kinds) {
-            for (&doubt, (other, other_length, ..)) in row.iter().zip(kinds) {
-                if length > 0 && other_length > 0 {
-                    self.covariance[first * count + other] = doubt;
-                }
+        for (kind, first) in firsts() {
+            for (other, at) in firsts() {
+                self.covariance[first * count + at] =
+                    self.newest.0[kind * self.kinds.len() + other];
             }
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -76,7 +76,7 @@ impl Gains {
         }
         let past = model.a.iter().chain(&whitening).map(|p| -p);
         let next: Vec<f64> = past.chain(model.c.iter().copied()).collect();
-        let mut doubt = Doubt::none(model, &whitening);
+        let mut doubt = Doubt::of_noise(model, &whitening);
         let mut shares = Vec::new();
         let mut step = |value: &f64| {
             if value.is_nan() {

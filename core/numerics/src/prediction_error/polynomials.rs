@@ -161,7 +161,8 @@ impl Polynomials {
     }
 
     /// How many values that filters gave before a segment have to be found.
-    pub(super) fn starts(&self) -> usize {
+    #[must_use]
+    pub fn starts(&self) -> usize {
         self.inputs.iter().map(|input| input.f.len()).sum()
     }
 

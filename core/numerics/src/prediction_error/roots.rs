@@ -15,19 +15,51 @@ pub(super) fn is_within(polynomial: &[f64], radius: f64) -> bool {
         p / stretch
     });
     let mut p: Vec<f64> = stretched.collect();
-    while let Some(&last) = p.last() {
-        // So that NaN fails.
-        let inside = last.abs() < 1.0 - 1e-9;
-        if !inside {
+    while !p.is_empty() {
+        let Some(shorter) = stepped_down(&p) else {
             return false;
-        }
-        let n = p.len();
-        let scale = 1.0 - last * last;
-        p = (0..n - 1)
-            .map(|j| (p[j] - last * p[n - 2 - j]) / scale)
-            .collect();
+        };
+        p = shorter;
     }
     true
+}
+
+/// The polynomial with a coefficient less in the step-down recursion; none where one of its roots is not inside the unit circle,
+/// as far as the last coefficient tells.
+fn stepped_down(p: &[f64]) -> Option<Vec<f64>> {
+    let (&last, rest) = p.split_last()?;
+    let scale = 1.0 - last * last;
+    let shorter = rest.iter().zip(rest.iter().rev());
+    // So that NaN fails.
+    let inside = last.abs() < 1.0 - 1e-9;
+    inside.then(|| {
+        shorter
+            .map(|(p, other)| (p - last * other) / scale)
+            .collect()
+    })
+}
+
+/// The correlation of what `1/(1 + p₁ q⁻¹ + … + p_n q⁻ⁿ)` makes of white noise with itself so many samples before, from none to one
+/// less than there are coefficients: each from the shorter ones by the polynomial of its order in the step-down recursion (Brockwell
+/// and Davis 1991, section 5.2). Those of a filter that grows are 0 but for the first.
+pub(super) fn alike(polynomial: &[f64]) -> Vec<f64> {
+    let mut orders = vec![polynomial.to_vec()];
+    while let Some(shorter) = orders.last().and_then(|of| stepped_down(of)) {
+        orders.push(shorter);
+    }
+    let mut alike = vec![0.0; polynomial.len()];
+    if let Some(first) = alike.first_mut() {
+        *first = 1.0;
+    }
+    // Down to the one without coefficients, or a root was not inside.
+    if orders.len() == polynomial.len() + 1 {
+        for lag in 1..alike.len() {
+            let of_order = orders[orders.len() - 1 - lag].iter();
+            let earlier = of_order.zip(alike[..lag].iter().rev());
+            alike[lag] = -earlier.map(|(p, alike)| p * alike).sum::<f64>();
+        }
+    }
+    alike
 }
 
 /// The same polynomial with all roots so many times as large that the largest just lies within the radius.

@@ -11,7 +11,8 @@ use crate::checks::check_length;
 ///
 /// A sample that is missing is at first taken for what was predicted of it, so that predictions several samples ahead are steps
 /// without one (Ljung 1999, section 3.2). How unsure that is, is kept, so that the samples that follow also tell what it was: the
-/// Kalman filter of the model.
+/// Kalman filter of the model. So do those after a start of what the filters of inputs gave before it, which nothing moves but the
+/// inputs: the better they are known, the less samples count, until they are told by the inputs alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Saved")]
 pub struct Stepper {
@@ -115,8 +116,14 @@ impl Stepper {
         &self.model
     }
 
-    /// Forgets what was: the inputs have always been like this, and their filters gave what `before` says.
-    pub fn begin(&mut self, input: impl Fn(usize) -> f64, before: impl Fn(usize) -> f64) {
+    /// Forgets what was: the inputs have always been like this, and their filters gave what `before` says, of which `square` is
+    /// the variance, in that of an innovation.
+    pub fn begin(
+        &mut self,
+        input: impl Fn(usize) -> f64,
+        before: impl Fn(usize) -> f64,
+        square: impl Fn(usize) -> f64,
+    ) {
         let mut brought = 0.0;
         for (nth, past) in self.inputs.iter_mut().enumerate() {
             let filtered = before(nth);
@@ -127,51 +134,55 @@ impl Stepper {
         let level = brought / (1.0 + self.model.a.iter().sum::<f64>());
         self.past.fill(level);
         self.noise.fill(0.0);
-        self.doubt_innovations();
+        self.innovations.fill(0.0);
+        self.doubt.begin(square);
     }
 
     /// The same at rest: the filters gave what such inputs lead to.
     #[cfg(test)]
     pub(super) fn rest(&mut self, input: impl Fn(usize) -> f64) {
         let gains: Vec<f64> = self.model.inputs.iter().map(Transfer::gain).collect();
-        self.begin(&input, |nth| gains[nth] * input(nth));
+        self.begin(&input, |nth| gains[nth] * input(nth), |_| 0.0);
     }
 
-    /// What was not foreseen until now is not known, but for its variance.
-    fn doubt_innovations(&mut self) {
-        self.innovations.fill(0.0);
-        self.doubt.begin();
+    /// Takes the first sample after a [`begin`](Self::begin), about which noise that follows it has such a variance, in that of an
+    /// innovation; infinite where it may be anywhere.
+    ///
+    /// What was measured before is not known. Of a model that looks back on it, or on noise, it is taken to have always been like
+    /// this one: of what the inputs do not explain of that each of their filters has its share by how unsure it is, and the noise
+    /// the rest.
+    pub fn first(&mut self, input: impl Fn(usize) -> f64, value: f64, variance_of_noise: f64) {
+        if self.past.is_empty() && self.noise.is_empty() {
+            self.step(input, Some(value));
+        } else {
+            self.step(input, None);
+            self.settle(value, variance_of_noise);
+        }
     }
 
-    /// Where it is has been measured: of what the inputs do not explain of it each of their filters has such a share, and the noise
-    /// the rest, as if it had always been there.
-    pub fn settle_among(&mut self, value: f64, share: impl Fn(usize) -> f64) {
+    pub(super) fn settle(&mut self, value: f64, variance_of_noise: f64) {
         let value = value - self.model.level;
         let brought = |(past, of): (&PastInput, &Transfer)| match past.filtered.first() {
             Some(&filtered) => filtered,
             None => of.gain() * past.values.first().copied().unwrap_or(0.0),
         };
-        let mut explained: f64 = self
-            .inputs
-            .iter()
-            .zip(&self.model.inputs)
-            .map(brought)
-            .sum();
-        let off = value - explained;
-        for (nth, past) in self.inputs.iter_mut().enumerate() {
-            if past.filtered.is_empty() {
-                continue;
+        let inputs = self.inputs.iter().zip(&self.model.inputs);
+        let explained: f64 = inputs.map(brought).sum();
+        let in_all = value * (1.0 + self.model.a.iter().sum::<f64>());
+        let off = in_all - explained;
+        self.doubt.settle(variance_of_noise);
+        let mut shares = self.doubt.shared()[self.past.len()..].iter();
+        let mut noise = off;
+        for past in &mut self.inputs {
+            let both = past.filtered.iter_mut().zip(&mut shares).enumerate();
+            for (lag, (filtered, share)) in both {
+                *filtered += share * off;
+                noise -= if lag == 0 { share * off } else { 0.0 };
             }
-            let own = share(nth) * off;
-            past.filtered
-                .iter_mut()
-                .for_each(|filtered| *filtered += own);
-            explained += own;
         }
         self.past.fill(value);
-        let noise = value * (1.0 + self.model.a.iter().sum::<f64>()) - explained;
         self.noise.fill(noise);
-        self.doubt_innovations();
+        self.innovations.fill(0.0);
     }
 
     /// Goes on by one sample, and gives what was predicted of it.
@@ -221,17 +232,28 @@ impl Stepper {
             return self.push(expected + off, noise + off, off);
         }
         let innovation = off / self.doubt.observe();
-        // What is put right of past values is the noise's.
+        // What is put right of past values and of filters is the noise's.
         let mut of_noise = noise + off;
         let mut shared = self.doubt.shared().iter();
-        for (a, (past, shared)) in self
-            .model
-            .a
-            .iter()
-            .zip(self.past.iter_mut().zip(&mut shared))
-        {
-            *past += shared * innovation;
-            of_noise += a * shared * innovation;
+        for (a, past) in self.model.a.iter().zip(&mut self.past) {
+            let right = shared.next().map_or(0.0, |shared| shared * innovation);
+            *past += right;
+            of_noise += a * right;
+        }
+        for (of, past) in self.model.inputs.iter().zip(&mut self.inputs) {
+            // The newest that it gave is among them already, and the oldest no more.
+            let mut newest = 0.0;
+            for (nth, f) in of.f.iter().enumerate() {
+                let right = shared.next().map_or(0.0, |shared| shared * innovation);
+                newest -= f * right;
+                if let Some(earlier) = past.filtered.get_mut(nth + 1) {
+                    *earlier += right;
+                }
+            }
+            if let Some(filtered) = past.filtered.first_mut() {
+                *filtered += newest;
+            }
+            of_noise -= newest;
         }
         let others = self.noise.iter_mut().chain(&mut self.innovations);
         for (of, shared) in others.zip(shared) {
@@ -247,15 +269,16 @@ impl Stepper {
         push(&mut self.innovations, innovation);
     }
 
-    /// How many numbers of the past it goes by, beside those of the inputs.
+    /// How many numbers of the past it goes by, beside the inputs.
     #[must_use]
     pub fn remembers(&self) -> usize {
-        self.past.len() + self.noise.len() + self.innovations.len()
+        let filtered = self.inputs.iter().map(|past| past.filtered.len());
+        self.past.len() + filtered.sum::<usize>() + self.noise.len() + self.innovations.len()
     }
 
     /// By how much the variance of what is predicted so many samples ahead is larger than that of
     /// [`variances`](Polynomials::variances), in that of an innovation: more than 0 after a start or samples that were missing,
-    /// until they count no more. It is worked out in `room` for as many numbers as it [`remembers`](Self::remembers).
+    /// until what filters gave and noise was before is known or counts no more. It is worked out in `room` for as many numbers as it [`remembers`](Self::remembers).
     #[must_use]
     pub fn doubt(&self, steps: usize, room: &mut [f64]) -> f64 {
         self.doubt.ahead(steps, room)

@@ -26,6 +26,9 @@ pub(super) const MOST_STEPS: i64 = 10_000;
 const RUNS_PER_STEP: i64 = 16;
 /// For how many runs room is made at most, however far ahead is predicted.
 const MOST_RUNS: f64 = 4_096.0;
+/// How unsure filters are at most where they begin, as a variance in that of an innovation: beyond, rounding would count more than
+/// innovations, and the first truths tell all in any case.
+const MOST_UNSURE: f64 = 1e8;
 
 /// A model as it was identified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -128,7 +131,19 @@ struct Known {
     inputs: VecDeque<f64>,
 }
 
-athermal_core::state!(Known, "identified/3");
+athermal_core::state!(Known, "identified/4");
+
+/// How it was kept while filters were taken to be where the first truth had put them.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Sure {
+    /// Of a model without filters it is the same.
+    Same(Known),
+    /// Of others it does not tell how unsure they are, and what it says of the rest has other places.
+    Other {},
+}
+
+athermal_core::state!(Sure, "identified/3");
 
 /// How it was kept while what was predicted in a gap was taken for measured.
 #[derive(Debug, Serialize, Deserialize)]
@@ -141,19 +156,27 @@ athermal_core::state!(Before, "identified/2");
 struct Following {
     known: Known,
     deviations: Vec<f64>,
-    /// Where the filters of the inputs begin, and the share of each in what the first truth is off by.
-    beginnings: Vec<Beginning>,
-    shares: Vec<f64>,
+    begins: Begins,
     /// For predictions, which leave no trace.
     scratch: RefCell<Stepper>,
     /// To work out in how unsure they are.
     room: RefCell<Vec<f64>>,
 }
 
+/// What is taken for the past of a segment.
+#[derive(Debug)]
+struct Begins {
+    /// What the filter of each input gave, in times of the input.
+    times: Vec<f64>,
+    /// The variance of that, in that of an innovation.
+    squares: Vec<f64>,
+    /// The same of noise that is followed; infinite where it may be anywhere.
+    noise: f64,
+}
+
 impl Following {
     fn new(of: &Identified) -> Self {
         let stepper = Stepper::new(of.model.clone());
-        let beginnings = beginnings(of);
         let followed = Followed {
             stepper: stepper.clone(),
             at: Instant::MIN,
@@ -170,8 +193,7 @@ impl Following {
                 inputs: VecDeque::new(),
             },
             deviations: of.deviations.clone(),
-            shares: shares(of, &beginnings),
-            beginnings,
+            begins: Begins::of(of),
             room: RefCell::new(vec![0.0; stepper.remembers()]),
             scratch: RefCell::new(stepper),
         }
@@ -195,30 +217,46 @@ fn beginnings(of: &Identified) -> Vec<Beginning> {
     at_rest.collect()
 }
 
-/// The share of the filter of each input in what the first truth is off by: that of the square of how far off it may begin, beside
-/// the others and the variance of the noise. Noise that is integrated has all, since it may be anywhere; where there is no model of
-/// noise, filters have all.
-fn shares(of: &Identified, beginnings: &[Beginning]) -> Vec<f64> {
-    let squares = beginnings.iter().map(|beginning| beginning.square);
-    let noise = match of.deviations.last() {
-        Some(deviation) if of.model.follows() => deviation.powi(2),
-        _ => 0.0,
-    };
-    let all = squares.clone().sum::<f64>() + noise;
-    let share = |square: f64| {
-        let share = square / all;
-        if of.model.differences == 0 && share.is_finite() {
-            share
+impl Begins {
+    fn of(of: &Identified) -> Self {
+        let beginnings = beginnings(of);
+        let innovation = of.deviations.first().map_or(0.0, |first| first.powi(2));
+        // Nothing of nothing is nothing.
+        let unsure = |square: f64| {
+            if square > 0.0 {
+                square / innovation
+            } else {
+                0.0
+            }
+        };
+        let squares = beginnings.iter().map(|of| unsure(of.square));
+        let all: f64 = squares.clone().sum();
+        let scale = if all > MOST_UNSURE {
+            MOST_UNSURE / all
         } else {
-            0.0
+            1.0
+        };
+        let noise = of
+            .deviations
+            .last()
+            .map_or(0.0, |last| unsure(last.powi(2)));
+        Self {
+            times: beginnings.iter().map(|of| of.times).collect(),
+            squares: squares
+                .map(|square| (scale * square).min(MOST_UNSURE))
+                .collect(),
+            noise: if of.model.differences > 0 {
+                f64::INFINITY
+            } else {
+                scale * noise
+            },
         }
-    };
-    squares.map(share).collect()
+    }
 }
 
 impl Known {
     /// Begins a step before what the first run predicts, with filters as far as its inputs tell of them.
-    fn begin(&mut self, row: &[f64], of: Instant, beginnings: &[Beginning]) {
+    fn begin(&mut self, row: &[f64], of: Instant, begins: &Begins) {
         let Self {
             scaling,
             series,
@@ -228,8 +266,10 @@ impl Known {
         let count = series.len() as i64;
         for (nth, followed) in series.iter_mut().enumerate() {
             let input = scaling.of(row);
-            let before = |nth: usize| beginnings[nth].times * input(nth);
-            followed.stepper.begin(&input, before);
+            let before = |nth: usize| begins.times[nth] * input(nth);
+            followed
+                .stepper
+                .begin(&input, before, |nth| begins.squares[nth]);
             followed.at = of - *step + part(*step, nth as i64, count);
             followed.told = 0;
         }
@@ -282,6 +322,12 @@ impl Known {
             .is_some_and(|(&last, longest)| self.steps(last, of) > longest)
     }
 
+    /// Of how many values of filters it is known what they gave.
+    fn filters(&self) -> usize {
+        let models = self.series.iter().map(|followed| followed.stepper.model());
+        models.map(Polynomials::starts).sum()
+    }
+
     /// Forgets where it was.
     fn end(&mut self) {
         self.begun = false;
@@ -324,7 +370,9 @@ impl Learner for Following {
 
     fn settled(&self) -> bool {
         let mut series = self.known.series.iter();
-        series.all(|followed| followed.told as usize >= followed.stepper.model().a.len().max(1))
+        // As many truths as tell what filters gave, or how far the model looks back.
+        let needed = |of: &Stepper| of.model().a.len().max(of.model().starts()).max(1);
+        series.all(|followed| followed.told as usize >= needed(&followed.stepper))
     }
 
     fn run(&mut self, regressors: &[f64], of: Instant, told: Instant) {
@@ -336,7 +384,7 @@ impl Learner for Following {
             known.end();
         }
         if !known.begun {
-            known.begin(regressors, of, &self.beginnings);
+            known.begin(regressors, of, &self.begins);
             known.make_room(of - told);
         }
         // A truth that has not been told by now never will be.
@@ -393,7 +441,7 @@ impl Learner for Following {
         let followed = self.known.nearest(of);
         let known = |nth: usize| self.deviations.get(nth).copied().unwrap_or(f64::NAN);
         let last = self.deviations.len().saturating_sub(1);
-        if followed.told == 0 {
+        if followed.told == 0 && followed.stepper.model().follows() {
             return known(last);
         }
         let steps = usize::try_from(self.known.steps(followed.at, of)).unwrap_or(usize::MAX);
@@ -404,7 +452,7 @@ impl Learner for Following {
 
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
         if !self.known.begun {
-            self.known.begin(regressors, at, &self.beginnings);
+            self.known.begin(regressors, at, &self.begins);
         }
         let oldest = self
             .known
@@ -427,9 +475,11 @@ impl Learner for Following {
         for between in known.between(from, at) {
             stepper.step(known.inputs_at(between, regressors), None);
         }
-        stepper.step(known.scaling.of(regressors), Some(truth));
+        let input = known.scaling.of(regressors);
         if is_first {
-            stepper.settle_among(truth, |nth| self.shares[nth]);
+            stepper.first(input, truth, self.begins.noise);
+        } else {
+            stepper.step(input, Some(truth));
         }
         let followed = &mut known.series[nth];
         std::mem::swap(stepper, &mut followed.stepper);
@@ -450,8 +500,20 @@ impl Learner for Following {
         if state.is::<Before>() {
             return Restored::cold("it was kept without how unsure a gap had left it");
         }
-        let Ok(known) = state.downcast::<Known>() else {
-            return Restored::cold("the state belongs to another kind of node");
+        let (known, restored) = match state.downcast::<Sure>().map(|former| *former) {
+            Ok(Sure::Same(known)) if known.filters() == 0 => {
+                let from = "identified/3".to_owned();
+                (known, Restored::Migrated { from })
+            }
+            Ok(_) => {
+                return Restored::cold(
+                    "it was kept without how unsure a start had left its filters",
+                );
+            }
+            Err(state) => match state.downcast::<Known>() {
+                Ok(known) => (*known, Restored::Accepted),
+                Err(_) => return Restored::cold("the state belongs to another kind of node"),
+            },
         };
         if known.regressors != self.known.regressors {
             return Restored::cold("it was followed with other inputs");
@@ -480,7 +542,7 @@ impl Learner for Following {
         let Known { runs, inputs, .. } = &mut self.known;
         runs.reserve(runs.len().max(16));
         inputs.reserve(inputs.len().max(16));
-        Restored::Accepted
+        restored
     }
 }
 

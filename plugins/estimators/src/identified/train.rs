@@ -23,6 +23,9 @@ const STEPS_AHEAD: usize = 256;
 /// Steps of the search times coefficients, of which many are never all settled.
 const MOST_WORK: usize = 1000;
 
+/// How many times as large as one step ahead an error of a run is about which there is something to tell.
+const WORTH_TELLING: f64 = 1.05;
+
 /// How a model is found from evenly spaced samples.
 pub(crate) trait Identify: std::fmt::Debug + Send {
     /// How long a step is, where that is stated.
@@ -188,18 +191,25 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             earlier, follows, ..
         } = self.reach;
         let ahead = steps(earlier, of.step);
-        let differs = !follows || of.model.follows() && ahead > 1;
+        let further = of.model.follows() && ahead > 1;
+        // The fit finds where filters begin, which a run is told by its truths.
+        let differs = !follows || further || of.model.starts() > 0;
         let error = differs.then(|| rehearse::error(&self.rows, of, self.reach));
         let error = error.flatten();
         report.in_sample_rmse = Some(error.unwrap_or(one_step));
-        if error.is_none() {
+        let Some(error) = error else {
+            return;
+        };
+        if follows && !further && error <= WORTH_TELLING * one_step {
             return;
         }
         report.figure("rmse_one_step_ahead", one_step);
-        let predicts = if follows {
+        let predicts = if !follows {
+            "it will not follow truths".to_owned()
+        } else if further {
             format!("it predicts {ahead} steps after the newest truth")
         } else {
-            "it will not follow truths".to_owned()
+            "in each piece its first truths tell where its filters are".to_owned()
         };
         report.notes.push(format!(
             "it was found by its errors one step ahead, which are {} {}; {predicts}, and the in-sample RMSE is that of this",
@@ -424,10 +434,10 @@ fn tell_pieces(samples: &Samples, model: &Polynomials, report: &mut TrainingRepo
     ));
 }
 
-/// The share of the rows from which errors on them are doubted where it takes so many to tell where filters begin.
+/// The share of the rows from which it is told that so many of them tell where filters begin.
 const STARTS: f64 = 0.1;
 
-/// Tells of errors that are small since the fit found where filters begin in each piece, which a run does not.
+/// Tells of rows that go into where filters begin in each piece.
 fn tell_starts(pieces: usize, starts: usize, rows: usize, report: &mut TrainingReport) {
     let share = starts as f64 / rows as f64;
     if pieces < 2 || share < STARTS {
@@ -435,8 +445,8 @@ fn tell_starts(pieces: usize, starts: usize, rows: usize, report: &mut TrainingR
     }
     report.figure("starts", starts);
     report.notes.push(format!(
-        "{:.0} % of what its rows tell goes into where its filters begin in each of {pieces} pieces, which a run does not know: there \
-         it errs more than the error on the rows of the fit and `deviation` say; `arx` and `armax` begin with truths instead",
+        "{:.0} % of what its rows tell goes into where its filters begin in each of {pieces} pieces, which a run does not know before \
+         its truths tell it: there it errs more; `arx` and `armax` begin with truths instead",
         100.0 * share,
     ));
 }
@@ -544,8 +554,8 @@ mod tests {
         assert_eq!(
             told(60, 70),
             [
-                "35 % of what its rows tell goes into where its filters begin in each of 60 pieces, which a run does not know: there \
-                 it errs more than the error on the rows of the fit and `deviation` say; `arx` and `armax` begin with truths instead"
+                "35 % of what its rows tell goes into where its filters begin in each of 60 pieces, which a run does not know before \
+                 its truths tell it: there it errs more; `arx` and `armax` begin with truths instead"
             ]
         );
         assert!(told(60, 15).is_empty() && told(1, 70).is_empty());

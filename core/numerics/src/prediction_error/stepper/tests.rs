@@ -61,7 +61,7 @@ fn what_has_a_level_but_is_taken_for_integrated_is_followed_as_a_mean() {
     let values = [40.0, 1.0, -2.0, 3.0, 0.5, -1.5];
     stepper.rest(|_| 0.0);
     stepper.step(|_| 0.0, Some(values[0]));
-    stepper.settle_among(values[0], |_| 0.0);
+    stepper.settle(values[0], f64::INFINITY);
     for count in 1..values.len() {
         let mean = values[..count].iter().sum::<f64>() / count as f64;
         let found = stepper.step(|_| 0.0, Some(values[count]));
@@ -79,7 +79,7 @@ fn right_after_a_start_predictions_of_a_moving_average_are_less_sure_by_what_cam
             ..Orders::default()
         })
     });
-    stepper.settle_among(1.0, |_| 0.0);
+    stepper.settle(1.0, f64::INFINITY);
     // The variances of the innovations algorithm (Brockwell and Davis 1991, example 5.2.1).
     let mut variance = 1.0 + c * c;
     for _ in 0..20 {
@@ -181,7 +181,7 @@ fn where_samples_are_missing_predictions_and_their_variances_are_what_the_others
         for seed in 0..4 {
             let (mut chance, mut known) = (uniform(seed), Vec::new());
             let mut stepper = Stepper::new(model.clone());
-            stepper.settle_among(0.0, |_| 0.0);
+            stepper.settle(0.0, f64::INFINITY);
             for nth in 0..25 {
                 let (expected, variance) = expected_by_hand(&model, &known);
                 let ahead = 1.0 + doubt(&stepper, 1);
@@ -209,7 +209,7 @@ fn some_samples_after_a_gap_nothing_is_in_doubt() {
             continue;
         }
         let mut stepper = Stepper::new(model.clone());
-        stepper.settle_among(0.0, |_| 0.0);
+        stepper.settle(0.0, f64::INFINITY);
         (0..300).for_each(|_| _ = stepper.step(|_| 0.0, Some(0.1)));
         assert_eq!(doubt(&stepper, 1), 0.0, "{model:?}");
         (0..3000).for_each(|_| _ = stepper.step(|_| 0.0, None));
@@ -222,7 +222,7 @@ fn some_samples_after_a_gap_nothing_is_in_doubt() {
 #[test]
 fn a_model_that_grows_without_end_is_followed_again_after_a_gap_in_which_it_did() {
     let mut stepper = Stepper::new(noise(&[-1.5], &[0.3], &[], 0));
-    stepper.settle_among(0.0, |_| 0.0);
+    stepper.settle(0.0, f64::INFINITY);
     stepper.step(|_| 0.0, Some(0.0));
     (0..1200).for_each(|_| _ = stepper.step(|_| 0.0, None));
     for value in [1.0, 1.0] {
@@ -239,7 +239,7 @@ fn a_model_that_grows_without_end_is_followed_again_after_a_gap_in_which_it_did(
 fn what_is_foreseen_is_what_steps_without_samples_predict() {
     for model in noises() {
         let mut stepper = Stepper::new(model);
-        stepper.settle_among(1.0, |_| 0.0);
+        stepper.settle(1.0, f64::INFINITY);
         for value in [Some(0.4), None, Some(-0.2)] {
             stepper.step(|_| 0.0, value);
         }
@@ -257,7 +257,7 @@ fn the_doubt_of_a_start_is_carried_to_the_sample_that_is_predicted() {
         let variances = model.variances(30);
         for known in 0..6 {
             let mut stepper = Stepper::new(model.clone());
-            stepper.settle_among(0.0, |_| 0.0);
+            stepper.settle(0.0, f64::INFINITY);
             for _ in 0..known {
                 stepper.step(|_| 0.0, Some(0.0));
             }
@@ -289,7 +289,7 @@ fn two_samples_after_a_truth_a_moving_average_of_one_is_known_no_worse_than_its_
         })
     };
     let mut stepper = Stepper::new(model.clone());
-    stepper.settle_among(1.0, |_| 0.0);
+    stepper.settle(1.0, f64::INFINITY);
     let variance = model.variances(2)[1] + doubt(&stepper, 2);
     assert!((variance - (1.0 + c * c)).abs() < 1e-12, "{variance}");
 }
@@ -309,7 +309,7 @@ fn a_stepper_that_is_read_back_goes_on_as_it_was_and_one_whose_parts_do_not_fit_
         level: 0.0,
     };
     let mut stepper = Stepper::new(model);
-    stepper.settle_among(1.0, |_| 0.0);
+    stepper.settle(1.0, f64::INFINITY);
     stepper.step(|_| 0.2, Some(0.3));
     stepper.step(|_| 0.2, None);
     let written = serde_json::to_value(&stepper).unwrap();
@@ -353,7 +353,7 @@ fn steppers_that_are_where_another_is_are_equal_whatever_way_they_came() {
         })
     };
     let mut stepper = Stepper::new(model.clone());
-    stepper.settle_among(1.0, |_| 0.0);
+    stepper.settle(1.0, f64::INFINITY);
     stepper.step(|_| 0.0, Some(0.3));
     let mut other = Stepper::new(model);
     other.take(&stepper);

@@ -62,14 +62,62 @@ fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noi
         learner.run(&[0.0], first + step, first);
         learner.predict(&[0.0], first + step)
     };
-    let of_both = 0.5 * 0.5 + 0.8 * 0.5;
-    assert!((second(&model) - of_both).abs() < 1e-12);
-    // Noise that may be anywhere has all, and where there is no model of it the filter has.
+    // Of what was before, a step later a quarter of the variance is left.
+    let (filter, noise, innovation) = (0.04 * 0.25, 0.04, 0.01);
+    let both = |share: f64, kept: f64| 0.5 * share + kept * (1.0 - share);
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found}");
+    near(second(&model), both(filter / (filter + noise), 0.8));
+    // Noise that may be anywhere has all, and what is not followed is an innovation.
     model.model.d = Vec::new();
     model.model.differences = 1;
-    assert!((second(&model) - 1.0).abs() < 1e-12);
+    near(second(&model), both(0.0, 1.0));
     model.model.differences = 0;
-    assert!((second(&model) - 0.5).abs() < 1e-12);
+    near(second(&model), both(filter / (filter + innovation), 0.0));
+}
+
+/// A filter that is far from rest when a segment begins, and truths with noise: what it is off by, and how unsure it says it is.
+fn from_far_off(model: &Identified, count: i64) -> (Vec<f64>, Vec<f64>) {
+    let mut learner = Following::new(model);
+    let (mut state, mut filtered) = (12_345_u64, 40.0);
+    // Uniform, of variance 1.
+    let mut draw = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        f64::sqrt(3.0) * ((state >> 33) as f64 / f64::from(1 << 30) - 1.0)
+    };
+    let steps = (0..count).map(|nth| {
+        let of = Instant::from_ns(0) + part(model.step, nth, 1);
+        filtered = 0.1 - model.model.inputs[0].f[0] * filtered;
+        learner.run(&[1.0], of, of - model.step);
+        let told = (
+            learner.predict(&[1.0], of) - filtered,
+            learner.deviation(&[1.0], of),
+        );
+        learner.learn(&[1.0], filtered + draw(), of);
+        told
+    });
+    steps.unzip()
+}
+
+#[test]
+fn after_a_start_truths_tell_where_a_slow_filter_is_and_the_deviation_says_how_well() {
+    let mut model = identified(Duration::from_ns(1_000_000_000));
+    model.model.a = Vec::new();
+    model.model.inputs[0].f = vec![-0.999];
+    let (off, deviations) = from_far_off(&model, 400);
+    // The filter gives 100 times its input, or nothing of the kind: it is taken to be at rest until truths come.
+    assert!(off[0].abs() > 50.0 && deviations[0] > 50.0);
+    let square = |of: &[f64]| of.iter().map(|of| of * of).sum::<f64>() / of.len() as f64;
+    for from in [1, 10, 100] {
+        // Of as many truths, the mean is as unsure as this.
+        let unsure = deviations[from].powi(2) - 1.0;
+        let as_mean = 1.0 / from as f64;
+        assert!((unsure / as_mean - 1.0).abs() < 0.1, "{from}: {unsure}");
+    }
+    let mean = square(&off[100..]).sqrt();
+    assert!(mean < 0.2, "{mean}");
+    assert!(deviations.is_sorted_by(|a, b| a >= b), "{deviations:?}");
 }
 
 #[test]
@@ -168,8 +216,9 @@ fn of_truths_that_are_not_told_the_deviation_is_that_of_as_many_steps() {
         );
     };
     near(deviations_after(200, 3), [1.0, spread, spread]);
-    // After one truth, what was not foreseen before it counts in the first of them alone.
-    near(deviations_after(1, 3), [spread, spread, spread]);
+    // One truth tells of the next as much as their covariance says, and nothing of others.
+    let after_one = f64::sqrt(1.64 - 0.64 / 1.64);
+    near(deviations_after(1, 3), [after_one, spread, spread]);
 }
 
 #[test]
@@ -275,7 +324,7 @@ fn where_truths_are_missing_predictions_and_deviations_are_those_of_a_kalman_fil
 fn a_state_that_does_not_tell_how_unsure_a_gap_left_it_is_answered_with_that() {
     let model = identified(Duration::from_ns(1_000_000_000));
     let mut written = serde_json::to_value(Following::new(&model).snapshot()).unwrap();
-    assert_eq!(written["state"], "identified/3");
+    assert_eq!(written["state"], "identified/4");
     let mut learner = Following::new(&model);
     let read = serde_json::from_value(written.clone()).unwrap();
     assert_eq!(learner.restore(read), Restored::Accepted);
@@ -286,4 +335,36 @@ fn a_state_that_does_not_tell_how_unsure_a_gap_left_it_is_answered_with_that() {
         learner.restore(read),
         Restored::cold("it was kept without how unsure a gap had left it")
     );
+}
+
+#[test]
+fn a_state_that_does_not_tell_how_unsure_filters_are_is_read_where_there_are_none() {
+    let step = Duration::from_ns(1_000_000_000);
+    let mut of = identified(step);
+    of.model.c = vec![0.5];
+    let restored = |of: &Identified, spoil: &dyn Fn(&mut serde_json::Value)| {
+        let mut before = Following::new(of);
+        before.run(&[1.0], Instant::from_ns(0), Instant::from_ns(0) - step);
+        before.learn(&[1.0], 3.0, Instant::from_ns(0));
+        let mut written = serde_json::to_value(before.snapshot()).unwrap();
+        written["state"] = "identified/3".into();
+        spoil(&mut written);
+        let mut after = Following::new(of);
+        let restored = after.restore(serde_json::from_value(written).unwrap());
+        let next = Instant::from_ns(0) + step;
+        let same = after.predict(&[1.0], next).to_bits() == before.predict(&[1.0], next).to_bits();
+        (restored, same)
+    };
+    let from = "identified/3".to_owned();
+    assert_eq!(restored(&of, &|_| {}), (Restored::Migrated { from }, true));
+    of.model.a = Vec::new();
+    of.model.inputs[0].f = vec![-0.5];
+    let cold = Restored::cold("it was kept without how unsure a start had left its filters");
+    // It was of innovations alone, and nothing where these were known.
+    for doubt in [&[0.5][..], &[]] {
+        let found = restored(&of, &|written| {
+            written["series"][0]["stepper"]["doubt"] = doubt.into();
+        });
+        assert_eq!(found.0, cold, "{doubt:?}");
+    }
 }
