@@ -12,9 +12,8 @@ use crate::order::Order;
 ///
 /// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + C(q)/D(q) e` (Box and Jenkins 1970; Ljung 1999, section 4.2). The sum of
 /// squared one-step prediction errors is made least by damped Gauss–Newton steps, starting where Steiglitz and McBride
-/// (1965) end for the features and Hannan and Rissanen (1982) for the noise; where several features have filters, one of
-/// them of more than one pole, from other starts too, among them the best model with shorter filters, and the best end is
-/// kept. Roots of each `F`, `C` and `D` stay inside the unit circle.
+/// (1965) end for the features and Hannan and Rissanen (1982) for the noise; where a filter has more than one pole, from
+/// other starts too, among them the best models with fewer coefficients, and the best end is kept. Roots of each `F`, `C` and `D` stay inside the unit circle.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
 /// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a

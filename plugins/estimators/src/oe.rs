@@ -12,9 +12,8 @@ use crate::order::Order;
 ///
 /// `y = μ + Σ B_i(q)/F_i(q) u_i(t − nk) + e` (Dugard and Landau 1980; Ljung 1999, section 4.2). The sum of squared errors
 /// of the simulated output is made least by damped Gauss–Newton steps with exact derivatives, starting where Steiglitz
-/// and McBride (1965) end; where several features have filters, one of them of more than one pole, from other starts too,
-/// among them the best model with shorter filters, and the best end is kept. Roots of each `F` stay inside the unit
-/// circle. Once it is known where the filters are, truths are not read: it is as good in a free run as beside a machine.
+/// and McBride (1965) end; where a filter has more than one pole, from other starts too, among them the best models with
+/// fewer coefficients, and the best end is kept. Roots of each `F` stay inside the unit circle. Once it is known where the filters are, truths are not read: it is as good in a free run as beside a machine.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the span
 /// of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins a

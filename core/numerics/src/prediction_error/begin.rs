@@ -32,21 +32,30 @@ struct Led {
 }
 
 impl PredictionError {
-    /// Where the search of a model of these orders begins.
+    /// Where the search of a model of these orders begins, which contains those that are known.
     pub(super) fn begun(
         &self,
         orders: &Orders,
         samples: &Samples,
         first: usize,
         radius: f64,
+        known: &[Polynomials],
     ) -> Result<Begun, NumericsError> {
-        let several = has_several_ends(orders);
+        let several = !known.is_empty() || shorter(orders, samples).is_some();
         let most = if several { usize::MAX } else { 1 };
+        let mut known = known.to_vec();
+        if several && known.is_empty() {
+            let fewer = [shorter(orders, samples), with_fewer_values(orders)];
+            let contained = fewer.into_iter().flatten();
+            known.extend(
+                contained.filter_map(|fewer| self.contained(&fewer, samples, first, radius, most)),
+            );
+        }
         let Led {
             models,
             counted,
             mut steps,
-        } = self.led(orders, samples, first, radius, most)?;
+        } = self.led(orders, samples, first, radius, most, &known)?;
         let start = if several {
             let (mut ends, more) = self.ends(models, samples, &counted, radius, most)?;
             steps += more;
@@ -62,7 +71,8 @@ impl PredictionError {
         })
     }
 
-    /// The models to begin with, of which at most so many are searched roughly where it takes that to know what starts count.
+    /// The models to begin with, of which at most so many are searched roughly where it takes that to know what starts count: among
+    /// them those that are known or, where none is, the best of those with a coefficient less.
     fn led(
         &self,
         orders: &Orders,
@@ -70,10 +80,14 @@ impl PredictionError {
         first: usize,
         radius: f64,
         most: usize,
+        known: &[Polynomials],
     ) -> Result<Led, NumericsError> {
         let mut models = initial::starts(orders, samples, self.penalty, radius)?;
-        if most > 1 {
-            models.extend(self.with_shorter_filters(orders, samples, first, radius, most));
+        models.extend(known.iter().filter_map(|model| model.padded(orders)));
+        if most > 1 && known.is_empty() {
+            let contained = shorter(orders, samples)
+                .and_then(|fewer| self.contained(&fewer, samples, first, radius, most));
+            models.extend(contained.and_then(|model| model.padded(orders)));
         }
         if orders.starts() > 0 && self.start_spread.is_finite() {
             let counted = self.counted(orders, first);
@@ -94,8 +108,8 @@ impl PredictionError {
         }
     }
 
-    /// The best model whose longest filters have a coefficient less, which is 0: no search that begins there errs more.
-    fn with_shorter_filters(
+    /// The best model of these orders, which others contain: no search errs more that begins with it.
+    fn contained(
         &self,
         orders: &Orders,
         samples: &Samples,
@@ -103,21 +117,9 @@ impl PredictionError {
         radius: f64,
         most: usize,
     ) -> Option<Polynomials> {
-        let longest = longest_filter(orders);
-        if longest < 2 {
-            return None;
-        }
-        let mut shorter = orders.clone();
-        for input in &mut shorter.inputs {
-            input.nf = input.nf.min(longest - 1);
-        }
-        let led = self.led(&shorter, samples, first, radius, most).ok()?;
+        let led = self.led(orders, samples, first, radius, most, &[]).ok()?;
         let ends = self.ends(led.models, samples, &led.counted, radius, most);
-        let mut model = ends.ok()?.0.swap_remove(0).model;
-        for (transfer, input) in model.inputs.iter_mut().zip(&orders.inputs) {
-            transfer.f.resize(input.nf, 0.0);
-        }
-        Some(model)
+        Some(ends.ok()?.0.swap_remove(0).model)
     }
 
     /// What starts count where something is known of them: pieces begin anywhere, so that each filter is as far from rest there as
@@ -194,11 +196,31 @@ impl PredictionError {
     }
 }
 
-/// Whether the least error is looked for from several starts: what one of several filters lacks another takes over, from where
-/// no small step leads on. Of filters with one pole each that has not been seen.
-fn has_several_ends(orders: &Orders) -> bool {
-    let filters = orders.inputs.iter().filter(|input| input.nf > 0);
-    filters.count() > 1 && longest_filter(orders) > 1
+/// The orders with a coefficient less from whose best model a search begins too, since none of its other starts may be near the
+/// least error: of filters with more than one pole, where poles that stand in for each other hold a search that begins with only
+/// some of them right, and of noise that is told from values of which some are missing.
+fn shorter(orders: &Orders, samples: &Samples) -> Option<Orders> {
+    let mut shorter = orders.clone();
+    let longest = longest_filter(orders);
+    if longest > 1 {
+        for input in &mut shorter.inputs {
+            input.nf = input.nf.min(longest - 1);
+        }
+    } else if orders.nc > 1 && samples.missing() > 0 {
+        shorter.nc -= 1;
+    } else {
+        return None;
+    }
+    Some(shorter)
+}
+
+/// The orders with a value less of each input that has several; none where no input has.
+fn with_fewer_values(orders: &Orders) -> Option<Orders> {
+    let mut fewer = orders.clone();
+    for input in &mut fewer.inputs {
+        input.nb -= usize::from(input.nb > 1);
+    }
+    (fewer != *orders).then_some(fewer)
 }
 
 fn longest_filter(orders: &Orders) -> usize {
@@ -243,6 +265,80 @@ mod tests {
             samples.push([inputs[0][sample], inputs[1][sample]], value);
         }
         samples.divided(samples.spread())
+    }
+
+    #[test]
+    fn one_filter_with_more_poles_errs_no_more_than_with_fewer() {
+        let search = PredictionError {
+            start_spread: std::f64::consts::SQRT_2,
+            ..PredictionError::default()
+        };
+        for seed in 0..6 {
+            let mut draw = normal(seed);
+            let mut white = |size: f64| -> Vec<f64> { (0..600).map(|_| size * draw()).collect() };
+            let (input, noise) = (through(&[-0.9], &white(1.0), 0.0).0, white(0.2));
+            let poles = [0.97, 0.8, 0.6].iter();
+            let brought = poles.fold(input.clone(), |of, pole| through(&[-pole], &of, 0.0).0);
+            let mut samples = Samples::new(1);
+            for sample in 1..600 {
+                samples.push([input[sample - 1]], 0.01 * brought[sample] + noise[sample]);
+            }
+            let samples = samples.divided(samples.spread());
+            let orders = |nb: usize, nf: usize| Orders {
+                inputs: vec![InputOrders { nb, nf, nk: 0 }],
+                ..Orders::default()
+            };
+            let errs = |(nb, nf)| search.fit(&orders(nb, nf), &samples, 2).unwrap();
+            let all = [(1, 1), (1, 2), (2, 2), (1, 3), (2, 3)];
+            let fits = all.map(|of| errs(of).residual_sum_of_squares);
+            for (of, found) in all.iter().zip(fits) {
+                for (other, contained) in all.iter().zip(fits) {
+                    let contains = other.0 <= of.0 && other.1 <= of.1;
+                    assert!(
+                        !contains || found <= 1.01 * contained,
+                        "{seed}: {of:?} {found}, {other:?} {contained}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn where_values_are_missing_noise_with_a_longer_memory_begins_with_a_shorter_one() {
+        let mut samples = Samples::new(0);
+        (0..9).for_each(|_| samples.push([], 1.0));
+        let noise = |nc: usize| Orders {
+            nc,
+            ..Orders::default()
+        };
+        assert_eq!(shorter(&noise(3), &samples), None);
+        samples.push_missing([]);
+        assert_eq!(shorter(&noise(3), &samples), Some(noise(2)));
+        assert_eq!(shorter(&noise(1), &samples), None);
+    }
+
+    #[test]
+    fn a_search_begins_with_the_best_that_is_known_and_passes_over_what_it_does_not_contain() {
+        let samples = two_filters(300, 1);
+        let orders = |nf: [usize; 2]| Orders {
+            inputs: nf.map(|nf| InputOrders { nb: 2, nf, nk: 0 }).to_vec(),
+            ..Orders::default()
+        };
+        let found = PredictionError::default()
+            .fit(&orders([1, 1]), &samples, 2)
+            .unwrap();
+        let no_steps = PredictionError {
+            most_steps: 0,
+            ..PredictionError::default()
+        };
+        let errs = |nf: [usize; 2], known: &[Polynomials]| {
+            let fit = no_steps.fit_beside(&orders(nf), &samples, 2, known);
+            fit.unwrap().residual_sum_of_squares
+        };
+        let model = std::slice::from_ref(&found.model);
+        let least = found.residual_sum_of_squares * (1.0 + 1e-9);
+        assert!(errs([1, 2], model) <= least && errs([1, 1], &[]) > least);
+        assert!(errs([1, 0], model) > least);
     }
 
     #[test]

@@ -44,6 +44,20 @@ impl Orders {
         self.differences == 0
     }
 
+    /// Whether each model of other orders is one of these too, with coefficients that are 0.
+    #[must_use]
+    pub fn contains(&self, other: &Self) -> bool {
+        let of_input = |(own, other): (&InputOrders, &InputOrders)| {
+            own.nk == other.nk && other.nb <= own.nb && other.nf <= own.nf
+        };
+        self.differences == other.differences
+            && self.inputs.len() == other.inputs.len()
+            && self.inputs.iter().zip(&other.inputs).all(of_input)
+            && other.na <= self.na
+            && other.nc <= self.nc
+            && other.nd <= self.nd
+    }
+
     /// The first sample of a segment whose residual has all that it needs.
     #[must_use]
     pub fn first(&self) -> usize {
@@ -129,6 +143,42 @@ impl Polynomials {
             d: vec![0.0; orders.nd],
             differences: orders.differences,
             level: 0.0,
+        }
+    }
+
+    /// The same model of these orders, with coefficients that are 0; none where they do not [contain](Orders::contains) it.
+    pub(super) fn padded(&self, orders: &Orders) -> Option<Self> {
+        let mut padded = Self {
+            level: self.level,
+            ..Self::zero(orders)
+        };
+        let put = |to: &mut Vec<f64>, from: &[f64]| {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        };
+        for (to, from) in padded.inputs.iter_mut().zip(&self.inputs) {
+            put(&mut to.b, &from.b);
+            put(&mut to.f, &from.f);
+        }
+        put(&mut padded.a, &self.a);
+        put(&mut padded.c, &self.c);
+        put(&mut padded.d, &self.d);
+        orders.contains(&self.orders()).then_some(padded)
+    }
+
+    /// How many coefficients each polynomial has.
+    #[must_use]
+    pub fn orders(&self) -> Orders {
+        let inputs = self.inputs.iter().map(|input| InputOrders {
+            nb: input.b.len(),
+            nk: input.delay,
+            nf: input.f.len(),
+        });
+        Orders {
+            na: self.a.len(),
+            inputs: inputs.collect(),
+            nc: self.c.len(),
+            nd: self.d.len(),
+            differences: self.differences,
         }
     }
 

@@ -26,8 +26,9 @@ const POLISHING: usize = 4;
 
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B` and on how far from rest
 /// filters begin, by damped Gauss–Newton
-/// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models. Where filters of several inputs could
-/// stand in for each other, it is searched from all starts, among them the best model of shorter filters, and the best end is kept.
+/// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models. Where a filter has more than one pole, or
+/// values are missing and the noise has a longer memory, it is searched from all starts, among them the best model with a
+/// coefficient less, and the best end is kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictionError {
     /// What is added to the sum: so many times the squares of the coefficients of `B`.
@@ -117,6 +118,20 @@ impl PredictionError {
         samples: &Samples,
         first: usize,
     ) -> Result<PredictionErrorFit, NumericsError> {
+        self.fit_beside(orders, samples, first, &[])
+    }
+
+    /// The same where models that this one contains are known, which it then errs no more than. Others among them are passed over.
+    ///
+    /// # Errors
+    /// As [`fit`](Self::fit).
+    pub fn fit_beside(
+        &self,
+        orders: &Orders,
+        samples: &Samples,
+        first: usize,
+        known: &[Polynomials],
+    ) -> Result<PredictionErrorFit, NumericsError> {
         check_penalty(self.penalty)?;
         let spread = self.start_spread;
         check_parameter("start_spread", spread, spread > 0.0, "above 0")?;
@@ -147,7 +162,7 @@ impl PredictionError {
             counted,
             start,
             steps: before,
-        } = self.begun(orders, samples, first, radius)?;
+        } = self.begun(orders, samples, first, radius, known)?;
         let (found, steps, converged) = self.search(start, samples, &counted, radius, TOLERANCE);
         let Judged { model, left, .. } = self.polished(found, samples, &counted, radius);
         Ok(PredictionErrorFit {

@@ -308,13 +308,21 @@ impl Asked {
         let mut tried = Vec::new();
         let mut fits = Vec::new();
         let mut failed = None;
-        // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
-        for (candidate, orders) in candidates {
+        // Those that others contain come before them, as a start.
+        let mut in_order: Vec<usize> = (0..candidates.len()).collect();
+        in_order.sort_by_key(|&nth| candidates[nth].1.coefficients());
+        let mut found: Vec<Option<Result<PredictionErrorFit, NumericsError>>> =
+            candidates.iter().map(|_| None).collect();
+        for nth in in_order {
+            let orders = &candidates[nth].1;
+            let known = best_contained(orders, &candidates, &found);
+            // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
+            let search = self.search(orders, 0.0, measured);
+            found[nth] = Some(search.fit_beside(orders, samples, first, &known));
+        }
+        for ((candidate, orders), fit) in candidates.into_iter().zip(found.into_iter().flatten()) {
             let coefficients = orders.coefficients();
-            match self
-                .search(&orders, 0.0, measured)
-                .fit(&orders, samples, first)
-            {
+            match fit {
                 Ok(fit) => {
                     let squares = fit.residual_sum_of_squares * spread * spread;
                     tried.push(Tried {
@@ -376,6 +384,28 @@ impl Asked {
         let differences = told.then_some(("differences", differences));
         order.letters(orders).chain(differences).collect()
     }
+}
+
+/// Of how many models that another contains the search for it begins too.
+const MOST_CONTAINED: usize = 2;
+
+/// The best of those fits whose models a model of these orders contains.
+fn best_contained(
+    orders: &Orders,
+    candidates: &[([usize; 6], Orders)],
+    found: &[Option<Result<PredictionErrorFit, NumericsError>>],
+) -> Vec<Polynomials> {
+    let fits = candidates.iter().zip(found);
+    let contained = fits.filter(|((_, other), _)| orders.contains(other));
+    let mut fits: Vec<&PredictionErrorFit> = contained
+        .filter_map(|(_, fit)| fit.as_ref()?.as_ref().ok())
+        .collect();
+    fits.sort_by(|a, b| {
+        a.residual_sum_of_squares
+            .total_cmp(&b.residual_sum_of_squares)
+    });
+    let best = fits.into_iter().take(MOST_CONTAINED);
+    best.map(|fit| fit.model.clone()).collect()
 }
 
 /// The largest standard deviation, about rest, of what all filters give where a piece begins, in spreads of the truth, which the
