@@ -10,6 +10,8 @@ const RENEWALS: usize = 20;
 
 /// Where poles are looked for beside.
 const POLES: [f64; 6] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.995];
+/// The same where values are missing, which may come much less often than samples.
+const SLOW_POLES: [f64; 3] = [0.998, 0.999, 0.9995];
 
 /// Models to start from; the best of them is taken.
 pub(super) fn starts(
@@ -45,7 +47,18 @@ pub(super) fn starts(
             found.into_iter().flatten().collect()
         }
     } else {
-        vec![regression(&direct, &differenced, penalty, 0)?]
+        let mut sparse = Vec::new();
+        if samples.missing() > 0 && orders.na > 0 && orders.differences == 0 {
+            let poles = POLES.iter().chain(&SLOW_POLES);
+            let found = poles.map(|&pole| from_known(orders, samples, penalty, pole));
+            sparse.extend(found.filter_map(Result::ok).map(whole));
+        }
+        match regression(&direct, &differenced, penalty, 0) {
+            Ok(found) => vec![found],
+            // Values are too far apart for it.
+            Err(_) if !sparse.is_empty() => return Ok(sparse),
+            Err(error) => return Err(error),
+        }
     };
     let mut starts = Vec::new();
     for plant in plants {
@@ -353,6 +366,45 @@ fn one_pole(
     Ok(model)
 }
 
+/// Least squares of the values that are known on inputs that have gone through `1/A` with one pole, which is given, whatever is
+/// missing between them.
+fn from_known(
+    orders: &Orders,
+    samples: &Samples,
+    penalty: f64,
+    pole: f64,
+) -> Result<Polynomials, NumericsError> {
+    let mut rows = Rows::new(0);
+    for segment in samples.segments().filter(|segment| !segment.is_empty()) {
+        let inputs: Vec<Vec<f64>> = (0..samples.width())
+            .map(|nth| {
+                let input = samples.input(segment.clone(), nth);
+                through(&[-pole], &input, input[0]).0
+            })
+            .collect();
+        for (sample, &value) in samples.values(segment).iter().enumerate() {
+            let of_inputs = orders.inputs.iter().zip(&inputs).flat_map(|(of, values)| {
+                let before = values[0];
+                (0..of.nb).map(move |j| Past { values, before }.at(sample, of.nk + j))
+            });
+            if !value.is_nan() {
+                rows.push(of_inputs, value);
+            }
+        }
+    }
+    let (found, level) = rows.solve(penalty)?;
+    let mut found = found.into_iter();
+    let mut model = Polynomials {
+        level,
+        ..Polynomials::zero(orders)
+    };
+    for b in model.inputs.iter_mut().flat_map(|input| &mut input.b) {
+        *b = found.next().unwrap_or(0.0);
+    }
+    model.a[0] = -pole;
+    Ok(model)
+}
+
 /// The transfer function with fewer coefficients in `F` whose answer to an impulse is nearest, as Steiglitz and McBride find it.
 fn nearest(transfer: &Transfer, nf: usize) -> Transfer {
     let own = Orders {
@@ -425,5 +477,52 @@ impl Rows {
         let scales = Standardization::of(&gram).scales;
         let fit = LeastSquares::ridge(penalty).solve(&gram, &columns, &scales, None)?;
         Ok((fit.coefficients, fit.intercept))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draws::uniform;
+    use crate::{InputOrders, PredictionError};
+
+    #[test]
+    fn values_that_are_far_apart_tell_what_happens_in_each_step_between_them() {
+        let (mut samples, mut u, mut value) = (Samples::new(1), uniform(3), 0.0);
+        for sample in 0..15_000 {
+            let input = u();
+            value = 0.97 * value + input + 0.1 * u();
+            if sample % 30 == 0 {
+                samples.push([input], value);
+            } else {
+                samples.push_missing([input]);
+            }
+        }
+        let orders = |na| Orders {
+            na,
+            inputs: vec![InputOrders {
+                nb: 1,
+                nf: 0,
+                nk: 0,
+            }],
+            ..Orders::default()
+        };
+        let search = PredictionError::default();
+        let fit = search.fit(&orders(1), &samples, 0).unwrap();
+        assert!((fit.model.a[0] + 0.97).abs() < 0.002, "{:?}", fit.model);
+        assert!(
+            (fit.model.inputs[0].b[0] - 1.0).abs() < 0.02,
+            "{:?}",
+            fit.model
+        );
+        // Of two in a row none is known.
+        let few = search.fit(&orders(2), &samples, 0).unwrap_err();
+        assert_eq!(
+            few,
+            NumericsError::TooFewRows {
+                needed: 6,
+                found: 0
+            }
+        );
     }
 }
