@@ -31,7 +31,8 @@ pub(super) fn text(told: &[Told], unfitted: &[String]) -> String {
         let mut found = told.iter().filter_map(|of| of.found.as_ref());
         if found.any(is_bounded) {
             text.push_str(
-                "polynomials without one are held by the bound of stability, where none is known\n",
+                "polynomials without one are held by the bound of stability, or the rows hardly\n\
+                 tell them: none is known\n",
             );
         }
     } else if told.is_empty() && unfitted.is_empty() {
