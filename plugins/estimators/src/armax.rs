@@ -15,17 +15,20 @@ use crate::order::Order;
 /// roots of `A` and `C` stay inside the unit circle.
 ///
 /// A sample is what the run at `t` saw and the truth at `t + ahead`. Samples are a step apart: `every`, by default the
-/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each begins
-/// a series of its own, which are fitted together and followed side by side. The time between two truths of a series
-/// counts as so many steps, rounded; what those that are missing were is told from the truths that follow too, as in a
-/// Kalman filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and predicts as
-/// many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its limits, the model
-/// is followed through them in the same way: errors count in their variance, as the likelihood has it. A segment begins
-/// with its first truth, as if that and the features had always been what they are, and so does, in the fit too, what
-/// comes after more steps without features than ten, or than the model reaches back where that is more; with
-/// `learn = false` it stays at rest. The port `deviation` is the standard deviation of the truth about its prediction, larger
-/// after truths that are missing. Features that are missing are taken for the last ones, and what that adds to the error
-/// is not in it. Since the answer changes with time alone, the node runs at every tick.
+/// span of the truth, since truths whose windows overlap share their noise; where several come within a step, each
+/// begins a series of its own, which are fitted together and followed side by side. The time between two truths of a
+/// series counts as so many steps, rounded; what those that are missing were is told from the truths that follow too,
+/// as in a Kalman filter of the model (Jones 1980). Running, it is told each truth that the embargo lets through and
+/// predicts as many steps ahead of the newest as there are. Where truths are missing in the fit, or outside of its
+/// limits, the model is followed through them in the same way: errors count in their variance, as the likelihood has
+/// it, from where as many truths a step apart are known as the model looks back on. Where truths regularly come less
+/// often than that, `every` must be as long as they are apart. A segment begins with its first truth, as if that and
+/// the features had always been what they are, and so does, in the fit too, what comes after more steps without
+/// features than ten, or than the model reaches back where that is more; with `learn = false` it stays at rest. The
+/// port `deviation` is the standard deviation of the truth about its prediction, larger after truths that are missing.
+/// Features that are missing are taken for the last ones, and what that adds to the error is not in it. Where rows tell
+/// the level less well than one of them does by itself, it is taken to be their mean, which is told. Since the answer
+/// changes with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Armax {

@@ -23,17 +23,19 @@ use crate::order::Order;
 /// steps ahead of the newest as there are.
 ///
 /// Where truths are missing in the fit, or outside of its limits, the model is followed through them in the same way:
-/// errors count in their variance, as the likelihood has it. After more steps without features than ten, or than the
-/// model reaches back where that is more, as in each segment, the filters start again: what those of the features gave
-/// before is found for each such piece beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it,
-/// and counts as found in criteria and errors; the noise begins without a past. Running, a segment begins with its first
-/// truth, as if that and the features had always been what they are; what they do not explain of it the filters and the
-/// noise share by how much each varies. The truths that follow tell the better what is the one and what the other, as in a
-/// Kalman filter of the model (Harvey 1989, section 3.2), until the filters go by the features alone. So does what comes
-/// after as many steps without features; with `learn = false` it stays at rest. The port `deviation` is the standard
-/// deviation of the truth about its prediction, larger after truths that are missing and until it is known where the
-/// filters are. Features that are missing are taken for the last ones; what that adds to the error is not in it. Since the
-/// answer changes with time alone, the node runs at every tick.
+/// errors count in their variance, as the likelihood has it, from where as many truths a step apart are known as the
+/// noise looks back on. After more steps without features than ten, or than the model reaches back where that is more,
+/// as in each segment, the filters start again: what those of the features gave before is found for each such piece
+/// beside the coefficients (Ljung 1999, section 10.5), as far as its samples tell it, and counts as found in criteria
+/// and errors; the noise begins without a past. Running, a segment begins with its first truth, as if that and the
+/// features had always been what they are; what they do not explain of it the filters and the noise share by how much
+/// each varies. The truths that follow tell the better what is the one and what the other, as in a Kalman filter of the
+/// model (Harvey 1989, section 3.2), until the filters go by the features alone. So does what comes after as many steps
+/// without features; with `learn = false` it stays at rest. The port `deviation` is the standard deviation of the truth
+/// about its prediction, larger after truths that are missing and until it is known where the filters are. Features
+/// that are missing are taken for the last ones; what that adds to the error is not in it. Where rows tell the level
+/// less well than one of them does by itself, it is taken to be their mean, which is told. Since the answer changes
+/// with time alone, the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bj {

@@ -332,6 +332,7 @@ impl Identify for StateSpace {
         let left = rows.saturating_sub(coefficients).max(1);
         Ok(Found {
             beginnings: Vec::new(),
+            mean_level: false,
             squared_errors: squares * scale * scale,
             rows,
             variance: squares * scale * scale / left as f64,

@@ -89,6 +89,9 @@ impl PredictionError {
                 .and_then(|fewer| self.contained(&fewer, samples, first, radius, most));
             models.extend(contained.and_then(|model| model.padded(orders)));
         }
+        if let (Some(level), 0) = (self.level, orders.differences) {
+            models.iter_mut().for_each(|model| model.level = level);
+        }
         if orders.starts() > 0 && self.start_spread.is_finite() {
             let counted = self.counted(orders, first);
             return self.roughly(models, samples, &counted, radius, most);

@@ -17,7 +17,8 @@ impl PredictionError {
     /// penalty those of the posterior, as in ridge. Where values are missing, what variances of predictions tell is in it.
     ///
     /// A polynomial that only the bound of stability holds where it is has none, and its list is empty: the theory is that of a
-    /// minimum, which there lies outside. Those of the others are told as if it were known. None at all where the samples do
+    /// minimum, which there lies outside. So it is where samples hardly tell it. Those of the others are told as if it were known, and
+    /// a level that was given has NaN. None at all where the samples do
     /// not determine all coefficients.
     #[must_use]
     pub fn standard_errors(
@@ -32,7 +33,8 @@ impl PredictionError {
         };
         let at = self.judged(fit.model.clone(), samples, &counted);
         let (hessian, gradient) = self.normal_equations(&at, samples, &counted);
-        let held = held(&fit.model, &hessian, &gradient, remembered(samples))?;
+        let given = self.given(&fit.model);
+        let held = held(&fit.model, &hessian, &gradient, remembered(samples), given)?;
         let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
         let scale = |i: usize| hessian[(free[i], free[i])].sqrt();
         let scaled = Mat::from_fn(free.len(), free.len(), |i, j| {
@@ -50,14 +52,15 @@ impl PredictionError {
 }
 
 /// Which coefficients, in the order of [`flat`](Polynomials::flat), are of a polynomial that would be better outside of the
-/// bound of stability.
+/// bound of stability, or that the samples tell so little of that it could as well be there; and those whose damping is beyond all
+/// bounds from the beginning.
 pub(super) fn held(
     model: &Polynomials,
     hessian: &Mat<f64>,
     gradient: &[f64],
     radius: f64,
+    mut damping: Vec<f64>,
 ) -> Option<Vec<bool>> {
-    let mut damping = vec![0.0; gradient.len()];
     loop {
         let change = descend(hessian, gradient, &damping)?;
         let share: Vec<f64> = change.iter().map(|by| SHARE * by).collect();

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::Orders;
-use crate::{Record, Standardizer};
+use crate::{Record, Standardization, Standardizer};
 
 /// Gaps of more samples are not filled to find where a search begins.
 const LONGEST_FILLED: usize = 5;
@@ -75,10 +75,20 @@ impl Samples {
     /// The standard deviation of the values; 1 where they are all the same.
     #[must_use]
     pub fn spread(&self) -> f64 {
+        self.standardization().scales[0]
+    }
+
+    /// The mean of the values.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.standardization().means[0]
+    }
+
+    fn standardization(&self) -> Standardization {
         let mut values = Standardizer::new(1);
         let known = self.records().flat_map(|record| record.outputs);
         known.for_each(|&value| values.partial_fit(&[value]));
-        values.standardization().scales[0]
+        values.standardization()
     }
 
     /// The same with values that are so many times smaller.

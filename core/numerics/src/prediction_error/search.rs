@@ -42,6 +42,8 @@ pub struct PredictionError {
     /// Of a segment of which values are missing nothing is counted before so many of them in a row are known, or as many as the
     /// model needs, whichever are more: models of several orders that are to be compared need the same.
     pub measured: usize,
+    /// The level, where it is not looked for but given.
+    pub level: Option<f64>,
 }
 
 impl Default for PredictionError {
@@ -51,6 +53,7 @@ impl Default for PredictionError {
             most_steps: 100,
             start_spread: f64::INFINITY,
             measured: 0,
+            level: None,
         }
     }
 }
@@ -181,6 +184,15 @@ impl PredictionError {
         })
     }
 
+    /// The damping, in the order of [`flat`](Polynomials::flat), of a search that takes what is given for given.
+    pub(super) fn given(&self, model: &Polynomials) -> Vec<f64> {
+        let mut damping = vec![0.0; model.flat().len()];
+        if let (Some(_), Some(level), 0) = (self.level, damping.first_mut(), model.differences) {
+            *level = f64::INFINITY;
+        }
+        damping
+    }
+
     pub(super) fn judged(
         &self,
         model: Polynomials,
@@ -206,7 +218,8 @@ impl PredictionError {
         tolerance: f64,
     ) -> (Judged, usize, bool) {
         let mut at = start;
-        let mut damping = vec![1e-3; at.model.flat().len()];
+        let given = self.given(&at.model).into_iter();
+        let mut damping: Vec<f64> = given.map(|of| of.max(1e-3)).collect();
         let mut gained = f64::INFINITY;
         for step in 0..self.most_steps {
             let (hessian, gradient) = self.normal_equations(&at, samples, counted);
@@ -257,7 +270,8 @@ impl PredictionError {
         let most = at.sum * (1.0 + SAME);
         for _ in 0..POLISHING {
             let (mut hessian, mut gradient) = self.normal_equations(&at, samples, counted);
-            let Some(held) = held(&at.model, &hessian, &gradient, radius) else {
+            let given = self.given(&at.model);
+            let Some(held) = held(&at.model, &hessian, &gradient, radius, given) else {
                 break;
             };
             let mut from = at.model.clone();
@@ -447,5 +461,33 @@ mod tests {
         };
         assert_eq!(fit(f64::INFINITY), Err(few));
         assert!(fit(1.0).unwrap().variance().is_finite());
+    }
+
+    #[test]
+    fn a_level_that_is_given_is_kept_and_has_no_standard_error() {
+        let (mut samples, mut u, mut value) = (Samples::new(0), uniform(3), 0.0);
+        for _ in 0..400 {
+            value = 0.8 * value + u();
+            samples.push([], 2.0 + value);
+        }
+        let orders = Orders {
+            na: 1,
+            nc: 1,
+            ..Orders::default()
+        };
+        let search = |level| PredictionError {
+            level,
+            ..PredictionError::default()
+        };
+        let free = search(None).fit(&orders, &samples, 0).unwrap();
+        for (level, most) in [(free.model.level, 1.0 + 1e-9), (3.0, 1.2)] {
+            let given = search(Some(level));
+            let fit = given.fit(&orders, &samples, 0).unwrap();
+            assert_eq!(fit.model.level, level);
+            let more = fit.residual_sum_of_squares / free.residual_sum_of_squares;
+            assert!((1.0 - 1e-9..most).contains(&more), "{level}: {more}");
+            let errors = given.standard_errors(&fit, &samples).unwrap();
+            assert!(errors.level.is_nan() && errors.a[0] > 0.0, "{errors:?}");
+        }
     }
 }

@@ -41,6 +41,9 @@ pub(super) struct Identified {
     /// The standard error of each coefficient, in its place; of a polynomial that has none, an empty list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) errors: Option<Polynomials>,
+    /// Whether the level is the mean of the rows of the fit, which do not tell it, so that it has no standard error.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) mean_level: bool,
     pub(super) step: Duration,
     /// How many truths come within a step.
     pub(super) series: usize,

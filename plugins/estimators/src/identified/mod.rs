@@ -1,5 +1,6 @@
 //! What the kinds share that are identified by the prediction error: their orders, and how they are told of mistakes.
 
+mod choose;
 mod follow;
 mod per_input;
 mod rehearse;

@@ -40,7 +40,7 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
         let at_rest = of.predict(&vec![0.0; of.regressors.len()]);
         let error = match &of.errors {
             // Where there are inputs, it is of another constant: that at their means.
-            Some(errors) if of.regressors.is_empty() => errors.level,
+            Some(errors) if of.regressors.is_empty() && !of.mean_level => errors.level,
             _ => f64::NAN,
         };
         told.terms

@@ -1,27 +1,22 @@
-//! Decides how rows become the evenly spaced samples that a model is identified from, and which of its orders is taken.
+//! Decides how rows become the evenly spaced samples that a model is identified from, and what is told of the fit; not which
+//! orders it has.
 
 use athermal_core::diagnostic::{count, digits};
 use athermal_core::node::{Trained, Trainer, TrainingError, TrainingReport, TrainingSetup};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{
-    Beginning, InformationCriteria, NumericsError, Orders, Polynomials, PredictionError,
-    PredictionErrorFit, Samples, Standardizer,
+    Beginning, Polynomials, PredictionError, PredictionErrorFit, Samples, Standardizer,
 };
 
+use super::Asked;
 use super::follow::{Identified, UNSEEN, steps};
 use super::rehearse::{self, Reach};
 use super::rows::{Bridges, Pace, Rows};
-use super::{Asked, Differences};
 use crate::conditioning::tell_rows;
-use crate::order::{Order, Tried};
-use crate::regression::told;
 use crate::scaling::Scaling;
 
 /// How many steps ahead the variance of a prediction is known; beyond, it grows no more.
 const STEPS_AHEAD: usize = 256;
-
-/// Steps of the search times coefficients, of which many are never all settled.
-const MOST_WORK: usize = 1000;
 
 /// How many times as large as one step ahead an error of a run is about which there is something to tell.
 const WORTH_TELLING: f64 = 1.05;
@@ -63,6 +58,8 @@ pub(crate) struct Found {
     pub(crate) variance: f64,
     /// Where the filter of each input begins in a run; nothing where there is none.
     pub(crate) beginnings: Vec<Beginning>,
+    /// Whether its level is the mean of its rows, which do not tell it.
+    pub(crate) mean_level: bool,
 }
 
 /// Keeps all rows, which are gone through again and again.
@@ -178,6 +175,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             model: found.model,
             beginnings: found.beginnings,
             errors: found.errors,
+            mean_level: found.mean_level,
             step: pace.step,
             series: pace.series,
         };
@@ -242,11 +240,33 @@ impl Identify for Asked {
         let spread = samples.spread();
         let divided = samples.divided(spread);
         let mut fit = self.fit(&divided, spread, report)?;
-        let search = PredictionError {
+        let mut search = PredictionError {
             penalty: self.penalty,
             ..PredictionError::default()
         };
         let mut errors = search.standard_errors(&fit, &divided);
+        let mean = divided.mean();
+        let mut mean_level = false;
+        if !tell_level(&fit, errors.as_ref(), mean) {
+            search.level = Some(mean);
+            let orders = fit.model.orders();
+            let with_level = PredictionError {
+                level: search.level,
+                ..self.search(&orders, self.penalty, fit.measured)
+            };
+            if let Ok(found) = with_level.fit(&orders, &divided, fit.first) {
+                errors = search.standard_errors(&found, &divided);
+                (fit, mean_level) = (found, true);
+                report.notes.push(format!(
+                    "its rows do not tell the level that it returns to, which is taken to be their mean, {}",
+                    digits(spread * mean, 4)
+                ));
+            }
+        }
+        if let Some(errors) = errors.as_mut().filter(|_| mean_level) {
+            // None is known, and it is no number.
+            errors.level = 0.0;
+        }
         fit.model.rescale(spread);
         if let Some(errors) = &mut errors {
             errors.rescale(spread);
@@ -275,143 +295,24 @@ impl Identify for Asked {
             beginnings: fit.beginnings,
             model: fit.model,
             errors,
+            mean_level,
         })
     }
 }
 
-impl Asked {
-    fn fit(
-        &self,
-        samples: &Samples,
-        spread: f64,
-        report: &mut TrainingReport,
-    ) -> Result<PredictionErrorFit, TrainingError> {
-        // By default no order is open.
-        let order = self.order.unwrap_or_default();
-        let mut candidates = Vec::new();
-        for one in order.combinations(self.given()) {
-            let tried = self.differences.tried();
-            candidates.extend(tried.map(|differences| (one, self.orders(&one, differences))));
-        }
-        if let [(_, orders)] = &candidates[..]
-            && self.order.is_none()
-        {
-            return self
-                .search(orders, self.penalty, 0)
-                .fit(orders, samples, 0)
-                .map_err(|error| unfit(error, samples));
-        }
-        let firsts = candidates.iter().map(|(_, orders)| orders.first());
-        let first = firsts.max().unwrap_or(0);
-        let measured = candidates.iter().map(|(_, orders)| orders.measured());
-        let measured = measured.max().unwrap_or(0);
-        let mut tried = Vec::new();
-        let mut fits = Vec::new();
-        let mut failed = None;
-        // Those that others contain come before them, as a start.
-        let mut in_order: Vec<usize> = (0..candidates.len()).collect();
-        in_order.sort_by_key(|&nth| candidates[nth].1.coefficients());
-        let mut found: Vec<Option<Result<PredictionErrorFit, NumericsError>>> =
-            candidates.iter().map(|_| None).collect();
-        for nth in in_order {
-            let orders = &candidates[nth].1;
-            let known = best_contained(orders, &candidates, &found);
-            // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.
-            let search = self.search(orders, 0.0, measured);
-            found[nth] = Some(search.fit_beside(orders, samples, first, &known));
-        }
-        for ((candidate, orders), fit) in candidates.into_iter().zip(found.into_iter().flatten()) {
-            let coefficients = orders.coefficients();
-            match fit {
-                Ok(fit) => {
-                    let squares = fit.residual_sum_of_squares * spread * spread;
-                    tried.push(Tried {
-                        letters: self.letters(&order, &candidate, orders.differences),
-                        coefficients,
-                        starts: fit.starts,
-                        figures: InformationCriteria::of(
-                            fit.rows,
-                            coefficients + fit.starts,
-                            squares,
-                        ),
-                    });
-                    fits.push((fit, orders));
-                }
-                Err(error) => failed = Some(error),
-            }
-        }
-        let rows = samples.counted(first, measured);
-        let best = order.best(rows, tried, report).map_err(|too_few| {
-            let error = failed.unwrap_or(too_few);
-            unfit(error, samples)
-        })?;
-        let (fit, orders) = fits.swap_remove(best);
-        let penalised = self.penalty > 0.0 && !orders.inputs.is_empty();
-        let as_compared = samples.missing() == 0 || orders.measured() == measured;
-        if !penalised && orders.first() == first && as_compared {
-            return Ok(fit);
-        }
-        if penalised {
-            report.notes.push(
-                "orders are compared without the penalty, with which the chosen one is fitted"
-                    .to_owned(),
-            );
-        }
-        // On all rows that it has a past for, and not only on those on which it was compared.
-        let search = self.search(&orders, self.penalty, 0);
-        let fit = search.fit(&orders, samples, 0);
-        fit.map_err(|error| unfit(error, samples))
-    }
-
-    fn search(&self, orders: &Orders, penalty: f64, measured: usize) -> PredictionError {
-        let most = MOST_WORK / orders.coefficients().max(1);
-        PredictionError {
-            penalty,
-            most_steps: most.clamp(20, 100),
-            start_spread: START_SPREAD,
-            measured,
-        }
-    }
-
-    /// What is open of an order.
-    fn letters(
-        &self,
-        order: &Order,
-        orders: &[usize; 6],
-        differences: usize,
-    ) -> Vec<(&'static str, usize)> {
-        let told = matches!(self.differences, Differences::Told);
-        let differences = told.then_some(("differences", differences));
-        order.letters(orders).chain(differences).collect()
-    }
+/// Whether samples, in units of their spread, tell the level of a model better than one of them does by itself. Without standard
+/// errors it must be among them.
+fn tell_level(fit: &PredictionErrorFit, errors: Option<&Polynomials>, mean: f64) -> bool {
+    let unsure = match errors {
+        Some(errors) => errors.level,
+        None => (fit.model.level - mean).abs() / FAR,
+    };
+    // Written so that NaN fails.
+    fit.model.differences > 0 || unsure <= 1.0
 }
 
-/// Of how many models that another contains the search for it begins too.
-const MOST_CONTAINED: usize = 2;
-
-/// The best of those fits whose models a model of these orders contains.
-fn best_contained(
-    orders: &Orders,
-    candidates: &[([usize; 6], Orders)],
-    found: &[Option<Result<PredictionErrorFit, NumericsError>>],
-) -> Vec<Polynomials> {
-    let fits = candidates.iter().zip(found);
-    let contained = fits.filter(|((_, other), _)| orders.contains(other));
-    let mut fits: Vec<&PredictionErrorFit> = contained
-        .filter_map(|(_, fit)| fit.as_ref()?.as_ref().ok())
-        .collect();
-    fits.sort_by(|a, b| {
-        a.residual_sum_of_squares
-            .total_cmp(&b.residual_sum_of_squares)
-    });
-    let best = fits.into_iter().take(MOST_CONTAINED);
-    best.map(|fit| fit.model.clone()).collect()
-}
-
-/// The largest standard deviation, about rest, of what all filters give where a piece begins, in spreads of the truth, which the
-/// truths that are fitted are in. That of filters that do not go along is at most 1; twice the square leaves room for some that do,
-/// and none for filters that are large and cancel out.
-const START_SPREAD: f64 = std::f64::consts::SQRT_2;
+/// A level that is so many spreads from the mean is not among samples.
+const FAR: f64 = 5.0;
 
 /// Tells of samples through which a model goes without a truth.
 fn tell_missing(samples: &Samples, report: &mut TrainingReport) {
@@ -481,20 +382,6 @@ fn tell_starts(pieces: usize, starts: usize, rows: usize, report: &mut TrainingR
     ));
 }
 
-/// Why samples allow no fit: those that count are fewer than all, since others are the past that they are predicted from.
-fn unfit(error: NumericsError, samples: &Samples) -> TrainingError {
-    match error {
-        NumericsError::TooFewRows { needed, found } => TrainingError::Unsolvable {
-            reason: format!(
-                "{found} of {} rows have all the past that these orders look back on, and at least {needed} are needed: \
-                 smaller orders, or more rows without gaps, would help",
-                samples.counted(0, 0)
-            ),
-        },
-        error => told(error),
-    }
-}
-
 impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
     fn row(&mut self, regressors: &[f64], truth: f64) {
         let second = Duration::from_ns(1_000_000_000);
@@ -540,7 +427,7 @@ impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use athermal_numerics::InputOrders;
+    use athermal_numerics::{InputOrders, Orders};
 
     #[test]
     fn short_pieces_are_told_with_the_polynomials_that_they_blur() {
@@ -589,5 +476,40 @@ mod tests {
             ]
         );
         assert!(told(60, 15).is_empty() && told(1, 70).is_empty());
+    }
+
+    /// An autoregression about 20 with so much more in each step, of which so many samples are known.
+    fn identified(pole: f64, drift: f64, count: usize) -> (Found, Vec<String>) {
+        let (mut state, mut value, mut samples) = (12_345_u64, 0.0, Samples::new(0));
+        for _ in 0..count {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            value = pole * value + drift + (state >> 33) as f64 / f64::from(1 << 30) - 1.0;
+            samples.push([], 20.0 + value);
+        }
+        let asked = Asked {
+            na: Some(1),
+            nc: Some(1),
+            ..Asked::default()
+        };
+        let mut report = TrainingReport::default();
+        let found = asked.identify(&samples, 1, &mut report).unwrap();
+        let off = (found.model.level - samples.mean()).abs();
+        assert!(!found.mean_level || off < 1e-9, "{off}");
+        (found, report.notes)
+    }
+
+    #[test]
+    fn a_level_that_rows_do_not_tell_is_their_mean_and_the_report_says_so() {
+        let (found, notes) = identified(1.0, 0.1, 300);
+        assert!(found.mean_level);
+        let told =
+            "its rows do not tell the level that it returns to, which is taken to be their mean, ";
+        assert!(notes.iter().any(|note| note.starts_with(told)), "{notes:?}");
+        let (found, notes) = identified(0.9, 0.0, 1000);
+        assert!(!found.mean_level && notes.is_empty(), "{notes:?}");
+        let error = found.errors.unwrap().level;
+        assert!((found.model.level - 20.0).abs() < 3.0 * error && error < 0.5);
     }
 }

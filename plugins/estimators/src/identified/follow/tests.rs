@@ -26,6 +26,7 @@ fn identified(step: Duration) -> Identified {
             level: 0.0,
         },
         errors: None,
+        mean_level: false,
         step,
         series: 1,
         deviations: vec![1.0],
