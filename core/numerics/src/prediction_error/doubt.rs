@@ -176,7 +176,10 @@ impl Doubt {
             }
             self.covariance[i * count + i] = 1.0;
         }
-        self.sure = self.all_below(0.0);
+        self.sure = false;
+        if self.all_below(0.0) {
+            self.forget();
+        }
     }
 
     /// A value was there, which is what the filters gave and noise of such a variance, infinite where that may be anywhere; the
