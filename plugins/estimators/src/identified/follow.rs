@@ -88,6 +88,10 @@ impl Predictor for Identified {
         if self.deviations.is_empty() {
             mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
         }
+        if let Some(wrong) = self.deviations.iter().find(|of| **of < 0.0) {
+            let message = format!("`deviations` has {wrong} and none may be negative");
+            mistakes.push(Mistake::at("deviations", message));
+        }
         mistakes
     }
 

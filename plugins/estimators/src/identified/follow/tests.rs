@@ -47,6 +47,15 @@ fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() 
 }
 
 #[test]
+fn a_deviation_that_is_negative_is_a_mistake() {
+    let mut model = identified(Duration::from_ns(1_000_000_000));
+    for (deviations, mistakes) in [(vec![], 1), (vec![1.0, -0.5], 1), (vec![0.0], 0)] {
+        model.deviations = deviations;
+        assert_eq!(model.mistakes().len(), mistakes);
+    }
+}
+
+#[test]
 fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noise_give() {
     let step = Duration::from_ns(1_000_000_000);
     // The filter gives 0.2 of an input, whose variance is 1, and the noise has a variance of 0.04, as has that.
