@@ -151,8 +151,11 @@ impl<'a> Descent<'a> {
             }
             let left = n - beyond * self.how.epsilon * self.how.epsilon;
             let next = (squares / left).sqrt();
+            if next <= self.least_sigma {
+                return self.least_sigma;
+            }
             // Negated so that NaN ends it too.
-            if !(next < sigma * (1.0 - 1e-15) && next > self.least_sigma) {
+            if !(next < sigma * (1.0 - 1e-15)) {
                 return sigma.max(self.least_sigma);
             }
             sigma = next;

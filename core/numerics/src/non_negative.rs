@@ -77,12 +77,12 @@ impl Search<'_> {
     /// Lets a column in, and those go that would be negative with it.
     fn admit(&mut self, column: usize) {
         self.active.push(column);
-        while !self.active.is_empty() {
+        while let Some(&newest) = self.active.last() {
             let Some(solution) = self.solve() else {
-                self.bar(column);
+                self.bar(newest);
                 continue;
             };
-            if self.active.last() == Some(&column)
+            if newest == column
                 && self.weights[column] == 0.0
                 && solution[self.active.len() - 1] <= 0.0
             {
