@@ -13,6 +13,8 @@ const ROUGH: f64 = 1e-4;
 const ALIKE: f64 = 1e-3;
 /// Of the models to which rough searches lead, so many are searched on.
 const MOST_ENDS: usize = 3;
+/// Where filters cannot stand in for each other, so many rough searches begin, from the best starts.
+const FEW: usize = 4;
 /// The least mean square of how far from rest a filter begins, so that what its start counts is a number.
 const LEAST_SQUARE: f64 = 1e-12;
 
@@ -42,7 +44,11 @@ impl PredictionError {
         known: &[Polynomials],
     ) -> Result<Begun, NumericsError> {
         let several = !known.is_empty() || shorter(orders, samples).is_some();
-        let most = if several { usize::MAX } else { 1 };
+        let most = match orders.inputs.iter().filter(|input| input.nf > 0).count() {
+            _ if !several => 1,
+            ..=1 => FEW,
+            _ => usize::MAX,
+        };
         let mut known = known.to_vec();
         if several && known.is_empty() {
             let fewer = [shorter(orders, samples), with_fewer_values(orders)];

@@ -27,7 +27,7 @@ const POLISHING: usize = 4;
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B` and on how far from rest
 /// filters begin, by damped Gauss–Newton
 /// steps (Levenberg 1944, Marquardt 1963; Ljung 1999, section 10.2) among stable models. Where a filter has more than one pole, or
-/// values are missing and the noise has a longer memory, it is searched from all starts, among them the best model with a
+/// values are missing and the noise has a longer memory, it is searched from several starts, among them the best model with a
 /// coefficient less, and the best end is kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictionError {
