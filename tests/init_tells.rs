@@ -463,3 +463,57 @@ fn lengths_in_inches_and_mils_are_taken_for_what_they_are() {
         );
     }
 }
+
+#[test]
+fn a_number_that_stands_for_no_value_is_no_position() {
+    let folder = Folder::new("tells-placeholder");
+    let log = |nothing: &str, every: usize| {
+        let mut text = "time_s,plate_degC,Z_um\n".to_owned();
+        for (time, plate, z) in machine(6000) {
+            let z = if time % every == 0 {
+                format!("{z:.4}")
+            } else {
+                nothing.to_owned()
+            };
+            let _ = writeln!(text, "{time},{plate:.4},{z}");
+        }
+        text
+    };
+    let (fine, empty, _) = init(&folder, "empty.csv", &log("", 90));
+    assert!(fine, "{empty}");
+    let (fine, told, graph) = init(&folder, "nines.csv", &log("-9999", 90));
+    assert!(fine, "{told}");
+    assert_eq!(window(&told), window(&empty));
+    let expected = "-9999 in 5,333 of 6,000 rows stands for no value, and is taken for none here; leave such cells empty";
+    assert!(told.contains(expected), "{told}");
+    let range = graph
+        .lines()
+        .rfind(|line| line.starts_with("range ="))
+        .unwrap();
+    assert!(
+        range.ends_with("-9999 stands for no value, and is left out"),
+        "{range}"
+    );
+    let fit = [
+        "fit",
+        "nines.csv.toml",
+        "--data",
+        "nines.csv",
+        "-o",
+        "m.json",
+    ];
+    let (fine, told) = said(&folder, &fit);
+    assert!(
+        fine && told.contains("position.Z: 5,333 samples are infinite or out of range"),
+        "{told}"
+    );
+    let (_, told, _) = init(&folder, "ninety.csv", &log("80", 20));
+    assert!(
+        told.contains("80.00 in 3,000 of 6,000 rows stands for no value"),
+        "{told}"
+    );
+    assert!(
+        told.contains("a graph cannot tell them from others"),
+        "{told}"
+    );
+}

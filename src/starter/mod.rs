@@ -6,6 +6,7 @@ mod dates;
 mod dropped;
 mod group;
 mod own_times;
+mod placeholder;
 mod spacing;
 mod survey;
 mod text;

@@ -205,7 +205,9 @@ impl Writer<'_> {
                     }
                 )
             );
-            text.push_str(&range(&group.unit, low, high));
+            let members = group.columns.iter();
+            let nothing = members.filter_map(|&index| self.survey.series[index].placeholder);
+            text.push_str(&range(&group.unit, low, high, &nothing.collect::<Vec<_>>()));
         }
     }
 
@@ -393,8 +395,9 @@ impl Writer<'_> {
     }
 }
 
-/// A range in which temperatures can be, as these have been; of other quantities it is only proposed.
-fn range(unit: &str, low: f64, high: f64) -> String {
+/// A range in which temperatures can be, as these have been; of other quantities it is only proposed, unless it leaves out what
+/// stands for `nothing`.
+fn range(unit: &str, low: f64, high: f64, nothing: &[f64]) -> String {
     let half = (high - low) / 2.0;
     let per_kelvin = Unit::parse(unit).ok();
     let per_kelvin = per_kelvin.and_then(|unit| Unit::kelvin().factor_to(&unit));
@@ -407,6 +410,12 @@ fn range(unit: &str, low: f64, high: f64) -> String {
                 "range = [\"{from} {unit}\", \"{to} {unit}\"]  # {seen}; a value outside is a fault, and left out\n"
             )
         }
+        None if let Some(margin) = margin(low, high, nothing) => format!(
+            "range = [\"{} {unit}\", \"{} {unit}\"]  # {seen}; {} stands for no value, and is left out\n",
+            number(low - margin),
+            number(high + margin),
+            number(nothing[0])
+        ),
         None => {
             let (from, to) = (number(low - half), number(high + half));
             format!(
@@ -414,6 +423,13 @@ fn range(unit: &str, low: f64, high: f64) -> String {
             )
         }
     }
+}
+
+/// How far beyond its ends a range may reach that leaves out what stands for nothing; none where that lies between them.
+fn margin(low: f64, high: f64, nothing: &[f64]) -> Option<f64> {
+    let away = nothing.iter().map(|of| (low - of).max(of - high));
+    let nearest = away.reduce(f64::min).filter(|away| *away > 0.0)?;
+    Some((10.0 * (high - low)).min(0.5 * nearest))
 }
 
 /// What stands in a line, and a comment beside it.

@@ -1,0 +1,70 @@
+//! Decides which value of a series stands for none, as -9999 does; not what becomes of it.
+
+/// The share of all values from which on one may stand for none. A rarer one leaps, as that of a failed sensor.
+const LEAST_SHARE: f64 = 0.2;
+/// It comes and goes at least so often, and there are at least so many others.
+const OFTEN: usize = 20;
+/// Others are so many times as far from it as from each other.
+const FAR: f64 = 20.0;
+
+/// The value that stands for none, where there is one, and how often.
+pub(super) fn placeholder(values: &[f64]) -> Option<(f64, u64)> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let most = sorted.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
+    let (value, count) = (most[0], most.len());
+    let runs = values.chunk_by(|a, b| (*a == value) == (*b == value));
+    let comes = runs.filter(|run| run[0] == value).count();
+    let others = || values.iter().filter(|of| **of != value);
+    if (count as f64) < LEAST_SHARE * values.len() as f64
+        || comes < OFTEN
+        || values.len() - count < OFTEN
+    {
+        return None;
+    }
+    let changes = others().zip(others().skip(1)).map(|(a, b)| (a - b).abs());
+    let usual = median(changes.filter(|change| *change > 0.0).collect())?;
+    let away = median(others().map(|of| (of - value).abs()).collect())?;
+    (away > FAR * usual).then_some((value, count as u64))
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn position(row: usize) -> f64 {
+        100.0 * (row as f64 / 700.0).sin() + (row as f64 * 2.3).sin()
+    }
+
+    #[test]
+    fn a_value_between_measured_ones_that_are_far_from_it_stands_for_none() {
+        for value in [-9999.0, 1e30, 500.0] {
+            let rows = (0..2000).map(|row| if row % 9 == 0 { position(row) } else { value });
+            let found = placeholder(&rows.collect::<Vec<_>>());
+            assert_eq!(found, Some((value, 1777)));
+        }
+    }
+
+    #[test]
+    fn what_is_held_or_rests_or_repeats_itself_stands_for_something() {
+        let of =
+            |value: &dyn Fn(usize) -> f64| placeholder(&(0..2000).map(value).collect::<Vec<_>>());
+        assert_eq!(of(&position), None);
+        assert_eq!(of(&|row| position(row - row % 9)), None);
+        assert_eq!(of(&|row| (position(row) / 40.0).round()), None);
+        assert_eq!(
+            of(&|row| if row < 1000 {
+                0.0
+            } else {
+                position(row) + 900.0
+            }),
+            None
+        );
+        assert_eq!(of(&|row| if row % 9 == 0 { 5.0 } else { 7.0 }), None);
+    }
+}
