@@ -154,8 +154,9 @@ impl<'a> Descent<'a> {
             if next <= self.least_sigma {
                 return self.least_sigma;
             }
-            // Negated so that NaN ends it too.
-            if !(next < sigma * (1.0 - 1e-15)) {
+            let falls = next < sigma * (1.0 - 1e-15);
+            // One that is not a number does not fall either.
+            if !falls {
                 return sigma.max(self.least_sigma);
             }
             sigma = next;
