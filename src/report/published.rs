@@ -96,16 +96,17 @@ const TABLES: [Table; 3] = [
 ];
 
 /// The tables about machines with the axes of this one, drifts in the same unit, and two or more of the kinds of nodes that they
-/// compare.
+/// compare, or the one.
 pub(super) fn published(course: &Course) -> Vec<Published> {
     let of_same_kind = |table: &&Table| {
         let found = course.axes.iter().map(|axis| axis.name.as_str());
         let voters = course.axes.first().map_or(&[][..], |axis| &axis.voters);
         let has = |kind: &str| voters.iter().any(|voter| voter.kind == kind);
-        let compared = table.rows.iter().filter(|(_, kind, _)| has(kind));
+        let kinds = || table.rows.iter().filter(|(_, kind, _)| !kind.is_empty());
+        let compared = kinds().filter(|(_, kind, _)| has(kind));
         found.eq(table.axes.iter().copied())
             && course.axes.iter().all(|axis| axis.unit == "nm/min")
-            && compared.count() > 1
+            && compared.count() >= kinds().count().min(2)
     };
     TABLES
         .iter()
@@ -205,6 +206,8 @@ mod tests {
         assert!(published(&course(&["X", "Z", "Y"], &both)).is_empty());
         assert!(published(&course(&["X", "Y", "Z"], &["arx", "median"])).is_empty());
         assert_eq!(published(&course(&["X", "Y", "Z"], &both)).len(), 1);
+        let tester = ["X1", "Y1", "Z1", "X2", "Y2", "Z2"];
+        assert_eq!(published(&course(&tester, &["auto_weighted"])).len(), 1);
     }
 
     #[test]
