@@ -90,6 +90,7 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     let dropped = survey.dropped.clone();
     let unfit = |why| NoStarter::Unfit([vec![why], dropped.clone()].concat().join("; "));
     column::assign(&mut columns, told).map_err(&unfit)?;
+    survey.leave_out_placeholders(&mut columns);
     survey.take_changes(&mut columns, &clock);
     survey.leave_out_slow(&mut columns, &clock, told);
     survey.leave_out_faults(&mut columns);

@@ -1,4 +1,8 @@
-//! Decides which value of a series stands for none, as -9999 does; not what becomes of it.
+//! Decides which value of a series stands for none, as -9999 does, and takes it out.
+
+use super::column::{Column, Kind};
+use super::survey::{Series, Survey};
+use crate::figures::{count, number};
 
 /// The share of all values from which on one may stand for none. A rarer one leaps, as that of a failed sensor.
 const LEAST_SHARE: f64 = 0.2;
@@ -7,8 +11,44 @@ const OFTEN: usize = 20;
 /// Others are so many times as far from it as from each other.
 const FAR: f64 = 20.0;
 
+impl Survey {
+    /// Takes the values out of temperatures and of what drifts that stand for none.
+    pub fn leave_out_placeholders(&mut self, columns: &mut [Column]) {
+        for (series, column) in self.series.iter_mut().zip(columns) {
+            let drifts = column.kind == Kind::Drifting;
+            if column.kind == Kind::Unused || !(drifts || column.is_temperature()) {
+                continue;
+            }
+            let Some((value, n)) = placeholder(&series.values) else {
+                continue;
+            };
+            let of = count(series.values.len());
+            series.leave_out(value);
+            let (low, high) = series.extremes();
+            let then = if (low..=high).contains(&value) {
+                "leave such cells empty: a graph cannot tell them from others"
+            } else {
+                "leave such cells empty"
+            };
+            column.warn(format!(
+                "{} in {} of {of} rows stands for no value, and is taken for none here; {then}",
+                number(value),
+                count(n)
+            ));
+        }
+    }
+}
+
+impl Series {
+    fn leave_out(&mut self, value: f64) {
+        let pairs = self.time_s.iter().copied().zip(self.values.iter().copied());
+        (self.time_s, self.values) = pairs.filter(|(_, of)| *of != value).unzip();
+        self.placeholder = Some(value);
+    }
+}
+
 /// The value that stands for none, where there is one, and how often.
-pub(super) fn placeholder(values: &[f64]) -> Option<(f64, u64)> {
+fn placeholder(values: &[f64]) -> Option<(f64, u64)> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let most = sorted.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;

@@ -12,8 +12,7 @@ use super::NoStarter;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::dropped::{self, Steps};
-use super::placeholder::placeholder;
-use crate::figures::{count, counted, number};
+use crate::figures::{count, counted};
 
 /// The values of a log, column by column.
 #[derive(Debug)]
@@ -172,11 +171,6 @@ impl Series {
         (before - self.values.len()) as u64
     }
 
-    fn leave_out(&mut self, value: f64) {
-        let pairs = self.time_s.iter().copied().zip(self.values.iter().copied());
-        (self.time_s, self.values) = pairs.filter(|(_, of)| *of != value).unzip();
-    }
-
     /// The smallest and the largest value.
     #[must_use]
     pub fn extremes(&self) -> (f64, f64) {
@@ -319,30 +313,13 @@ impl Survey {
         }
     }
 
-    /// Takes the values out that stand for none, and of temperatures those that only a failed sensor gives, and tells of leaps in
-    /// these and in what drifts.
+    /// Takes the values out of temperatures that only a failed sensor gives, and tells of leaps in these and in what drifts.
     pub fn leave_out_faults(&mut self, columns: &mut [Column]) {
         for (series, column) in self.series.iter_mut().zip(columns) {
             let is_temperature = column.is_temperature();
             let drifts = column.kind == Kind::Drifting;
             if column.kind == Kind::Unused || !(is_temperature || drifts) {
                 continue;
-            }
-            if let Some((value, n)) = placeholder(&series.values) {
-                let of = count(series.values.len());
-                series.leave_out(value);
-                series.placeholder = Some(value);
-                let (low, high) = series.extremes();
-                let then = if (low..=high).contains(&value) {
-                    "leave such cells empty: a graph cannot tell them from others"
-                } else {
-                    "leave such cells empty"
-                };
-                column.warn(format!(
-                    "{} in {} of {of} rows stands for no value, and is taken for none here; {then}",
-                    number(value),
-                    count(n)
-                ));
             }
             let Some(leaps) = series.leaps() else {
                 continue;
