@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use athermal::Duration;
 pub use athermal::core::diagnostic::{count, counted, digits};
+use athermal::{Duration, Instant};
 use jiff::Timestamp;
 
 /// How wide tables may be, in characters.
@@ -78,6 +78,12 @@ pub fn time(seconds: f64) -> String {
 
 /// Instants from here on, in s, are dates: 1980, by a clock that began in 1970. A machine does not run for ten years.
 pub const DATES_S: f64 = 315_532_800.0;
+
+/// An instant in s.
+#[must_use]
+pub fn seconds(at: Instant) -> f64 {
+    at.as_ns() as f64 / 1e9
+}
 
 /// An instant: its date where it has one, else in s as the data have it.
 #[must_use]

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 
 use workbench::{Scratch, athermal, athermal_on};
 
-/// A drift by one temperature; `vote` says what goes by past truths, and `after` what makes the drift.
+/// A drift by one temperature: of which signal or node it is the slope, and in which unit time is. `RATE` stands for what is integrated.
 fn graph(position: &str, time: &str) -> String {
     format!(
         r#"

@@ -18,7 +18,7 @@ use super::data::{self, Data, FITS, recording, tell_overlap};
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
 use super::model::{self, check_limit};
-use crate::figures::{count, counted, digits, matrix, number, or_dash, stated};
+use crate::figures::{count, counted, digits, matrix, number, or_dash, seconds, stated};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit several graphs on the same data and score them on others, in one table
@@ -201,7 +201,6 @@ impl Compare {
             ));
             return;
         }
-        let seconds = |at: athermal::Instant| at.as_ns() as f64 / 1e9;
         let times = || {
             trace
                 .truths

@@ -4,7 +4,6 @@ use std::cmp::Ordering;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
-use athermal::Instant;
 use athermal::core::compile::Wanted;
 use athermal::core::quantity::Quantity;
 use athermal::core::score::{Lack, Mode, Score, ScoreOptions, Scores, score};
@@ -16,7 +15,7 @@ use super::data::{self, Data};
 use super::faults::{self, FaultWatch, Purpose};
 use super::model::{check_limit, load_fitted};
 use super::numbers;
-use crate::figures::{count, counted, number, or_dash, paragraph, table};
+use crate::figures::{count, counted, number, or_dash, paragraph, seconds, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -198,10 +197,6 @@ impl Horizon {
             Self::FreeRun => "free-run",
         }
     }
-}
-
-fn seconds(at: Instant) -> f64 {
-    at.as_ns() as f64 / 1e9
 }
 
 fn describe(scores: &Scores, mode: Mode) -> String {

@@ -7,11 +7,11 @@ use athermal::core::recording::{Event, Recording, RecordingError, Rows};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
-use athermal::diagnosis::{of_truths, watched};
+use athermal::diagnosis::{health_reasons, of_truths};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::figures::{count, instant, number};
+use crate::figures::{count, instant, number, seconds};
 use crate::terminal::Terminal;
 
 /// What a recording is read for.
@@ -115,10 +115,13 @@ impl Recording for FaultWatch<'_> {
 }
 
 fn looked(plan: &Plan) -> Vec<Looked> {
-    let facts = of_truths(plan).into_iter().zip(watched(plan));
-    let channels = plan.sources.iter().zip(leap::finders(plan)).zip(facts);
-    let looked = channels.map(|((source, leaps), (of_truth, watched))| {
+    let watched = health_reasons(plan);
+    let channels = plan.sources.iter().zip(leap::finders(plan));
+    let channels = channels.zip(of_truths(plan)).enumerate();
+    let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
         let rests = source.optional;
+        // Such a node takes out what is stuck.
+        let watched = watched.contains_key(&slot);
         Looked {
             source: source.clone(),
             of_truth,
@@ -171,7 +174,7 @@ impl Rows for Looking<'_> {
         if let State::Read(looked) = &mut *self.state.borrow_mut() {
             match event {
                 Some(Event::Row(now)) => {
-                    let at_s = now.as_ns() as f64 / 1e9;
+                    let at_s = seconds(now);
                     for (of, &value) in looked.iter_mut().zip(&*values) {
                         of.row(at_s, value);
                     }

@@ -20,7 +20,7 @@ use super::faults::{self, FaultWatch, Faulty, Purpose};
 use super::model;
 use super::numbers;
 use super::threads::Threads;
-use crate::figures::{count, counted, number, paragraph, table};
+use crate::figures::{count, counted, number, paragraph, seconds, table};
 use crate::invocation::{next, program, quoted};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -428,10 +428,6 @@ fn short_card(fit: &EstimatorFit) -> Option<EstimatorCard> {
         step.candidates.truncate(CANDIDATES_KEPT);
     }
     Some(card)
-}
-
-fn seconds(instant: athermal::Instant) -> f64 {
-    instant.as_ns() as f64 / 1e9
 }
 
 /// The present time, or the one that a reproducible build names in `SOURCE_DATE_EPOCH`.

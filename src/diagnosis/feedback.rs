@@ -3,47 +3,40 @@
 //! Where the rate that is integrated goes by past truths, by lags, a vote or learning, and these are made of measured positions, a
 //! machine under the correction shows a drift that is not there: what the correction took away. An `uncorrected` node puts it back.
 
-use std::collections::BTreeSet;
+use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 
-use athermal_core::compile::{Plan, PlannedRole};
+use super::{slots, upstream};
 
 /// The measured channels that a correction moves and goes by.
 #[must_use]
 pub fn corrected_channels(plan: &Plan) -> Vec<&str> {
-    let (mut seen, mut waiting) = (BTreeSet::new(), Vec::new());
     let corrections = plan.nodes.iter().filter(|of| of.kind.name == "compensate");
-    for node in corrections {
-        let inputs = node.role.gathers();
-        waiting.extend(inputs.flat_map(|of| plan.gathers[of].entries.iter().map(|of| of.slot)));
-    }
-    while let Some(slot) = waiting.pop() {
-        if !seen.insert(slot) {
-            continue;
-        }
-        let Some(node) = plan.channels[slot].node.map(|node| &plan.nodes[node]) else {
-            continue;
-        };
-        if node.kind.name == "uncorrected" {
-            continue;
-        }
-        let inputs = node.role.gathers();
-        waiting.extend(inputs.flat_map(|of| plan.gathers[of].entries.iter().map(|of| of.slot)));
-        // A model that is only fitted on truths does not go by those of now.
-        let goes_by = match &node.role {
-            PlannedRole::Feature { .. } => None,
-            PlannedRole::Estimator {
-                truth, learning, ..
-            } => learning.as_ref().map(|_| truth),
-            PlannedRole::Combiner { truth, .. } => truth.as_ref(),
-        };
-        waiting.extend(goes_by.map(|truth| truth.slot));
-    }
+    let rates = corrections.flat_map(|node| slots(plan, node.role.gathers()));
+    let seen = upstream(plan, rates.collect(), |node| goes_by(plan, node));
     let of_truths = super::of_truths(plan);
     let moved = plan.sources.iter().enumerate();
     moved
-        .filter(|(slot, _)| of_truths[*slot] && seen.contains(slot))
+        .filter(|(slot, _)| of_truths[*slot] && seen[*slot])
         .map(|(_, source)| source.name.as_str())
         .collect()
+}
+
+/// The slots that a node goes by at a tick, past truths among them; none of those before an `uncorrected` node.
+fn goes_by(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
+    if node.kind.name == "uncorrected" {
+        return Vec::new();
+    }
+    // A model that is only fitted on truths does not go by those of now.
+    let truth = match &node.role {
+        PlannedRole::Feature { .. } => None,
+        PlannedRole::Estimator {
+            truth, learning, ..
+        } => learning.as_ref().map(|_| truth),
+        PlannedRole::Combiner { truth, .. } => truth.as_ref(),
+    };
+    let mut read = slots(plan, node.role.gathers());
+    read.extend(truth.map(|truth| truth.slot));
+    read
 }
 
 /// What is told of a graph whose correction goes by what it moves; nothing of others.

@@ -26,7 +26,9 @@ pub use plot::plots;
 pub(crate) use plot::{Picture, responses as response_pictures, with_truth as truth_picture};
 pub use rest::Untold;
 
-use athermal_core::compile::Plan;
+use std::collections::BTreeMap;
+
+use athermal_core::compile::{Plan, PlannedNode};
 use athermal_core::fit::FitError;
 use athermal_core::model::Model;
 use athermal_core::recording::Recording;
@@ -161,41 +163,51 @@ pub fn diagnose(
     Ok((diagnosis, observation))
 }
 
-/// The measured channels from which a slot follows, by their number.
-fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
-    let mut of_slot = vec![false; plan.channels.len()];
-    let mut waiting = vec![slot];
+/// The slots from which others follow, these included, where `reads` tells those that a node goes by.
+fn upstream(
+    plan: &Plan,
+    mut waiting: Vec<usize>,
+    reads: impl Fn(&PlannedNode) -> Vec<usize>,
+) -> Vec<bool> {
+    let mut found = vec![false; plan.channels.len()];
     while let Some(slot) = waiting.pop() {
-        if std::mem::replace(&mut of_slot[slot], true) {
-            continue;
-        }
-        let Some(node) = plan.channels[slot].node else {
-            continue;
-        };
-        // Truths that a node only learns from are not among its inputs.
-        for gather in plan.nodes[node].role.inputs() {
-            let entries = plan.gathers[gather].entries.iter();
-            waiting.extend(entries.map(|entry| entry.slot));
+        let is_new = !std::mem::replace(&mut found[slot], true);
+        if let Some(node) = plan.channels[slot].node.filter(|_| is_new) {
+            waiting.extend(reads(&plan.nodes[node]));
         }
     }
+    found
+}
+
+/// The slots of what a node takes as data; truths that it only learns from are not among them.
+fn inputs(plan: &Plan, node: &PlannedNode) -> Vec<usize> {
+    slots(plan, node.role.inputs())
+}
+
+/// The slots that gathers read.
+fn slots(plan: &Plan, gathers: impl Iterator<Item = usize>) -> Vec<usize> {
+    let entries = gathers.flat_map(|gather| &plan.gathers[gather].entries);
+    entries.map(|entry| entry.slot).collect()
+}
+
+/// The measured channels from which a slot follows, by their number.
+fn sources_of(plan: &Plan, slot: usize) -> Vec<bool> {
+    let mut of_slot = upstream(plan, vec![slot], |node| inputs(plan, node));
     of_slot.truncate(plan.sources.len());
     of_slot
 }
 
-/// The measured channels that a `health` node watches over, which takes out what is wrong with them.
+/// The measured channels that a `health` node watches over, each with the slot of the port `reason` that is about it.
 #[must_use]
-pub fn watched(plan: &Plan) -> Vec<bool> {
-    let mut watched = vec![false; plan.sources.len()];
+pub fn health_reasons(plan: &Plan) -> BTreeMap<usize, usize> {
+    let mut reasons = BTreeMap::new();
     for node in plan.nodes.iter().filter(|node| node.kind.name == "health") {
-        let slots = node
-            .role
-            .inputs()
-            .flat_map(|gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot));
-        slots
-            .filter(|slot| *slot < plan.sources.len())
-            .for_each(|slot| watched[slot] = true);
+        if let Some((_, slots)) = node.ports.get(1) {
+            let watched = inputs(plan, node).into_iter().zip(slots.clone());
+            reasons.extend(watched.filter(|(slot, _)| *slot < plan.sources.len()));
+        }
     }
-    watched
+    reasons
 }
 
 /// The measured channels that a truth is made of. Whatever else is measured is a sensor that may explain it.

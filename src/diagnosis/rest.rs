@@ -8,6 +8,7 @@ use athermal_core::engine::Engine;
 use serde::Serialize;
 
 use super::observation::SourceStatistics;
+use super::{inputs, upstream};
 
 /// How sensors rest, the stillest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,18 +50,7 @@ pub struct Untold {
 
 /// The first node on which a slot rests, itself included, that gives nothing.
 pub(super) fn silent(plan: &Plan, engine: &Engine, slot: usize) -> String {
-    let mut of_slot = vec![false; plan.channels.len()];
-    let mut waiting = vec![slot];
-    while let Some(slot) = waiting.pop() {
-        if std::mem::replace(&mut of_slot[slot], true) {
-            continue;
-        }
-        if let Some(node) = plan.channels[slot].node {
-            for gather in plan.nodes[node].role.inputs() {
-                waiting.extend(plan.gathers[gather].entries.iter().map(|of| of.slot));
-            }
-        }
-    }
+    let of_slot = upstream(plan, vec![slot], |node| inputs(plan, node));
     let mut all = (0..of_slot.len()).filter(|&slot| of_slot[slot]);
     let first = all.find(|&slot| engine.value(slot).is_nan());
     name(plan, first.unwrap_or(slot))

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::figure;
 use crate::diagnosis::leap::{Finder, Leaps, finders};
-use crate::diagnosis::of_truths;
 use crate::diagnosis::standstill;
+use crate::diagnosis::{health_reasons, of_truths};
 use crate::figures::{counted, time};
 
 /// What can be said of a measured channel.
@@ -75,7 +75,7 @@ struct Looking {
 
 /// One for each measured channel.
 pub(super) fn sensors(plan: &Plan) -> Vec<SensorFacts> {
-    let reasons = reasons(plan);
+    let reasons = health_reasons(plan);
     let of_truths = of_truths(plan);
     let facts = |(slot, (source, finder)): (usize, (&SourceChannel, Option<Finder>))| {
         let channel = &plan.channels[slot].channel;
@@ -107,26 +107,6 @@ pub(super) fn ask_for_reasons(plan: &mut Plan) {
             wanted.fill(true);
         }
     }
-}
-
-/// The slots of the ports `reason`, by the measured channels that they are about.
-fn reasons(plan: &Plan) -> BTreeMap<usize, usize> {
-    let mut reasons = BTreeMap::new();
-    for node in plan.nodes.iter().filter(|node| node.kind.name == "health") {
-        let PlannedRole::Feature { gathers, .. } = &node.role else {
-            continue;
-        };
-        let (Some(&watched), Some((_, slots))) = (gathers.first(), node.ports.get(1)) else {
-            continue;
-        };
-        let watched = plan.gathers[watched].entries.iter().map(|entry| entry.slot);
-        reasons.extend(
-            watched
-                .zip(slots.clone())
-                .filter(|(slot, _)| *slot < plan.sources.len()),
-        );
-    }
-    reasons
 }
 
 impl SensorFacts {
