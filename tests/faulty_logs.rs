@@ -238,6 +238,16 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
         let of = (name == "frozen.csv", name == "dead.csv");
         assert_eq!((found[0].is_some(), found[1].is_some()), of, "{told}");
     }
+    let revived = |row: usize, values: &mut [f64; 3]| {
+        if row < 1920 {
+            frozen(row, values);
+        }
+    };
+    let revived = file("revived.csv", log(revived));
+    let fitted = athermal_on("fit", &graph, &revived, &[&"-o", &model]).ended(0);
+    fitted.tells(&["warning: temperature.room is 20.04 in 960 samples one after the other"]);
+    // That it goes on is no failure of its own.
+    assert!(!fitted.told.contains("leaps"), "{}", fitted.told);
     let watched = GRAPH.replace(
         "inputs.features = \"temperature\"",
         "inputs.features = \"watched\"",

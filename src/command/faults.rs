@@ -82,21 +82,32 @@ impl<'a> FaultWatch<'a> {
         let State::Read(looked) = self.state.into_inner() else {
             return Vec::new();
         };
-        let all = looked.into_iter().map(|of| Faulty {
-            purpose: self.purpose,
-            channel: of.source.name,
-            of_truth: of.of_truth,
-            leaps: of.leaps.and_then(|finder| finder.found()),
-            stuck: of.stuck.and_then(|finder| {
+        let all = looked.into_iter().map(|of| {
+            let stuck = of.stuck.and_then(|finder| {
                 // What never changes is named by a fit, and as a truth by its scores.
                 let counts =
                     finder.changes() > 0 || (self.purpose == Purpose::Scores && !of.of_truth);
                 finder.found().filter(|_| counts)
-            }),
-            silent: of.silent.and_then(silence::Finder::found),
+            });
+            let leaps = of.leaps.and_then(|finder| finder.found());
+            Faulty {
+                purpose: self.purpose,
+                channel: of.source.name,
+                of_truth: of.of_truth,
+                leaps: leaps.filter(|leaps| !stuck.is_some_and(|stuck| ends(leaps, &stuck))),
+                stuck,
+                silent: of.silent.and_then(silence::Finder::found),
+            }
         });
         all.filter(|of| !of.is_sound()).collect()
     }
+}
+
+/// Whether the only leap is that of a sensor which goes on after it was stuck at a usual value.
+fn ends(leaps: &Leaps, stuck: &Standstill) -> bool {
+    let (low, high) = leaps.usual;
+    let is_usual = (low..=high).contains(&stuck.value);
+    leaps.count == 1 && is_usual && leaps.first.from == stuck.value
 }
 
 impl Recording for FaultWatch<'_> {
