@@ -6,7 +6,8 @@ use std::sync::Arc;
 use athermal::core::document::TimeBase;
 use athermal::core::engine::Carry;
 use athermal::core::live::{Control, Feed, Notice, StageError, Staged, Verdict};
-use athermal::files::TimeForm;
+use athermal::core::time::Civil;
+use athermal::files::{TimeColumn, TimeForm};
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
@@ -140,11 +141,14 @@ fn load<'a>(
 impl When {
     /// A time as the data give it, or a duration.
     fn read(text: &str, base: &TimeBase) -> Result<Self, Failure> {
-        let TimeBase::Column { form, .. } = base;
-        let own = TimeForm::from(form).read(text.as_bytes());
-        let time = own.or_else(|| TimeForm::Rfc3339.read(text.as_bytes()));
+        let mut column = TimeColumn::from(base);
+        let own = column.read(text.as_bytes(), None);
+        column.form = TimeForm::Rfc3339;
+        let at = match own.or_else(|| column.read(text.as_bytes(), None)) {
+            Some(Civil::At(at)) => Some(Self::At(at)),
+            _ => None,
+        };
         let after = || text.parse().ok().map(Self::After);
-        let at = time.map(|ns| Self::At(Instant::from_ns(ns)));
         at.or_else(after).ok_or_else(|| {
             Failure::Request(format!("--swap-at: {text:?} is no time of these data: write it as they do, or as a duration such as 6h"))
         })

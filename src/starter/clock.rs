@@ -17,6 +17,8 @@ pub struct Clock {
     pub form: TimeForm,
     /// What a graph file says of it beside the column: a key of `[time]` and its value.
     pub declared: Option<(&'static str, String)>,
+    /// Whether these are dates and times that do not say how far they are from UTC.
+    pub lacks_zone: bool,
     /// Why it was taken.
     pub(super) why: String,
     /// Another form that reads the first rows as well, and otherwise.
@@ -93,6 +95,7 @@ impl Clock {
             columns,
             form: dates.form,
             declared: Some(dates.declared),
+            lacks_zone: dates.lacks_zone,
             why: dates.why,
             other: dates.other,
         }
@@ -264,6 +267,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
             columns,
             form: TimeForm::Numbers { ns_per_unit },
             declared: declared(name),
+            lacks_zone: false,
             why: match known(&below) {
                 Some(_) => format!("numbers in {name}, as the row below its name says"),
                 None => format!("numbers in {name}, by its name"),
@@ -280,6 +284,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
             columns,
             form: TimeForm::Samples { step_ns: SAMPLE_NS },
             declared: Some(("step", "1s".to_owned())),
+            lacks_zone: false,
             why: "a sample number; how long a sample takes the log does not say".to_owned(),
             other: None,
         });
@@ -291,6 +296,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
                 ns_per_unit: 86_400_000_000_000,
             },
             declared: declared("d"),
+            lacks_zone: false,
             why: format!(
                 "numbers from {} on that rise by parts of one, taken for days as a spreadsheet counts them; if they are \
                  another unit, its name must say so: time_s, time_ms, time_min, time_h",
@@ -318,6 +324,7 @@ pub(super) fn clock(described: &Description, texts: &Texts) -> Option<Clock> {
         columns,
         form: TimeForm::Numbers { ns_per_unit },
         declared: declared(name),
+        lacks_zone: false,
         why,
         other: None,
     })

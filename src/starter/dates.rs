@@ -4,8 +4,8 @@ use athermal::core::time::TimeFormat;
 use athermal::files::{TimeForm, has_clock, has_zone};
 
 /// What is told of dates and times that do not say how far they are from UTC.
-pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local time, the hour that comes twice when \
-     the clocks go back in autumn is lost: log in UTC, or with an offset such as +01:00";
+pub const WITHOUT_ZONE: &str = "without a zone, taken for UTC; if they are local time, say whose, so that no hour is lost \
+     when the clocks go back in autumn: `zone = \"Europe/Berlin\"` in `[time]`";
 
 /// Forms that loggers, spreadsheets and measuring programs write, beside that of RFC 3339. A day that comes first stands before a
 /// month that does, where only the numbers could tell them apart.
@@ -43,6 +43,8 @@ pub struct Dates {
     pub form: TimeForm,
     /// What a graph file says of it: a key of `[time]` and its value.
     pub declared: (&'static str, String),
+    /// Whether they do not say how far they are from UTC.
+    pub lacks_zone: bool,
     /// Why it was taken.
     pub why: String,
     /// Another form that reads these cells as well, and otherwise.
@@ -61,6 +63,7 @@ pub fn of(cells: &[String]) -> Option<Dates> {
         return Some(Dates {
             form: TimeForm::Rfc3339,
             declared: ("unit", "rfc3339".to_owned()),
+            lacks_zone: !zoned,
             why: format!("dates and times {which}"),
             other: None,
         });
@@ -77,11 +80,13 @@ pub fn of(cells: &[String]) -> Option<Dates> {
 /// That of a format.
 pub fn by(format: TimeFormat) -> Dates {
     let mut why = format!("dates and times as `{format}`");
-    if !format.has_offset() {
+    let lacks_zone = !format.has_offset();
+    if lacks_zone {
         why = format!("{why} {WITHOUT_ZONE}");
     }
     Dates {
         declared: ("format", format.to_string()),
+        lacks_zone,
         why,
         other: None,
         form: TimeForm::Format(format),

@@ -1,8 +1,6 @@
 //! Decides what is told of the rows that a log has and no command takes, with the likely cause. Not which rows these are.
 
-use athermal::files::{
-    Again, Description, FileError, Report, TimeForm, has_zone, with_decimal_point,
-};
+use athermal::files::{Again, Description, FileError, Report, with_decimal_point};
 
 use super::clock::Clock;
 use super::texts::Texts;
@@ -119,13 +117,9 @@ fn out_of_order(report: &Report, clock: &Clock) -> String {
         return String::new();
     }
     let back_s = before.saturating_sub(now) as f64 / 1e9;
-    let is_civil = match &clock.form {
-        TimeForm::Rfc3339 => !has_zone(time.as_bytes()),
-        TimeForm::Format(format) => !format.has_offset(),
-        TimeForm::Numbers { .. } | TimeForm::Samples { .. } => false,
-    };
-    if is_civil && (3000.0..=3600.0).contains(&back_s) {
-        return "; did the clocks go back in autumn? Log in UTC, or with an offset such as +01:00"
+    if clock.lacks_zone && (3000.0..=3600.0).contains(&back_s) {
+        return "; did the clocks go back in autumn? With their zone in the graph these rows are read too: `zone = \"Europe/Berlin\"` \
+                in `[time]`"
             .to_owned();
     }
     format!(

@@ -192,6 +192,7 @@ impl Survey {
             time: TimeColumn {
                 columns: clock.columns.clone(),
                 form: clock.form.clone(),
+                zone: None,
             },
             channels: columns
                 .iter()

@@ -135,6 +135,11 @@ impl Writer<'_> {
             }
             text.push('\n');
         }
+        if self.clock.lacks_zone {
+            text.push_str(
+                "# zone = \"Europe/Berlin\"                # whose clock this is; without it UTC\n",
+            );
+        }
     }
 
     fn signals(&self, text: &mut String) {

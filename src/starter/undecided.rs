@@ -16,6 +16,7 @@ fn doubts(path: &Path, clock: &Clock, form: &TimeForm) -> Result<u64, FileError>
         time: TimeColumn {
             columns: clock.columns.clone(),
             form: form.clone(),
+            zone: None,
         },
         channels: Vec::new(),
     };

@@ -150,6 +150,39 @@ fn times_without_a_zone_are_told_once_and_those_with_one_are_not() {
 }
 
 #[test]
+fn times_of_a_zone_are_read_and_written_as_the_clock_shows_them() {
+    let scratch = desk("zoned").0;
+    let graph = |zone: &str| {
+        let time = format!("time = {{ column = \"time_s\", unit = \"rfc3339\"{zone} }}");
+        format!("schema = 1\nextends = \"fitted.toml\"\n{time}\n")
+    };
+    // From two o'clock of summer time to half past two of winter time, one and a half hours later.
+    let row = |(at, row): (usize, &String)| {
+        let (_, rest) = row.split_once(',').unwrap();
+        let minute = at % 60;
+        format!("2026-10-25 02:{minute:02}:00,{rest}")
+    };
+    let shown: Vec<String> = rows(0, 90).iter().enumerate().map(row).collect();
+    let log = scratch.file("night.csv", csv(&shown));
+    let model = scratch.path("zoned.json");
+    let kept = |zone: &str| {
+        let graph = scratch.file("zoned.toml", graph(zone));
+        let fit = athermal(&[&"fit", &graph, &"-o", &model, &"--data", &log]).ended(0);
+        let run = athermal(&[&"run", &model, &"-i", &log]).ended(0);
+        (run.out.lines().count() - 1, fit.told)
+    };
+    let (all, told) = kept(", zone = \"Europe/Berlin\"");
+    assert_eq!(all, 90);
+    assert!(!told.contains("taken for UTC"), "{told}");
+    let (half, told) = kept("");
+    assert_eq!(half, 60);
+    assert!(
+        told.contains("`zone = \"Europe/Berlin\"` in `[time]`"),
+        "{told}"
+    );
+}
+
+#[test]
 fn times_of_a_form_of_their_own_are_read_and_named_as_they_are_written() {
     let scratch = desk("dated").0;
     let graph = "schema = 1\nextends = \"fitted.toml\"\ntime = { column = \"time_s\", format = \"%d.%m.%Y %H:%M:%S\" }\n";

@@ -8,9 +8,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 mod columns;
 mod format;
+mod zone;
 
 pub use columns::{TimeColumns, TimeColumnsError};
 pub use format::{TimeFormat, TimeFormatError};
+pub use zone::{Civil, UnknownZone, Zone};
 
 const NS_PER_US: i64 = 1_000;
 const NS_PER_MS: i64 = 1_000_000;

@@ -28,15 +28,22 @@ impl From<&Declared> for TimeForm {
     }
 }
 
+impl From<&TimeBase> for TimeColumn {
+    fn from(base: &TimeBase) -> Self {
+        let TimeBase::Column { column, form, zone } = base;
+        Self {
+            columns: column.clone(),
+            form: form.into(),
+            zone: zone.clone(),
+        }
+    }
+}
+
 /// What a graph expects of a table: how time is given, and a column for each measured channel.
 #[must_use]
 pub fn layout(plan: &Plan) -> Layout {
-    let TimeBase::Column { column, form } = &plan.time;
     Layout {
-        time: TimeColumn {
-            columns: column.clone(),
-            form: form.into(),
-        },
+        time: (&plan.time).into(),
         channels: plan
             .sources
             .iter()

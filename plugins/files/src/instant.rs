@@ -4,14 +4,33 @@ use jiff::Timestamp;
 use jiff::fmt::temporal::DateTimeParser;
 use jiff::tz::Offset;
 
-use crate::TimeForm;
+use athermal_core::time::{Civil, Instant};
+
 use crate::decimal::Decimal;
+use crate::{TimeColumn, TimeForm};
 
 /// A civil date is ten characters long; only behind it can a sign belong to an offset.
 const DATE_LENGTH: usize = 10;
 
+impl TimeColumn {
+    /// What a trimmed cell stands for, or `None` if it is not of this form. Where times come twice, `last` tells which is meant: the
+    /// instant before, with the time from one to the next in ns.
+    #[must_use]
+    pub fn read(&self, text: &[u8], last: Option<(Instant, i64)>) -> Option<Civil> {
+        let Some(ns) = self.form.read(text) else {
+            return self.form.is_beyond(text).then_some(Civil::Beyond);
+        };
+        let at = Instant::from_ns(ns);
+        Some(match &self.zone {
+            Some(zone) if self.form.is_zoned(text) == Some(false) => zone.instant(at, last),
+            _ => Civil::At(at),
+        })
+    }
+}
+
 impl TimeForm {
-    /// The instant in ns that a trimmed cell stands for, or `None` if it is not of this form or does not fit into 64 bits.
+    /// The instant in ns that a trimmed cell stands for, or `None` if it is not of this form or does not fit into 64 bits. A date and
+    /// time that has no offset is one of UTC.
     #[must_use]
     pub fn read(&self, text: &[u8]) -> Option<i64> {
         match *self {
@@ -26,7 +45,7 @@ impl TimeForm {
     }
 
     /// Whether a cell is of this form, and its instant does not fit into 64 bits.
-    pub(crate) fn is_beyond(&self, text: &[u8]) -> bool {
+    fn is_beyond(&self, text: &[u8]) -> bool {
         let is_of_form = match self {
             Self::Format(format) => format.read(text).is_some(),
             Self::Numbers { .. } => Decimal::parse(text).is_some(),

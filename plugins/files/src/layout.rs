@@ -1,6 +1,6 @@
 //! What is wanted from a recording: which columns give time, and which channels. Not where they stand in a file.
 
-use athermal_core::time::{TimeColumns, TimeFormat};
+use athermal_core::time::{TimeColumns, TimeFormat, Zone};
 
 /// The columns to read, by name; a column that is not named here is skipped.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,6 +18,8 @@ pub struct TimeColumn {
     pub columns: TimeColumns,
     /// How the text of a time is written.
     pub form: TimeForm,
+    /// Whose clock dates and times are read from that have no offset from UTC; none for UTC itself.
+    pub zone: Option<Zone>,
 }
 
 impl TimeColumn {
@@ -27,6 +29,7 @@ impl TimeColumn {
         Self {
             columns: TimeColumns::one(self.columns.title()),
             form: self.form.clone(),
+            zone: self.zone.clone(),
         }
     }
 }
@@ -39,7 +42,7 @@ pub enum TimeForm {
         /// Nanoseconds in one unit: 1,000,000,000 for seconds, 1,000,000 for milliseconds.
         ns_per_unit: i64,
     },
-    /// RFC 3339 text such as `2013-07-04T00:00:00Z`; without a zone (`2013-07-04 00:00:00`, `2013-07-04`) it is UTC.
+    /// RFC 3339 text such as `2013-07-04T00:00:00Z`, or without an offset: `2013-07-04 00:00:00`, `2013-07-04`.
     /// Nanoseconds then count from 1970-01-01T00:00:00Z.
     Rfc3339,
     /// Dates and times in another form, such as `04.07.2013 00:00:00`.
@@ -85,6 +88,7 @@ impl Layout {
             time: TimeColumn {
                 columns: TimeColumns::one(time),
                 form,
+                zone: None,
             },
             channels,
         }

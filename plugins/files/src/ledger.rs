@@ -1,5 +1,6 @@
 //! What was left out of a recording and why: an error when reading strictly, a count when reading leniently.
 
+use athermal_core::time::Instant;
 use athermal_core::unit::Unit;
 
 use crate::cell::decimal_mark;
@@ -123,6 +124,12 @@ impl Ledger {
             time_mark: None,
             value_mark: None,
         }
+    }
+
+    /// The instant of the last row taken, and how long after the one before it that was, in ns.
+    pub fn last(&self) -> Option<(Instant, i64)> {
+        self.last_ns
+            .map(|last_ns| (Instant::from_ns(last_ns), self.step_ns))
     }
 
     /// How a row at this instant would follow the last one taken.

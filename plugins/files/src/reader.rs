@@ -3,6 +3,8 @@
 use std::io::Read;
 use std::path::Path;
 
+use athermal_core::time::Civil;
+
 use crate::cell::{self, Cells};
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
@@ -10,7 +12,7 @@ use crate::joined::{self, Held, Joined};
 use crate::json_rows::JsonRows;
 use crate::ledger::{Follows, Ledger};
 use crate::lines::Lines;
-use crate::{Again, FileError, Format, Layout, Place, Report};
+use crate::{Again, FileError, Format, Layout, Place, Report, TimeColumn};
 
 /// How a recording is to be read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -303,42 +305,25 @@ fn read_time<C: Cells>(
     let cell = cell::trim(rows.time());
     text.clear();
     let time = &layout.time;
-    let time_ns = match std::str::from_utf8(cell) {
-        Ok(cell) => {
-            text.push_str(cell);
-            if rows.decimal_comma()
-                && let Some(comma) = cell::comma_of_time(cell.as_bytes())
-            {
-                text.replace_range(comma..=comma, ".");
-            }
-            time.form.read(text.as_bytes())
+    let read = std::str::from_utf8(cell).ok().and_then(|cell| {
+        text.push_str(cell);
+        if rows.decimal_comma()
+            && let Some(comma) = cell::comma_of_time(cell.as_bytes())
+        {
+            text.replace_range(comma..=comma, ".");
         }
-        Err(_) => None,
-    };
-    if time_ns.is_none() {
-        if rows.take_header(ledger)? {
+        time.read(text.as_bytes(), ledger.last())
+    });
+    let Some(Civil::At(at)) = read else {
+        if read.is_none() && rows.take_header(ledger)? {
             return Ok(None);
         }
-        ledger.refuse_row(|| {
-            let found = excerpt(cell::trim(rows.time()));
-            let (place, column) = (rows.place(), time.columns.to_string());
-            if time.form.is_beyond(text.as_bytes()) {
-                return FileError::TimeBeyond {
-                    place,
-                    column,
-                    found,
-                };
-            }
-            FileError::BadTime {
-                place,
-                column,
-                found,
-                expected: time.form.expected(),
-            }
-        })?;
-    } else if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
+        ledger.refuse_row(|| no_instant(time, read, rows.place(), cell::trim(rows.time())))?;
+        return Ok(None);
+    };
+    if let Some(zoned) = time.form.is_zoned(text.as_bytes()) {
         let report = &mut ledger.report;
-        if report.without_zone.is_none() && !zoned {
+        if report.without_zone.is_none() && !zoned && time.zone.is_none() {
             report.without_zone = Some(rows.place());
         }
     } else if rows.decimal_comma()
@@ -347,7 +332,32 @@ fn read_time<C: Cells>(
         ledger.refuse_row(|| mixed(rows.place(), &time.columns.to_string(), cell, mark))?;
         return Ok(None);
     }
-    Ok(time_ns)
+    Ok(Some(at.as_ns()))
+}
+
+/// What is wrong with a time that is no instant, read as this.
+fn no_instant(time: &TimeColumn, read: Option<Civil>, place: Place, cell: &[u8]) -> FileError {
+    let (column, found) = (time.columns.to_string(), excerpt(cell));
+    match (read, &time.zone) {
+        (Some(Civil::Skipped { offset_s }), Some(zone)) => FileError::TimeSkipped {
+            place,
+            column,
+            found,
+            zone: zone.to_string(),
+            offset_s,
+        },
+        (Some(_), _) => FileError::TimeBeyond {
+            place,
+            column,
+            found,
+        },
+        (None, _) => FileError::BadTime {
+            place,
+            column,
+            found,
+            expected: time.form.expected(),
+        },
+    }
 }
 
 fn read_values<C: Cells>(

@@ -60,9 +60,15 @@ fn times() -> impl Strategy<Value = TimeColumn> {
         Just(TimeForm::Format("%d.%m.%Y %H:%M".parse().unwrap())),
         any::<i64>().prop_map(|step_ns| TimeForm::Samples { step_ns }),
     ];
-    (columns, forms).prop_map(|(columns, form)| TimeColumn {
+    let zones = prop_oneof![
+        Just(None),
+        Just(Some("Europe/Berlin")),
+        Just(Some("-03:30"))
+    ];
+    (columns, forms, zones).prop_map(|(columns, form, zone)| TimeColumn {
         columns: columns.parse().unwrap(),
         form,
+        zone: zone.map(|zone| zone.parse().unwrap()),
     })
 }
 

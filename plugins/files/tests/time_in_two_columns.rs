@@ -13,7 +13,11 @@ const SECOND: i64 = 1_000_000_000;
 
 fn time(columns: &str, form: TimeForm) -> TimeColumn {
     let columns = columns.parse().unwrap();
-    TimeColumn { columns, form }
+    TimeColumn {
+        columns,
+        form,
+        zone: None,
+    }
 }
 
 fn german() -> TimeColumn {

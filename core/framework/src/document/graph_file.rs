@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use super::tree::Value;
 use crate::diagnostic::Place;
 use crate::quantity::Quantity;
-use crate::time::{Duration, TimeColumns, TimeFormat};
+use crate::time::{Duration, TimeColumns, TimeFormat, Zone};
 use crate::unit::Unit;
 
 /// A whole graph file after merging, with every `each` expanded.
@@ -50,6 +50,8 @@ pub enum TimeBase {
         column: TimeColumns,
         /// How their text is read.
         form: TimeForm,
+        /// Where dates and times are those of a clock on the wall; without it they are UTC, save those that have an offset.
+        zone: Option<Zone>,
     },
 }
 
@@ -75,7 +77,7 @@ pub enum TimeForm {
 impl fmt::Display for TimeBase {
     /// "the column `time_s` in steps of 1s", to stand in a sentence.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let TimeBase::Column { column, form } = self;
+        let TimeBase::Column { column, form, .. } = self;
         write!(f, "the column `{column}` ")?;
         match form {
             TimeForm::Numbers { unit } => write!(f, "in steps of {unit}"),

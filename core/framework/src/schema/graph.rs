@@ -393,9 +393,15 @@ fn time(duration: &Value) -> Value {
             },
             "step": described(duration, "The time from one sample number to the next."),
             "format": {
-                "description": "How dates and times are written that are not as in RFC 3339, in the letters of strptime; without an offset (%z) they are UTC.",
+                "description": "How dates and times are written that are not as in RFC 3339, in the letters of strptime; `%z` is the offset from UTC.",
                 "type": "string",
                 "examples": ["%d.%m.%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%d.%m.%Y %H:%M:%S%.f"]
+            },
+            "zone": {
+                "description": "Whose clock dates and times without an offset are read from: a zone of the tz database, or an offset from UTC.",
+                "type": "string",
+                "default": "UTC",
+                "examples": ["Europe/Berlin", "America/New_York", "+01:00"]
             }
         }
     })

@@ -163,7 +163,7 @@ fn of_text(text: &str) -> String {
 
 pub(super) fn time(plan: &Plan) -> Facts {
     let mut facts = Facts::default();
-    let TimeBase::Column { column, form } = &plan.time;
+    let TimeBase::Column { column, form, zone } = &plan.time;
     facts.plain("column", column.to_string());
     match form {
         TimeForm::Numbers { unit } => facts.plain("unit", unit.to_string()),
@@ -175,6 +175,9 @@ pub(super) fn time(plan: &Plan) -> Facts {
                 facts.plain("step", step.to_string());
             }
         }
+    }
+    if let Some(zone) = zone {
+        facts.plain("zone", zone.as_str());
     }
     facts
 }

@@ -24,7 +24,7 @@ fn graph(text: &str) -> GraphFile {
 }
 
 fn time(text: &str) -> (String, TimeForm) {
-    let TimeBase::Column { column, form } = graph(text).time;
+    let TimeBase::Column { column, form, .. } = graph(text).time;
     (column.to_string(), form)
 }
 

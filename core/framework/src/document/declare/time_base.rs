@@ -8,7 +8,7 @@ use crate::diagnostic::{Diagnostics, Place};
 use crate::document::graph_file::{TimeBase, TimeForm};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Table, Value};
-use crate::time::{Duration, TimeColumns, TimeFormat};
+use crate::time::{Duration, TimeColumns, TimeFormat, Zone};
 
 const SECOND: Duration = Duration::from_ns(1_000_000_000);
 /// What `unit` may be, beside the units of time.
@@ -24,11 +24,12 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
         return TimeBase::Column {
             column: TimeColumns::one("time_s"),
             form: seconds,
+            zone: None,
         };
     };
     known_keys(
         time,
-        &["column", "unit", "step", "format"],
+        &["column", "unit", "step", "format", "zone"],
         "[time]",
         diagnostics,
     );
@@ -50,7 +51,24 @@ pub(super) fn declare(time: Option<&Value>, diagnostics: &mut Diagnostics) -> Ti
             (TimeForm::Numbers { .. }, None) => TimeColumns::one("time_s"),
         },
     };
-    TimeBase::Column { column, form }
+    let zone = zone(time, &form, diagnostics);
+    TimeBase::Column { column, form, zone }
+}
+
+/// The zone of dates and times, where one is stated; other times have none, nor those that have an offset each.
+fn zone(time: &Table, form: &TimeForm, diagnostics: &mut Diagnostics) -> Option<Zone> {
+    let entry = time.entry("zone")?;
+    let with = match form {
+        TimeForm::Numbers { .. } => Some("times that are numbers"),
+        TimeForm::Samples { .. } => Some("times that are sample numbers"),
+        TimeForm::Format(format) if format.has_offset() => Some("a format that has the offset"),
+        TimeForm::Format(_) | TimeForm::Rfc3339 => None,
+    };
+    if let Some(with) = with {
+        let (key, with) = ("zone", with.to_owned());
+        diagnostics.report(entry.key, DocumentProblem::TimeContradiction { key, with });
+    }
+    parsed(&entry.value, "zone", diagnostics)
 }
 
 /// The format of dates and times, where there is one; beside it neither a unit nor a step has a meaning.

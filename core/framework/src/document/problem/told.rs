@@ -357,6 +357,10 @@ impl Problem for DocumentProblem {
             Self::TimeContradiction { key: "format", .. } => {
                 Some("leave out one of the two".to_owned())
             }
+            Self::TimeContradiction { key: "zone", .. } => Some(
+                "leave it out; dates and times have one, by `unit = \"rfc3339\"` or a `format` without `%z`"
+                    .to_owned(),
+            ),
             Self::TimeContradiction { key, .. } => {
                 Some(format!("leave out `{key}`, or write `unit = \"sample\"`"))
             }

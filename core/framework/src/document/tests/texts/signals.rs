@@ -137,6 +137,36 @@ error[A010]: "format" is refused: it does not give a whole date and time; write 
 }
 
 #[test]
+fn a_zone_is_one_that_there_is_and_stands_beside_dates() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[time]
+unit = "ms"
+zone = "berlin"
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A024]: `zone` has no meaning with times that are numbers
+ --> a.toml:4:1
+  |
+4 | zone = "berlin"
+  | ^^^^
+  |
+  = help: leave it out; dates and times have one, by `unit = "rfc3339"` or a `format` without `%z`
+
+error[A010]: "zone" is refused: there is no such time zone; did you mean "Europe/Berlin"? Write one of the tz database such as "Europe/Berlin", or an offset such as "+01:00"
+ --> a.toml:4:8
+  |
+4 | zone = "berlin"
+  |        ^^^^^^^^ refused
+"#
+    );
+}
+
+#[test]
 fn braces_in_the_column_of_time_name_columns_each_once() {
     let files = [(
         "a.toml",

@@ -1,0 +1,316 @@
+//! What each error says: what it is, where, and what to do.
+
+use std::fmt;
+
+use super::{Again, FileError, MissingColumn, Place, quoted};
+use crate::cell;
+use crate::instant::{has_clock, is_time_of_day};
+
+/// Whether a text holds a date such as `2013-07-04`, at its beginning or as an example.
+fn is_date(text: &str) -> bool {
+    let form = |four: &[u8]| four.iter().all(u8::is_ascii_digit);
+    let mut dates = text.as_bytes().windows(10);
+    dates.any(|of| {
+        form(&of[..4]) && of[4] == b'-' && form(&of[5..7]) && of[7] == b'-' && form(&of[8..])
+    })
+}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Open { file, source } => {
+                write!(
+                    f,
+                    "{file}: cannot be opened: {source}; check the path and the rights"
+                )
+            }
+            Self::Read { place, source } => write!(f, "{place}: cannot be read further: {source}"),
+            Self::Write { file, source } => write!(f, "{file}: cannot be written: {source}"),
+            Self::StandardInputInList => write!(
+                f,
+                "standard input cannot be joined with other files, whose order is found by opening them twice; save it to a file first"
+            ),
+            Self::Empty { file } => write!(
+                f,
+                "{file}: is empty; a recording starts with a line of column names (CSV) or an object (JSON lines)"
+            ),
+            Self::NotText { place } => {
+                write!(
+                    f,
+                    "{place}: is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\""
+                )
+            }
+            Self::TooLong { place, limit } => write!(
+                f,
+                "{place}: a row longer than {limit} bytes starts here; look for a quote that is not closed or missing line ends"
+            ),
+            Self::UnclosedQuote { place } => {
+                write!(
+                    f,
+                    "{place}: a quoted cell starts here that never ends; close the quote or remove it"
+                )
+            }
+            Self::DuplicateColumn {
+                place,
+                column,
+                positions: [first, second],
+            } => {
+                let is_time = ["time", "timestamp", "datetime", "zeit"];
+                let advice = match is_time.contains(&&*column.to_lowercase()) {
+                    true => "export the log with one time for all columns",
+                    false => "give each column a name of its own",
+                };
+                write!(
+                    f,
+                    "{place}: the name `{column}` stands at columns {first} and {second}; {advice}"
+                )
+            }
+            Self::MissingColumns {
+                place,
+                missing,
+                found,
+                windows_1252,
+            } => lacking(f, place, missing, found, *windows_1252),
+            Self::BadCell {
+                place,
+                column,
+                found,
+            } => {
+                write!(
+                    f,
+                    "{place}: column `{column}`: expected a number, found `{found}`; "
+                )?;
+                match cell::thousands_mark(found) {
+                    Some(mark) => write!(
+                        f,
+                        "write numbers without {mark} between thousands, or read leniently (`--lenient`) to take such as absent"
+                    ),
+                    None => write!(
+                        f,
+                        "leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
+                    ),
+                }
+            }
+            Self::MixedMarks {
+                place,
+                column,
+                found,
+                mark,
+                since,
+            } => {
+                write!(
+                    f,
+                    "{place}: column `{column}`: expected a number with the decimal mark `{mark}`, as in line {since}, found `{found}`; "
+                )?;
+                let thousands = match cell::thousands_mark(found) {
+                    Some(_) => " and none between thousands",
+                    None => "",
+                };
+                write!(
+                    f,
+                    "write all numbers of a file with one mark{thousands}, or read leniently (`--lenient`) to leave out those with another"
+                )
+            }
+            Self::TimeBeyond {
+                place,
+                column,
+                found,
+            } => write!(
+                f,
+                "{place}: column `{column}`: the time `{found}` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`, or read leniently (`--lenient`) to leave the row out"
+            ),
+            Self::BadTime {
+                place,
+                column,
+                found,
+                expected,
+            } => {
+                write!(f, "{place}: column `{column}`: expected {expected}, found ")?;
+                match found.as_str() {
+                    "" => write!(f, "nothing")?,
+                    found => write!(f, "`{found}`")?,
+                }
+                if is_time_of_day(found) {
+                    return write!(
+                        f,
+                        "; a time of day alone is no instant: where its date stands in another column, name both in `[time]`, e.g. `column = \"{{Date}} {{Time}}\"`, \
+                         else write it before the time"
+                    );
+                }
+                if is_date(found) && !is_date(expected) {
+                    return write!(f, "; `unit = \"rfc3339\"` in `[time]` reads such times");
+                }
+                if has_clock(found) && !is_date(found) && !expected.contains('%') {
+                    return write!(
+                        f,
+                        "; `[time]` reads dates and times by their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59"
+                    );
+                }
+                write!(
+                    f,
+                    "; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
+                )
+            }
+            Self::TimeSkipped {
+                place,
+                column,
+                found,
+                zone,
+                offset_s,
+            } => {
+                let (sign, minutes) = (if *offset_s < 0 { '-' } else { '+' }, offset_s.abs() / 60);
+                write!(
+                    f,
+                    "{place}: column `{column}`: `{found}` is no time in {zone}: the clocks are set forward over it; a logger whose clock is not \
+                     set forward has `zone = \"{sign}{:02}:{:02}\"` in `[time]`; or read leniently (`--lenient`) to leave the row out",
+                    minutes / 60,
+                    minutes % 60
+                )
+            }
+            Self::TimeAgain { place, time, why } => {
+                write!(f, "{place}: the time `{time}` is that of the row before")?;
+                match why {
+                    Again::Live => write!(
+                        f,
+                        "; the row was left out: where rows are taken as they come, what belongs to one time must stand in one"
+                    ),
+                    Again::Nothing => {
+                        write!(f, ", which has all that it has; the row was left out")
+                    }
+                    Again::Other(column) => write!(
+                        f,
+                        ", and the two have different values of `{column}`; the row was left out"
+                    ),
+                }
+            }
+            Self::TimeNotAfter {
+                place,
+                time,
+                previous,
+            } => write!(
+                f,
+                "{place}: the time `{time}` is not after `{previous}`; the row was left out"
+            ),
+            Self::TimeLeaps {
+                place,
+                time,
+                previous,
+                next,
+            } => write!(
+                f,
+                "{place}: the time `{time}` is far after `{previous}`, and the next one, `{next}`, is not; the row was left out"
+            ),
+            Self::TimeStaysBehind {
+                place,
+                time,
+                rows,
+                previous,
+            } => write!(
+                f,
+                "{place}: the last {rows} rows were all left out, up to the time `{time}`, since `{previous}` came before them: has the \
+                 clock been set back, or was that time wrong? Rows are taken again once they are after it"
+            ),
+            Self::HeaderAgain {
+                place,
+                moved,
+                lacking,
+            } => {
+                write!(f, "{place}: the names of the columns stand here again, ")?;
+                match moved {
+                    true => write!(f, "in other places; from here on values are taken by them")?,
+                    false => write!(f, "as before; the row was left out")?,
+                }
+                match lacking.as_slice() {
+                    [] => Ok(()),
+                    lacking => {
+                        let names = quoted(lacking.iter().map(String::as_str));
+                        write!(f, ", and without {names}, of which there are none")
+                    }
+                }
+            }
+            Self::LongFormat { place, long } => write!(f, "{place}: {long}"),
+            Self::CellCount {
+                place,
+                expected,
+                found,
+            } => write!(
+                f,
+                "{place}: {found} cells where the header has {expected}; correct the row, or read leniently (`--lenient`) to leave it out"
+            ),
+            Self::BadObject { place, reason } => write!(
+                f,
+                "{place}: expected one JSON object on the line: {reason}; write one object per line, or read leniently (`--lenient`) to leave the line out"
+            ),
+            Self::JsonArray { place } => write!(
+                f,
+                "{place}: a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
+            ),
+            Self::NotBegun { file, reason } => write!(
+                f,
+                "{file}: it cannot be gone on with, and is left as it is, since no earlier run like this wrote it: {reason}; name another file, or move this one away"
+            ),
+            Self::ValueCount {
+                file,
+                expected,
+                found,
+            } => write!(f, "{file}: {found} values for {expected} columns"),
+        }
+    }
+}
+
+/// Which columns are missing, what is there, and what each may be called there.
+fn lacking(
+    f: &mut fmt::Formatter<'_>,
+    place: &Place,
+    missing: &[MissingColumn],
+    found: &[String],
+    windows_1252: bool,
+) -> fmt::Result {
+    let there = match found {
+        [] => "no columns".to_owned(),
+        found => quoted(found.iter().map(String::as_str)),
+    };
+    let read = if windows_1252 {
+        " (read as Windows-1252, since they are not in UTF-8)"
+    } else {
+        ""
+    };
+    let (is, correct) = match missing {
+        [_] => (
+            "is no column",
+            "correct the name, or make it optional if it is a channel",
+        ),
+        _ => (
+            "are no columns",
+            "correct the names, or make optional those that are channels",
+        ),
+    };
+    write!(
+        f,
+        "{place}: there {is} {}; found {there}{read}; ",
+        quoted(missing.iter().map(|column| column.name.as_str()))
+    )?;
+    let mut named = found.iter().filter(|name| !name.is_empty());
+    if !found.is_empty() && named.all(|name| cell::is_number(name) || has_clock(name)) {
+        return f.write_str(
+            "these are values: give the log with the line that names its columns, with which `tail -n +1 -f` begins",
+        );
+    }
+    let near = missing
+        .iter()
+        .filter_map(|column| Some((column, column.nearest.as_deref()?)));
+    let meant: Vec<_> = near
+        .map(|(column, nearest)| match missing {
+            [_] => format!("`{nearest}`"),
+            _ => format!("`{nearest}` for `{}`", column.name),
+        })
+        .collect();
+    if !meant.is_empty() {
+        write!(f, "did you mean {}?", meant.join(", "))?;
+    }
+    match meant.len() {
+        all if all == missing.len() => Ok(()),
+        0 => write!(f, "{correct}"),
+        _ => write!(f, " otherwise {correct}"),
+    }
+}
