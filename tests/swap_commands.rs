@@ -206,6 +206,49 @@ fn a_worse_graph_is_refused_with_figures_and_a_margin_lets_it_pass() {
 }
 
 #[test]
+fn a_graph_that_is_due_when_another_takes_over_follows_it() {
+    let scratch = desk("due");
+    scratch.file("data.csv", format!("time_s,Z\n{}", rows(1000, 61)));
+    let (first, second) = (
+        swap(&scratch, "1100", "still.toml"),
+        swap(&scratch, "1110", "graph.toml"),
+    );
+    let both = [&*first, &second, "--shadow", "2min", "--margin", "10000%"];
+    let finished = run(&scratch, &both).ended(0);
+    assert_eq!(finished.told.matches("took over before").count(), 2);
+    assert_eq!(table(&finished).len(), 61, "no row is lost");
+}
+
+#[test]
+fn samples_far_outside_of_those_of_the_fit_are_told_though_another_graph_has_taken_over() {
+    let scratch = desk("beyond");
+    let model = scratch.path("shown.json");
+    let usual = scratch.file("usual.csv", format!("time_s,Z\n{}", rows(1000, 31)));
+    athermal(&[
+        &"fit",
+        &scratch.path("graph.toml"),
+        &"--data",
+        &usual,
+        &"-o",
+        &model,
+    ])
+    .ended(0);
+    let text = format!(
+        "time_s,Z\n{}",
+        rows(1000, 61).replacen("1050,", "1050,99", 1)
+    );
+    let data = scratch.file("data.csv", text);
+    let told = |more: &[&str]| {
+        let mut all: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"run", &model, &"--input", &data];
+        all.extend(more.iter().map(|argument| argument as &dyn AsRef<_>));
+        athermal(&all).ended(0).told
+    };
+    let beyond = "position.Z is between";
+    assert!(told(&[]).contains(beyond));
+    assert!(told(&[&swap(&scratch, "1300", "still.toml")]).contains(beyond));
+}
+
+#[test]
 fn what_cannot_be_swapped_is_told_before_the_first_row() {
     let scratch = desk("refused");
     let other_time = "schema = 1\nextends = \"still.toml\"\ntime = { unit = \"ms\" }\n";

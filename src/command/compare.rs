@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use athermal::Model;
 use athermal::core::compile::Wanted;
 use athermal::core::engine::SampleRange;
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
@@ -11,7 +12,7 @@ use athermal::core::quantity::Quantity;
 use athermal::core::score::{Lack, Trace, trace};
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, Row, compare};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::beyond;
 use super::data::{self, Data, FITS, recording, tell_overlap};
@@ -45,7 +46,7 @@ pub struct Compare {
     #[arg(long, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     on: Vec<PathBuf>,
     /// Only truths whose absolute value is below count, such as "250 nm/min"
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
     abs_truth_below: Option<Quantity>,
 }
 
@@ -62,17 +63,65 @@ struct Fitted {
     lacks: Vec<Lack>,
 }
 
+/// What has been told of data: graphs that read the same have the same to tell.
+struct Once<'a> {
+    terminal: &'a Terminal,
+    told: BTreeSet<String>,
+    /// Where samples lay in the fits so far.
+    in_fits: Vec<SampleRange>,
+}
+
+impl Once<'_> {
+    fn warn(&mut self, told: impl IntoIterator<Item = String>) {
+        for words in told {
+            if self.told.insert(words.clone()) {
+                self.terminal.warning(words);
+            }
+        }
+    }
+
+    fn note(&mut self, told: Option<String>) {
+        if let Some(words) = told.filter(|words| self.told.insert(words.clone())) {
+            self.terminal.note(words);
+        }
+    }
+
+    fn tell_beyond(&mut self, report: &FitReport, trace: &Trace) {
+        let new = |range: &&SampleRange| beyond::usual(&self.in_fits, &range.channel).is_none();
+        let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
+        beyond::tell(self.terminal, &beyond::beyond(&new, &trace.ranges));
+        self.in_fits.extend(new);
+    }
+}
+
 impl Compare {
     /// Fits, scores and prints.
     ///
     /// # Errors
     /// When a graph has mistakes or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let on = self.data.others(self.on.clone());
-        if self.graphs.len() > 1 {
-            self.data.check_lasting("--data")?;
-            on.check_lasting("--on")?;
+        let (contenders, fits) = self.fit_and_run(terminal)?;
+        let comparisons = compare(&contenders, self.abs_truth_below.as_ref());
+        if terminal.format == Format::Json {
+            println!("{:#}", facts(&comparisons, &fits));
+        } else {
+            for comparison in &comparisons {
+                println!("{}", describe(comparison, fits.len() > 1));
+            }
+            for fit in &fits {
+                println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
+            }
         }
+        tell(terminal, &comparisons, &fits);
+        Ok(if failed(terminal, &fits) {
+            Answer::No
+        } else {
+            Answer::Fine
+        })
+    }
+
+    /// The graphs, each with its name.
+    fn models(&self, terminal: &Terminal) -> Result<Vec<(String, String, Model)>, Failure> {
         let mut models = Vec::new();
         for path in &self.graphs {
             let model = model::load(path, Wanted::default(), terminal)?;
@@ -83,16 +132,32 @@ impl Compare {
         }
         let graphs = models.iter();
         let names = names(graphs.map(|(path, model)| (model.plan.name.as_deref(), path.as_str())));
+        let named = models.into_iter().zip(names);
+        Ok(named
+            .map(|((path, model), name)| (name, path, model))
+            .collect())
+    }
+
+    fn fit_and_run(&self, terminal: &Terminal) -> Result<(Vec<Contender>, Vec<Fitted>), Failure> {
+        let on = self.data.others(self.on.clone());
+        if self.graphs.len() > 1 {
+            self.data.check_lasting("--data")?;
+            on.check_lasting("--on")?;
+        }
         let (mut contenders, mut fits) = (Vec::new(), Vec::<Fitted>::new());
-        let mut in_fits = Vec::new();
-        let mut faults = BTreeSet::new();
-        for ((path, mut model), name) in models.into_iter().zip(names) {
+        let mut once = Once {
+            terminal,
+            told: BTreeSet::new(),
+            in_fits: Vec::new(),
+        };
+        for (name, path, mut model) in self.models(terminal)? {
             let began = Instant::now();
             let options = FitOptions::default();
-            let told = fit_without_card(&mut model, &self.data, &options, terminal)?;
-            let mut words = faults::in_words(&told.faults);
-            let report = told.report;
+            let fit = fit_without_card(&mut model, &self.data, &options, terminal)?;
             let seconds = began.elapsed().as_secs_f64();
+            once.warn(fit.doubts);
+            once.note(data::without_zone(&fit.dataset.reports()));
+            let report = fit.report;
             let dataset = on.dataset();
             let mut progress = terminal.progress("scoring");
             let mut ticks = 0;
@@ -104,27 +169,16 @@ impl Compare {
                 }
             })?;
             drop(progress);
-            data::tell(
-                terminal,
-                &model.plan,
-                &dataset.reports(),
-                trace.refused,
-                &trace.rejected,
-            );
-            let new = |range: &&SampleRange| beyond::usual(&in_fits, &range.channel).is_none();
-            let new: Vec<_> = report.ranges.iter().filter(new).cloned().collect();
-            beyond::tell(terminal, &beyond::beyond(&new, &trace.ranges));
-            in_fits.extend(new);
-            words.extend(faults::in_words(&watch.found()));
+            let reports = dataset.reports();
+            let rejected = &trace.rejected;
+            once.warn(data::doubts(&model.plan, &reports, trace.refused, rejected));
+            once.note(data::without_zone(&reports));
+            once.tell_beyond(&report, &trace);
             if fits.is_empty() && !report.estimators.is_empty() {
                 self.tell_fitted_on(terminal, &report, &trace);
             }
-            for words in words {
-                // The graphs read the same channels.
-                if faults.insert(words.clone()) {
-                    terminal.warning(words);
-                }
-            }
+            once.warn(faults::in_words(&fit.faults));
+            once.warn(faults::in_words(&watch.found()));
             fits.push(Fitted {
                 graph: name.clone(),
                 path,
@@ -138,57 +192,7 @@ impl Compare {
                 trace,
             });
         }
-        let comparisons = compare(&contenders, self.abs_truth_below.as_ref());
-        if terminal.format == Format::Json {
-            let graphs: Vec<_> = fits
-                .iter()
-                .map(|fit| {
-                    json!({
-                        "graph": fit.graph,
-                        "file": fit.path,
-                        "fit_s": fit.seconds,
-                        "lacks": fit.lacks,
-                    })
-                })
-                .collect();
-            println!(
-                "{:#}",
-                json!({ "graphs": graphs, "comparisons": comparisons })
-            );
-        } else {
-            for comparison in &comparisons {
-                println!("{}", describe(comparison, fits.len() > 1));
-            }
-            for fit in &fits {
-                println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
-            }
-        }
-        if comparisons.is_empty() {
-            terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
-        }
-        for comparison in &comparisons {
-            tell_left_out(terminal, comparison);
-        }
-        for column in comparisons.iter().flat_map(|of| &of.truths) {
-            if !column.otherwise.is_empty() {
-                terminal.warning(format_args!(
-                    "`{}` of {} has other values than that of {}, on which all are scored: name truths that are not the same differently",
-                    column.truth,
-                    column.otherwise.join(", "),
-                    fits[0].graph
-                ));
-            }
-        }
-        for fit in &fits {
-            for told in Lack::told(&fit.lacks) {
-                terminal.warning(format_args!("{}: {told}", fit.graph));
-            }
-        }
-        Ok(if failed(terminal, &fits) {
-            Answer::No
-        } else {
-            Answer::Fine
-        })
+        Ok((contenders, fits))
     }
 
     /// Tells where graphs are scored on what they were fitted on.
@@ -233,6 +237,46 @@ fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -
         names.extend(free.find(|name| !names.contains(name)));
     }
     names
+}
+
+fn facts(comparisons: &[Comparison], fits: &[Fitted]) -> Value {
+    let graphs: Vec<_> = fits
+        .iter()
+        .map(|fit| {
+            json!({
+                "graph": fit.graph,
+                "file": fit.path,
+                "fit_s": fit.seconds,
+                "lacks": fit.lacks,
+            })
+        })
+        .collect();
+    json!({ "graphs": graphs, "comparisons": comparisons })
+}
+
+/// Tells what makes scores say less than they seem to.
+fn tell(terminal: &Terminal, comparisons: &[Comparison], fits: &[Fitted]) {
+    if comparisons.is_empty() {
+        terminal.warning("no graph predicts a measured truth, so there is nothing to compare");
+    }
+    for comparison in comparisons {
+        tell_left_out(terminal, comparison);
+    }
+    for column in comparisons.iter().flat_map(|of| &of.truths) {
+        if !column.otherwise.is_empty() {
+            terminal.warning(format_args!(
+                "`{}` of {} has other values than that of {}, on which all are scored: name truths that are not the same differently",
+                column.truth,
+                column.otherwise.join(", "),
+                fits[0].graph
+            ));
+        }
+    }
+    for fit in fits {
+        for told in Lack::told(&fit.lacks) {
+            terminal.warning(format_args!("{}: {told}", fit.graph));
+        }
+    }
 }
 
 /// Tells where the scores hide what happens while a prediction has no value.

@@ -248,18 +248,18 @@ fn repeated(files: impl Iterator<Item = impl AsRef<str>>) -> Vec<String> {
     told
 }
 
-/// Notes, once however many files there are, that times do not say how far they are from UTC.
-pub fn note_zone(terminal: &Terminal, reports: &[(String, Report)]) {
+/// That times do not say how far they are from UTC, once however many files there are.
+#[must_use]
+pub fn without_zone(reports: &[(String, Report)]) -> Option<String> {
     let mut places = reports
         .iter()
         .filter_map(|(_, report)| report.without_zone.as_ref());
-    if let Some(place) = places.next() {
-        terminal.note(format_args!("{place}: dates and times {WITHOUT_ZONE}"));
-    }
+    let place = places.next()?;
+    Some(format!("{place}: dates and times {WITHOUT_ZONE}"))
 }
 
-/// Tells of rows and cells that were not taken, of samples that were rejected, of units that the data have and the graph has not, and
-/// of files that count more than once.
+/// Tells of rows and cells that were not taken, of samples that were rejected, of units that the data have and the graph has not, of
+/// files that count more than once, and of dates without a zone.
 pub fn tell(
     terminal: &Terminal,
     plan: &Plan,
@@ -267,31 +267,44 @@ pub fn tell(
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    for told in of_files(reports) {
+    for told in doubts(plan, reports, refused, rejected) {
         terminal.warning(told);
     }
-    for told in other_units(plan, reports) {
-        terminal.warning(told);
+    if let Some(told) = without_zone(reports) {
+        terminal.note(told);
     }
+}
+
+/// The same but for the last.
+#[must_use]
+pub fn doubts(
+    plan: &Plan,
+    reports: &[(String, Report)],
+    refused: u64,
+    rejected: &[(String, u64)],
+) -> Vec<String> {
+    let mut told = of_files(reports);
+    told.extend(other_units(plan, reports));
     if refused > 0 {
         let were = if refused == 1 { "was" } else { "were" };
-        terminal.warning(format_args!(
+        told.push(format!(
             "{} {were} refused for a time that is not after the one before",
             counted(refused, "row")
         ));
     }
     let rows: u64 = reports.iter().map(|(_, report)| report.rows).sum();
-    for (channel, n) in rejected {
+    told.extend(rejected.iter().map(|(channel, n)| {
         let samples = counted(*n, "sample");
-        terminal.warning(match *n {
+        match *n {
             most if 2 * most > rows && most > 1 => format!(
                 "{channel}: {}{samples} are infinite or out of range, taken as missing; is its unit that of the log?",
                 if most == rows { "all " } else { "" }
             ),
             1 => format!("{channel}: {samples} is infinite or out of range, taken as missing"),
             _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),
-        });
-    }
+        }
+    }));
+    told
 }
 
 /// Columns under whose names another unit stands than that of their signal.

@@ -1,13 +1,14 @@
 //! `athermal diff`: what differs in meaning between two graphs or models.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use athermal::Model;
-use athermal::core::compile::{Change, ParameterChange, PlanDiff, diff};
+use athermal::core::compile::{Change, ParameterChange, PlanDiff, Wanted, diff};
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::model;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Say what differs in meaning between two graphs or models
@@ -33,7 +34,8 @@ impl Diff {
     /// # Errors
     /// When one of them cannot be read or has mistakes.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let (before, after) = (Model::load(&self.before)?, Model::load(&self.after)?);
+        let load = |path: &Path| model::load(path, Wanted::default(), terminal);
+        let (before, after) = (load(&self.before)?, load(&self.after)?);
         let plans = diff(&before.plan, &after.plan);
         let fitted = fitted(&before, &after);
         let same = plans.is_same() && fitted.is_empty();

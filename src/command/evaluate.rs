@@ -1,6 +1,5 @@
 //! `athermal evaluate`: scores a model's predictions on recorded data.
 
-use std::cmp::Ordering;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -15,7 +14,7 @@ use super::data::{self, Data};
 use super::faults::{self, FaultWatch, Purpose};
 use super::model::{check_limit, load_fitted};
 use super::numbers;
-use crate::figures::{count, counted, number, or_dash, paragraph, seconds, table};
+use crate::figures::{count, counted, number, or_dash, paragraph, seconds, stated, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -54,7 +53,7 @@ pub struct Evaluate {
     #[command(flatten)]
     data: Data,
     /// Only truths whose absolute value is below count, such as "250 nm/min"
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
     abs_truth_below: Option<Quantity>,
     /// Score each prediction on all instants of its own
     #[arg(long)]
@@ -70,7 +69,6 @@ pub struct Evaluate {
     #[arg(
         long,
         value_name = "K",
-        required_if_eq("mode", "k-step"),
         allow_negative_numbers = true,
         value_parser = numbers::read::<NonZeroU32>("a whole number of steps, 1 or more and below 2^32")
     )]
@@ -150,7 +148,6 @@ impl Evaluate {
         faults::tell(terminal, &faults);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
         self.data.tell_fitted_on(terminal, &model, period);
-        data::note_zone(terminal, &dataset.reports());
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);
         }
@@ -236,7 +233,7 @@ fn describe(scores: &Scores, mode: Mode) -> String {
             text,
             "  no model {}, persistence {}, standard error of the truth {}",
             or_dash(first.baseline_zero),
-            or_dash(first.baseline_persistence),
+            persistence(&rows),
             or_dash(first.truth_noise)
         );
         text.push_str(&left_out(&rows));
@@ -263,14 +260,34 @@ fn describe(scores: &Scores, mode: Mode) -> String {
     text
 }
 
+/// How far off the truth of before is, for each horizon where that differs.
+fn persistence(rows: &[&Score]) -> String {
+    let mut all: Vec<(f64, String)> = Vec::new();
+    for row in rows.iter().filter(|row| !row.own_instants) {
+        if all.iter().all(|(ahead_s, _)| *ahead_s != row.ahead_s) {
+            all.push((row.ahead_s, or_dash(row.baseline_persistence)));
+        }
+    }
+    let Some((_, first)) = all.first() else {
+        return or_dash(rows.first().and_then(|row| row.baseline_persistence));
+    };
+    if all.iter().all(|(_, error)| error == first) {
+        return first.clone();
+    }
+    let told = all
+        .iter()
+        .map(|(ahead_s, error)| format!("{error} at {}", stated(*ahead_s)));
+    told.collect::<Vec<_>>().join(" and ")
+}
+
 /// What is told where many instants are not scored, since some prediction has no value there.
 fn left_out(rows: &[&Score]) -> String {
     let scored_together = || rows.iter().filter(|row| !row.own_instants);
     let Some(most) = scored_together().max_by_key(|row| row.left_out) else {
         return String::new();
     };
-    let lacking =
-        scored_together().min_by(|a, b| a.valid.partial_cmp(&b.valid).unwrap_or(Ordering::Equal));
+    let valid = |row: &Score| row.valid.unwrap_or(f64::NEG_INFINITY);
+    let lacking = scored_together().min_by(|a, b| valid(a).total_cmp(&valid(b)));
     match lacking {
         Some(lacking) if most.leaves_many_out() => {
             let words = format!(

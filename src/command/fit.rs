@@ -145,6 +145,7 @@ impl Fit {
             dataset,
             report,
             faults,
+            ..
         } = told;
         let to_stdout = self.output.as_os_str() == "-";
         if terminal.format == Format::Json && !to_stdout {
@@ -186,6 +187,8 @@ pub struct Told {
     pub report: FitReport,
     /// What is wrong with channels.
     pub faults: Vec<Faulty>,
+    /// What was left out of the data, and what may be wrong in them.
+    pub doubts: Vec<String>,
 }
 
 /// Fits a model on data, fills in its card, and tells what was left out of the data, or may be wrong in them.
@@ -199,9 +202,14 @@ pub fn fit_on(
     terminal: &Terminal,
 ) -> Result<Told, Failure> {
     let told = fit_without_card(model, data, options, terminal)?;
-    faults::tell(terminal, &told.faults);
     let (dataset, report) = (&told.dataset, &told.report);
-    data::note_zone(terminal, &dataset.reports());
+    for doubt in &told.doubts {
+        terminal.warning(doubt);
+    }
+    if let Some(told) = data::without_zone(&dataset.reports()) {
+        terminal.note(told);
+    }
+    faults::tell(terminal, &told.faults);
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),
         created: created(),
@@ -217,7 +225,7 @@ pub fn fit_on(
     Ok(told)
 }
 
-/// The same for a model that is not kept: a card has the checksums of all data. What is wrong with channels is not told.
+/// The same for a model that is not kept: a card has the checksums of all data. What there is to tell is left to the caller.
 ///
 /// # Errors
 /// When the data cannot be read.
@@ -236,8 +244,7 @@ pub fn fit_without_card(
     drop(progress);
     let faults = watch.found();
     model.fitted = fitted;
-    data::tell(
-        terminal,
+    let doubts = data::doubts(
         &model.plan,
         &dataset.reports(),
         report.refused,
@@ -247,6 +254,7 @@ pub fn fit_without_card(
         dataset,
         report,
         faults,
+        doubts,
     })
 }
 

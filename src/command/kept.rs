@@ -8,6 +8,7 @@ use athermal::core::recording::Event;
 use athermal::{Engine, Instant};
 
 use super::aside::{not_written, whole_aside};
+use crate::figures::length;
 use crate::terminal::{Failure, Terminal, outside};
 
 /// How long a run that is killed may have learned in vain.
@@ -150,8 +151,9 @@ impl Rest<'_> {
         };
         if before > athermal::Duration::ZERO {
             self.terminal.warning(format_args!(
-                "the last row is {before} before what the run before saw last: nothing was predicted; if a clock was ahead then, a \
-                 run with another `--state` file begins cold and goes on from there"
+                "the last row is {} before what the run before saw last: nothing was predicted; if a clock was ahead then, a \
+                 run with another `--state` file begins cold and goes on from there",
+                length(before)
             ));
         } else {
             self.terminal.note(

@@ -63,6 +63,11 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
 /// # Errors
 /// When a truth is in a unit that measures something else.
 pub fn check_limit(limit: &Quantity, model: &Model) -> Result<(), Failure> {
+    if limit.value <= 0.0 {
+        return Err(Failure::Request(format!(
+            "--abs-truth-below {limit}: no truth is below that; give a limit above 0, such as \"250 nm/min\""
+        )));
+    }
     let truths = model
         .plan
         .channels

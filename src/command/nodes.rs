@@ -95,6 +95,14 @@ fn explain(terminal: &Terminal, kind: &Kind) {
         let what = format!("{} ({read}{unit}{optional})", port.summary);
         print!("{}", paragraph(&name, 6, &what));
     }
+    let outputs = outputs(kind);
+    if !outputs.is_empty() {
+        println!("\nOutput ports, the first where none is named:");
+    }
+    for (port, what) in outputs {
+        let name = format!("  {port:<17} ");
+        print!("{}", paragraph(&name, 6, what));
+    }
     let schema = Value::from((kind.schema)());
     println!("\nParameters:");
     if kind.framework_keys().contains(&"ahead") {
@@ -124,6 +132,50 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
 }
 
+/// The output ports that nodes of a kind may have, and when.
+fn outputs(kind: &Kind) -> Vec<(&'static str, &'static str)> {
+    const PREDICTION: (&str, &str) = (
+        "prediction",
+        "what the truth will be, in its unit; a combiner's is made from the votes",
+    );
+    match kind.role {
+        // Each kind names its own, on its page.
+        RoleName::Feature => Vec::new(),
+        RoleName::Estimator => {
+            let mut ports = vec![PREDICTION];
+            if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
+                ports.push((
+                    "learning",
+                    "with `learn`: what became of the newest truth. 0 learned, 1 frozen on command, 2 frozen by a channel, 3 an outlier, \
+                     4 outside the range of the fit, 5 outside `train.abs_truth`, 6 a regressor was missing",
+                ));
+            }
+            ports.push((
+                "deviation",
+                "the standard deviation of the truth about the prediction, of kinds that tell it",
+            ));
+            ports
+        }
+        RoleName::Combiner => vec![
+            PREDICTION,
+            (
+                "weights",
+                "of kinds that weigh: the weight of each voter, by its name",
+            ),
+            (
+                "reason",
+                "of kinds that switch: the number of why it does what it does",
+            ),
+            ("lower", "of kinds that give intervals: where they begin"),
+            ("upper", "the same: where they end"),
+            (
+                "deviation",
+                "of kinds that weigh, where all voters have one: that of the truth about the prediction",
+            ),
+        ],
+    }
+}
+
 fn describe(kind: &Kind) -> Value {
     let inputs: Vec<Value> = (kind.inputs)()
         .iter()
@@ -143,6 +195,10 @@ fn describe(kind: &Kind) -> Value {
         "package": kind.package,
         "version": kind.version,
         "inputs": inputs,
+        "outputs": outputs(kind)
+            .iter()
+            .map(|(name, summary)| json!({ "name": name, "summary": summary }))
+            .collect::<Vec<_>>(),
         "parameters": Value::from((kind.schema)()),
     })
 }

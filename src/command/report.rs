@@ -49,6 +49,10 @@ impl Report {
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         self.data.check_lasting("--data")?;
         if let Some(output) = &self.output {
+            if output.as_os_str() == "-" && terminal.format == Format::Json {
+                let told = "--output -: the page and the facts as JSON cannot both go to standard output; name a file for the page";
+                return Err(Failure::Request(told.to_owned()));
+            }
             let read = self.data.paths().chain([&*self.model]);
             check_apart("--output", output, read)?;
         }

@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use athermal::core::compile::Wanted;
-use athermal::core::compile::{Plan, SourceChannel};
+use athermal::core::compile::{Plan, SourceChannel, Wanted};
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
@@ -20,6 +19,7 @@ use super::model::{self, check_fitted};
 use super::rejected::Ranged;
 use super::swap;
 use super::{beyond, data};
+use crate::figures::length;
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
 /// Run a model: rows in, predictions out
@@ -266,7 +266,7 @@ impl Run {
             terminal.warning(format_args!(
                 "{}: its last row is {} before what the run before saw last: what was predicted between stands in another file, or is lost",
                 self.output.display(),
-                seen - last
+                length(seen - last)
             ));
         }
         Ok(writer)

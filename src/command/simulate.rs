@@ -41,13 +41,14 @@ pub struct Simulate {
     /// The machine; all are listed when none is named
     machine: Option<String>,
     /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE", requires = "machine")]
     output: Option<PathBuf>,
     /// Length of the recording in days
     #[arg(
         long,
         default_value_t = 7.0,
         allow_negative_numbers = true,
+        requires = "machine",
         value_parser = numbers::read::<f64>("a number of days, such as 0.5")
     )]
     days: f64,
@@ -56,20 +57,21 @@ pub struct Simulate {
         long,
         default_value_t = 1,
         allow_negative_numbers = true,
+        requires = "machine",
         value_parser = numbers::read::<u64>("a whole number, 0 or more and below 2^64")
     )]
     seed: u64,
     /// Add the true drift of each axis as a column
-    #[arg(long)]
+    #[arg(long, requires = "machine")]
     truth: bool,
     /// Set points over time; the machine has a schedule of its own
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "machine")]
     schedule: Option<PathBuf>,
     /// Let a fitted graph correct the axes; what they applied is recorded as {axis}_applied_nm
-    #[arg(long, value_name = "MODEL")]
+    #[arg(long, value_name = "MODEL", requires = "machine")]
     compensate: Option<PathBuf>,
     /// A fault of a sensor, or of each of a signal: CHANNEL=KIND[,from=…][,for=…][,size=…]
-    #[arg(long = "fault", value_name = "SPEC")]
+    #[arg(long = "fault", value_name = "SPEC", requires = "machine")]
     faults: Vec<FaultSpec>,
 }
 

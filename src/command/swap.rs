@@ -13,7 +13,7 @@ use clap::Args;
 
 use super::model::check_fitted;
 use super::watched::Watched;
-use crate::figures::{count, counted, number};
+use crate::figures::{count, counted, length, number};
 use crate::terminal::{Failure, Terminal};
 
 /// When and how the graph is replaced.
@@ -21,16 +21,28 @@ use crate::terminal::{Failure, Terminal};
 pub struct Options {
     /// Replace the graph at this time of the data, or so long after its first row, by another model or a graph whose
     /// estimators mean the same
-    #[arg(long, value_name = "TIME=GRAPH")]
+    #[arg(
+        long,
+        value_name = "TIME=GRAPH",
+        allow_hyphen_values = true,
+        group = "replaced"
+    )]
     swap_at: Vec<String>,
     /// Compare a new graph with the running one for so long before it takes over
-    #[arg(long, value_name = "DURATION", value_parser = some_time)]
+    #[arg(long, value_name = "DURATION", value_parser = some_time, requires = "replaced")]
     shadow: Option<Duration>,
     /// By how much the error of a new graph may be larger, such as "5%"
-    #[arg(long, value_name = "PERCENT", default_value = "0%", value_parser = percent)]
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        default_value = "0%",
+        value_parser = percent,
+        allow_hyphen_values = true,
+        requires = "shadow"
+    )]
     margin: f64,
     /// Replace the graph whenever its file changes
-    #[arg(long)]
+    #[arg(long, group = "replaced")]
     watch: bool,
 }
 
@@ -38,12 +50,9 @@ pub struct Options {
 const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(200);
 
 fn percent(text: &str) -> Result<f64, String> {
-    let digits = text
-        .trim()
-        .strip_suffix('%')
-        .ok_or_else(|| format!("expected a percentage such as \"5%\", found {text:?}"))?;
-    match digits.trim().parse::<f64>() {
-        Ok(percent) if percent.is_finite() && percent >= 0.0 => Ok(percent / 100.0),
+    let digits = text.trim().strip_suffix('%').map(str::trim);
+    match digits.and_then(|digits| digits.parse::<f64>().ok()) {
+        Some(percent) if percent.is_finite() && percent >= 0.0 => Ok(percent / 100.0),
         _ => Err(format!(
             "expected a percentage such as \"5%\", found {text:?}"
         )),
@@ -80,7 +89,8 @@ impl Options {
     pub fn schedule(&self, running: &Model, terminal: &Terminal) -> Result<Vec<Swap>, Failure> {
         let mut swaps: Vec<Swap> = Vec::new();
         for text in &self.swap_at {
-            let (time, path) = text.split_once('=').ok_or_else(|| {
+            let named = text.split_once('=').filter(|(_, path)| !path.is_empty());
+            let (time, path) = named.ok_or_else(|| {
                 Failure::Request(format!("--swap-at takes TIME=GRAPH, such as 3600=new.toml or 1h=new.toml, found {text:?}"))
             })?;
             let at = When::read(time, &running.plan.time)?;
@@ -222,19 +232,19 @@ impl<'a> Course<'a> {
             return Ok(());
         }
         self.tell(control.pump());
+        // One at a time: what is committed takes over with this row, and only then may the next be staged.
         if self.staged.is_some() {
-            self.judge(control)?;
+            return self.judge(control);
         }
         if due
-            && self.staged.is_none()
             && let Some(Swap {
                 path, mut model, ..
             }) = self.waiting.pop()
         {
             model.take_fits_of(&self.running);
-            self.stage(control, model, path)?;
+            return self.stage(control, model, path);
         }
-        if look && self.staged.is_none() {
+        if look {
             self.look(control);
         }
         Ok(())
@@ -285,9 +295,10 @@ impl<'a> Course<'a> {
         if !silent.is_empty() {
             let named: Vec<_> = silent.iter().map(|name| format!("`{name}`")).collect();
             self.terminal.warning(format_args!(
-                "{} gives no {} over the past {past} that it was warmed by: are its sensors those of this machine?",
+                "{} gives no {} over the past {} that it was warmed by: are its sensors those of this machine?",
                 path.display(),
-                named.join(", ")
+                named.join(", "),
+                length(past)
             ));
         }
         self.staged = Some((model, path));
@@ -450,7 +461,9 @@ fn report(path: &Path, staged: &Staged) -> String {
     if let Some((past, wanted)) = staged.too_short_a_past() {
         let _ = write!(
             text,
-            "\n  the past to warm it by is {past}, and it looks back as far as {wanted}: until then it may give less than it will"
+            "\n  the past to warm it by is {}, and it looks back as far as {}: until then it may give less than it will",
+            length(past),
+            length(wanted)
         );
     }
     text

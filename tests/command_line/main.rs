@@ -16,6 +16,7 @@ mod mistakes;
 mod mistakes_in_tests;
 mod next;
 mod numbers;
+mod requests;
 mod truths;
 
 use std::path::PathBuf;

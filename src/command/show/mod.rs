@@ -13,8 +13,8 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use serde_json::{Value, json};
 
-use super::model::load_fitted;
-use crate::drawing::{Diagram, Flow, diagram, dot, mermaid, plan, svg};
+use super::model::{self, load_fitted};
+use crate::drawing::{Class, Diagram, Flow, diagram, dot, mermaid, plan, svg};
 use crate::terminal::{Answer, Failure, Terminal, print};
 use coefficients::Told;
 
@@ -79,7 +79,7 @@ impl Show {
                 self.format
             )));
         }
-        let model = Model::load(&self.graph)?;
+        let model = model::load(&self.graph, Wanted::default(), terminal)?;
         let drawn = || diagram(&model.plan, self.expand);
         let text = match self.format.as_str() {
             "mermaid" => mermaid::text(&drawn()),
@@ -128,7 +128,13 @@ fn facts(diagram: &Diagram, told: &[Told]) -> Value {
         .boxes
         .iter()
         .map(|shown| {
-            let class = format!("{:?}", shown.class).to_lowercase();
+            let class = match shown.class {
+                Class::Signal => "signal",
+                Class::Feature => "feature",
+                Class::Estimator => "estimator",
+                Class::Combiner => "combiner",
+                Class::Output => "output",
+            };
             json!({ "name": shown.title, "class": class, "lines": shown.lines })
         })
         .collect();

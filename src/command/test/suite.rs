@@ -43,9 +43,7 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
         let mut of_file = Diagnostics::new();
         let planned = plan_and_tests(path, &mut sources, &mut of_file);
         let broken = of_file.has_errors();
-        if broken {
-            diagnostics.extend(of_file);
-        }
+        diagnostics.extend(of_file);
         if let Some((mut plan, trials)) = planned.filter(|_| !broken) {
             trial::observe(&mut plan, &trials);
             let line = |trial: &Trial| (trial.name.clone(), sources.line_column(trial.place).0);
@@ -63,5 +61,6 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
         terminal.diagnostics(&diagnostics, &sources);
         return Err(Failure::Told(2));
     }
+    terminal.doubts(&diagnostics, &sources);
     Ok(suites)
 }

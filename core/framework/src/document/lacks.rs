@@ -36,7 +36,7 @@ impl Lacks {
     pub(super) fn for_texts(found: &Data) -> Option<Self> {
         match found {
             Data::Text(text) => Some(Self::Brackets {
-                around: format!("{text:?}"),
+                around: toml::Value::from(&**text).to_string(),
             }),
             _ => None,
         }

@@ -8,6 +8,7 @@ use super::estimate::Estimate;
 use super::slots::Given;
 use super::state::{NodeState, SlotState};
 use super::{Engine, EngineState, RestoreError, Running};
+use crate::channel::Extremes;
 use crate::compile::PlannedRole;
 use crate::node::Restored;
 
@@ -82,7 +83,7 @@ impl Engine {
     pub fn state(&self) -> EngineState {
         let name = |slot: usize| self.plan.channels[slot].name.clone();
         let outputs = self.plan.outputs.iter().enumerate();
-        let sources = self.plan.sources.iter().zip(&self.rejected);
+        let source = |index: usize| self.plan.sources[index].name.clone();
         EngineState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             revision: self.revision().to_owned(),
@@ -90,10 +91,19 @@ impl Engine {
             last: self.last,
             before_break: self.before_break,
             frozen: self.frozen,
-            rejected: sources
-                .map(|(source, &count)| (source.name.clone(), count))
+            rejected: self
+                .rejected
+                .iter()
+                .enumerate()
+                .map(|(index, &count)| (source(index), count))
                 .collect(),
             refused: self.refused,
+            extremes: self
+                .extremes
+                .iter()
+                .enumerate()
+                .map(|(index, &extremes)| (source(index), extremes))
+                .collect(),
             slots: (0..self.plan.channels.len())
                 .map(|slot| (name(slot), self.slot_state(slot)))
                 .collect(),
@@ -221,8 +231,11 @@ impl Engine {
         for gathered in &mut self.gathered {
             gathered.forget_places();
         }
-        for (count, source) in self.rejected.iter_mut().zip(&self.plan.sources) {
+        let counts = self.rejected.iter_mut().zip(&mut self.extremes);
+        for ((count, extremes), source) in counts.zip(&self.plan.sources) {
             *count = state.rejected.get(&source.name).copied().unwrap_or(0);
+            let was = state.extremes.get(&source.name);
+            *extremes = was.copied().unwrap_or(Extremes::NONE);
         }
         for (index, output) in self.plan.outputs.iter().enumerate() {
             if let Some(was) = state.blending.get(&output.name)

@@ -10,6 +10,7 @@ use super::history::History;
 use super::recent_error::RecentError;
 use super::revision::fnv_1a;
 use super::withheld::LearningState;
+use crate::channel::Extremes;
 use crate::node::{Restored, State};
 use crate::time::Instant;
 
@@ -28,6 +29,9 @@ pub struct EngineState {
     pub(crate) before_break: Option<Instant>,
     pub(crate) rejected: BTreeMap<String, u64>,
     pub(crate) refused: u64,
+    /// Between which values the samples of each channel lay: for whoever takes over in the same run.
+    #[serde(skip)]
+    pub(crate) extremes: BTreeMap<String, Extremes>,
     pub(crate) slots: BTreeMap<String, SlotState>,
     pub(crate) histories: BTreeMap<String, History>,
     pub(crate) nodes: BTreeMap<String, NodeState>,

@@ -130,7 +130,10 @@ fn channels(
     diagnostics: &mut Diagnostics,
 ) -> Option<Vec<(String, Place)>> {
     if let Some(set) = value.as_text() {
-        let or = format!("write `[{set:?}]` for a channel of that name");
+        let or = format!(
+            "write `[{}]` for a channel of that name",
+            toml::Value::from(set)
+        );
         let members = sets.find_or(set, value.place, Some(or), diagnostics)?;
         return Some(
             members

@@ -1,0 +1,87 @@
+//! Requests that cannot be met as they stand, told before anything is done; and what is told once for all that was asked.
+
+use super::workbench::{Scratch, athermal, athermal_on};
+use super::{csv, desk, rows};
+
+#[test]
+fn options_that_need_another_are_refused_without_it() {
+    let (scratch, plain, data, model) = desk("requests");
+    let log = scratch.path("log.csv");
+    for (more, lacking) in [
+        (["--shadow", "1h"], "--swap-at"),
+        (["--margin", "5%"], "--shadow"),
+    ] {
+        let run = athermal(&[&"run", &plain, &"--input", &data, &more[0], &more[1]]);
+        run.ended(2).tells(&["required", lacking]);
+    }
+    let simulate = athermal(&[&"simulate", &"-o", &log, &"--days", &"3"]);
+    simulate.ended(2).tells(&["required", "<MACHINE>"]);
+    assert!(!log.exists());
+    athermal_on("evaluate", &model, &data, &[&"--mode", &"k-step"])
+        .ended(2)
+        .tells(&["--mode k-step needs the number of steps: `--steps 3`"]);
+    athermal_on(
+        "report",
+        &model,
+        &data,
+        &[&"-o", &"-", &"--format", &"json"],
+    )
+    .ended(2)
+    .tells(&["cannot both go to standard output"]);
+    athermal(&[&"run", &plain, &"--input", &data, &"--swap-at", &"6h="])
+        .ended(2)
+        .tells(&["--swap-at takes TIME=GRAPH"]);
+}
+
+#[test]
+fn a_limit_below_which_no_truth_lies_is_refused() {
+    let (_scratch, _, data, model) = desk("no-limit");
+    for limit in ["0 nm", "-5 nm"] {
+        athermal_on("evaluate", &model, &data, &[&"--abs-truth-below", &limit])
+            .ended(2)
+            .tells(&["no truth is below that"]);
+    }
+}
+
+#[test]
+fn what_is_doubtful_in_data_or_a_graph_is_told_once_by_each_command_that_takes_it() {
+    let (scratch, ..) = desk("doubts");
+    let unused = "schema = 1\nextends = \"fitted.toml\"\nnodes.unused = { type = \"slope\", inputs.signal = \"temperature\", windows = [\"30s\"] }\n\
+                  signals.temperature = { range = [\"20.5 Cel\", \"200 Cel\"] }\n";
+    let (one, two) = (
+        scratch.file("one.toml", unused),
+        scratch.file("two.toml", unused),
+    );
+    let data = scratch.path("data.csv");
+    let compared = athermal(&[&"compare", &one, &two, &"--data", &data, &"--on", &data]);
+    let told = compared.ended(0).told;
+    let times = told.matches("samples are infinite or out of range").count();
+    assert_eq!(times, 1, "{told}");
+    athermal(&[&"show", &one]).ended(0).tells(&["A059"]);
+    athermal(&[&"diff", &one, &two]).ended(0).tells(&["A059"]);
+}
+
+#[test]
+fn persistence_of_several_horizons_is_told_for_each() {
+    let scratch: Scratch = desk("horizons").0;
+    let graph = "schema = 1\nextends = \"plain.toml\"\nnodes.later = { type = \"persistence\", inputs.truth = \"drift.Z\", ahead = \"2min\" }\n\
+                 outputs.later = \"later\"\n";
+    let graph = scratch.file("later.toml", graph);
+    let data = scratch.file("more.csv", csv(&rows(0, 200)));
+    let scores = athermal_on("evaluate", &graph, &data, &[]).ended(0);
+    let scored = athermal_on("evaluate", &graph, &data, &[&"--format", &"json"]).ended(0);
+    let scored = scored.json();
+    let heading = scores.out.lines().nth(1).unwrap();
+    assert!(heading.contains(" at 30s and "), "{heading}");
+    assert!(heading.contains(" at 2min"), "{heading}");
+    let of = |row: usize| scored["scores"][row]["baseline_persistence"].as_f64();
+    assert_ne!(of(0), of(1));
+}
+
+#[test]
+fn the_page_of_a_node_names_its_output_ports() {
+    let page = |kind: &str| athermal(&[&"nodes", &kind]).ended(0).out;
+    assert!(page("rls").contains("learning"));
+    assert!(page("linear").contains("deviation"));
+    assert!(page("auto_weighted").contains("weights"));
+}
