@@ -31,6 +31,7 @@ pub mod diagnosis;
 mod drawing;
 mod figures;
 mod invocation;
+mod markup;
 mod program;
 pub mod report;
 mod starter;

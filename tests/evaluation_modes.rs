@@ -438,7 +438,7 @@ fn steps_are_asked_for_and_refused_where_they_mean_nothing() {
         arguments.extend(mode.iter().map(|part| part as &dyn AsRef<std::ffi::OsStr>));
         athermal(&arguments).ended(code)
     };
-    evaluate(&["--mode", "k-step"], 2).tells(&["--steps <K>"]);
+    evaluate(&["--mode", "k-step"], 2).tells(&["--mode k-step needs the number of steps"]);
     evaluate(&["--mode", "free-run", "--steps", "3"], 2).tells(&["--mode k-step", "free-run"]);
     evaluate(&["--mode", "k-step", "--steps", "0"], 2).tells(&["--steps"]);
     evaluate(&["--mode", "k-step", "--steps", "1000"], 0)

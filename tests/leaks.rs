@@ -7,6 +7,7 @@ mod workbench;
 use athermal::core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Tick,
 };
+use athermal::core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use workbench::Read;
@@ -189,6 +190,44 @@ fn a_kind_that_mixes_as_many_channels_as_it_reads_hides_nothing() {
         let leak = told(&format!("{crossed}{}", estimator(channel, "0s")));
         assert!(leak[0].1.contains("from `position.X`"), "{}", leak[0].1);
     }
+}
+
+/// Passes its input on as if each value were one of an instant.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Instantaneous {}
+
+impl Feature for Instantaneous {
+    fn inputs() -> &'static [InputPort] {
+        Crossed::inputs()
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let mut ports = Crossed {}.outputs(inputs)?;
+        for channel in &mut ports[0].channels {
+            channel.span = Duration::ZERO;
+        }
+        Ok(ports)
+    }
+
+    fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator> {
+        Crossed {}.build(inputs, wanted)
+    }
+}
+
+athermal::core::register!(Instantaneous, Feature, "test_instantaneous");
+
+#[test]
+fn a_truth_is_held_to_the_span_of_what_it_is_made_of_though_its_kind_forgets_it() {
+    let ar = |lag: &str| {
+        format!(
+            "[nodes.bare]\ntype = \"test_instantaneous\"\ninputs.signal = \"drift\"\n\
+             [nodes.ar]\ntype = \"ar\"\ninputs.truth = \"bare.X\"\nahead = \"0s\"\nlags = [\"{lag}\"]\n\
+             [outputs]\npredicted = \"ar\"\n"
+        )
+    };
+    assert_eq!(told(&ar("1min")).len(), 1);
+    assert_eq!(told(&ar("5min")), []);
 }
 
 #[test]

@@ -13,7 +13,6 @@ pub(crate) use colours::LINES;
 pub use colours::{COLOURS, STYLE};
 use colours::{UNSCALED, in_light};
 pub use plot::Plot;
-pub(crate) use svg::escaped;
 
 use scale::{decimated, label, range, ticks};
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Anchor, Scene, Shape};
+use crate::markup::escaped;
 
 impl Scene {
     pub(super) fn svg(&self) -> String {
@@ -107,22 +108,9 @@ fn path(svg: &mut String, points: &[(f64, f64)], dots: bool) {
     }
 }
 
-/// A text that cannot be taken for markup.
-pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_name_cannot_break_the_page() {
-        assert_eq!(escaped("<b>&\""), "&lt;b&gt;&amp;&quot;");
-    }
 
     #[test]
     fn a_line_stops_at_a_gap_and_goes_on_after_it() {

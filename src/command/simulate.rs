@@ -139,26 +139,19 @@ impl Simulate {
         terminal: &Terminal,
     ) -> Result<u64, Failure> {
         let engine = load_fitted(model, Wanted::default(), terminal)?.engine()?;
-        let refused = |error: MachineError| Failure::Request(error.to_string());
-        let simulation = recording.start().map_err(refused)?;
+        let simulation = Box::new(Watched::start(recording, terminal)?);
         let mut simulation = ClosedLoop::new(machine, simulation, engine).map_err(refused)?;
         let channels = machine.channels();
         let axes = channels.iter().filter(|channel| channel.is_axis());
         let mut columns = table_columns(channels, self.truth);
         columns.extend(axes.map(|axis| format!("{}_applied_nm", axis.name)));
-        let mut writer = Writer::create(output, "time_s", &columns, Flush::Buffered)?;
         let mut row = Row::empty(channels);
-        let (mut values, mut rows) = (Vec::new(), 0);
-        while simulation.next(&mut row) {
-            values.clear();
-            values.extend_from_slice(&row.values);
-            values.extend(row.true_drift.iter().filter(|_| self.truth));
+        write_rows(output, &columns, |values| {
+            let more = simulation.next(&mut row);
+            take(&row, self.truth, values);
             values.extend_from_slice(simulation.applied());
-            writer.write_row("", row.time_ns, &values)?;
-            rows += 1;
-        }
-        writer.finish()?;
-        Ok(rows)
+            more.then_some(row.time_ns)
+        })
     }
 
     fn schedule(&self, machine: &dyn Machine) -> Result<Option<Schedule>, Failure> {
@@ -190,30 +183,15 @@ pub fn write_recording(
     output: &Path,
     terminal: &Terminal,
 ) -> Result<u64, Failure> {
-    let simulation = recording
-        .start()
-        .map_err(|error| Failure::Request(error.to_string()))?;
-    let days = recording.setup().days;
-    let mut simulation = Watched {
-        simulation,
-        // Days are counted in thousandths, since how many rows there will be is the machine's business.
-        progress: terminal.progress_to("simulating", "", Some((days * 1000.0) as u64)),
-    };
+    let mut simulation = Watched::start(recording, terminal)?;
     let channels = machine.channels();
     if FileFormat::from_path(output) == Some(FileFormat::JsonLines) {
-        let columns = table_columns(channels, truth);
-        let mut writer = Writer::create(output, "time_s", &columns, Flush::Buffered)?;
         let mut row = Row::empty(channels);
-        let (mut values, mut rows) = (Vec::new(), 0);
-        while simulation.next(&mut row) {
-            values.clear();
-            values.extend_from_slice(&row.values);
-            values.extend(row.true_drift.iter().filter(|_| truth));
-            writer.write_row("", row.time_ns, &values)?;
-            rows += 1;
-        }
-        writer.finish()?;
-        return Ok(rows);
+        return write_rows(output, &table_columns(channels, truth), |values| {
+            let more = simulation.next(&mut row);
+            take(&row, truth, values);
+            more.then_some(row.time_ns)
+        });
     }
     let failed = |error: io::Error| {
         if error.kind() == io::ErrorKind::BrokenPipe {
@@ -233,10 +211,48 @@ pub fn write_recording(
     Ok(rows)
 }
 
+/// Writes rows for as long as there is one, by its time in ns and its values, and gives their number.
+fn write_rows(
+    output: &Path,
+    columns: &[String],
+    mut next: impl FnMut(&mut Vec<f64>) -> Option<i64>,
+) -> Result<u64, Failure> {
+    let mut writer = Writer::create(output, "time_s", columns, Flush::Buffered)?;
+    let (mut values, mut rows) = (Vec::new(), 0);
+    while let Some(time_ns) = next(&mut values) {
+        writer.write_row("", time_ns, &values)?;
+        values.clear();
+        rows += 1;
+    }
+    writer.finish()?;
+    Ok(rows)
+}
+
+fn take(row: &Row, truth: bool, values: &mut Vec<f64>) {
+    values.extend_from_slice(&row.values);
+    values.extend(row.true_drift.iter().filter(|_| truth));
+}
+
+fn refused(error: MachineError) -> Failure {
+    Failure::Request(error.to_string())
+}
+
 /// A simulation that tells how far it has come.
 struct Watched {
     simulation: Box<dyn Simulation>,
     progress: Progress,
+}
+
+impl Watched {
+    fn start(recording: &Simulated, terminal: &Terminal) -> Result<Self, Failure> {
+        let simulation = recording.start().map_err(refused)?;
+        let days = recording.setup().days;
+        Ok(Self {
+            simulation,
+            // Days are counted in thousandths, since how many rows there will be is the machine's business.
+            progress: terminal.progress_to("simulating", "", Some((days * 1000.0) as u64)),
+        })
+    }
 }
 
 impl Simulation for Watched {

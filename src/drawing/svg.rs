@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::layout::layout;
 use super::{Box, Class, Diagram, Flow};
+use crate::markup::escaped;
 
 const MARGIN: f64 = 24.0;
 const TITLE: f64 = 40.0;
@@ -190,11 +191,4 @@ fn legend(diagram: &Diagram, y: f64) -> String {
         }
     }
     text
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }

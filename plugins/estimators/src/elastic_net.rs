@@ -4,13 +4,14 @@ use athermal_core::node::{
     Estimator, Forms, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
-use athermal_core::time::Duration;
 use athermal_numerics::{Gram, GramBlocks, NumericsError, Standardization, logarithmic_grid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::conditioning::tell_columns;
+use crate::features::{FEATURES_AND_TRUTH, present_features};
 use crate::folds::Folds;
+use crate::penalty::{best_of, means};
 use crate::regression::{LinearPredictor, told};
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
@@ -58,7 +59,7 @@ pub struct Path {
     #[serde(default = "ten_thousandth")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub smallest_share: f64,
-    /// How many are tried to each factor of ten, 1 or more.
+    /// How many are tried to each factor of ten, 1 to 1000.
     #[serde(default = "twenty")]
     #[schemars(range(min = 1, max = 1000))]
     pub per_decade: u32,
@@ -116,23 +117,6 @@ impl SparsePenalty {
                 mistakes
             }
         }
-    }
-}
-
-/// The ports of estimators that take features alone.
-pub(crate) const FEATURES_AND_TRUTH: &[InputPort] = &[
-    InputPort::held(
-        "features",
-        "what the prediction is made of, such as slopes of temperatures",
-    ),
-    InputPort::truth("what is predicted, such as the drift of an axis"),
-];
-
-/// The features as they are now.
-pub(crate) fn present_features() -> Regressors {
-    Regressors {
-        feature_lags: vec![Duration::ZERO],
-        ..Regressors::default()
     }
 }
 
@@ -212,13 +196,8 @@ impl SparseTrainer {
         let alphas = logarithmic_grid(path.smallest_share * largest, largest, path.per_decade);
         let splits = self.blocks.splits(&path.folds.cut())?;
         let folds = how.cross_validated(&splits, &all, scales, &alphas)?;
-        let means: Vec<f64> = folds
-            .iter()
-            .map(|scores| scores.iter().sum::<f64>() / scores.len() as f64)
-            .collect();
-        // Of several as good the largest, which leaves out most.
-        let best = (0..alphas.len()).reduce(|a, b| if means[b] >= means[a] { b } else { a });
-        let best = best.unwrap_or(0);
+        let means = means(&folds);
+        let best = best_of(&means);
         let edge = if best == 0 {
             "; it is the smallest tried, a smaller one may be better"
         } else {

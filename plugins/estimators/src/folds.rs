@@ -9,8 +9,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Folds {
-    /// Into so many contiguous parts, 2 or more, each of which is tested on once.
-    Contiguous(#[schemars(range(min = 2))] usize),
+    /// Into so many contiguous parts, 2 to 1000, each of which is tested on once.
+    Contiguous(#[schemars(range(min = 2, max = 1000))] usize),
     /// In a way of its own.
     Cut(Cut),
 }
@@ -22,8 +22,8 @@ pub enum Cut {
     /// Each of so many contiguous parts is tested on once; the rest trains, apart from what is too near to be independent
     /// (López de Prado 2018, section 7.4).
     Blocked {
-        /// How many parts, 2 or more.
-        #[schemars(range(min = 2))]
+        /// How many parts, 2 to 1000.
+        #[schemars(range(min = 2, max = 1000))]
         count: usize,
         /// Rows left out on either side of the tested part: windows that reach across the edge share measurements.
         #[serde(default)]
@@ -34,8 +34,8 @@ pub enum Cut {
     },
     /// Each of the last parts is tested on by what came before it, as it would have been at the time.
     Expanding {
-        /// How many tests, 2 or more; the rows are cut into one part more.
-        #[schemars(range(min = 2))]
+        /// How many tests, 2 to 1000; the rows are cut into one part more.
+        #[schemars(range(min = 2, max = 1000))]
         count: usize,
         /// Rows left out between what trains and what is tested.
         #[serde(default)]

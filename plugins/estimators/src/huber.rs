@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::conditioning::tell_columns;
-use crate::elastic_net::{FEATURES_AND_TRUTH, present_features};
+use crate::features::{FEATURES_AND_TRUTH, present_features};
 use crate::regression::{LinearPredictor, rows_gone, told};
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.

@@ -4,7 +4,8 @@ use athermal_core::node::{Estimator, InputPort, Mistake, Regressors, Trainer, Tr
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::elastic_net::{FEATURES_AND_TRUTH, SparsePenalty, SparseTrainer, present_features};
+use crate::elastic_net::{SparsePenalty, SparseTrainer};
+use crate::features::{FEATURES_AND_TRUTH, present_features};
 
 /// Linear regression of the truth on features that leaves out those it can do without.
 ///

@@ -10,6 +10,7 @@ mod arx;
 mod bj;
 mod conditioning;
 mod elastic_net;
+mod features;
 mod folds;
 mod huber;
 mod identified;

@@ -3,10 +3,10 @@
 use athermal_core::node::{
     Estimator, InputPort, Learns, Mistake, Regressors, Trainer, TrainingSetup,
 };
-use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::features::{FEATURES, TRUTH, present_features};
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
 use crate::solver::Solver;
@@ -39,23 +39,11 @@ pub struct Linear {
 
 impl Estimator for Linear {
     fn inputs() -> &'static [InputPort] {
-        const {
-            &[
-                InputPort::held(
-                    "features",
-                    "what the prediction is made of, such as slopes of temperatures",
-                ),
-                InputPort::truth("what is predicted, such as the drift of an axis"),
-                InputPort::freeze(),
-            ]
-        }
+        const { &[FEATURES, TRUTH, InputPort::freeze()] }
     }
 
     fn regressors(&self) -> Regressors {
-        Regressors {
-            feature_lags: vec![Duration::ZERO],
-            ..Regressors::default()
-        }
+        present_features()
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

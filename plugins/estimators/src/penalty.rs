@@ -37,7 +37,7 @@ pub enum Choice {
         #[serde(default = "largest")]
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         largest: f64,
-        /// How many are tried to each factor of ten, 1 or more.
+        /// How many are tried to each factor of ten, 1 to 1000.
         #[serde(default = "four")]
         #[schemars(range(min = 1, max = 1000))]
         per_decade: u32,
@@ -53,7 +53,7 @@ pub enum Choice {
         #[serde(default = "largest")]
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         largest: f64,
-        /// How many are tried to each factor of ten, 1 or more.
+        /// How many are tried to each factor of ten, 1 to 1000.
         #[serde(default = "four")]
         #[schemars(range(min = 1, max = 1000))]
         per_decade: u32,
@@ -95,6 +95,18 @@ struct Chosen {
     place: usize,
     /// The mean R² over the folds, where there are any.
     r2: Option<f64>,
+}
+
+/// The mean of each penalty's scores over the folds.
+pub(crate) fn means(folds: &[Vec<f64>]) -> Vec<f64> {
+    let mean = |scores: &Vec<f64>| scores.iter().sum::<f64>() / scores.len() as f64;
+    folds.iter().map(mean).collect()
+}
+
+/// The place of the best score; of several as good that of the largest penalty.
+pub(crate) fn best_of(scores: &[f64]) -> usize {
+    let better = |a, b| if scores[b] >= scores[a] { b } else { a };
+    (0..scores.len()).reduce(better).unwrap_or(0)
 }
 
 impl Settled {
@@ -193,8 +205,7 @@ impl Penalty {
             Choice::CrossValidation { folds, .. } => {
                 let splits = blocks.splits(&folds.cut())?;
                 let folds = cross_validated_penalties(&splits, columns, scales, &alphas)?;
-                let mean = |scores: &Vec<f64>| scores.iter().sum::<f64>() / scores.len() as f64;
-                folds.iter().map(mean).collect()
+                means(&folds)
             }
             Choice::GeneralisedCrossValidation { .. } => {
                 let scores =
@@ -202,9 +213,7 @@ impl Penalty {
                 scores.iter().map(|score| -score).collect()
             }
         };
-        // Of several as good the largest.
-        let best = (0..alphas.len()).reduce(|a, b| if scores[b] >= scores[a] { b } else { a });
-        let best = best.unwrap_or(0);
+        let best = best_of(&scores);
         let r2 = match choice {
             Choice::CrossValidation { .. } => Some(scores[best]),
             Choice::GeneralisedCrossValidation { .. } => None,

@@ -10,7 +10,7 @@ use athermal_numerics::Standardizer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::elastic_net::{FEATURES_AND_TRUTH, present_features};
+use crate::features::{FEATURES_AND_TRUTH, present_features};
 use crate::regression::LinearTrainer;
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
 use crate::selection::Selection;

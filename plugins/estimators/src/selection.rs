@@ -47,7 +47,7 @@ pub enum Selection {
 #[serde(deny_unknown_fields)]
 #[schemars(inline)]
 pub struct CrossValidated {
-    /// How the rows are cut: a number of contiguous folds, 2 or more, or a table such as
+    /// How the rows are cut: a number of contiguous folds, 2 to 1000, or a table such as
     /// `{ type = "blocked", count = 5, gap_rows = 4, embargo_rows = 8 }` or `{ type = "expanding", count = 5 }`.
     #[serde(default = "Folds::three")]
     pub folds: Folds,

@@ -5,10 +5,11 @@ use athermal_core::node::{
     Coefficients, Estimator, Factor, Figure, InputPort, Of, Predictor, Regressors, Term, Trained,
     Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
-use athermal_core::time::Duration;
 use athermal_numerics::{Gram, GramBlocks, NumericsError, non_negative_least_squares};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::features::present_features;
 
 /// Stacked regression: the sum of several predictions, by weights that are not negative and found by least squares in the fit.
 ///
@@ -47,10 +48,7 @@ impl Estimator for Stack {
     }
 
     fn regressors(&self) -> Regressors {
-        Regressors {
-            feature_lags: vec![Duration::ZERO],
-            ..Regressors::default()
-        }
+        present_features()
     }
 
     fn needs_constants(&self) -> bool {
@@ -311,6 +309,8 @@ athermal_core::register!(Stack, Estimator, "stack");
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use athermal_core::time::Duration;
+
     use super::*;
     use athermal_core::node::Regressor;
 

@@ -64,9 +64,7 @@ impl Description {
     ) -> Result<Self, FileError> {
         of_lines(Lines::new(name.into(), input), format, rows)
     }
-}
 
-impl Description {
     /// What the columns are where the file is in long format.
     #[must_use]
     pub fn long_format(&self) -> Option<LongFormat> {

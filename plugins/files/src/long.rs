@@ -88,9 +88,7 @@ impl LongFormat {
             values: columns[values].clone(),
         })
     }
-}
 
-impl LongFormat {
     /// The column of names, and the name, where columns are called as in long format and all rows have one name.
     pub(crate) fn of_one_name(columns: &[String], rows: &[Vec<String>]) -> Option<(usize, String)> {
         let called = |known: &[&str]| {

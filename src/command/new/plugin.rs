@@ -24,7 +24,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
   athermal new plugin my-regression --role estimator
   athermal new plugin our-controller --role source")]
 pub struct Plugin {
-    /// The name of the crate and of what it brings: small letters, digits, `-`
+    /// The name of the crate and of what it brings: small letters, digits, `-` or `_`
     name: String,
     /// What the crate brings
     #[arg(long, value_enum, default_value = "feature")]
@@ -94,7 +94,7 @@ impl Plugin {
         let names = Names::of(name).ok_or_else(|| {
             Failure::Request(format!(
                 "`{name}` cannot be the name of a crate and of what it brings: begin with a small letter, go on with small letters, \
-                 digits and single `-`"
+                 digits and single `-` or `_`"
             ))
         })?;
         self.free(&names)?;

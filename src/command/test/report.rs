@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::suite::Suite;
 use super::work::{Ran, Status};
 use crate::figures::count;
+use crate::markup::escaped;
 use crate::terminal::{Answer, Failure};
 
 /// The line of a test and, unless it passed, the figures that say why.
@@ -205,23 +206,6 @@ fn case(xml: &mut String, suite: &Suite, ran: &Ran) {
         escaped(first),
         escaped(&reasons.join("\n"))
     );
-}
-
-/// Text as XML has it; characters that XML cannot have are replaced.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\n' | '\t' => escaped.push(character),
-            character if character < ' ' => escaped.push('\u{fffd}'),
-            character => escaped.push(character),
-        }
-    }
-    escaped
 }
 
 fn finding(finding: &Finding) -> Value {

@@ -8,7 +8,8 @@ mod tables;
 use std::fmt::Write as _;
 
 use super::{Facts, Hours, Worth, figure};
-use crate::chart::{COLOURS, Chart, Plot, STYLE, escaped};
+use crate::chart::{COLOURS, Chart, Plot, STYLE};
+use crate::markup::escaped;
 
 /// One self-contained HTML page: no request leaves it, it prints, and it follows the reader's light or dark.
 #[must_use]

@@ -6,8 +6,8 @@ use athermal_core::model::EstimatorCard;
 use athermal_core::score::Score;
 
 use super::super::{Departure, Hours, Published, SensorFacts, Worth, figure, spelled};
-use crate::chart::escaped;
 use crate::figures::count;
+use crate::markup::escaped;
 
 fn table(header: &[&str], rows: &str) -> String {
     let header: String = header

@@ -85,7 +85,7 @@ impl Resolver<'_> {
                 link: TruthLink {
                     slot: predicts,
                     ahead,
-                    span: self.channels[predicts].channel.span,
+                    span: self.provenance[predicts].span(),
                     limit: Duration::ZERO,
                 },
             });

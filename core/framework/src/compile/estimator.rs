@@ -246,7 +246,8 @@ impl Resolver<'_> {
                 .report(instance.input_place("truth"), problem);
             return None;
         }
-        let span = channel.span;
+        // A node may forget what its inputs are means of.
+        let span = self.provenance[truth].span();
         if let Some(node) = self.endless(truth) {
             let channel = self.channels[truth].name.clone();
             let problem = CompileProblem::EndlessTruth { channel, node };

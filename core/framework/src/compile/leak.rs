@@ -133,6 +133,7 @@ impl Resolver<'_> {
                     }
                 };
                 for (slot, behind) in self.nodes[node].slots.clone().zip(behind) {
+                    let behind = behind.spanning(self.channels[slot].channel.span);
                     if self.provenance[slot] != behind {
                         self.provenance[slot] = behind;
                         changed = true;

@@ -36,7 +36,6 @@ pub(crate) use plan::{Rows, admits};
 pub(crate) use port_channels::PortChannels;
 pub use problem::CompileProblem;
 pub(crate) use provenance::persistence_lag;
-pub use provenance::smallest_lag;
 pub(crate) use reference::Reference;
 pub(crate) use scope::outermost;
 

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::persistence_lag;
+use super::provenance::smallest_lag;
 use super::slot_set::SlotSet;
 use crate::channel::Channel;
 use crate::document::TimeBase;
@@ -415,7 +416,7 @@ impl TruthLink {
     /// How much earlier than a prediction the newest truth may have arrived that it knows of: `max(0, span − ahead)`.
     #[must_use]
     pub fn embargo(&self) -> Duration {
-        (self.span - self.ahead).max(Duration::ZERO)
+        smallest_lag(self.span, self.ahead)
     }
 
     /// The truth that a learner's predictions are made of beside their regressors, with the delay of the newest that it has seen.
@@ -426,7 +427,7 @@ impl TruthLink {
     /// Whether the truth of a run's own tick is a regressor that it may have: the window of what it predicts begins where that
     /// truth's ends, or later.
     #[must_use]
-    pub fn allows_present(&self) -> bool {
+    pub(crate) fn allows_present(&self) -> bool {
         self.ahead > Duration::ZERO && self.embargo().is_zero()
     }
 }

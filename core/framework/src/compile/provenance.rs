@@ -6,15 +6,21 @@ use std::sync::Arc;
 use crate::time::Duration;
 
 /// The measured channels behind a value, each with the smallest delay on any path: through data inputs, and through the truth of
-/// what learns while it runs.
+/// what learns while it runs. And the longest span on any of them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Provenance(Arc<BTreeMap<usize, Duration>>);
+pub struct Provenance {
+    delays: Arc<BTreeMap<usize, Duration>>,
+    span: Duration,
+}
 
 impl Provenance {
     /// A measured channel itself.
     #[must_use]
     pub fn source(slot: usize) -> Self {
-        Self(Arc::new(BTreeMap::from([(slot, Duration::ZERO)])))
+        Self {
+            delays: Arc::new(BTreeMap::from([(slot, Duration::ZERO)])),
+            span: Duration::ZERO,
+        }
     }
 
     /// What is made of several values, `delay` later.
@@ -26,40 +32,54 @@ impl Provenance {
         };
         let mut all = first.clone();
         if delay != Duration::ZERO {
-            Arc::make_mut(&mut all.0)
+            Arc::make_mut(&mut all.delays)
                 .values_mut()
                 .for_each(|d| *d += delay);
         }
         for (part, delay) in parts {
-            if delay == Duration::ZERO && Arc::ptr_eq(&part.0, &all.0) {
+            all.span = all.span.max(part.span);
+            if delay == Duration::ZERO && Arc::ptr_eq(&part.delays, &all.delays) {
                 continue;
             }
-            for (&slot, &gathered) in part.0.iter() {
+            for (&slot, &gathered) in part.delays.iter() {
                 let gathered = gathered + delay;
-                if all.0.get(&slot).is_none_or(|&known| gathered < known) {
-                    Arc::make_mut(&mut all.0).insert(slot, gathered);
+                if all.delays.get(&slot).is_none_or(|&known| gathered < known) {
+                    Arc::make_mut(&mut all.delays).insert(slot, gathered);
                 }
             }
         }
         all
     }
 
+    /// The same of a value that summarises so much of the past, as its node says.
+    #[must_use]
+    pub(crate) fn spanning(self, span: Duration) -> Self {
+        let span = self.span.max(span);
+        Self { span, ..self }
+    }
+
+    /// The longest span of the value and of all that it is made of: no node gives an instant of what is a mean of minutes.
+    #[must_use]
+    pub(crate) fn span(&self) -> Duration {
+        self.span
+    }
+
     /// The smallest delay of a measured channel, where it is behind the value.
     #[must_use]
-    pub fn delay_of(&self, source: usize) -> Option<Duration> {
-        self.0.get(&source).copied()
+    pub(crate) fn delay_of(&self, source: usize) -> Option<Duration> {
+        self.delays.get(&source).copied()
     }
 
     /// The measured channels and their smallest delays.
-    pub fn sources(&self) -> impl Iterator<Item = (usize, Duration)> + '_ {
-        self.0.iter().map(|(&slot, &delay)| (slot, delay))
+    pub(crate) fn sources(&self) -> impl Iterator<Item = (usize, Duration)> + '_ {
+        self.delays.iter().map(|(&slot, &delay)| (slot, delay))
     }
 }
 
 /// The smallest lag at which a truth of this span may be a regressor for this horizon, where `Duration::ZERO` stands for
 /// "one sample" when both are zero.
 #[must_use]
-pub fn smallest_lag(span: Duration, ahead: Duration) -> Duration {
+pub(crate) fn smallest_lag(span: Duration, ahead: Duration) -> Duration {
     (span - ahead).max(Duration::ZERO)
 }
 

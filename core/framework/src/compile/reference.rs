@@ -71,7 +71,7 @@ impl<'a> Reference<'a> {
 
 /// Whether a pattern has anything to expand, so that it may name several channels.
 #[must_use]
-pub fn is_pattern(text: &str) -> bool {
+pub(crate) fn is_pattern(text: &str) -> bool {
     text.contains(['*', '?', '{'])
 }
 

@@ -229,7 +229,7 @@ impl<'g> Resolver<'g> {
             for channel in port.channels {
                 let own = channel.name.clone();
                 let outward = outward_name(instance.decl.member.as_deref(), single, &own);
-                let slot = self.channels.len();
+                let (slot, span) = (self.channels.len(), channel.span);
                 let named = if ranges.is_empty() {
                     format!("{}.{outward}", instance.node.name)
                 } else {
@@ -243,7 +243,8 @@ impl<'g> Resolver<'g> {
                     // Only what a node gives first is a prediction; the other ports tell of it.
                     predicts: predicts.filter(|_| ranges.is_empty()),
                 });
-                self.provenance.push(behind.next().unwrap_or_default());
+                let behind = behind.next().unwrap_or_default();
+                self.provenance.push(behind.spanning(span));
                 let scope = self.scopes.get_mut(&instance.node.name);
                 if scope
                     .ports

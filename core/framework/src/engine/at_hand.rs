@@ -7,9 +7,17 @@ use crate::time::Instant;
 /// in the source.
 pub(crate) struct AtHand<'a> {
     plan: &'a Plan,
-    /// The instant of the tick; none in a fit.
-    now: Option<Instant>,
+    when: When,
     node: usize,
+}
+
+/// When a node is at work.
+#[derive(Clone, Copy)]
+enum When {
+    Tick(Instant),
+    Fit,
+    /// While it is made, or takes a state back.
+    Start,
 }
 
 impl<'a> AtHand<'a> {
@@ -18,15 +26,24 @@ impl<'a> AtHand<'a> {
     pub(super) fn at(plan: &'a Plan, now: Instant) -> Self {
         Self {
             plan,
-            now: Some(now),
+            when: When::Tick(now),
             node: usize::MAX,
         }
     }
 
     /// This one, while it is fitted.
     pub(crate) fn in_fit(plan: &'a Plan, node: usize) -> Self {
-        let now = None;
-        Self { plan, now, node }
+        let when = When::Fit;
+        Self { plan, when, node }
+    }
+
+    /// None yet, of a plan whose nodes are made or take their states back.
+    pub(super) fn at_start(plan: &'a Plan) -> Self {
+        Self {
+            plan,
+            when: When::Start,
+            node: usize::MAX,
+        }
     }
 
     /// From here on it is this one.
@@ -42,13 +59,17 @@ impl Drop for AtHand<'_> {
         if std::thread::panicking()
             && let Some(node) = self.plan.nodes.get(self.node)
         {
-            eprintln!("{}", told(node, self.now));
+            eprintln!("{}", told(node, self.when));
         }
     }
 }
 
-fn told(node: &PlannedNode, now: Option<Instant>) -> String {
-    let when = now.map_or_else(|| "in its fit".to_owned(), |now| format!("at {now} s"));
+fn told(node: &PlannedNode, when: When) -> String {
+    let when = match when {
+        When::Tick(now) => format!("at {now} s"),
+        When::Fit => "in its fit".to_owned(),
+        When::Start => "before its first tick".to_owned(),
+    };
     format!(
         "the node `{}` panicked {when}; what it said stands above, and is for the author of `{}`, from {} {}",
         node.instance(),

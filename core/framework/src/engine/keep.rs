@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::AtHand;
 use super::carry::{Begin, Carry, Heritage, NodeCarry, Touched};
 use super::estimate::Estimate;
 use super::slots::Given;
@@ -167,7 +168,9 @@ impl Engine {
         };
         let mut carried = Vec::with_capacity(plan.nodes.len());
         let mut refusing = vec![false; plan.nodes.len()];
+        let mut at_hand = AtHand::at_start(&plan);
         for (index, (node, running)) in plan.nodes.iter().zip(&mut self.nodes).enumerate() {
+            at_hand.is(index);
             let was = state.nodes.get(&node.instance());
             let outcome = match &heritage.nodes[index] {
                 Begin::AsItWas => match restored(running, was) {
@@ -192,6 +195,7 @@ impl Engine {
                 outcome,
             });
         }
+        drop(at_hand);
         self.adopt_slots(state, heritage, &refusing);
         if refusing.contains(&true) {
             // What hangs on a node that begins afresh has its old state, but will not go on as if nothing had happened.

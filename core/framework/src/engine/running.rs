@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::at_hand::AtHand;
 use super::estimate::{Estimate, fit_of};
 use super::learning::Learning;
 use super::vote::{Vote, Wires};
@@ -79,7 +80,9 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
         .collect();
     let mut nodes = Vec::with_capacity(plan.nodes.len());
     let mut used = 0;
-    for node in &plan.nodes {
+    let mut at_hand = AtHand::at_start(plan);
+    for (nth, node) in plan.nodes.iter().enumerate() {
+        at_hand.is(nth);
         nodes.push(match (&node.role, node.spec.role()) {
             (
                 PlannedRole::Feature {

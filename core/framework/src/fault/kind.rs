@@ -55,13 +55,13 @@ impl FaultKind {
 
     /// Whether it has a size: all but `missing` and `stuck` do.
     #[must_use]
-    pub const fn has_size(self) -> bool {
+    pub(crate) const fn has_size(self) -> bool {
         !matches!(self, Self::Missing | Self::Stuck)
     }
 
     /// The size where none is given, in the unit of the channel (per hour for `drift`): 1 K for a temperature, 100 nm for a length, and shares and multiples of it; other units have none.
     #[must_use]
-    pub fn usual_size(self, unit: &Unit) -> Option<f64> {
+    pub(crate) fn usual_size(self, unit: &Unit) -> Option<f64> {
         let of = |text: &str, size: f64| {
             let usual = Unit::parse(text).ok()?;
             Some(size * usual.factor_to(unit)?)

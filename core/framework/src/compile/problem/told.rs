@@ -1,7 +1,7 @@
 //! How each mistake in what a graph means is told; which there are stands above.
 
 use super::CompileProblem;
-use crate::compile::smallest_lag;
+use crate::compile::provenance::smallest_lag;
 use crate::diagnostic::{Names, Problem, Severity, nearest};
 use crate::time::Duration;
 

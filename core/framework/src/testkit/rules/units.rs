@@ -11,7 +11,15 @@ use crate::unit::Unit;
 const ROUNDING: f64 = 1e-7;
 
 pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
-    let given: Vec<Given> = subject.given.iter().map(in_another_unit).collect();
+    let given: Vec<Given> = subject
+        .given
+        .iter()
+        .map(|given| {
+            let mut ports = (subject.kind.inputs)().iter();
+            let stated = ports.any(|port| port.name == given.port && port.unit.is_some());
+            in_another_unit(given, stated)
+        })
+        .collect();
     if given
         .iter()
         .zip(&subject.given)
@@ -78,8 +86,9 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// The same input in a unit of the same kind, where there is one.
-fn in_another_unit(given: &Given) -> Given {
+/// The same input in a unit of the same kind, where there is one. A port with a stated unit that is a point on a scale takes such
+/// alone.
+fn in_another_unit(given: &Given, stated: bool) -> Given {
     let Ok(unit) = Unit::parse(&given.unit) else {
         return given.clone();
     };
@@ -89,7 +98,9 @@ fn in_another_unit(given: &Given) -> Given {
         .chain(OTHERS.map(str::to_owned))
         .filter_map(|text| Some((Unit::parse(&text).ok()?, text)))
         .find(|(other, _)| {
-            other.measures_same(&unit) && unit.convert(1.0, other).is_some_and(|one| one != 1.0)
+            let is_taken = !stated || other.is_temperature_point() == unit.is_temperature_point();
+            let differs = unit.convert(1.0, other).is_some_and(|one| one != 1.0);
+            other.measures_same(&unit) && is_taken && differs
         });
     let (low, high) = given.range();
     match other {
@@ -103,8 +114,8 @@ fn in_another_unit(given: &Given) -> Given {
 }
 
 /// Units to choose from where a prefix alone makes no unit.
-const OTHERS: [&str; 12] = [
-    "K", "um", "mm", "nm/s", "um/min", "mK/min", "K/s", "B", "%", "min", "mV", "kW",
+const OTHERS: [&str; 13] = [
+    "K", "um", "mm", "nm/s", "um/min", "mK/min", "K/s", "B", "%", "min", "mV", "kW", "[degF]",
 ];
 
 fn converted(table: &Table, from: &[Given], to: &[Given]) -> Result<Table, String> {
