@@ -27,15 +27,21 @@ macro_rules! reasons {
 /// Passes a prediction on, and watches with the test of Page and Hinkley whether the model behind it has drifted.
 ///
 /// The series is the error, truth minus prediction, of each truth that the embargo lets through, in multiples of the usual error:
-/// `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, and an alarm where `m_t` has gone `λ` from its smallest or largest value (Page 1954;
-/// Hinkley 1971; the fading sums after Gama et al. 2013). After an alarm the test begins anew. The usual error is the root mean
+/// `g_t = max(0, φ g_{t−1} ± (x_t − x̄_t) − δ)`, and an alarm where `g_t` is above `λ` (Page 1954; Hinkley 1971); `x̄_t` is the mean
+/// since the test began. After an alarm it begins anew. The usual error is the root mean
 /// square of all that have been taken, the present one among them; one that is larger than five times that counts as five
 /// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves. Among the `first`
 /// errors, at most 100, 1.4826 times the median of their sizes stands for the usual error in this.
 ///
-/// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985). Those of truths that
-/// overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much room: a bias as large as the
-/// usual error is told in some hours, one of half that size hardly ever.
+/// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985), and in no fewer with a
+/// `φ` below 1. Those of truths that overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much
+/// room: a bias as large as the usual error is told in some hours, one of half that size hardly ever.
+///
+/// What is usual goes on being learned, the course of a day too, so that a change that comes soon after the start, or after an alarm,
+/// is taken for usual. The mean takes a bias `b` in as it grows: of `n` truths before it `g` comes to no more than
+/// `n (b ln(b/δ) − b + δ)`, and less as the usual error grows with it. With the defaults a bias as large as the usual error is told
+/// from a day of truths on, one of 2.5 times that from half a day on. Where it matters sooner, `adwin` compares the truths with
+/// each other and tells more of them.
 ///
 #[doc = reasons!()]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -56,7 +62,7 @@ pub struct PageHinkley {
     #[serde(default = "threshold")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub threshold: f64,
-    /// `φ`, what remains of the sum at each truth; above 0, at most 1.
+    /// `φ`, what remains of `g` at each truth, so that a small bias that lasts adds up to less; above 0, at most 1.
     #[serde(default = "factor")]
     #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
     pub factor: f64,
@@ -360,7 +366,7 @@ struct Seen<D> {
     newest: Option<Instant>,
 }
 
-athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/2");
+athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/3");
 athermal_core::state!(Seen<numerics::Adwin>, "adwin/2");
 
 impl<D: Detector> Watching<D> {

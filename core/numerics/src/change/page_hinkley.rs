@@ -16,7 +16,7 @@ pub struct PageHinkleyOptions {
     pub tolerance: f64,
     /// How far the cumulative sum must have gone from its extreme, above 0.
     pub threshold: f64,
-    /// What remains of the cumulative sum at each value, above 0, at most 1.
+    /// What remains at each value of how far the sum has gone, above 0, at most 1.
     pub factor: f64,
 }
 
@@ -31,8 +31,11 @@ impl Default for PageHinkleyOptions {
     }
 }
 
-/// The test of Page (1954) and Hinkley (1971), both ways, with the fading sums of Gama et al. (2013):
-/// `m_t = φ m_{t−1} + x_t − x̄_t ∓ δ`, an alarm where `m_t` has gone `λ` from its smallest or largest value.
+/// The test of Page (1954) and Hinkley (1971), both ways: `g_t = max(0, φ g_{t−1} ± (x_t − x̄_t) − δ)`, an alarm where `g_t` is
+/// above `λ`. With `φ = 1` it is how far `m_t = m_{t−1} + x_t − x̄_t ∓ δ` has gone from its smallest or largest value.
+///
+/// Gama et al. (2013) and river let `m_t` fade and not the way from its extreme. Then `m_t` is drawn to `∓δ/(1 − φ)` and comes back
+/// from there by chance, which is an alarm where nothing has changed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PageHinkley {
@@ -40,9 +43,7 @@ pub struct PageHinkley {
     count: u64,
     mean: f64,
     up: f64,
-    lowest: f64,
     down: f64,
-    highest: f64,
 }
 
 impl PageHinkley {
@@ -67,15 +68,12 @@ impl PageHinkley {
     }
 
     fn begin(options: PageHinkleyOptions) -> Self {
-        // The sums are 0 before the first value, whose own deviation is 0.
         Self {
             options,
             count: 0,
             mean: 0.0,
             up: 0.0,
-            lowest: f64::MAX,
             down: 0.0,
-            highest: f64::MIN,
         }
     }
 
@@ -93,15 +91,13 @@ impl PageHinkley {
         self.count += 1;
         self.mean += (value - self.mean) / self.count as f64;
         let deviation = value - self.mean;
-        self.up = factor * self.up + deviation - tolerance;
-        self.down = factor * self.down + deviation + tolerance;
-        self.lowest = self.lowest.min(self.up);
-        self.highest = self.highest.max(self.down);
+        self.up = (factor * self.up + deviation - tolerance).max(0.0);
+        self.down = (factor * self.down - deviation - tolerance).max(0.0);
         let change = if self.count < first {
             None
-        } else if self.up - self.lowest > threshold {
+        } else if self.up > threshold {
             Some(MeanChange::Up)
-        } else if self.highest - self.down > threshold {
+        } else if self.down > threshold {
             Some(MeanChange::Down)
         } else {
             None
@@ -139,6 +135,35 @@ mod tests {
         };
         // `page_hinkley_default` of drift_expected.json; the mean goes up at 800 and down at 1500.
         assert_eq!(alarms, [(833, MeanChange::Up), (1505, MeanChange::Down)]);
+    }
+
+    /// Values of mean 0 and deviation 1, nearly normal: sums of twelve that are equally likely from −½ to ½.
+    fn noise(count: usize) -> impl Iterator<Item = f64> {
+        let mut state = 1_u64;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..count).map(move |_| (0..12).map(|_| uniform()).sum())
+    }
+
+    #[test]
+    fn what_fades_gives_no_alarm_where_nothing_changes() {
+        for factor in [0.99, 0.9999, 1.0] {
+            let mut test = PageHinkley::new(PageHinkleyOptions {
+                tolerance: 0.5,
+                threshold: 30.0,
+                factor,
+                first: 30,
+            })
+            .unwrap();
+            let alarm = noise(200_000).position(|value| test.push(value).is_some());
+            assert_eq!(alarm, None, "{factor}");
+            let alarm = noise(200).position(|value| test.push(value + 1.0).is_some());
+            assert!(alarm.is_some_and(|after| after < 100), "{factor}");
+        }
     }
 
     #[test]

@@ -79,6 +79,17 @@ fn an_alarm_is_told_at_the_tick_at_which_it_becomes_known_however_short_its_hold
 }
 
 #[test]
+fn a_bias_as_large_as_the_usual_error_is_told_from_a_day_of_truths_on() {
+    for (before, told) in [(100, false), (288, true)] {
+        let alarm = first_alarm(page_hinkley().build(1), before + 576, |nth| {
+            let sign = if nth % 2 == 0 { 1.0 } else { -1.0 };
+            if nth < before { sign } else { sign + 1.0 }
+        });
+        assert_eq!(alarm.is_some(), told, "{before}");
+    }
+}
+
+#[test]
 fn a_model_that_gets_worse_without_bias_is_told_by_the_size_of_its_errors() {
     let size = PageHinkley {
         watch: Watched::Size,
