@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::memory::Memory;
 
-/// The largest square of an error that is remembered: of so many as there may be in a memory the sum is a number.
+/// The largest square of an error; a larger one counts as that, so that of so many as there may be in a memory the sum is a number.
 const LARGEST: f64 = 1e290;
 
 /// A combiner that goes by the recent errors of its voters.
@@ -167,21 +167,12 @@ impl Errors {
         }
     }
 
-    /// Takes the error of one vote whose truth has arrived, unless it is so large that no mean of squares with it is a number;
-    /// whether it was taken.
-    pub(crate) fn observe_one(
-        &mut self,
-        voter: usize,
-        vote: f64,
-        truth: f64,
-        arrived: Instant,
-    ) -> bool {
+    /// Takes the error of one vote whose truth has arrived.
+    pub(crate) fn observe_one(&mut self, voter: usize, vote: f64, truth: f64, arrived: Instant) {
         let square = (vote - truth) * (vote - truth);
-        let takes = square <= LARGEST;
-        if takes {
-            self.remember(voter, arrived, square);
+        if !square.is_nan() {
+            self.remember(voter, arrived, square.min(LARGEST));
         }
-        takes
     }
 
     fn remember(&mut self, voter: usize, arrived: Instant, square: f64) {
@@ -304,3 +295,40 @@ impl Errors {
 }
 
 athermal_core::state!(Errors, "recent_errors/1");
+
+#[cfg(test)]
+mod tests {
+    use athermal_core::node::{Combine, Combiner, Votes};
+    use athermal_core::time::{Duration, Instant};
+
+    use crate::auto_weighted::AutoWeighted;
+    use crate::choose::Best;
+    use crate::guard::Guard;
+    use crate::memory::Memory;
+
+    #[test]
+    fn a_voter_that_says_what_has_no_square_is_not_taken_for_the_one_that_it_was() {
+        let memory = Memory::Time(Duration::from_ns(900_000_000_000));
+        let mut guard = Guard {
+            memory,
+            min_truths: 2,
+        }
+        .build(1);
+        let weighted: AutoWeighted = serde_json::from_str(r#"{ "memory": "15min" }"#).unwrap();
+        let mut choosing = [Best { memory }.build(2), weighted.build(2)];
+        for nth in 0..40 {
+            let at = Instant::from_ns(60_000_000_000 * nth);
+            let said = if nth < 20 { 1.0 } else { 1e200 };
+            let of = |node: &mut Box<dyn Combine>, votes: &[f64]| {
+                node.observe(Votes(votes), 1.0, at);
+                node.advance(at);
+            };
+            of(&mut guard, &[said]);
+            choosing.iter_mut().for_each(|node| of(node, &[said, 1.5]));
+        }
+        assert_eq!(guard.combine(Votes(&[1e200])), 0.0);
+        for node in choosing {
+            assert_eq!(node.combine(Votes(&[1e200, 1.5])), 1.5);
+        }
+    }
+}

@@ -147,9 +147,8 @@ impl Rule for Guarding {
 
     fn observe(&self, errors: &mut Errors, votes: Votes<'_>, truth: f64, arrived: Instant) {
         for (voter, vote) in votes.present() {
-            if errors.observe_one(voter, vote, truth, arrived) {
-                errors.observe_one(self.voters + voter, 0.0, truth, arrived);
-            }
+            errors.observe_one(voter, vote, truth, arrived);
+            errors.observe_one(self.voters + voter, 0.0, truth, arrived);
         }
     }
 
