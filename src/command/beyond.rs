@@ -75,9 +75,9 @@ pub fn usual<'a>(fit: &'a [SampleRange], channel: &str) -> Option<&'a SampleRang
 /// What to think of samples that lie far outside; none where they do not.
 fn doubt(usual: &SampleRange, lowest: f64, highest: f64) -> Option<&'static str> {
     if usual.exceeded_by(lowest, highest) > ANOTHER_UNIT {
-        Some("is it in the unit of the fit? Nothing was learned of values so far outside")
+        Some("is it in the unit of the fit? The fit learned nothing of values so far outside")
     } else {
         let far = usual.is_far_from(lowest, highest);
-        far.then_some("nothing was learned of values so far outside")
+        far.then_some("the fit learned nothing of values so far outside")
     }
 }

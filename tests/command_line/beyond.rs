@@ -43,7 +43,7 @@ fn data_far_outside_of_those_of_the_fit_are_told_by_whatever_reads_them() {
         on(command, &model, &far, more).tells(&[
             "temperature.room is between 40",
             ", and was between 20",
-            "in the data of the fit: nothing was learned of values so far outside",
+            "in the data of the fit: the fit learned nothing of values so far outside",
             "position.Z is between 200",
             "is it in the unit of the fit?",
         ]);
