@@ -30,8 +30,8 @@ pub enum Direction {
     Forward,
     /// From everything, taking out what is missed least, down to one unit.
     Backward,
-    /// Forward, and after each step back for as long as that gives a better set than any of that size before
-    /// (Pudil, Novovičová and Kittler 1994).
+    /// Forward, and after each step back for as long as that gives a better set than any of that size before, or than one that
+    /// came with several units at once past that size (Pudil, Novovičová and Kittler 1994).
     Floating,
 }
 
@@ -210,12 +210,14 @@ impl State<'_> {
     fn float(&mut self) {
         let mut records = vec![f64::NEG_INFINITY; self.units.len() + 1];
         loop {
-            let before = self.units.clone();
+            let (before, smaller) = (self.units.clone(), self.size());
             if !self.add() {
                 return;
             }
-            let size = self.size();
-            records[size] = records[size].max(self.reached);
+            // What jumps over a size stands there too: a set of that size that is worse is no way back.
+            for record in &mut records[smaller + 1..=self.size()] {
+                *record = record.max(self.reached);
+            }
             let new: Vec<bool> = (0..before.len())
                 .map(|unit| self.units[unit] && !before[unit])
                 .collect();

@@ -254,6 +254,62 @@ fn two_sensors_are_not_taken_for_what_one_alone_gives_but_for_less_than_the_tole
     assert_eq!(chosen(0.5, 0.6).columns, [0]);
 }
 
+#[test]
+fn floating_by_sensor_ends_with_no_set_that_is_larger_and_worse_than_one_on_its_way() {
+    // Beside each of six sensors there are products of some, which no sensor alone brings.
+    let needs: Vec<Vec<usize>> = [vec![2, 3, 4, 5], vec![0, 4], vec![0, 1, 2, 4]].into();
+    let single = (0..6).map(|unit| vec![unit]);
+    let sensors = Candidates::of_units(single.chain(needs.clone()).collect());
+    let units = |columns: &[usize]| {
+        let mut units: Vec<usize> = columns
+            .iter()
+            .flat_map(|&column| match column.checked_sub(6) {
+                Some(product) => needs[product].clone(),
+                None => vec![column],
+            })
+            .collect();
+        units.sort_unstable();
+        units.dedup();
+        units.len()
+    };
+    for seed in 0..2000_u32 {
+        let mut blocks = GramBlocks::with_row_memory(9, 1 << 20);
+        for i in 0..150 {
+            // Numbers that hang together in no way.
+            let noise = |k: u32| {
+                let x = f64::from(1 + i + 150 * seed) * 12.9898 + f64::from(k) * 78.233;
+                3.0 * (x.sin() * 43_758.545_3).rem_euclid(1.0) - 1.5
+            };
+            let mut row: Vec<f64> = (0..6).map(noise).collect();
+            let products = needs
+                .iter()
+                .map(|units| units.iter().map(|&unit| row[unit]));
+            let products: Vec<f64> = products.map(Iterator::product).collect();
+            let share = |k: usize| sine(seed, 0.7 + k as f64);
+            let target: f64 = (0..3).map(|k| share(k) * products[k]).sum();
+            let target = target
+                + 0.3 * share(4) * row[0]
+                + 0.3 * share(5) * row[3]
+                + (noise(11) + noise(12)) * f64::from(seed % 4) * 0.3;
+            row.extend(products);
+            blocks.push(&row, target);
+        }
+        let how = Search {
+            direction: Direction::Floating,
+            tolerance: Some(1e-3),
+            ..Search::forward()
+        };
+        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
+        let found = how.over(&splits, &[1.0; 9], &sensors).unwrap();
+        let last = found.steps.last().unwrap().mean;
+        let size = units(&found.columns);
+        for (step, columns) in found.steps.iter().zip(&found.path) {
+            let is_smaller = units(columns) < size;
+            assert!(!is_smaller || step.mean < last, "{seed}: {found:?}");
+        }
+    }
+}
+
 /// The sum of the squared errors of a fit over the rows of a Gram matrix.
 fn squared_errors(gram: &crate::Gram, fit: &crate::LinearFit) -> f64 {
     let mut at = vec![0.0; gram.width() + 1];
