@@ -102,6 +102,17 @@ fn gradients_that_diverge_are_an_error_that_names_the_step_size() {
 }
 
 #[test]
+fn a_robust_fit_of_rows_with_outliers_is_of_use() {
+    let rows = data(500, |row, u, v| {
+        let far = 1000.0 * f64::from(row % 5 == 0);
+        3.0 * u - 2.0 * v + noise(row, 3) + far
+    });
+    let node = format!("type = \"huber\"\n{FEATURES}");
+    let told = fit("outliers", &node, &rows, &[]).ended(0).out;
+    assert!(told.contains("100 of 500 rows are outliers") && !told.contains("of no use"));
+}
+
+#[test]
 fn a_fit_that_is_left_with_no_regressor_says_so_and_why() {
     let stays = |row: usize, u: f64| format!("{row},{u},5,{}\n", 3.0 * u + noise(row, 3));
     let rows: String = (0..300).map(|row| stays(row, noise(row, 1))).collect();

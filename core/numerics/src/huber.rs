@@ -9,6 +9,8 @@ use faer::{Mat, Side};
 const MOST_STEPS: usize = 100;
 /// Where no more than this share of the objective can be gained, one step more is the last.
 const NEAR: f64 = 1e-12;
+/// From so many standard deviations on an error is an outlier's.
+const OUTLYING: f64 = 3.0;
 /// Rows per step of the sums.
 const STEP_ROWS: usize = 256;
 
@@ -16,7 +18,7 @@ const STEP_ROWS: usize = 256;
 /// `H(z) = z²` up to `|z| = ε` and `2ε|z| − ε²` beyond (Huber 1981, section 7.7; the same as `HuberRegressor` of scikit-learn).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Huber {
-    /// From how many scales on an error counts as an outlier's, at least 1.
+    /// From how many scales on an error counts by its size, at least 1.
     pub epsilon: f64,
     /// The penalty `α` on the scaled coefficients.
     pub alpha: f64,
@@ -29,9 +31,15 @@ pub struct HuberFit {
     pub coefficients: Vec<f64>,
     /// The intercept in target units.
     pub intercept: f64,
-    /// The scale of the errors, in target units.
+    /// The scale `σ` of the minimum, in target units: for normal errors below their standard deviation, at `ε = 1.35` 0.68 of it.
     pub scale: f64,
-    /// How many rows count as outliers.
+    /// How many errors are beyond `ε` scales, so that they count by their size.
+    pub beyond: u64,
+    /// The standard deviation of the errors by the median of their sizes, which outliers hardly move, in target units.
+    pub deviation: f64,
+    /// The same of the target about its median.
+    pub target_deviation: f64,
+    /// How many errors are beyond three such deviations; of normal ones 0.3 % are.
     pub outliers: u64,
     /// The sum of the squared residuals of all rows.
     pub residual_sum_of_squares: f64,
@@ -294,18 +302,37 @@ impl<'a> Descent<'a> {
         let coefficients: Vec<f64> = scaled.map(|(&j, w)| w / self.scales[j]).collect();
         let limit = self.how.epsilon * self.sigma;
         let terms = self.columns.iter().zip(&coefficients);
+        let sizes = self.residuals.iter().map(|r| r.abs());
+        let deviation = robust_deviation(sizes.clone()).max(self.least_sigma);
+        let targets = || self.rows.iter().map(|(_, y, _)| y);
+        let middle = median(targets());
         HuberFit {
             intercept: terms.fold(self.weights[self.columns.len()], |rest, (&j, b)| {
                 rest - b * self.means[j]
             }),
             coefficients,
             scale: self.sigma,
-            outliers: self.residuals.iter().filter(|r| r.abs() > limit).count() as u64,
+            beyond: sizes.clone().filter(|size| *size > limit).count() as u64,
+            deviation,
+            target_deviation: robust_deviation(targets().map(|y| (y - middle).abs())),
+            outliers: sizes.filter(|size| *size > OUTLYING * deviation).count() as u64,
             residual_sum_of_squares: self.residuals.iter().map(|r| r * r).sum(),
             objective: self.objective,
             converged,
         }
     }
+}
+
+/// The standard deviation of normal errors of these sizes (Hampel 1974).
+fn robust_deviation(sizes: impl Iterator<Item = f64>) -> f64 {
+    1.4826 * median(sizes)
+}
+
+/// The upper one of the two in the middle where there are two.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// What a step takes for the matrix of second derivatives.
@@ -393,7 +420,7 @@ mod tests {
             assert!(fit.converged);
             assert!(fit.objective <= number("objective") * (1.0 + 1e-12));
             assert!((fit.scale / number("scale") - 1.0).abs() < 1e-8);
-            assert_eq!(fit.outliers, model["outliers"]);
+            assert_eq!(fit.beyond, model["outliers"]);
             assert!((fit.intercept - number("intercept")).abs() < 1e-8);
             for (found, wanted) in fit
                 .coefficients
@@ -429,6 +456,38 @@ mod tests {
             .solve(rows, &[0, 1], &standard.means, &standard.scales)
             .unwrap();
         assert!((fit.coefficients.iter().sum::<f64>() - 3.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn ordinary_errors_are_no_outliers() {
+        let mut blocks = GramBlocks::new(1);
+        let count = 3000;
+        for i in 0..count {
+            // Normal errors, by the sum of the sines of angles that hang together in no way.
+            let angle = |k: u32| f64::from(i * i % 7919 + k * i) * (1.0 + f64::from(k) * 0.618);
+            let error: f64 = (1..=12).map(|k| angle(k).sin()).sum::<f64>() / 6.0_f64.sqrt();
+            let x = f64::from(i) / 1000.0;
+            let far = if i % 10 == 0 { 1000.0 } else { 0.0 };
+            blocks.push(&[x], 3.0 * x + error + far);
+        }
+        let how = Huber {
+            epsilon: 1.35,
+            alpha: 0.0,
+        };
+        let standard = Standardization::of(&blocks.total());
+        let rows = blocks.rows().unwrap();
+        let fit = how
+            .solve(rows, &[0], &standard.means, &standard.scales)
+            .unwrap();
+        let share = |rows: u64| rows as f64 / f64::from(count);
+        assert!(
+            (0.1..0.11).contains(&share(fit.outliers)),
+            "{}",
+            fit.outliers
+        );
+        assert!(share(fit.beyond) > 0.2);
+        assert!((0.9..1.3).contains(&fit.deviation), "{}", fit.deviation);
+        assert!(fit.target_deviation > 2.0 * fit.deviation);
     }
 
     #[test]

@@ -18,10 +18,14 @@ use crate::regression::{LinearPredictor, rows_gone, told};
 /// Minimises `Σ(σ + H((y − ŷ)/σ) σ) + α Σ w_j²` over the coefficients `w`, the intercept and the scale `σ`, with features and truth
 /// standardised and `H(z) = z²` up to `|z| = ε`, `2ε|z| − ε²` beyond (Huber 1981, section 7.7). It goes over its rows several
 /// times, so they must fit in memory (`fit --memory`).
+///
+/// A fit tells how many rows are outliers: those with errors beyond three standard deviations, which are 1.4826 times the median of
+/// the sizes of the errors (Hampel 1974); of normal errors 0.3 %.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Huber {
-    /// From how many scales on an error counts as an outlier's, 1 or more; at 1.35 normal errors cost 5 % of the precision.
+    /// From how many scales on an error counts by its size, 1 or more. The scale is below the standard deviation, of normal errors 0.68
+    /// of it at 1.35: 36 % of them count by their size, which costs 11 % of the precision. At 1.6 it is 18 % and 5 %.
     #[serde(default = "usual")]
     #[schemars(range(min = 1.0))]
     pub epsilon: f64,
@@ -109,16 +113,19 @@ impl Trainer for RobustTrainer {
         let count = rows.count();
         let mut report = TrainingReport {
             in_sample_rmse: Some((fit.residual_sum_of_squares / count as f64).sqrt()),
+            robust_error: Some(fit.deviation / fit.target_deviation),
             ..TrainingReport::default()
         };
         tell_columns(&gram, |column| &self.regressors[column].name, &mut report);
         report.figure("outliers", fit.outliers);
+        report.figure("deviation", fit.deviation);
         report.figure("scale", fit.scale);
+        report.figure("beyond_epsilon", fit.beyond);
         report.figure("converged", fit.converged);
         report.notes.push(format!(
-            "{} of {count} rows count as outliers; the scale of the others is {} {}",
+            "{} of {count} rows are outliers; the standard deviation of the others is about {} {}",
             fit.outliers,
-            digits(fit.scale, 4),
+            digits(fit.deviation, 4),
             self.unit
         ));
         if !fit.converged {

@@ -206,7 +206,8 @@ impl Truths {
         };
         let of_mean = (self.squares / self.rows as f64).sqrt();
         let clearly = rmse > WORSE_THAN_MEAN * of_mean + ROUNDING * self.mean.abs();
-        if clearly {
+        let has_outliers = |error: f64| error <= WORSE_THAN_MEAN;
+        if clearly && !report.robust_error.is_some_and(has_outliers) {
             let times = rmse / of_mean;
             report.figure("rmse_over_that_of_mean", times);
             let times = match times {
@@ -224,6 +225,21 @@ impl Truths {
 mod tests {
     use super::*;
     use crate::time::Duration;
+
+    #[test]
+    fn a_fit_that_outliers_cannot_pull_is_judged_by_most_of_its_rows() {
+        let mut truths = Truths::default();
+        [-1.0, 1.0, -1.0, 1.0].map(|truth| truths.count(truth));
+        for (robust_error, doubted) in [(None, true), (Some(0.3), false), (Some(2.0), true)] {
+            let mut report = TrainingReport {
+                in_sample_rmse: Some(1.5),
+                robust_error,
+                ..TrainingReport::default()
+            };
+            truths.doubt_large_error(&mut report);
+            assert_eq!(!report.notes.is_empty(), doubted, "{robust_error:?}");
+        }
+    }
 
     #[test]
     fn a_row_counts_for_a_sensor_whichever_of_its_regressors_is_missing() {

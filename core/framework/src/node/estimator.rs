@@ -278,6 +278,14 @@ pub struct TrainingReport {
         skip_serializing_if = "Option::is_none"
     )]
     pub in_sample_rmse: Option<f64>,
+    /// The median size of the errors over the rows of the fit, over that of predicting the median of the truths; where outliers cannot
+    /// pull the fit, which is then not judged by its root mean square error.
+    #[serde(
+        default,
+        with = "crate::model::number_or_none",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub robust_error: Option<f64>,
     /// What the user should know, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
