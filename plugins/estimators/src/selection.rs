@@ -16,7 +16,8 @@ use crate::folds::{Folds, tell_moved};
 #[serde(tag = "method", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Selection {
     /// From nothing on, the regressor that raises the mean R² over the folds most is added, of several equal ones the
-    /// first, until the gain is below the tolerance. One is always taken, whatever it gains.
+    /// first, until the gain is below the tolerance. One is always taken, whatever it gains. A fold in which the variance of the truth
+    /// is below 1e-12 of that in all of them has no part in the mean.
     Forward(CrossValidated),
     /// From all regressors on, the one that is missed least is taken out, until that loses more than the tolerance.
     Backward(CrossValidated),
@@ -185,6 +186,7 @@ impl Selection {
         let splits = blocks.splits(&how.folds.cut())?;
         let selected = search.over(&splits, scales, &candidates)?;
         tell_moved(blocks, report);
+        tell_quiet(&selected, splits.len(), report);
         let name = |candidate: usize| {
             let units = candidates.units_of(candidate).iter();
             let names: Vec<&str> = units.map(|&unit| names[unit].as_str()).collect();
@@ -243,6 +245,18 @@ impl Selection {
             return Ok(smallest.columns);
         }
         Ok(selected.columns)
+    }
+}
+
+/// Tells of folds in which the truth stays the same.
+fn tell_quiet(selected: &athermal_numerics::Selection, folds: usize, report: &mut TrainingReport) {
+    let quiet: Vec<String> = selected.quiet.iter().map(|f| (f + 1).to_string()).collect();
+    if !quiet.is_empty() {
+        report.figure("quiet_folds", quiet.len());
+        report.notes.push(format!(
+            "the truth hardly changes in fold {} of {folds}, so R² says nothing there and is the mean of the others",
+            quiet.join(", ")
+        ));
     }
 }
 

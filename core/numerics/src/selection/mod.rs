@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SelectionScore {
-    /// `1 − Σe² / Σ(y − ȳ)²` with the mean of the test rows; where the target is constant in them, 1 without any
-    /// error and else 0.
+    /// `1 − Σe² / Σ(y − ȳ)²` with the mean of the test rows, over the folds in which the target has a spread beside that of all test
+    /// rows; where it is constant in each, 1 without any error and else 0.
     #[default]
     R2,
     /// Minus the root of the mean squared error, in the target's unit.
@@ -72,6 +72,8 @@ pub struct Selection {
     pub columns: Vec<usize>,
     /// The columns chosen after each step, the start counted where there is one.
     path: Vec<Vec<usize>>,
+    /// The folds that have no part in any mean, since the target has no spread in their test rows beside that of all.
+    pub quiet: Vec<usize>,
     /// How many sets at the beginning of the path have more units than were asked for.
     too_large: usize,
 }

@@ -310,6 +310,28 @@ fn floating_by_sensor_ends_with_no_set_that_is_larger_and_worse_than_one_on_its_
     }
 }
 
+#[test]
+fn a_fold_in_which_the_target_stays_the_same_has_no_part_in_the_mean() {
+    let chosen = |still: &dyn Fn(u32) -> bool| {
+        let mut blocks = GramBlocks::with_row_memory(2, 1 << 20);
+        for i in 0..300 {
+            let (a, b) = (sine(i, 0.37), 1e-3 * sine(i, 0.71));
+            let target = if still(i) { 7.0 + 1e-9 * b } else { a };
+            blocks.push(&[a, b], target);
+        }
+        let folds = Folds::contiguous(3);
+        Search::forward().run(&blocks, &folds, &[1.0; 2]).unwrap()
+    };
+    let found = chosen(&|i| i < 100);
+    assert_eq!((found.columns[0], &found.quiet[..]), (0, &[0][..]));
+    let [first, second] = found.steps[0].folds[..] else {
+        panic!("{found:?}");
+    };
+    assert!((found.steps[0].mean - f64::midpoint(first, second)).abs() < 1e-12);
+    assert!(chosen(&|_| false).quiet.is_empty());
+    assert!(chosen(&|_| true).quiet.is_empty());
+}
+
 /// The sum of the squared errors of a fit over the rows of a Gram matrix.
 fn squared_errors(gram: &crate::Gram, fit: &crate::LinearFit) -> f64 {
     let mut at = vec![0.0; gram.width() + 1];
