@@ -16,6 +16,7 @@ mod fitting;
 mod kinds;
 mod lags;
 mod leaks;
+mod parameters;
 mod samples;
 mod segments;
 mod stacking;

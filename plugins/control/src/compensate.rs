@@ -191,10 +191,13 @@ impl Feature for Compensate {
         }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        Vec::from_iter(Mistake::unless_lasting("max_gap", self.max_gap))
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let rate = inputs.port("rate");
         let mut mistakes = Vec::new();
-        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
         if let Some(first) = rate.first() {
             mistakes.extend(self.limits(first).err().into_iter().flatten());
             if let Some(other) = rate

@@ -156,8 +156,7 @@ impl Feature for Health {
         const { &[InputPort::fresh("signal", "the channels to watch")] }
     }
 
-    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        let signal = inputs.port("signal");
+    fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         if !(3..=100_000).contains(&self.noise_samples) {
             let message = format!(
@@ -168,14 +167,13 @@ impl Feature for Health {
         }
         mistakes.extend(Mistake::unless_lasting("stuck_after", self.stuck_after));
         mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
+        mistakes
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let signal = inputs.port("signal");
         for channel in signal {
-            if let Err(found) = self.limits(channel) {
-                mistakes.extend(found);
-                break;
-            }
-        }
-        if !mistakes.is_empty() {
-            return Err(mistakes);
+            self.limits(channel)?;
         }
         Ok(vec![
             OutputPort {

@@ -123,11 +123,14 @@ impl Feature for SafeState {
         }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        Vec::from_iter(Mistake::unless_lasting("max_gap", self.max_gap))
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let signal = inputs.port("signal");
         let distrust = inputs.port("distrust");
         let mut mistakes = Vec::new();
-        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
         if !matches!(distrust.len(), 0 | 1) {
             mistakes.extend(limit::same_count("distrust", distrust, "signal", signal));
         }

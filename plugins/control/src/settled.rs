@@ -57,7 +57,6 @@ impl Settled {
             }
         };
         let (loss, set_point) = (one("loss"), one("set_point"));
-        mistakes.extend(Mistake::unless_lasting("for", self.r#for));
         if let (Some(loss), Some(set_point)) = (loss, set_point) {
             let below = limit::size(&self.below, &loss.unit, "below");
             let change = limit::size(&self.change, &set_point.unit.difference(), "change");
@@ -84,6 +83,12 @@ impl Feature for Settled {
                 ),
             ]
         }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("for", self.r#for));
+        mistakes.extend(Mistake::unless_lasting("max_gap", self.max_gap));
+        mistakes
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -99,6 +99,13 @@ impl Feature for Sum {
         const { &[TERMS] }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut weights = self.weights.iter().flatten();
+        let wild = weights.find(|weight| !weight.is_finite());
+        let told = wild.map(|wild| format!("a weight is {wild} and must be a number"));
+        Vec::from_iter(told.map(|told| Mistake::at("weights", told)))
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let channels = inputs.port("signal");
         let first = same_units(channels)?;
@@ -111,12 +118,6 @@ impl Feature for Sum {
                     channels.len()
                 );
                 return Err(vec![Mistake::at("weights", message)]);
-            }
-            if let Some(wild) = weights.iter().find(|weight| !weight.is_finite()) {
-                return Err(vec![Mistake::at(
-                    "weights",
-                    format!("a weight is {wild} and must be a number"),
-                )]);
             }
             total = weights.iter().sum();
         }
@@ -227,12 +228,16 @@ impl Feature for Scale {
         const { &[InputPort::fresh("signal", "what is scaled")] }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        if self.factor.is_finite() {
+            return Vec::new();
+        }
+        let message = format!("`factor` is {} and must be a number", self.factor);
+        vec![Mistake::at("factor", message)]
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let mut mistakes = Vec::new();
-        if !self.factor.is_finite() {
-            let message = format!("`factor` is {} and must be a number", self.factor);
-            mistakes.push(Mistake::at("factor", message));
-        }
         let mut channels = inputs.port("signal").to_vec();
         for channel in &mut channels {
             let unit = self.unit_of(channel);

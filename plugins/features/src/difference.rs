@@ -51,18 +51,6 @@ impl Difference {
         }
         channels
     }
-
-    fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        let nothing = Mistake::unless_lasting("over", self.over);
-        mistakes.extend(
-            nothing.map(|mistake| {
-                mistake.help("leave it out for the change from one value to the next")
-            }),
-        );
-        mistakes.extend(max_age_mistake(self.max_age, channels));
-        mistakes
-    }
 }
 
 impl Feature for Difference {
@@ -70,11 +58,16 @@ impl Feature for Difference {
         const { &[InputPort::fresh("signal", "what changes")] }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        let nothing = Mistake::unless_lasting("over", self.over);
+        let help = "leave it out for the change from one value to the next";
+        Vec::from_iter(nothing.map(|mistake| mistake.help(help)))
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let from = inputs.port("signal");
-        let mistakes = self.mistakes(from);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
+        if let Some(mistake) = max_age_mistake(self.max_age, from) {
+            return Err(vec![mistake]);
         }
         let earlier = self.earlier(from);
         let change = |(channel, earlier): (&Channel, &Channel)| Channel {

@@ -125,15 +125,17 @@ impl Feature for FirstOrder {
         const { &[InputPort::fresh("signal", "what is followed")] }
     }
 
-    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+    fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::from_iter(Mistake::unless_lasting("span", self.span));
-        let constants = match self.time_constants.list() {
-            Ok(constants) if mistakes.is_empty() => constants,
-            found => {
-                mistakes.extend(found.err());
-                return Err(mistakes);
-            }
-        };
+        mistakes.extend(self.time_constants.list().err());
+        mistakes
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let constants = self
+            .time_constants
+            .list()
+            .map_err(|mistake| vec![mistake])?;
         let mut channels = Vec::new();
         for from in inputs.port("signal") {
             for constant in &constants {

@@ -95,8 +95,14 @@ impl Hampel {
             }
         }
     }
+}
 
-    fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
+impl Feature for Hampel {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what may have spikes")] }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         if self.window <= Duration::ZERO {
             let message = format!("a window of {} is no window", self.window);
@@ -113,25 +119,13 @@ impl Hampel {
             );
             mistakes.push(Mistake::at("min_samples", message));
         }
-        mistakes.extend(
-            channels
-                .iter()
-                .find_map(|channel| self.floor(channel).err()),
-        );
         mistakes
-    }
-}
-
-impl Feature for Hampel {
-    fn inputs() -> &'static [InputPort] {
-        const { &[InputPort::fresh("signal", "what may have spikes")] }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let from = inputs.port("signal");
-        let mistakes = self.mistakes(from);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
+        if let Some(mistake) = from.iter().find_map(|channel| self.floor(channel).err()) {
+            return Err(vec![mistake]);
         }
         let span = match self.replace {
             Replacement::Absent => Duration::ZERO,

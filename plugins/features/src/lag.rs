@@ -28,8 +28,12 @@ pub struct Lag {
     pub max_age: Option<Duration>,
 }
 
-impl Lag {
-    fn mistakes(&self, channels: &[Channel]) -> Vec<Mistake> {
+impl Feature for Lag {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what is looked back at")] }
+    }
+
+    fn mistakes(&self) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         if self.lags.is_empty() {
             let mistake = Mistake::at("lags", "there is no lag");
@@ -41,21 +45,13 @@ impl Lag {
                 mistakes.push(Mistake::at(format!("lags.{i}"), message));
             }
         }
-        mistakes.extend(max_age_mistake(self.max_age, channels));
         mistakes
-    }
-}
-
-impl Feature for Lag {
-    fn inputs() -> &'static [InputPort] {
-        const { &[InputPort::fresh("signal", "what is looked back at")] }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let from = inputs.port("signal");
-        let mistakes = self.mistakes(from);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
+        if let Some(mistake) = max_age_mistake(self.max_age, from) {
+            return Err(vec![mistake]);
         }
         let of = |channel: &Channel, lag: &Duration| Channel {
             name: if self.lags.len() == 1 {

@@ -64,12 +64,12 @@ impl Feature for Moving {
         }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        window_mistakes(&self.windows, self.min_samples, 1, self.min_coverage)
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let windows = self.windows.lengths().map_err(|mistake| vec![mistake])?;
-        let mistakes = window_mistakes(&windows, self.min_samples, 1, self.min_coverage);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
-        }
         let values = over(inputs.port("signal"), &windows);
         let port = |name| {
             let unit = |channel: &Channel| match name {

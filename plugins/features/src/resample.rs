@@ -38,16 +38,6 @@ impl Resample {
     fn late(&self) -> Duration {
         self.late.unwrap_or(self.every)
     }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("every", self.every));
-        let late = self.late();
-        if mistakes.is_empty() && !(Duration::ZERO..=self.every).contains(&late) {
-            let message = format!("`late` is {late} and must be from 0 s to {}", self.every);
-            mistakes.push(Mistake::at("late", message));
-        }
-        mistakes
-    }
 }
 
 /// What is made of the samples of a period.
@@ -71,11 +61,17 @@ impl Feature for Resample {
         }
     }
 
-    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
-        let mistakes = self.mistakes();
-        if !mistakes.is_empty() {
-            return Err(mistakes);
+    fn mistakes(&self) -> Vec<Mistake> {
+        let mut mistakes = Vec::from_iter(Mistake::unless_lasting("every", self.every));
+        let late = self.late();
+        if mistakes.is_empty() && !(Duration::ZERO..=self.every).contains(&late) {
+            let message = format!("`late` is {late} and must be from 0 s to {}", self.every);
+            mistakes.push(Mistake::at("late", message));
         }
+        mistakes
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let regular = |channel: &Channel| Channel {
             span: channel.span + self.every + self.late(),
             ..channel.clone()

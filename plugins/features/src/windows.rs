@@ -39,7 +39,7 @@ pub(crate) fn half() -> f64 {
 
 /// Mistakes in the lengths of windows and in what they must hold: at least `fewest` samples.
 pub(crate) fn window_mistakes(
-    windows: &[Duration],
+    windows: &Windows,
     min_samples: usize,
     fewest: usize,
     min_coverage: f64,
@@ -54,6 +54,13 @@ pub(crate) fn window_mistakes(
         let help = "a window does not hold the sample at its beginning, so that samples a tenth of it apart span 0.9 of it";
         mistakes.push(Mistake::at("min_coverage", message).help(help));
     }
+    let windows = match windows.lengths() {
+        Ok(windows) => windows,
+        Err(mistake) => {
+            mistakes.push(mistake);
+            return mistakes;
+        }
+    };
     if windows.is_empty() {
         mistakes.push(
             Mistake::at("windows", "there is no window")
@@ -240,7 +247,8 @@ mod tests {
 
     #[test]
     fn samples_need_not_span_all_of_a_window_which_they_cannot() {
-        let told = |coverage: f64| window_mistakes(&[s(60.0)], 3, 1, coverage).len();
+        let told =
+            |coverage: f64| window_mistakes(&Windows::Lengths(vec![s(60.0)]), 3, 1, coverage).len();
         assert_eq!([0.0, 0.999, 1.0, f64::NAN].map(told), [0, 0, 1, 1]);
     }
 }

@@ -4,8 +4,28 @@ use super::instance::Instance;
 use super::plan::{PlannedFit, PlannedRole};
 use super::provenance::Provenance;
 use super::resolver::{Resolver, Suspect};
-use crate::node::{Feature, InputPort, Read};
+use crate::node::{Feature, InputPort, Inputs, Mistake, OutputPort, Read};
 use crate::time::Duration;
+
+/// The output ports of a feature, or all that is wrong with it; none and nothing where it is not known what it reads.
+pub(super) fn outputs_of(
+    feature: &dyn Feature,
+    inputs: Option<&Inputs>,
+) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+    let mut mistakes = feature.mistakes();
+    match inputs.map_or(Ok(Vec::new()), |inputs| feature.outputs(inputs)) {
+        Ok(outputs) if mistakes.is_empty() => return Ok(outputs),
+        Ok(_) => {}
+        Err(others) => {
+            for other in others {
+                if !mistakes.contains(&other) {
+                    mistakes.push(other);
+                }
+            }
+        }
+    }
+    Err(mistakes)
+}
 
 impl Resolver<'_> {
     /// Resolves a feature. One that closes a loop is given its inputs later, and knows none of them here.
@@ -39,6 +59,7 @@ impl Resolver<'_> {
             ports.push((*port, slots));
         }
         if !whole {
+            self.mistakes(instance, feature.mistakes());
             return None;
         }
         let truth = ports.iter().find(|(port, _)| port.read == Read::Truth);
@@ -52,7 +73,7 @@ impl Resolver<'_> {
         let data = ports.iter().filter(|(port, _)| port.read != Read::Truth);
         let slots: Vec<Vec<usize>> = data.map(|(_, slots)| slots.clone()).collect();
         let inputs = self.inputs(instance, ports);
-        let outputs = match feature.outputs(&inputs) {
+        let outputs = match outputs_of(feature, Some(&inputs)) {
             Ok(outputs) => outputs,
             Err(mistakes) => {
                 self.mistakes(instance, mistakes);

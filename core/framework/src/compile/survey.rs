@@ -1,5 +1,6 @@
 //! Decides what is told of an instance that cannot be resolved, since mistakes in it have been told: all that is wrong with the rest.
 
+use super::feature::outputs_of;
 use super::inputs::meant_input;
 use super::instance::{Declared, ReadParts};
 use super::keys::Learn;
@@ -52,11 +53,10 @@ impl Resolver<'_> {
         };
         let inputs = ports.map(|ports| self.inputs(&declared, ports));
         let mistakes = agreed(spec.readings().map(|spec| match spec.role() {
-            Role::Feature(feature) if !feature.closes_loops() => {
-                let outputs = inputs.as_ref().map(|inputs| feature.outputs(inputs));
-                outputs.and_then(Result::err).unwrap_or_default()
+            Role::Feature(feature) => {
+                let inputs = inputs.as_ref().filter(|_| !feature.closes_loops());
+                outputs_of(feature, inputs).err().unwrap_or_default()
             }
-            Role::Feature(_) => Vec::new(),
             Role::Estimator(estimator) => estimator.mistakes(),
             Role::Combiner(combiner) => combiner.mistakes(),
         }));

@@ -83,10 +83,15 @@ pub trait Feature: Debug + Send + Sync {
     where
         Self: Sized;
 
-    /// The output ports for these inputs; the first is the default.
+    /// Mistakes in the parameters that their types do not exclude, whatever the inputs are: they are told though an input is wrong.
+    fn mistakes(&self) -> Vec<Mistake> {
+        Vec::new()
+    }
+
+    /// The output ports for these inputs; the first is the default. Asked for though there are [`mistakes`](Self::mistakes) too.
     ///
     /// # Errors
-    /// Every mistake in the parameters, or in how the inputs fit them.
+    /// Every mistake in how the inputs fit the parameters; those of `mistakes` need not be there, and do no harm.
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>>;
 
     /// What can be used and is probably not meant, told as warnings; asked for only where there is no mistake.

@@ -68,34 +68,25 @@ impl Slope {
             .factor_to(&self.unit(of)?)
     }
 
-    fn mistakes(&self, channels: &[Channel], windows: &[Duration]) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
-        for channel in channels {
-            if self.factor(channel).is_none() {
-                let unit = self
-                    .unit
-                    .as_ref()
-                    .map_or_else(String::new, ToString::to_string);
-                let natural = channel.unit.difference().per(&Unit::second());
-                let message = format!(
-                    "the slope of `{}` ({}) cannot be in {unit}",
-                    channel.name, channel.unit
-                );
-                let help = channel
-                    .unit
-                    .scale_meant()
-                    .map_or_else(|| format!("a unit such as {natural}"), str::to_owned);
-                mistakes.push(Mistake::at("unit", message).help(help));
-                break;
-            }
+    /// A unit in which the slope of a channel cannot be.
+    fn unit_mistake(&self, channel: &Channel) -> Option<Mistake> {
+        if self.factor(channel).is_some() {
+            return None;
         }
-        mistakes.extend(window_mistakes(
-            windows,
-            self.min_samples,
-            2,
-            self.min_coverage,
-        ));
-        mistakes
+        let unit = self
+            .unit
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string);
+        let natural = channel.unit.difference().per(&Unit::second());
+        let message = format!(
+            "the slope of `{}` ({}) cannot be in {unit}",
+            channel.name, channel.unit
+        );
+        let help = channel
+            .unit
+            .scale_meant()
+            .map_or_else(|| format!("a unit such as {natural}"), str::to_owned);
+        Some(Mistake::at("unit", message).help(help))
     }
 }
 
@@ -104,13 +95,16 @@ impl Feature for Slope {
         const { &[InputPort::fresh("signal", "what the slope is taken of")] }
     }
 
+    fn mistakes(&self) -> Vec<Mistake> {
+        window_mistakes(&self.windows, self.min_samples, 2, self.min_coverage)
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let from = inputs.port("signal");
-        let windows = self.windows.lengths().map_err(|mistake| vec![mistake])?;
-        let mistakes = self.mistakes(from, &windows);
-        if !mistakes.is_empty() {
-            return Err(mistakes);
+        if let Some(mistake) = from.iter().find_map(|channel| self.unit_mistake(channel)) {
+            return Err(vec![mistake]);
         }
+        let windows = self.windows.lengths().map_err(|mistake| vec![mistake])?;
         let values = over(from, &windows);
         let slope = |channel: &Channel| Channel {
             unit: self.unit(channel).unwrap_or_else(|| channel.unit.clone()),
