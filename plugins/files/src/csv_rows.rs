@@ -1,5 +1,6 @@
 //! CSV as rows of cells: header, quoting, ragged and cut-off rows. Not what a cell means.
 
+use athermal_core::time::Civil;
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
 use crate::cell::{self, Cells, is_number, trim};
@@ -36,11 +37,21 @@ pub(crate) struct CsvRows {
 /// How a row came out of the stream.
 enum Record {
     End,
-    Row { cells: usize, complete: bool },
+    Row {
+        cells: usize,
+        complete: bool,
+    },
+    /// The stream ends within a quoted cell, and within a line.
+    Cut,
+    /// A quoted cell does not end: the row is its first line, and those after it are read anew.
+    Unclosed,
 }
 
 /// How many rows are looked at to tell why a column is missing.
 const LOOKED_AT: usize = 20;
+
+/// Over how many lines a row can go, by line breaks in quotes.
+const LINES_OF_ROW: usize = 50;
 
 impl CsvRows {
     /// Reads the header and finds the wanted columns in it.
@@ -107,10 +118,18 @@ impl CsvRows {
                 .filter(|layout| !layout.time.columns.is_one())
                 .map(|_| Vec::new()),
         };
-        let Record::Row { cells, .. } = rows.read_record()? else {
-            return Err(FileError::Empty {
-                file: rows.lines.file,
-            });
+        let cells = match rows.read_record()? {
+            Record::Row { cells, .. } => cells,
+            Record::Unclosed | Record::Cut => {
+                return Err(FileError::UnclosedQuote {
+                    place: rows.place(),
+                });
+            }
+            Record::End => {
+                return Err(FileError::Empty {
+                    file: rows.lines.file,
+                });
+            }
         };
         rows.names = rows.current(cells);
         columns::check_unique(&rows.names, || rows.place())?;
@@ -250,18 +269,24 @@ impl CsvRows {
             return Ok(Record::End);
         }
         self.row_line = self.lines.number();
+        let mut before = Vec::new();
         let (mut used, mut written, mut counted) = (0, 0, 0);
         loop {
             let line = &self.lines.text()[used..];
+            let at_end = line.is_empty() && !self.lines.is_complete();
+            // A line break ends a last line that has none, unless it is within quotes.
             let (result, read, bytes, ends) = self.splitter.read_record(
-                line,
+                if at_end { b"\n" } else { line },
                 &mut self.cells[written..],
                 &mut self.ends[counted..],
             );
-            used += read;
+            used += if at_end { 0 } else { read };
             written += bytes;
             counted += ends;
             match result {
+                ReadRecordResult::Record if !before.is_empty() && !self.is_width(counted) => {
+                    return Ok(self.unclosed(before));
+                }
                 ReadRecordResult::Record => {
                     self.drop_carriage_return(counted);
                     let beyond = self.ends_in_delimiter && counted == self.width + 1;
@@ -271,31 +296,78 @@ impl CsvRows {
                         complete: self.lines.is_complete(),
                     });
                 }
-                ReadRecordResult::OutputFull if written >= LONGEST_ROW => {
-                    return Err(FileError::UnclosedQuote {
-                        place: self.lines.place_of(self.row_line),
-                    });
-                }
                 ReadRecordResult::OutputFull => self.cells.resize(2 * self.cells.len(), 0),
                 ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len(), 0),
                 ReadRecordResult::InputEmpty if self.lines.is_complete() => {
                     used = 0;
-                    if !self.lines.advance()? {
-                        return Err(FileError::UnclosedQuote {
-                            place: self.lines.place_of(self.row_line),
-                        });
+                    before.push(self.lines.take());
+                    if !self.goes_on(&before)? {
+                        return Ok(self.unclosed(before));
                     }
                 }
-                // The next call sees an empty input, which ends the record.
-                ReadRecordResult::InputEmpty if self.row_line == self.lines.number() => {}
-                ReadRecordResult::InputEmpty => {
-                    return Err(FileError::UnclosedQuote {
-                        place: self.lines.place_of(self.row_line),
-                    });
-                }
+                ReadRecordResult::InputEmpty if at_end => return Ok(Record::Cut),
+                ReadRecordResult::InputEmpty => {}
                 ReadRecordResult::End => return Ok(Record::End),
             }
         }
+    }
+
+    /// Whether a row over several lines may have so many cells. Of the names, none are known before.
+    fn is_width(&self, cells: usize) -> bool {
+        let names = self.names.len();
+        names == 0 || cells == names || cells == names + 1 && self.ends_in_delimiter
+    }
+
+    /// Leaves only the first of these lines to a row whose quoted cell began in it, and gives the others and the current one again.
+    fn unclosed(&mut self, mut before: Vec<(u64, Vec<u8>)>) -> Record {
+        let mut after = before.split_off(1);
+        after.extend(self.lines.take_any());
+        self.lines.hold(after);
+        self.splitter.reset();
+        Record::Unclosed
+    }
+
+    /// Goes to the next line of a quoted cell that began within these. It does not go on for long, nor in what is a row by itself.
+    fn goes_on(&mut self, before: &[(u64, Vec<u8>)]) -> Result<bool, FileError> {
+        let bytes: usize = before.iter().map(|(_, line)| line.len()).sum();
+        if before.len() >= LINES_OF_ROW || bytes > LONGEST_ROW {
+            return Ok(false);
+        }
+        match self.lines.advance() {
+            Ok(more) => Ok(more && !self.is_row_by_itself()),
+            Err(error) if error.is_of_line() => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Whether the current line has as many cells as a row, and a time, be its quotes taken for such or not.
+    fn is_row_by_itself(&self) -> bool {
+        let line = self.lines.text();
+        let line = line.strip_suffix(b"\n").unwrap_or(line);
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        let plain = line.split(|&byte| byte == self.delimiter);
+        let plain: Vec<String> = plain.map(columns::name).collect();
+        [plain, columns::names_in(line, self.delimiter)]
+            .iter()
+            .any(|cells| header::is_of_width(cells, self.names.len()) && self.have_time(cells))
+    }
+
+    /// Whether these cells have a time where the columns have it.
+    fn have_time(&self, cells: &[String]) -> bool {
+        let Some(layout) = &self.layout else {
+            return cells.first().is_some_and(|first| header::is_value(first));
+        };
+        let cell = |column: usize| {
+            let at = self.columns.time.get(column).copied().flatten();
+            at.map_or(&[][..], |at| cells[at].as_bytes())
+        };
+        let mut time = Vec::new();
+        layout.time.columns.join(&mut time, cell);
+        let time = cell::text(&time);
+        let read = layout
+            .time
+            .read(cell::with_decimal_point(&time).as_bytes(), None);
+        matches!(read, Some(Civil::At(_)))
     }
 
     /// A line may end in CR LF; only LF ends a record, so that a stray CR cannot shift the rest of a line.
@@ -331,8 +403,24 @@ impl CsvRows {
 impl Cells for CsvRows {
     fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
         loop {
-            let Record::Row { cells, complete } = self.read_record()? else {
-                return Ok(false);
+            let (cells, complete) = match self.read_record() {
+                Ok(Record::Row { cells, complete }) => (cells, complete),
+                Ok(Record::End) => return Ok(false),
+                Ok(Record::Cut) => {
+                    ledger.report.truncated = Some(self.place());
+                    return Ok(false);
+                }
+                Ok(Record::Unclosed) => {
+                    ledger.refuse_row(|| FileError::UnclosedQuote {
+                        place: self.place(),
+                    })?;
+                    continue;
+                }
+                Err(error) if error.is_of_line() => {
+                    ledger.refuse_row(|| error)?;
+                    continue;
+                }
+                Err(error) => return Err(error),
             };
             let taken = match cells == self.width && !self.is_comment() {
                 true => Some(true),

@@ -92,7 +92,7 @@ pub enum FileError {
         /// The longest row that is read, in bytes.
         limit: usize,
     },
-    /// A quoted cell that never ends.
+    /// A quoted cell that does not end, in its line or soon after.
     UnclosedQuote {
         /// The row in which the cell starts.
         place: Place,
@@ -274,6 +274,11 @@ impl FileError {
             file: path.display().to_string().into(),
             source: Arc::new(source),
         }
+    }
+
+    /// Whether only one line cannot be read, and those after it can.
+    pub(crate) fn is_of_line(&self) -> bool {
+        matches!(self, Self::TooLong { .. } | Self::JsonArray { .. })
     }
 
     /// Whether whoever read the output went away, as `head` does: a reason to stop, but no failure.

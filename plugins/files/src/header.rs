@@ -184,7 +184,7 @@ fn longest_table(seen: &[Line], stated: Option<u8>) -> Option<(usize, u8)> {
 }
 
 /// Whether a row has so many cells, or one more that is empty: some loggers end rows, but not the names, with a delimiter.
-fn is_of_width(row: &[String], width: usize) -> bool {
+pub(crate) fn is_of_width(row: &[String], width: usize) -> bool {
     row.len() == width || row.len() == width + 1 && row[width].is_empty()
 }
 
@@ -194,7 +194,7 @@ fn can_name(row: &[String]) -> bool {
 }
 
 /// Whether a cell holds a number, a date or a time.
-fn is_value(cell: &str) -> bool {
+pub(crate) fn is_value(cell: &str) -> bool {
     let begins = cell.starts_with(|first: char| first.is_ascii_digit());
     begins && !cell.contains(char::is_alphabetic) || is_number(cell)
 }

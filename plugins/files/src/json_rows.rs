@@ -123,7 +123,16 @@ impl Key {
 
 impl Cells for JsonRows {
     fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
-        while self.lines.advance_to_content()? {
+        loop {
+            match self.lines.advance_to_content() {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) if error.is_of_line() && self.found.is_some() => {
+                    ledger.refuse_row(|| error)?;
+                    continue;
+                }
+                Err(error) => return Err(error),
+            }
             let is_first = self.found.is_none();
             match self.read_object() {
                 Ok(()) if self.of_time().all(|key| key.ever_seen) => {
@@ -511,6 +520,19 @@ mod tests {
         let mut row = Row::default();
         while reader.next_into(&mut row).unwrap() {
             assert_eq!(*told.lock().unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_too_long_is_an_error_or_left_out_and_the_next_is_read() {
+        for long in ["{\"x\":\"", "["] {
+            let long = long.to_owned() + &"y".repeat(3_000_000);
+            let text =
+                format!("{{\"t\":0,\"a\":1,\"b\":2}}\n{long}\n{{\"t\":1,\"a\":3,\"b\":4}}\n");
+            assert!(read_with(&text, false).is_err());
+            let (rows, reader) = read_with(&text, true).unwrap();
+            assert_eq!(rows, "0 [1.0, 2.0]; 1 [3.0, 4.0]");
+            assert_eq!(reader.report().refused_rows.count, 1);
         }
     }
 

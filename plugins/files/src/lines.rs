@@ -28,6 +28,8 @@ pub(crate) struct Lines {
     number: u64,
     /// Lines that were read and are to come again, the next one last.
     held: Vec<(u64, Vec<u8>)>,
+    /// Whether the last line that was read was too long and is not yet read to its end.
+    is_cut_short: bool,
     /// Whether comments are content: the header was one, and so may the next be.
     pub comments_count: bool,
 }
@@ -44,6 +46,7 @@ impl Lines {
             line: Vec::new(),
             number: 0,
             held: Vec::new(),
+            is_cut_short: false,
             comments_count: false,
         }
     }
@@ -61,11 +64,15 @@ impl Lines {
     }
 
     /// Goes to the next line; false at the end of the stream.
+    ///
+    /// # Errors
+    /// The stream cannot be read, or the line is too long; the next one can then be gone to.
     pub fn advance(&mut self) -> Result<bool, FileError> {
         if let Some((number, line)) = self.held.pop() {
             (self.number, self.line) = (number, line);
-            return Ok(true);
+            return self.check_length();
         }
+        self.pass_over_rest()?;
         self.line.clear();
         let limit = LONGEST_ROW as u64 + 1;
         let read = (&mut self.input)
@@ -81,18 +88,34 @@ impl Lines {
             return Ok(false);
         }
         self.number += 1;
-        if self.line.len() > LONGEST_ROW {
-            if begins_json_array(&self.line) {
-                return Err(FileError::JsonArray {
-                    place: self.place(),
-                });
-            }
-            return Err(FileError::TooLong {
-                place: self.place(),
-                limit: LONGEST_ROW,
-            });
+        self.is_cut_short = self.line.len() > LONGEST_ROW && !self.is_complete();
+        self.check_length()
+    }
+
+    fn check_length(&self) -> Result<bool, FileError> {
+        if self.line.len() <= LONGEST_ROW {
+            return Ok(true);
         }
-        Ok(true)
+        let place = self.place();
+        Err(match begins_json_array(&self.line) {
+            true => FileError::JsonArray { place },
+            false => FileError::TooLong {
+                place,
+                limit: LONGEST_ROW,
+            },
+        })
+    }
+
+    /// Passes over what is left of a line that was too long.
+    fn pass_over_rest(&mut self) -> Result<(), FileError> {
+        if std::mem::take(&mut self.is_cut_short) {
+            let passed = self.input.skip_until(b'\n');
+            passed.map_err(|source| FileError::Read {
+                place: self.place(),
+                source: Arc::new(source),
+            })?;
+        }
+        Ok(())
     }
 
     /// Goes to the next line that is neither blank nor a comment; false at the end of the stream.
@@ -130,6 +153,11 @@ impl Lines {
     /// Takes the current line out, with its number.
     pub fn take(&mut self) -> (u64, Vec<u8>) {
         (self.number, std::mem::take(&mut self.line))
+    }
+
+    /// The same, if there is one.
+    pub fn take_any(&mut self) -> Option<(u64, Vec<u8>)> {
+        (!self.line.is_empty()).then(|| self.take())
     }
 
     /// Gives lines with these numbers, the first of them at the next call.
@@ -214,6 +242,22 @@ mod tests {
             (lines.text(), lines.number(), lines.is_complete()),
             (&b"b"[..], 2, false)
         );
+    }
+
+    #[test]
+    fn the_line_after_one_that_is_too_long_can_be_read() {
+        for length in [LONGEST_ROW, 3 * LONGEST_ROW] {
+            let text = format!("a\n{}\nb\n", "x".repeat(length));
+            let mut lines = lines(std::io::Cursor::new(text.into_bytes()));
+            assert!(lines.advance().unwrap());
+            assert!(lines.advance().is_err());
+            let long = lines.take();
+            assert!(lines.advance().unwrap());
+            assert_eq!((lines.text(), lines.number()), (&b"b\n"[..], 3));
+            lines.hold(vec![long]);
+            assert!(lines.advance().is_err(), "as long as before");
+            assert!(!lines.advance().unwrap());
+        }
     }
 
     #[test]

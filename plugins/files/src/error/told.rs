@@ -42,12 +42,12 @@ impl fmt::Display for FileError {
             }
             Self::TooLong { place, limit } => write!(
                 f,
-                "{place}: a row longer than {limit} bytes starts here; look for a quote that is not closed or missing line ends"
+                "{place}: a row longer than {limit} bytes starts here; look for missing line ends, or read leniently (`--lenient`) to leave it out"
             ),
             Self::UnclosedQuote { place } => {
                 write!(
                     f,
-                    "{place}: a quoted cell starts here that never ends; close the quote or remove it"
+                    "{place}: a quoted cell starts here that does not end; close the quote or remove it, or read leniently (`--lenient`) to leave the row out"
                 )
             }
             Self::DuplicateColumn {
