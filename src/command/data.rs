@@ -358,9 +358,11 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
                 "left out",
             ),
         ];
-        match (report.headers.count, &report.headers.first) {
-            (more @ 2.., Some(first)) => told.push(format!("{first}; {} in all", count(more))),
-            (_, first) => told.extend(first.iter().map(ToString::to_string)),
+        for headers in [&report.headers_moved, &report.headers] {
+            match (headers.count, &headers.first) {
+                (more @ 2.., Some(first)) => told.push(format!("{first}; {} in all", count(more))),
+                (_, first) => told.extend(first.iter().map(ToString::to_string)),
+            }
         }
         for (found, what, then) in counted {
             if let Some(first) = &found.first {

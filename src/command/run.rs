@@ -238,7 +238,7 @@ impl Run {
                 FileError::MissingColumns { .. } => {
                     terminal.warning(format_args!("{first} (missing until a line has it)"));
                 }
-                FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { .. } => {
+                FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { moved: true, .. } => {
                     terminal.warning(format_args!("{first}"));
                 }
                 _ => terminal.warning(format_args!("{first}; others like it are counted")),

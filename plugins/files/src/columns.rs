@@ -94,6 +94,16 @@ impl Columns {
         self.have_time() || channels >= 2 && 2 * channels >= layout.channels.len()
     }
 
+    /// Whether those that are there in both stand at the same places.
+    pub fn agree_with(&self, other: &Self) -> bool {
+        let all = |columns: &Self| {
+            let columns = columns.time.iter().chain(&columns.channels);
+            columns.copied().collect::<Vec<_>>()
+        };
+        let mut pairs = all(self).into_iter().zip(all(other));
+        pairs.all(|pair| !matches!(pair, (Some(a), Some(b)) if a != b))
+    }
+
     /// The names of those that must be there and are not.
     pub fn lacking<'a>(&self, layout: &'a Layout) -> Vec<&'a str> {
         let time = layout.time.columns.names().iter().zip(&self.time);

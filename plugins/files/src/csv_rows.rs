@@ -32,6 +32,16 @@ pub(crate) struct CsvRows {
     columns: Columns,
     /// The text of the time of the current row, where it is put together from several cells.
     joined: Option<Vec<u8>>,
+    /// The last header, where it lacks columns, until the row below it tells whether it was cut off.
+    doubted: Option<NamesAgain>,
+}
+
+/// The names of the columns where they stand within the log again.
+struct NamesAgain {
+    place: Place,
+    names: Vec<String>,
+    columns: Columns,
+    lacking: Vec<String>,
 }
 
 /// How a row came out of the stream.
@@ -117,6 +127,7 @@ impl CsvRows {
             joined: layout
                 .filter(|layout| !layout.time.columns.is_one())
                 .map(|_| Vec::new()),
+            doubted: None,
         };
         let cells = match rows.read_record()? {
             Record::Row { cells, .. } => cells,
@@ -170,6 +181,9 @@ impl CsvRows {
     ) -> Result<Option<bool>, FileError> {
         if self.takes_header(cells, ledger)? || self.is_comment() {
             return Ok(None);
+        }
+        if let Some(again) = self.doubted.take() {
+            self.resolve(again, cells, ledger)?;
         }
         let expected = self.names.len();
         if self.width == 0 {
@@ -246,21 +260,66 @@ impl CsvRows {
             ledger.report.truncated = Some(self.place());
             return Ok(true);
         }
-        columns::check_unique(&names, || self.place())?;
-        let is_forgiven = ledger.is_lenient() && columns.have_time();
-        if !lacking.is_empty() && !is_forgiven {
-            return Err(self.missing(lacking, &names));
+        let unusable = match columns::check_unique(&names, || self.place()) {
+            Ok(()) if lacking.is_empty() || ledger.is_lenient() && columns.have_time() => None,
+            Ok(()) => Some(self.missing(lacking.clone(), &names)),
+            Err(error) => Some(error),
+        };
+        if let Some(error) = unusable {
+            ledger.refuse_header(error)?;
+            if !columns.agree_with(&self.columns) {
+                // Rows have no time until the columns are named so that they can be told apart.
+                self.columns.time.fill(None);
+            }
+            return Ok(true);
         }
-        ledger.header(FileError::HeaderAgain {
+        let again = NamesAgain {
             place: self.place(),
-            moved: columns != self.columns,
             lacking: lacking.into_iter().map(str::to_owned).collect(),
+            names,
+            columns,
+        };
+        self.width = 0;
+        if again.lacking.is_empty() {
+            self.take_names(again, ledger);
+        } else {
+            self.doubted = Some(again);
+        }
+        Ok(true)
+    }
+
+    /// Takes the columns by these names from here on.
+    fn take_names(&mut self, again: NamesAgain, ledger: &mut Ledger) {
+        ledger.header(FileError::HeaderAgain {
+            place: again.place,
+            moved: again.columns != self.columns,
+            lacking: again.lacking,
         });
-        (self.names, self.columns) = (names, columns);
+        (self.names, self.columns) = (again.names, again.columns);
         self.units.clear();
         self.width = 0;
         self.ends_in_delimiter = false;
-        Ok(true)
+        self.doubted = None;
+    }
+
+    /// Takes the columns by a header that lacks some, save where it was cut off: the row below it is then as wide as those before.
+    fn resolve(
+        &mut self,
+        again: NamesAgain,
+        cells: usize,
+        ledger: &mut Ledger,
+    ) -> Result<(), FileError> {
+        let (before, found) = (self.names.len(), again.names.len());
+        let is_as_before = cells == before || cells == before + 1;
+        if cells == found || !is_as_before {
+            self.take_names(again, ledger);
+            return Ok(());
+        }
+        ledger.refuse_header(FileError::CellCount {
+            place: again.place,
+            expected: before,
+            found,
+        })
     }
 
     /// Reads one record into `cells`, over several lines if it has line breaks in quotes.

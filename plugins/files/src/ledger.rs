@@ -25,8 +25,10 @@ pub struct Report {
     pub bad_cells_of: Vec<Count>,
     /// Rows left out because of their time cell, number of cells or syntax; only when reading leniently.
     pub refused_rows: Count,
-    /// Rows within the recording that name its columns again ([`FileError::HeaderAgain`]), unless each was told at once.
+    /// Rows within the recording that name its columns again as before ([`FileError::HeaderAgain`]).
     pub headers: Count,
+    /// Those that name them in other places, unless each was told at once.
+    pub headers_moved: Count,
     /// The columns of channels under whose names stands a unit, with that.
     pub units: Vec<(String, Unit)>,
     /// The first time that is a date without a zone, and was taken for UTC.
@@ -97,6 +99,8 @@ pub(crate) struct Ledger {
     /// Whether rows of one time are put together.
     pub joins: bool,
     lenient: bool,
+    /// Rows that name the columns again and are left out.
+    unusable_headers: Count,
     last_ns: Option<i64>,
     /// How long after the one before it that was.
     step_ns: i64,
@@ -117,6 +121,7 @@ impl Ledger {
             tell: None,
             joins: false,
             lenient,
+            unusable_headers: Count::default(),
             last_ns: None,
             step_ns: 0,
             behind: 0,
@@ -266,12 +271,27 @@ impl Ledger {
         self.lenient
     }
 
-    /// A row that names the columns again; each is told, since with each they may stand elsewhere.
+    /// A row that names the columns again. Each that moves them is told.
     pub fn header(&mut self, again: FileError) {
-        match &mut self.tell {
-            Some(tell) => tell(&again),
-            None => self.report.headers.add(|| again, &mut None),
+        let report = &mut self.report;
+        match (&again, &mut self.tell) {
+            (FileError::HeaderAgain { moved: true, .. }, Some(tell)) => tell(&again),
+            (FileError::HeaderAgain { moved: true, .. }, None) => {
+                report.headers_moved.add(|| again, &mut None);
+            }
+            (_, tell) => report.headers.add(|| again, tell),
         }
+    }
+
+    /// A row that names the columns again, and so that they cannot be taken by it.
+    #[cold]
+    pub fn refuse_header(&mut self, error: FileError) -> Result<(), FileError> {
+        if self.is_lenient() {
+            self.unusable_headers.add(|| error.clone(), &mut self.tell);
+            self.report.refused_rows.add(|| error, &mut None);
+            return Ok(());
+        }
+        Err(error)
     }
 
     /// A row that cannot be used.

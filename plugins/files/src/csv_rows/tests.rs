@@ -341,7 +341,11 @@ fn two_byte_text_without_a_mark_is_refused_with_advice() {
 
 /// What was told of rows that name the columns again.
 fn headers(reader: &Reader) -> (u64, String) {
-    let headers = &reader.report().headers;
+    let report = reader.report();
+    let headers = match report.headers_moved.count {
+        0 => &report.headers,
+        _ => &report.headers_moved,
+    };
     let first = headers.first.as_ref();
     (
         headers.count,
@@ -373,8 +377,8 @@ fn a_header_within_the_log_moves_the_columns_and_is_told() {
 }
 
 #[test]
-fn a_header_that_says_the_same_again_is_left_out_and_each_is_told() {
-    let text = "t,a,b\nt,a,b\n0,1,2.5\nt,a,b\n1,3,\n";
+fn a_header_that_says_the_same_again_is_left_out_and_told_once_and_each_that_does_not_is_told() {
+    let text = "t,a,b\nt,a,b\n0,1,2.5\nt,a,b\n1,3,\nt,b,a\n2,5,6\nt,b,a\nt,a,b\n3,7,8\n";
     let mut reader = reader(text, Options::default()).unwrap();
     let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     reader.tell_first({
@@ -383,13 +387,21 @@ fn a_header_that_says_the_same_again_is_left_out_and_each_is_told() {
     });
     let mut row = Row::default();
     while reader.next_into(&mut row).unwrap() {}
-    let again = |line: u8| {
-        format!(
-            "f.csv:{line}: the names of the columns stand here again, as before; the row was left out"
-        )
+    let again = |line: u8, how: &str| {
+        format!("f.csv:{line}: the names of the columns stand here again, {how}")
     };
-    assert_eq!(*told.lock().unwrap(), [again(2), again(4)]);
-    assert_eq!(reader.report().rows, 2);
+    let moved = "in other places; from here on values are taken by them";
+    assert_eq!(
+        *told.lock().unwrap(),
+        [
+            again(2, "as before; the row was left out"),
+            again(6, moved),
+            again(9, moved)
+        ]
+    );
+    let report = reader.report();
+    assert_eq!((report.rows, report.headers.count), (4, 3));
+    assert_eq!(report.headers_moved.count, 0, "each was told");
 }
 
 #[test]
@@ -406,15 +418,58 @@ fn a_header_within_the_log_that_lacks_a_channel_is_an_error_and_leniently_the_ch
         "f.csv:3: the names of the columns stand here again, in other places; from here on values are taken by them, and without `b`, \
          of which there are none"
     );
-    let renamed = "t,a,b\n0,1,2.5\ntime,a,b\n1,3,4\n";
-    assert!(error(renamed).starts_with("f.csv:3: there is no column `t`"));
-    let mut lenient = reader(renamed, lenient()).unwrap();
-    let mut row = Row::default();
-    assert!(lenient.next_into(&mut row).unwrap());
-    assert!(
-        lenient.next_into(&mut row).is_err(),
-        "values without a time"
-    );
+}
+
+#[test]
+fn a_header_within_the_log_that_cannot_be_used_is_an_error_or_left_out_and_the_columns_stay() {
+    for (header, told) in [
+        ("time,a,b", "f.csv:3: there is no column `t`"),
+        ("t,a,b,a", "f.csv:3: the name `a` stands at columns 2 and 4"),
+    ] {
+        let text = format!("t,a,b\n0,1,2.5\n{header}\n1,3,\n");
+        let failed = error(&text);
+        assert!(failed.starts_with(told), "{failed}");
+        let (rows, reader) = read_with(&text, lenient());
+        assert_eq!(rows, TWO_ROWS);
+        let refused = &reader.report().refused_rows;
+        assert_eq!((refused.count, headers(&reader).0), (1, 0));
+        assert!(
+            refused
+                .first
+                .as_ref()
+                .unwrap()
+                .to_string()
+                .starts_with(told)
+        );
+    }
+    let other_places = "t,a,b\n0,1,2.5\ntime,b,a\n5,6,7\nt,b,a\n1,,3\n";
+    let (rows, reader) = read_with(other_places, lenient());
+    assert_eq!(rows, TWO_ROWS, "no value is taken for another");
+    assert_eq!(reader.report().refused_rows.count, 2);
+}
+
+#[test]
+fn a_header_that_was_cut_off_within_the_log_is_an_error_or_left_out_and_the_columns_stay() {
+    for (header, cells) in [("t", 1), ("t,a", 2), ("t,b", 2)] {
+        let text = format!("t,a,b\n0,1,2.5\n{header}\n1,3,\n");
+        assert!(error(&text).starts_with("f.csv:3: there "));
+        let (rows, reader) = read_with(&text, lenient());
+        assert_eq!(rows, TWO_ROWS, "{header}");
+        let refused = &reader.report().refused_rows;
+        assert_eq!((refused.count, headers(&reader).0), (1, 0));
+        let told = format!("f.csv:3: {cells} cells where the header has 3");
+        assert!(
+            refused
+                .first
+                .as_ref()
+                .unwrap()
+                .to_string()
+                .starts_with(&told)
+        );
+    }
+    let shorter = "t,a,b\n0,1,2.5\nt,a\n1,3\n";
+    let (rows, reader) = read_with(shorter, lenient());
+    assert_eq!((&*rows, headers(&reader).0), (TWO_ROWS, 1));
 }
 
 #[test]
