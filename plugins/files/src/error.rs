@@ -190,7 +190,7 @@ pub enum FileError {
         /// The newest time before it.
         previous: String,
     },
-    /// An instant that is far after the one before, and after the next one too.
+    /// An instant that is far after the one before, and after the next one too, or the last.
     TimeLeaps {
         /// The row.
         place: Place,
@@ -198,8 +198,8 @@ pub enum FileError {
         time: String,
         /// The time before it.
         previous: String,
-        /// The time after it.
-        next: String,
+        /// The time after it, if a row follows.
+        next: Option<String>,
     },
     /// Rows one after the other, none of them after the one before them; told only while the recording is read.
     TimeStaysBehind {

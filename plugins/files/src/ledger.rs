@@ -13,7 +13,7 @@ pub struct Report {
     /// Rows given.
     pub rows: u64,
     /// Rows left out because their time was before the one before ([`FileError::TimeNotAfter`]), or far after it and after the next
-    /// one too ([`FileError::TimeLeaps`]).
+    /// one too, or without a next one ([`FileError::TimeLeaps`]).
     pub refused_time: Count,
     /// Rows left out because their time was that of the row before ([`FileError::TimeAgain`]).
     pub repeated_time: Count,
@@ -218,14 +218,14 @@ impl Ledger {
         }
     }
 
-    /// Leaves out a row that leaps, since the next one, by its time cell, does not leap as far.
+    /// Leaves out a row that leaps, since the next one, by its time cell, does not leap as far, or none follows.
     #[cold]
-    pub fn refuse_leap(&mut self, cell: &[u8], place: Place, next: &[u8]) {
+    pub fn refuse_leap(&mut self, cell: &[u8], place: Place, next: Option<&[u8]>) {
         let error = || FileError::TimeLeaps {
             place,
             time: excerpt(cell),
             previous: excerpt(&self.last_time),
-            next: excerpt(next),
+            next: next.map(excerpt),
         };
         self.report.refused_time.add(error, &mut self.tell);
     }

@@ -44,21 +44,16 @@ pub struct Row {
 /// A row is left out and counted when its time is not after the one before, save one of the same time that is put together with it
 /// ([`Options::joins`]). One that leaps, by more than five minutes and more than
 /// thirty times the step before, waits for the next row: it is left out and counted when that lies between the two, since then
-/// its time is wrong and no row after it is to be lost. A last line without an end that lacks cells
+/// its time is wrong and no row after it is to be lost; so is it when no row follows. A last line without an end that lacks cells
 /// (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never an error.
 pub struct Reader {
     rows: Rows,
     layout: Layout,
     ledger: Ledger,
-    ahead: Option<Ahead>,
+    /// What was read to find out whether the row before it is to be taken.
+    ahead: Option<Stamped>,
     /// Where rows of one time are put together.
     held: Option<Held>,
-}
-
-/// What was read to find out whether the row before it is to be taken.
-enum Ahead {
-    Row(Stamped),
-    Error(FileError),
 }
 
 /// A row with the cell that its time is from.
@@ -167,7 +162,7 @@ fn next_joined<C: Cells>(
     rows: &mut C,
     layout: &Layout,
     ledger: &mut Ledger,
-    ahead: &mut Option<Ahead>,
+    ahead: &mut Option<Stamped>,
     held: &mut Option<Held>,
     row: &mut Row,
 ) -> Result<bool, FileError> {
@@ -184,7 +179,7 @@ fn next_joined<C: Cells>(
     loop {
         // Where the next row stands, if that was read before.
         let stands = match ahead {
-            Some(Ahead::Row(read)) if read.row.time_ns == row.time_ns => Some(read.place.clone()),
+            Some(read) if read.row.time_ns == row.time_ns => Some(read.place.clone()),
             _ => None,
         };
         let read = next(rows, layout, ledger, ahead, &mut held.row);
@@ -212,18 +207,13 @@ fn next<C: Cells>(
     rows: &mut C,
     layout: &Layout,
     ledger: &mut Ledger,
-    ahead: &mut Option<Ahead>,
+    ahead: &mut Option<Stamped>,
     row: &mut Row,
 ) -> Result<bool, FileError> {
     if let Some(read_ahead) = ahead.take() {
-        let read_ahead = match read_ahead {
-            Ahead::Row(read_ahead) => read_ahead,
-            Ahead::Error(error) => return Err(error),
-        };
         let follows = ledger.follows(read_ahead.row.time_ns);
         if !ledger.refuses(follows) {
-            next_doubted(rows, layout, ledger, ahead, read_ahead, row);
-            return Ok(true);
+            return next_doubted(rows, layout, ledger, ahead, read_ahead, row);
         }
         ledger.refuse(follows, &read_ahead.cell, || read_ahead.place);
     }
@@ -231,7 +221,7 @@ fn next<C: Cells>(
         None => return Ok(false),
         Some(Follows::Leaping) => {
             let doubted = Stamped::new(row, rows);
-            next_doubted(rows, layout, ledger, ahead, doubted, row);
+            return next_doubted(rows, layout, ledger, ahead, doubted, row);
         }
         Some(Follows::Again) => {}
         Some(_) => ledger.take(row.time_ns, cell::trim(rows.time())),
@@ -239,36 +229,35 @@ fn next<C: Cells>(
     Ok(true)
 }
 
-/// Gives a row of which the next tells whether it is taken, or else that one.
+/// Gives a row of which the next tells whether it is taken, or else that one; false where none follows that tells it.
 #[cold]
 fn next_doubted<C: Cells>(
     rows: &mut C,
     layout: &Layout,
     ledger: &mut Ledger,
-    ahead: &mut Option<Ahead>,
+    ahead: &mut Option<Stamped>,
     mut doubted: Stamped,
     row: &mut Row,
-) {
+) -> Result<bool, FileError> {
     while ledger.follows(doubted.row.time_ns) == Follows::Leaping {
-        let next = match read(rows, layout, ledger, row) {
-            Ok(None) => break,
-            Ok(Some(_)) => Stamped::new(row, rows),
-            Err(error) => {
-                *ahead = Some(Ahead::Error(error));
-                break;
-            }
+        let next = read(rows, layout, ledger, row);
+        let Ok(Some(_)) = next else {
+            ledger.refuse_leap(&doubted.cell, doubted.place, None);
+            return next.map(|_| false);
         };
+        let next = Stamped::new(row, rows);
         if next.row.time_ns >= doubted.row.time_ns {
-            *ahead = Some(Ahead::Row(next));
+            *ahead = Some(next);
             break;
         }
-        ledger.refuse_leap(&doubted.cell, doubted.place, &next.cell);
+        ledger.refuse_leap(&doubted.cell, doubted.place, Some(&next.cell));
         doubted = next;
     }
     if ledger.follows(doubted.row.time_ns) != Follows::Again {
         ledger.take(doubted.row.time_ns, &doubted.cell);
     }
     *row = doubted.row;
+    Ok(true)
 }
 
 /// Reads the next row that is after the last one taken, or where rows are put together at its time, and how it follows that; none at

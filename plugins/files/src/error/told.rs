@@ -196,10 +196,18 @@ impl fmt::Display for FileError {
                 time,
                 previous,
                 next,
-            } => write!(
-                f,
-                "{place}: the time `{time}` is far after `{previous}`, and the next one, `{next}`, is not; the row was left out"
-            ),
+            } => {
+                write!(
+                    f,
+                    "{place}: the time `{time}` is far after `{previous}`, and "
+                )?;
+                match next {
+                    Some(next) => write!(f, "the next one, `{next}`, is not; the row was left out"),
+                    None => f.write_str(
+                        "no row follows by which to tell a gap from a wrong time; the row was left out",
+                    ),
+                }
+            }
             Self::TimeStaysBehind {
                 place,
                 time,

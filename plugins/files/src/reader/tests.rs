@@ -312,9 +312,10 @@ fn a_single_time_far_ahead_is_left_out_and_the_rows_after_it_are_not() {
 }
 
 #[test]
-fn rows_after_a_gap_are_all_given_up_to_the_last_one() {
-    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,4\n90000,5\n");
-    assert_eq!((&*times, &*end), ("0=1 10=2 40000=3 40010=4 90000=5", ""));
+fn rows_after_a_gap_are_all_given() {
+    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,4\n90000,5\n90010,6\n");
+    let all = "0=1 10=2 40000=3 40010=4 90000=5 90010=6";
+    assert_eq!((&*times, &*end), (all, ""));
     assert!(told.is_empty(), "{told:?}");
     let (times, told, _) = given("t,a\n0,1\n10,2\n40000,3\n40000,4\n40010,5\n");
     assert_eq!(times, "0=1 10=2 40000=3 40010=5");
@@ -322,12 +323,20 @@ fn rows_after_a_gap_are_all_given_up_to_the_last_one() {
         told[0].starts_with("f.csv:5: the time `40000` is that of the row before"),
         "{told:?}"
     );
-    let (times, _, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,off\n");
-    assert_eq!(
-        times, "0=1 10=2 40000=3",
-        "the row before an error is given first"
-    );
+}
+
+#[test]
+fn a_last_row_far_ahead_is_left_out_since_it_may_be_a_wrong_time_as_well_as_one_after_a_gap() {
+    let left_out = "f.csv:4: the time `40000` is far after `10`, and no row follows by which to tell a gap from a wrong time; the row \
+                    was left out";
+    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n");
+    assert_eq!((&*times, &*end), ("0=1 10=2", ""));
+    assert_eq!(told, [left_out]);
+    let (times, told, end) = given("t,a\n0,1\n10,2\n40000,3\n40010,off\n");
+    assert_eq!((&*times, &*told), ("0=1 10=2", &[left_out.to_owned()][..]));
     assert!(end.starts_with("f.csv:5: column `a`"), "{end}");
+    let (times, told, _) = given("t,a\n0,1\n10,2\n90000,3\n40000,4\n");
+    assert_eq!((&*times, told.len()), ("0=1 10=2", 1), "others are counted");
 }
 
 #[test]
