@@ -208,7 +208,7 @@ fn a_row_that_is_left_out_of_a_pipe_is_told_before_the_pipe_ends() {
 fn rows_that_were_left_out_of_a_pipe_are_counted_under_the_name_by_which_the_first_was_told() {
     let mut rows = first_rows(2);
     rows.extend(rows[1..].to_vec());
-    let input = rows.join("\n");
+    let input = rows.join("\n") + "\n";
     let run = athermal_fed(&[&"run", &fitted().model, &"-i", &"-"], input.as_bytes());
     let told = run.ended(0).told;
     assert!(!told.contains("-:"), "{told}");

@@ -71,7 +71,7 @@ fn a_run_that_is_restarted_gives_what_one_in_one_piece_does_and_needs_its_state_
     let (scratch, model, data, whole) = desk("restarted");
     let text = std::fs::read_to_string(&data).unwrap();
     let lines: Vec<_> = text.lines().collect();
-    let half = lines[..2000].join("\n");
+    let half = lines[..2000].join("\n") + "\n";
     let state = scratch.path("state");
 
     let before = athermal_fed(
@@ -87,7 +87,7 @@ fn a_run_that_is_restarted_gives_what_one_in_one_piece_does_and_needs_its_state_
     assert_eq!(before.clone() + &rows(&after), whole);
 
     // A source that gives only what is new is as good.
-    let new = [&lines[..1], &lines[2000..]].concat().join("\n");
+    let new = [&lines[..1], &lines[2000..]].concat().join("\n") + "\n";
     let cold = athermal_fed(&[&"run", &model, &"-i", &"-"], new.as_bytes());
     assert_ne!(before + &rows(&cold.ended(0).out), whole);
     let again = scratch.path("again");
@@ -100,10 +100,41 @@ fn a_run_that_is_restarted_gives_what_one_in_one_piece_does_and_needs_its_state_
 }
 
 #[test]
+fn a_run_leaves_out_at_the_end_of_its_input_what_only_more_of_it_would_confirm_and_the_next_reads_it()
+ {
+    let (scratch, model, data, whole) = desk("confirmed");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let half = lines[..2000].join("\n") + "\n";
+    let last = lines[2000];
+    for (test, begun, told) in [
+        (
+            "cut",
+            last[..last.len() - 1].to_owned(),
+            "the last line has no end and was left out",
+        ),
+        (
+            "ahead",
+            format!("9999{last}\n"),
+            "no row follows by which to tell a gap from a wrong time; the row was left out",
+        ),
+    ] {
+        let state = scratch.path(test);
+        let growing = scratch.file("growing.csv", format!("{half}{begun}"));
+        let run = |data| athermal(&[&"run", &model, &"-i", data, &"--state", &state]).ended(0);
+        let before = run(&growing);
+        before.tells(&[told]);
+        let after = run(&data);
+        let rows = after.out.split_once('\n').unwrap().1;
+        assert_eq!(before.out + rows, whole, "{test}");
+    }
+}
+
+#[test]
 fn a_watched_run_that_is_restarted_goes_on_too() {
     let (scratch, model, data, _) = desk("watched");
     let text = std::fs::read_to_string(&data).unwrap();
-    let half = text.lines().take(2000).collect::<Vec<_>>().join("\n");
+    let half = text.lines().take(2000).collect::<Vec<_>>().join("\n") + "\n";
     let state = scratch.path("state");
     let watched = |rows: &str, state: Option<&PathBuf>| {
         let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
@@ -169,7 +200,7 @@ fn a_run_that_is_restarted_goes_on_with_its_output_as_it_was_left() {
         let run = |rows: usize| {
             let arguments: [&dyn AsRef<std::ffi::OsStr>; 8] =
                 [&"run", &model, &"-i", &"-", &"-o", &out, &"--state", &state];
-            athermal_fed(&arguments, lines[..rows].join("\n").as_bytes()).ended(0)
+            athermal_fed(&arguments, (lines[..rows].join("\n") + "\n").as_bytes()).ended(0)
         };
         run(2000);
         let kept = std::fs::read(&state).unwrap();
@@ -271,7 +302,7 @@ fn what_was_rejected_in_a_run_is_not_told_again_by_the_next() {
             &"--state",
             &state,
         ];
-        athermal_fed(&arguments, lines.join("\n").as_bytes())
+        athermal_fed(&arguments, (lines.join("\n") + "\n").as_bytes())
             .ended(0)
             .told
     };
@@ -347,13 +378,13 @@ fn a_run_that_was_once_told_of_a_far_future_says_why_the_next_predicts_nothing()
     let (scratch, model, data, _) = desk("future");
     let text = std::fs::read_to_string(&data).unwrap();
     let lines: Vec<_> = text.lines().collect();
-    let ahead = format!("9{}", lines[1000]);
+    let ahead = [1000, 1001].map(|row| format!("9{}\n", lines[row]));
     let state = scratch.path("state");
     let arguments: [&dyn AsRef<std::ffi::OsStr>; 6] =
         [&"run", &model, &"-i", &"-", &"--state", &state];
-    let first = [&lines[..1000], &[&ahead]].concat().join("\n");
+    let first = lines[..1000].join("\n") + "\n" + &ahead.concat();
     athermal_fed(&arguments, first.as_bytes()).ended(0);
-    let rest = [&lines[..1], &lines[1001..2000]].concat().join("\n");
+    let rest = [&lines[..1], &lines[1002..2000]].concat().join("\n");
     let next = athermal_fed(&arguments, rest.as_bytes());
     next.tells(&[
         "warning: ",

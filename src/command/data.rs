@@ -372,7 +372,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
         }
         if let Some(place) = &report.truncated {
             told.push(format!(
-                "{place}: the last line is cut off and was left out"
+                "{place}: the last line has no end and was left out, since it was cut off or is still being written"
             ));
         }
     }

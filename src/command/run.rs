@@ -221,6 +221,7 @@ impl Run {
         Options {
             lenient: self.lenient,
             joins: self.ends(),
+            goes_on: self.state.is_some() || !self.ends(),
             ..Options::default()
         }
     }

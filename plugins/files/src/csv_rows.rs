@@ -463,9 +463,9 @@ impl Cells for CsvRows {
     fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError> {
         loop {
             let (cells, complete) = match self.read_record() {
-                Ok(Record::Row { cells, complete }) => (cells, complete),
+                Ok(Record::Row { cells, complete }) if self.lines.may_be_row() => (cells, complete),
                 Ok(Record::End) => return Ok(false),
-                Ok(Record::Cut) => {
+                Ok(Record::Row { .. } | Record::Cut) => {
                     ledger.report.truncated = Some(self.place());
                     return Ok(false);
                 }

@@ -133,6 +133,10 @@ impl Cells for JsonRows {
                 }
                 Err(error) => return Err(error),
             }
+            if !self.lines.may_be_row() {
+                ledger.report.truncated = Some(self.lines.place());
+                break;
+            }
             let is_first = self.found.is_none();
             match self.read_object() {
                 Ok(()) if self.of_time().all(|key| key.ever_seen) => {
@@ -547,5 +551,20 @@ mod tests {
         let (rows, reader) = read_with("{\"t\":0,\"a\":1,\"b\":2}", false).unwrap();
         assert_eq!(rows, "0 [1.0, 2.0]");
         assert!(reader.report().truncated.is_none());
+    }
+
+    #[test]
+    fn a_last_object_without_a_line_end_is_left_out_where_more_comes_later() {
+        let options = Options {
+            goes_on: true,
+            ..Options::default()
+        };
+        let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
+        let text = &b"{\"t\":0,\"a\":1}\n{\"t\":1,\"a\":2}"[..];
+        let mut reader = Reader::from_read("pipe", text, layout, options).unwrap();
+        let mut row = Row::default();
+        assert!(reader.next_into(&mut row).unwrap());
+        assert!(!reader.next_into(&mut row).unwrap());
+        assert_eq!(reader.report().truncated.as_ref().unwrap().line, 2);
     }
 }

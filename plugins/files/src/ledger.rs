@@ -33,7 +33,7 @@ pub struct Report {
     pub units: Vec<(String, Unit)>,
     /// The first time that is a date without a zone, and was taken for UTC.
     pub without_zone: Option<Place>,
-    /// The last line, when it was cut off in the middle and left out.
+    /// The last line, when it has no end and was left out: it was cut off in the middle, or may have been.
     pub truncated: Option<Place>,
     /// Files read before in the same recording, with how many rows are dated within the period of each.
     pub overlaps: Vec<(String, u64)>,
@@ -98,6 +98,8 @@ pub(crate) struct Ledger {
     pub tell: Option<Tell>,
     /// Whether rows of one time are put together.
     pub joins: bool,
+    /// Whether what is read goes on later.
+    pub goes_on: bool,
     lenient: bool,
     /// Rows that name the columns again and are left out.
     unusable_headers: Count,
@@ -120,6 +122,7 @@ impl Ledger {
             report: Report::default(),
             tell: None,
             joins: false,
+            goes_on: false,
             lenient,
             unusable_headers: Count::default(),
             last_ns: None,
@@ -153,6 +156,11 @@ impl Ledger {
                 }
             }
         }
+    }
+
+    /// Whether a last row that leaps is left out: two rows do not tell how far apart rows are.
+    pub fn knows_leaps(&self) -> bool {
+        self.goes_on || self.step_ns > 0
     }
 
     /// Whether a row that follows so is left out.

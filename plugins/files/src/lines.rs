@@ -32,6 +32,8 @@ pub(crate) struct Lines {
     is_cut_short: bool,
     /// Whether comments are content: the header was one, and so may the next be.
     pub comments_count: bool,
+    /// Whether a line without an end is no row, whatever it holds.
+    pub only_whole: bool,
 }
 
 impl Lines {
@@ -48,6 +50,7 @@ impl Lines {
             held: Vec::new(),
             is_cut_short: false,
             comments_count: false,
+            only_whole: false,
         }
     }
 
@@ -178,6 +181,11 @@ impl Lines {
     /// Whether the current line has an end; only the last one of a stream may not.
     pub fn is_complete(&self) -> bool {
         self.line.ends_with(b"\n")
+    }
+
+    /// Whether the current line may be a row.
+    pub fn may_be_row(&self) -> bool {
+        !self.only_whole || self.is_complete()
     }
 
     pub fn place(&self) -> Place {

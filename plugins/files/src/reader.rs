@@ -26,6 +26,9 @@ pub struct Options {
     /// Put rows of one time together, where no two have different values of a channel. A row then waits for the time of the next
     /// one: for what was recorded, not for what is still being written.
     pub joins: bool,
+    /// What is read goes on later, and is read again then: leave out at its end what only more of it would confirm. That is a last
+    /// line without an end, even if it lacks nothing, since its last number may lack digits, and a second row that leaps.
+    pub goes_on: bool,
 }
 
 /// One row of a recording. Reused from row to row, so that reading does not allocate.
@@ -44,7 +47,7 @@ pub struct Row {
 /// A row is left out and counted when its time is not after the one before, save one of the same time that is put together with it
 /// ([`Options::joins`]). One that leaps, by more than five minutes and more than
 /// thirty times the step before, waits for the next row: it is left out and counted when that lies between the two, since then
-/// its time is wrong and no row after it is to be lost; so is it when no row follows. A last line without an end that lacks cells
+/// its time is wrong and no row after it is to be lost; so is it when no row follows, unless it is the second. A last line without an end that lacks cells
 /// (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never an error.
 pub struct Reader {
     rows: Rows,
@@ -107,12 +110,14 @@ impl Reader {
     }
 
     fn from_lines(mut lines: Lines, layout: Layout, options: Options) -> Result<Self, FileError> {
+        lines.only_whole = options.goes_on;
         let rows = match lines.format_or(options.format)? {
             Format::Csv => Rows::Csv(Box::new(CsvRows::new(lines, &layout, options.delimiter)?)),
             Format::JsonLines => Rows::Json(Box::new(JsonRows::new(lines, &layout)?)),
         };
         let mut ledger = Ledger::new(options.lenient);
         ledger.joins = options.joins;
+        ledger.goes_on = options.goes_on;
         Ok(Self {
             rows,
             layout,
@@ -240,12 +245,14 @@ fn next_doubted<C: Cells>(
     row: &mut Row,
 ) -> Result<bool, FileError> {
     while ledger.follows(doubted.row.time_ns) == Follows::Leaping {
-        let next = read(rows, layout, ledger, row);
-        let Ok(Some(_)) = next else {
-            ledger.refuse_leap(&doubted.cell, doubted.place, None);
-            return next.map(|_| false);
+        let next = match read(rows, layout, ledger, row) {
+            Ok(Some(_)) => Stamped::new(row, rows),
+            Ok(None) if !ledger.knows_leaps() => break,
+            end => {
+                ledger.refuse_leap(&doubted.cell, doubted.place, None);
+                return end.map(|_| false);
+            }
         };
-        let next = Stamped::new(row, rows);
         if next.row.time_ns >= doubted.row.time_ns {
             *ahead = Some(next);
             break;

@@ -78,11 +78,12 @@ fn options() -> impl Strategy<Value = Options> {
         Just(Some(Format::Csv)),
         Just(Some(Format::JsonLines))
     ];
-    (formats, any::<bool>(), any::<bool>()).prop_map(|(format, lenient, joins)| Options {
+    (formats, any::<[bool; 3]>()).prop_map(|(format, [lenient, joins, goes_on])| Options {
         format,
         delimiter: None,
         lenient,
         joins,
+        goes_on,
     })
 }
 

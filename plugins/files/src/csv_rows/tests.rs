@@ -215,6 +215,25 @@ fn a_last_line_with_all_cells_but_no_end_is_complete() {
 }
 
 #[test]
+fn a_last_line_without_an_end_is_left_out_where_more_comes_later() {
+    let options = Options {
+        goes_on: true,
+        ..Options::default()
+    };
+    for cut in ["2,4,928", "2,4", "2,4,\"5\"", "t,b,a"] {
+        let text = format!("t,a,b\n0,1,2.5\n1,3,\n{cut}");
+        let (rows, reader) = read_with(&text, options.clone());
+        assert_eq!(rows, TWO_ROWS);
+        let truncated = reader.report().truncated.as_ref();
+        assert_eq!(truncated.map(|place| place.line), Some(4), "{cut}");
+    }
+    let (rows, reader) = read_with("t,a,b\n0,1,2.5\n1,3,\n", options.clone());
+    assert_eq!(rows, TWO_ROWS);
+    assert!(reader.report().truncated.is_none());
+    assert_eq!(read_with("t,a,b", options).0, "");
+}
+
+#[test]
 fn a_quote_that_is_not_closed_is_an_error_at_its_row_or_that_row_is_left_out() {
     for open in [
         "5,\"1,2\n",

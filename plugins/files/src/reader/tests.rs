@@ -337,6 +337,13 @@ fn a_last_row_far_ahead_is_left_out_since_it_may_be_a_wrong_time_as_well_as_one_
     assert!(end.starts_with("f.csv:5: column `a`"), "{end}");
     let (times, told, _) = given("t,a\n0,1\n10,2\n90000,3\n40000,4\n");
     assert_eq!((&*times, told.len()), ("0=1 10=2", 1), "others are counted");
+    let two = "t,a\n0,1\n3600,2\n";
+    assert_eq!(given(two).0, "0=1 3600=2", "nothing tells that it leaps");
+    let goes_on = Options {
+        goes_on: true,
+        ..Options::default()
+    };
+    assert_eq!(rows(&mut open(two, goes_on)).len(), 1);
 }
 
 #[test]
