@@ -143,6 +143,24 @@ fn an_excerpt_is_short_and_never_cuts_a_character() {
 }
 
 #[test]
+fn what_would_clear_a_screen_or_break_a_line_is_told_as_its_number() {
+    let bad = FileError::BadCell {
+        place: place(),
+        column: "a\u{7}".into(),
+        found: excerpt(b"\x1b[2J1\n2\xe2\x80\xae\xc2\xb0C"),
+    };
+    let told = bad.to_string();
+    assert!(
+        told.starts_with(
+            "run.csv:12: column `a\\u{7}`: expected a number, found `\\u{1b}[2J1\\n2\\u{202e}°C`; leave the cell empty"
+        ),
+        "{told}"
+    );
+    let excerpt = excerpt("x\n".repeat(500).as_bytes());
+    assert!(excerpt.len() < 200, "{excerpt}");
+}
+
+#[test]
 fn a_log_without_its_header_is_told_to_have_lost_it() {
     let missing = FileError::MissingColumns {
         place: place(),

@@ -1,6 +1,6 @@
 //! What each error says: what it is, where, and what to do.
 
-use std::fmt;
+use std::fmt::{self, Write};
 
 use super::{Again, FileError, MissingColumn, Place, quoted};
 use crate::cell;
@@ -17,6 +17,34 @@ fn is_date(text: &str) -> bool {
 
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.tell(&mut OneLine(f))
+    }
+}
+
+/// Writes characters that would break a line or move a terminal's cursor, whatever log they are from, as `\u{1b}`.
+struct OneLine<'a, 'f>(&'a mut fmt::Formatter<'f>);
+
+impl Write for OneLine<'_, '_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for piece in text.split_inclusive(moves) {
+            match piece.char_indices().next_back() {
+                Some((at, last)) if moves(last) => {
+                    write!(self.0, "{}{}", &piece[..at], last.escape_default())?;
+                }
+                _ => self.0.write_str(piece)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a character moves those after it: one of control, or one that turns the direction of writing.
+fn moves(character: char) -> bool {
+    character.is_control() || matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+impl FileError {
+    fn tell(&self, f: &mut dyn Write) -> fmt::Result {
         match self {
             Self::Open { file, source } => {
                 write!(
@@ -268,7 +296,7 @@ impl fmt::Display for FileError {
 
 /// Which columns are missing, what is there, and what each may be called there.
 fn lacking(
-    f: &mut fmt::Formatter<'_>,
+    f: &mut dyn Write,
     place: &Place,
     missing: &[MissingColumn],
     found: &[String],
