@@ -10,7 +10,7 @@ use athermal::Model;
 use athermal::core::compile::Plan;
 use athermal::core::engine::Fnv1a;
 use athermal::core::model::DataCard;
-use athermal::files::{Dataset, Format, Options, Report};
+use athermal::files::{Dataset, FileError, Format, Options, Report};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use serde_json::{Value, json};
@@ -344,8 +344,9 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
                 "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so windows begin afresh in it and what both have counts twice"
             ));
         }
+        let unreadable = format!("unreadable cell{}", of_columns(report));
         let counted = [
-            (&report.bad_cells, "unreadable cell", "taken as missing"),
+            (&report.bad_cells, &*unreadable, "taken as missing"),
             (&report.refused_rows, "unreadable row", "left out"),
             (
                 &report.refused_time,
@@ -377,6 +378,30 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
         }
     }
     told
+}
+
+/// How many columns with cells that cannot be read are named.
+const NAMED: usize = 8;
+
+/// In which columns cells cannot be read, where these are several.
+fn of_columns(report: &Report) -> String {
+    let mut columns: BTreeMap<&str, u64> = BTreeMap::new();
+    for found in &report.bad_cells_of {
+        if let Some(column) = found.first.as_ref().and_then(FileError::column) {
+            *columns.entry(column).or_default() += found.count;
+        }
+    }
+    if columns.len() < 2 {
+        return String::new();
+    }
+    let named = columns.iter().take(NAMED);
+    let mut named: Vec<_> = named
+        .map(|(column, n)| format!("{} in `{column}`", count(*n)))
+        .collect();
+    if columns.len() > NAMED {
+        named.push(format!("others in {} more", columns.len() - NAMED));
+    }
+    format!(" ({})", named.join(", "))
 }
 
 /// What is told to programs, with the files whose periods overlap, where there are any, under `overlaps`.

@@ -317,6 +317,7 @@ fn a_bad_cell_is_an_error_with_file_line_and_column_or_counted_when_lenient() {
     assert!(!scratch.path("new.json").exists());
     let lenient = athermal(&[&"run", &plain, &"--input", &bad, &"--lenient"]).ended(0);
     lenient.tells(&["2 × unreadable cell", "bad.csv:8"]);
+    assert!(!lenient.told.contains("in `"), "{}", lenient.told);
     let room: Vec<bool> = lenient
         .out
         .lines()
@@ -328,6 +329,11 @@ fn a_bad_cell_is_an_error_with_file_line_and_column_or_counted_when_lenient() {
     athermal(&[&"evaluate", &model, &"--data", &bad, &"--lenient"])
         .ended(0)
         .tells(&["2 × unreadable cell"]);
+    lines[9] = "90,21,??".to_owned();
+    let bad = scratch.file("bad.csv", csv(&lines));
+    athermal(&[&"evaluate", &model, &"--data", &bad, &"--lenient"])
+        .ended(0)
+        .tells(&["2 × unreadable cell (1 in `Z`, 1 in `room`), taken as missing; the first: "]);
 }
 
 #[test]

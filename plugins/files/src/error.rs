@@ -276,6 +276,15 @@ impl FileError {
         }
     }
 
+    /// The column of a cell that cannot be read.
+    #[must_use]
+    pub fn column(&self) -> Option<&str> {
+        match self {
+            Self::BadCell { column, .. } | Self::MixedMarks { column, .. } => Some(column),
+            _ => None,
+        }
+    }
+
     /// Whether only one line cannot be read, and those after it can.
     pub(crate) fn is_of_line(&self) -> bool {
         matches!(self, Self::TooLong { .. } | Self::JsonArray { .. })

@@ -262,8 +262,8 @@ impl Ledger {
         let report = &mut self.report;
         let channels = report.bad_cells_of.len().max(channel + 1);
         report.bad_cells_of.resize_with(channels, Count::default);
-        report.bad_cells_of[channel].add(&error, &mut None);
-        report.bad_cells.add(error, &mut self.tell);
+        report.bad_cells_of[channel].add(&error, &mut self.tell);
+        report.bad_cells.add(error, &mut None);
         Ok(())
     }
 

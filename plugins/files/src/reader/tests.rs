@@ -227,6 +227,24 @@ fn a_lenient_reader_takes_bad_cells_as_absent_and_keeps_the_first() {
     assert!(of_channel.first.is_some());
 }
 
+#[test]
+fn the_first_cell_of_each_channel_that_cannot_be_read_is_told_at_once() {
+    let layout = Layout::new("t", TimeForm::SECONDS, ["a", "b"]);
+    let text = &b"t,a,b\n0,ERR,1\n1,ERR,1\n2,ERR,FAIL\n3,ERR,FAIL\n"[..];
+    let mut reader = Reader::from_read("pipe", text, layout, lenient()).unwrap();
+    let told = Arc::new(std::sync::Mutex::new(Vec::new()));
+    reader.tell_first({
+        let told = Arc::clone(&told);
+        move |error| told.lock().unwrap().push(error.to_string())
+    });
+    assert_eq!(rows(&mut reader).len(), 4);
+    let told = told.lock().unwrap();
+    assert_eq!(told.len(), 2);
+    assert!(told[0].starts_with("pipe:2: column `a`: expected a number, found `ERR`"));
+    assert!(told[1].starts_with("pipe:4: column `b`: expected a number, found `FAIL`"));
+    assert_eq!(reader.report().bad_cells.count, 6);
+}
+
 /// Gives one line after the other, and knows how many it has begun to give.
 struct LineByLine {
     lines: std::array::IntoIter<&'static str, 4>,
