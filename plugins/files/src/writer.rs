@@ -33,6 +33,8 @@ pub struct Writer {
     rows: Rows,
     /// The same file, where it is one that keeps what it is given.
     kept: Option<File>,
+    /// What begins that file, once it was written.
+    header: Vec<u8>,
     /// The instant of the last row that stood in it before.
     stood_ns: Option<i64>,
 }
@@ -66,9 +68,10 @@ impl Writer {
                 flush,
             );
         }
-        let output = File::create(path).map_err(|source| FileError::cannot_open(path, source))?;
+        let output = create(path).map_err(|source| FileError::cannot_open(path, source))?;
         let mut writer = Self::to_file(path, output, time_column, columns, flush)?;
         writer.write_header(time_column, columns)?;
+        writer.keep_header(time_column, columns)?;
         Ok(writer)
     }
 
@@ -96,6 +99,7 @@ impl Writer {
         let output = open().map_err(|source| FileError::cannot_open(path, source))?;
         let mut writer = Self::to_file(path, output, &time.columns.title(), columns, flush)?;
         writer.stood_ns = begun.last_ns;
+        writer.keep_header(&time.columns.title(), columns)?;
         Ok(writer)
     }
 
@@ -149,12 +153,7 @@ impl Writer {
     ) -> Self {
         let output: Box<dyn Write + Send> = Box::new(output);
         let rows = match format {
-            Format::Csv => Rows::Csv(Box::new(
-                csv::WriterBuilder::new()
-                    .comment(Some(b'#'))
-                    .buffer_capacity(BUFFER)
-                    .from_writer(output),
-            )),
+            Format::Csv => Rows::Csv(Box::new(csv_to(output))),
             Format::JsonLines => Rows::Json(JsonObjects::new(output, time_column, columns)),
         };
         Self {
@@ -165,6 +164,7 @@ impl Writer {
             instant: String::new(),
             rows,
             kept: None,
+            header: Vec::new(),
             stood_ns: None,
         }
     }
@@ -263,7 +263,32 @@ impl Writer {
         write().map_err(|source| self.failed(source))
     }
 
+    /// Keeps what begins the file, to begin it again where another program empties it.
+    fn keep_header(&mut self, time_column: &str, columns: &[String]) -> Result<(), FileError> {
+        if let (Rows::Csv(_), Flush::EachRow) = (&self.rows, self.flush) {
+            let mut csv = csv_to(Vec::new());
+            let written = csv
+                .write_field(time_column)
+                .and_then(|()| csv.write_record(columns));
+            written.map_err(|error| self.failed(io_error(error)))?;
+            let header = csv.into_inner();
+            self.header = header.map_err(|error| self.failed(error.into_error()))?;
+        }
+        Ok(())
+    }
+
+    /// Begins the file again where it was emptied, as what rotates logs does with one that it has copied.
+    fn begin_again(&mut self) -> io::Result<()> {
+        match &mut self.kept {
+            Some(file) if file.metadata()?.len() == 0 => file.write_all(&self.header),
+            _ => Ok(()),
+        }
+    }
+
     fn flush_when(&mut self, now: bool) -> io::Result<()> {
+        if now && !self.header.is_empty() {
+            self.begin_again()?;
+        }
         match &mut self.rows {
             _ if !now => Ok(()),
             Rows::Csv(csv) => csv.flush(),
@@ -277,6 +302,22 @@ impl Writer {
             source: Arc::new(source),
         }
     }
+}
+
+/// Creates a file, or empties it. What is written to it goes to its end, wherever that is by then.
+fn create(path: &Path) -> io::Result<File> {
+    let created = File::create(path)?;
+    match created.metadata()?.is_file() {
+        true => OpenOptions::new().append(true).open(path),
+        false => Ok(created),
+    }
+}
+
+fn csv_to<W: Write>(output: W) -> csv::Writer<W> {
+    csv::WriterBuilder::new()
+        .comment(Some(b'#'))
+        .buffer_capacity(BUFFER)
+        .from_writer(output)
 }
 
 /// What the name of a file says, CSV if it says nothing.
@@ -392,6 +433,35 @@ mod tests {
             serde_json::json!({"time": "+.5", "a \"b\"": 1e300, "c": -0.0})
         );
         assert!(text.starts_with("{\"time\":0.50,"), "{text}");
+    }
+
+    #[test]
+    fn a_file_that_another_program_empties_is_begun_again() {
+        let folder = std::env::temp_dir().join(format!("athermal-emptied-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let columns = ["a".to_owned()];
+        let time = Layout::new("t", TimeForm::SECONDS, ["a"]).time;
+        for (name, header) in [("out.csv", "t,a\n"), ("out.jsonl", "")] {
+            let path = folder.join(name);
+            let create = || Writer::create(&path, "t", &columns, Flush::EachRow).unwrap();
+            let resume = || Writer::resume(&path, &time, &columns, Flush::EachRow).unwrap();
+            for open in [&create as &dyn Fn() -> Writer, &resume] {
+                let mut writer = open();
+                writer.write_row("1", 1_000_000_000, &[1.0]).unwrap();
+                let before = std::fs::read_to_string(&path).unwrap();
+                File::create(&path).unwrap();
+                for second in [2, 3] {
+                    let row = writer.write_row(&second.to_string(), second * 1_000_000_000, &[1.0]);
+                    row.unwrap();
+                }
+                let after = std::fs::read_to_string(&path).unwrap();
+                let rows = before.strip_prefix(header).unwrap();
+                let (two, three) = (rows.replacen('1', "2", 1), rows.replacen('1', "3", 1));
+                assert_eq!(after, format!("{header}{two}{three}"), "{name}");
+                std::fs::write(&path, before).unwrap();
+            }
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]
