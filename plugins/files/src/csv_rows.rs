@@ -374,7 +374,8 @@ impl CsvRows {
     /// Whether a row over several lines may have so many cells. Of the names, none are known before.
     fn is_width(&self, cells: usize) -> bool {
         let names = self.names.len();
-        names == 0 || cells == names || cells == names + 1 && self.ends_in_delimiter
+        let may_end_so = self.width == 0 || self.ends_in_delimiter;
+        names == 0 || cells == names || cells == names + 1 && may_end_so
     }
 
     /// Leaves only the first of these lines to a row whose quoted cell began in it, and gives the others and the current one again.
