@@ -271,26 +271,6 @@ fn scores_are_printed_as_json_with_all_their_keys() {
 }
 
 #[test]
-fn a_limit_in_a_unit_of_something_else_is_refused() {
-    let (_scratch, _, data, model) = desk("limit");
-    let limited = |limit: &str| {
-        athermal(&[
-            &"evaluate",
-            &model,
-            &"--data",
-            &data,
-            &"--abs-truth-below",
-            &limit,
-        ])
-    };
-    limited("250 nm/min")
-        .ended(2)
-        .tells(&["nm/min", "position.Z"]);
-    limited("250").ended(2);
-    limited("0.203 um").ended(0);
-}
-
-#[test]
 fn a_bad_cell_is_an_error_with_file_line_and_column_or_counted_when_lenient() {
     let (scratch, plain, _, model) = desk("bad-cell");
     let mut lines = rows(0, 60);

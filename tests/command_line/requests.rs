@@ -34,6 +34,26 @@ fn options_that_need_another_are_refused_without_it() {
 }
 
 #[test]
+fn a_limit_in_a_unit_of_something_else_is_refused() {
+    let (_scratch, _, data, model) = desk("limit");
+    let limited = |limit: &str| {
+        athermal(&[
+            &"evaluate",
+            &model,
+            &"--data",
+            &data,
+            &"--abs-truth-below",
+            &limit,
+        ])
+    };
+    limited("250 nm/min")
+        .ended(2)
+        .tells(&["nm/min", "position.Z"]);
+    limited("250").ended(2);
+    limited("0.203 um").ended(0);
+}
+
+#[test]
 fn a_limit_below_which_no_truth_lies_is_refused() {
     let (_scratch, _, data, model) = desk("no-limit");
     for limit in ["0 nm", "-5 nm"] {

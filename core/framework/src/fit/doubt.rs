@@ -229,7 +229,9 @@ mod tests {
     #[test]
     fn a_fit_that_outliers_cannot_pull_is_judged_by_most_of_its_rows() {
         let mut truths = Truths::default();
-        [-1.0, 1.0, -1.0, 1.0].map(|truth| truths.count(truth));
+        for truth in [-1.0, 1.0, -1.0, 1.0] {
+            truths.count(truth);
+        }
         for (robust_error, doubted) in [(None, true), (Some(0.3), false), (Some(2.0), true)] {
             let mut report = TrainingReport {
                 in_sample_rmse: Some(1.5),
