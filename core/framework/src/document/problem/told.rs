@@ -6,6 +6,7 @@ use std::path::Path;
 use super::DocumentProblem;
 use crate::diagnostic::{Names, Place, Problem, nearest};
 use crate::document::lacks::Lacks;
+use crate::document::salvage::DUPLICATE_KEY;
 use crate::quantity::QuantityError;
 
 /// At most twelve names in quotes, for a list of what there is.
@@ -254,6 +255,10 @@ impl Problem for DocumentProblem {
             Self::Syntax {
                 slip: Some(slip), ..
             } => Some(slip.help()),
+            Self::Syntax { reason, .. } if reason == DUPLICATE_KEY => Some(
+                "a key stands once, be it `key = …`, `[key]` or `[[key]]`: take one of the two away"
+                    .to_owned(),
+            ),
             Self::Syntax { bare, .. } => {
                 bare.as_ref()
                     .map(|bare| match bare.to_ascii_lowercase().as_str() {

@@ -113,13 +113,16 @@ fn leave_out_homeless(statements: &[Statement], left_out: &mut [bool]) -> Vec<bo
     each.collect()
 }
 
+/// What the parser says of a key that stands twice.
+pub(super) const DUPLICATE_KEY: &str = "duplicate key";
+
 /// What the parser says of a text that begins at a byte of a file, in order.
 pub(super) fn errors(text: &str, start: usize) -> Vec<SyntaxError> {
     let (_, errors) = DeTable::parse_recoverable(text);
     let placed = |error: &toml::de::Error| {
         let bytes = error.span().unwrap_or(text.len()..text.len());
         SyntaxError {
-            bare: bare(text, &bytes),
+            bare: bare(text, &bytes).filter(|_| error.message() != DUPLICATE_KEY),
             bytes: start + bytes.start..start + bytes.end,
             reason: error.message().to_owned(),
         }

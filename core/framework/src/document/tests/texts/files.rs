@@ -64,6 +64,15 @@ error[A001]: this is not TOML: unclosed array table, expected `]`
 }
 
 #[test]
+fn a_key_that_stands_twice_is_not_told_to_be_a_text() {
+    let text = "schema = 1\ntests = []\n\n[[tests]]\nname = \"t\"\n";
+    let told = rendered(&[("a.toml", text)]);
+    assert!(told.contains("this is not TOML: duplicate key"), "{told}");
+    assert!(told.contains("a key stands once, be it"), "{told}");
+    assert!(!told.contains("quotes"), "{told}");
+}
+
+#[test]
 fn what_is_usual_elsewhere_and_no_toml_is_told_with_what_to_write() {
     for (line, help) in [
         ("a = 0,001", "a number has a decimal point: 0.001"),
