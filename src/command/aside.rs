@@ -4,6 +4,8 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use athermal::files::STANDARD_INPUT;
+
 use crate::terminal::Failure;
 
 /// Refuses an output that is another file of the same command, such as one that is read: what stands in it would be lost.
@@ -19,15 +21,46 @@ pub fn check_apart<'a>(
     let known = |path: &Path| fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let is_file =
         |path: &Path| fs::metadata(path).map_or(path.as_os_str() != "-", |of| of.is_file());
-    let is_same = |other: &&Path| is_file(output) && known(other) == known(output);
-    match others.into_iter().find(is_same) {
+    let is_same =
+        |other: &&Path| known(other) == known(output) || is_one_file(output, from_stream(other));
+    match others
+        .into_iter()
+        .find(|other| is_file(output) && is_same(other))
+    {
         Some(other) => Err(Failure::Request(format!(
             "{option} {}: this is the same file as {}, and what stands in it would be lost; name another file",
             output.display(),
-            other.display()
+            if other.as_os_str() == "-" {
+                STANDARD_INPUT.to_owned()
+            } else {
+                other.display().to_string()
+            }
         ))),
         None => Ok(()),
     }
+}
+
+/// Where a path is looked at that stands for standard input: a shell may have opened a file there.
+fn from_stream(path: &Path) -> &Path {
+    if path.as_os_str() == "-" {
+        Path::new("/dev/stdin")
+    } else {
+        path
+    }
+}
+
+/// Whether two paths lead to one file, be it by links or by what is open already.
+#[cfg(unix)]
+fn is_one_file(one: &Path, other: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+
+    let place = |path: &Path| fs::metadata(path).map(|of| (of.dev(), of.ino()));
+    matches!((place(one), place(other)), (Ok(one), Ok(other)) if one == other)
+}
+
+#[cfg(not(unix))]
+fn is_one_file(_one: &Path, _other: &Path) -> bool {
+    false
 }
 
 /// Writes a file aside and renames it, so that a reader never sees half of it and a failure, be it of power, leaves the old one.

@@ -15,6 +15,7 @@ use super::threads::Threads;
 use crate::output::offer;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 use report::Summary;
+use suite::Suite;
 use work::Status;
 
 /// Run the tests that graph files carry
@@ -51,6 +52,9 @@ impl Test {
             check_apart("--junit", path, self.graphs.iter().map(|path| &**path))?;
         }
         let mut suites = suite::load(&self.graphs, terminal)?;
+        if let Some(path) = &self.junit {
+            check_apart("--junit", path, suites.iter().flat_map(Suite::data))?;
+        }
         if let Some(text) = &self.filter {
             let text = text.to_lowercase();
             for suite in &mut suites {

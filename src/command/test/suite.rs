@@ -1,11 +1,11 @@
 //! Decides how graph files become plans with tests; all mistakes of all files are told together.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::core::compile::Plan;
 use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::trial::{self, Trial};
+use athermal::core::trial::{self, DataSet, On, Trial};
 
 use crate::command::check::plan_and_tests;
 use crate::terminal::{Failure, Terminal};
@@ -29,6 +29,22 @@ impl Suite {
     pub(super) fn line(&self, trial: &Trial) -> usize {
         let found = self.lines.iter().find(|(name, _)| *name == trial.name);
         found.map_or(1, |(_, line)| *line)
+    }
+
+    /// The recorded data that tests are fitted on and run over.
+    pub(super) fn data(&self) -> impl Iterator<Item = &Path> {
+        let sets = self.trials.iter().flat_map(|trial| {
+            let on = match &trial.on {
+                On::Data(data) => Some(data),
+                On::Synthetic(_) => None,
+            };
+            trial.fit.iter().chain(on)
+        });
+        let files = sets.flat_map(|data| match data {
+            DataSet::Files(files) => files.as_slice(),
+            DataSet::Simulated(_) => &[],
+        });
+        files.map(PathBuf::as_path)
     }
 }
 
