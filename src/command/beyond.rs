@@ -52,10 +52,14 @@ pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
     }
 }
 
-/// Tells of the first such sample of a channel; whether there is one.
-pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) -> bool {
-    let doubt = doubt(usual, sample, sample);
-    if let Some(doubt) = doubt {
+/// Whether a sample is such.
+pub fn is_beyond(usual: &SampleRange, sample: f64) -> bool {
+    doubt(usual, sample, sample).is_some()
+}
+
+/// Tells of the first such sample of a channel.
+pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
+    if let Some(doubt) = doubt(usual, sample, sample) {
         terminal.warning(format_args!(
             "{} at {time}: {}, and was between {} and {} in the data of the fit: {doubt}",
             usual.channel,
@@ -64,7 +68,6 @@ pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: 
             number(usual.highest),
         ));
     }
-    doubt.is_some()
 }
 
 /// Where the samples of a channel lay in a fit.

@@ -1,24 +1,38 @@
-//! Decides when a sample that does not count, or lies far outside of what the fit saw, is told of while rows still come; which
-//! samples count is decided by the graph.
+//! Decides when a sample that does not count, or lies far outside of what the fit saw, is told of while rows still come: the first, and
+//! again the first after some time in order; which samples count is decided by the graph.
 
 use athermal::core::compile::SourceChannel;
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{Samples, Source, SourceError};
 use athermal::core::recording::Event;
 
+use athermal::{Duration, Instant};
+
 use super::beyond;
 use crate::figures::number;
 use crate::terminal::Terminal;
+
+/// A channel that has been in order for so long is told of when it is not again.
+const IN_ORDER: Duration = Duration::from_ns(3600 * 1_000_000_000);
 
 /// Rows as they are read. Where they may never end, the first sample of each channel that does not count, and the first far outside
 /// of what the fit saw, are told at once.
 pub struct Ranged<'a> {
     source: &'a mut dyn Source,
     terminal: Terminal,
-    /// The channels of which none has been told yet, with their places in a row.
-    untold: Vec<(usize, SourceChannel)>,
-    /// The same for samples that count and are far outside of what the fit saw, with where they lay there.
-    untold_beyond: Vec<(usize, SourceChannel, SampleRange)>,
+    /// The channels in the order of a row's values.
+    channels: Vec<Channel>,
+}
+
+/// A channel of which is told.
+struct Channel {
+    source: SourceChannel,
+    /// Where samples lay in the fit, if that is known.
+    usual: Option<SampleRange>,
+    /// When the last sample came that does not count.
+    rejected: Option<Instant>,
+    /// When the last came that counts and is far outside.
+    beyond: Option<Instant>,
 }
 
 impl<'a> Ranged<'a> {
@@ -30,40 +44,56 @@ impl<'a> Ranged<'a> {
         channels: &[SourceChannel],
         usual: &[SampleRange],
     ) -> Self {
-        let beyond = channels.iter().enumerate().filter_map(|(place, channel)| {
-            let usual = beyond::usual(usual, &channel.name)?;
-            Some((place, channel.clone(), usual.clone()))
+        let channels = channels.iter().map(|channel| Channel {
+            source: channel.clone(),
+            usual: beyond::usual(usual, &channel.name).cloned(),
+            rejected: None,
+            beyond: None,
         });
         Self {
             source,
             terminal: *terminal,
-            untold: channels.iter().cloned().enumerate().collect(),
-            untold_beyond: beyond.collect(),
+            channels: channels.collect(),
         }
     }
+}
+
+impl Channel {
+    fn sample(&mut self, terminal: &Terminal, now: Instant, time: &str, value: f64) {
+        if value.is_nan() {
+            return;
+        }
+        let Self { source, usual, .. } = self;
+        if !source.admits(value) {
+            if is_news(&mut self.rejected, now) {
+                terminal.warning(format_args!(
+                    "{} at {time}: {}, taken as missing; others like it are counted",
+                    source.name,
+                    why(value, source.range)
+                ));
+            }
+        } else if let Some(usual) = usual
+            && beyond::is_beyond(usual, value)
+            && is_news(&mut self.beyond, now)
+        {
+            beyond::tell_first(terminal, usual, time, value);
+        }
+    }
+}
+
+/// Whether none came in a while before; this one is the last then.
+fn is_news(last: &mut Option<Instant>, now: Instant) -> bool {
+    let before = last.replace(now);
+    before.is_none_or(|before| now - before >= IN_ORDER)
 }
 
 impl Source for Ranged<'_> {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
         let event = self.source.next(samples)?;
-        if let Some(Event::Row(_)) = event {
-            let (time, values, terminal) = (&samples.time_text, &samples.values, self.terminal);
-            self.untold.retain(|(place, channel)| {
-                let value = values[*place];
-                let counts = value.is_nan() || channel.admits(value);
-                if !counts {
-                    terminal.warning(format_args!(
-                        "{} at {time}: {}, taken as missing; others like it are counted",
-                        channel.name,
-                        why(value, channel.range)
-                    ));
-                }
-                counts
-            });
-            self.untold_beyond.retain(|(place, channel, usual)| {
-                let value = values[*place];
-                !(channel.admits(value) && beyond::tell_first(&terminal, usual, time, value))
-            });
+        if let Some(Event::Row(now)) = event {
+            for (channel, &value) in self.channels.iter_mut().zip(&samples.values) {
+                channel.sample(&self.terminal, now, &samples.time_text, value);
+            }
         }
         Ok(event)
     }

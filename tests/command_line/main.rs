@@ -17,6 +17,7 @@ mod mistakes_in_tests;
 mod next;
 mod numbers;
 mod requests;
+mod sensors;
 mod standing;
 mod truths;
 
