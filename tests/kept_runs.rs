@@ -213,13 +213,36 @@ fn a_run_that_is_restarted_goes_on_with_its_output_as_it_was_left() {
         std::fs::write(&out, &put_out[..put_out.len() / 2]).unwrap();
         run(lines.len()).tells(&["its last row is", "is lost"]);
         std::fs::remove_file(&state).unwrap();
-        run(lines.len());
-        assert!(
-            std::fs::read_to_string(&out).unwrap() == whole,
-            "a cold run begins its output anew"
-        );
-        std::fs::remove_file(&state).unwrap();
     }
+}
+
+/// The state is gone, damaged, or from before the first row; a controller gives only what is new.
+#[test]
+fn a_run_that_begins_cold_goes_on_with_its_output_too_and_loses_no_row_of_it() {
+    let (scratch, model, data, whole) = desk("cold-output");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 8] =
+        [&"run", &model, &"-i", &"-", &"-o", &out, &"--state", &state];
+    let run = |rows: &[&str]| athermal_fed(&arguments, rows.join("\n").as_bytes()).ended(0);
+    run(&lines[..2001]);
+    let before = std::fs::read_to_string(&out).unwrap();
+    std::fs::remove_file(&state).unwrap();
+    let told = run(&[&lines[..1], &lines[2001..2101]].concat());
+    told.tells(&[
+        "out.csv: rows of a run before stand there and stay, though this one begins cold",
+        "of 19990 s, is written again",
+    ]);
+    let after = std::fs::read_to_string(&out).unwrap();
+    assert!(after.starts_with(&before), "what stood there stays");
+    assert_eq!(after.lines().count(), 2101);
+
+    // Rows that stand there are stepped, so that those behind them are as in one piece.
+    std::fs::write(&out, &before).unwrap();
+    std::fs::remove_file(&state).unwrap();
+    run(&lines);
+    assert!(std::fs::read_to_string(&out).unwrap() == whole);
 }
 
 #[test]
@@ -392,4 +415,28 @@ fn a_run_that_was_once_told_of_a_far_future_says_why_the_next_predicts_nothing()
         "begins cold",
     ]);
     assert_eq!(next.ended(0).out.lines().count(), 1);
+}
+
+/// A clock that was set back goes on for as long without a prediction, while the pipe stays open.
+#[test]
+fn rows_of_a_pipe_that_are_passed_over_are_told_at_ten_a_hundred_and_so_on_also_to_who_wants_little()
+ {
+    let (scratch, model, data, _) = desk("set-back");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let state = scratch.path("state");
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 7] =
+        [&"run", &model, &"-i", &"-", &"--state", &state, &"-q"];
+    athermal_fed(&arguments, lines[..2001].join("\n").as_bytes()).ended(0);
+    let back = [&lines[..1], &lines[1001..2500]].concat().join("\n");
+    let told = athermal_fed(&arguments, back.as_bytes()).ended(0).told;
+    for part in [
+        "10 rows so far, up to that of 10090.0, which is 2h45min before the last of the run before: nothing is put out until",
+        "100 rows so far",
+        "1,000 rows so far",
+        "begins cold and goes on from there",
+    ] {
+        assert_eq!(told.matches(part).count().min(1), 1, "{part}: {told}");
+    }
+    assert_eq!(told.lines().count(), 3, "{told}");
 }

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use workbench::{Finished, Scratch, athermal};
+use workbench::{Finished, Scratch, athermal, athermal_fed};
 
 /// Two predictions of a drift, of which the graph shows one.
 const GRAPH: &str = r#"
@@ -383,6 +383,13 @@ impl Live {
         panic!("revision {before} goes on");
     }
 
+    /// Ends it as a failure of power does, and gives the time of its last row.
+    fn killed(mut self) -> u32 {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+        self.time
+    }
+
     fn told(self) -> String {
         drop(self.rows);
         let output = self.child.wait_with_output().unwrap();
@@ -452,9 +459,101 @@ fn what_took_over_in_a_run_goes_on_in_the_next() {
     live.row();
     let line = live.line();
     assert_eq!(line, format!("{},60.0,{second}", live.time));
-    live.told();
 
+    // Another graph that stands in the file then is a change, as it would be while the run goes on.
     scratch.file("model.toml", module("still"));
-    let refused = run(&scratch, &["--watch", "--state", state.to_str().unwrap()]).ended(2);
-    refused.tells(&["cannot go on from", "belongs to revision"]);
+    let time = live.time;
+    live.told();
+    let mut live = Live::going_on(&graph, &kept, time);
+    let third = live.until_swapped(&second);
+    assert_ne!(third, first);
+    let told = live.told();
+    for part in [
+        "graph.toml is not what ran last: that goes on, and the file is taken as a change of it",
+        "took over before",
+    ] {
+        assert!(told.contains(part), "`{part}` is not in\n{told}");
+    }
+}
+
+#[test]
+fn what_took_over_goes_on_after_a_kill_though_its_file_is_broken_since() {
+    let scratch = desk("killed");
+    let (graph, state) = (scratch.path("graph.toml"), scratch.path("state"));
+    let kept = ["--state", state.to_str().unwrap()];
+    let mut live = Live::going_on(&graph, &kept, 0);
+    let first = live.revision();
+    let slower = GRAPH.replace("windows = [\"30s\"]", "windows = [\"40s\"]");
+    scratch.file("graph.toml", &slower);
+    let second = live.until_swapped(&first);
+    // What took over is kept after its first row has been put out.
+    assert_eq!(live.revision(), second);
+    let time = live.killed();
+
+    let mut live = Live::going_on(&graph, &kept, time);
+    assert_eq!(live.revision(), second);
+    let time = live.killed();
+
+    scratch.file("graph.toml", slower.replace("[outputs]", "[outputs"));
+    let mut live = Live::going_on(&graph, &kept, time);
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(2) {
+        assert_eq!(live.revision(), second);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let told = live.told();
+    for part in [
+        "is not what ran last",
+        "error[A001]",
+        "graph.toml is not taken over; what runs goes on",
+    ] {
+        assert!(told.contains(part), "`{part}` is not in\n{told}");
+    }
+
+    // Without what is watched, nothing else than the file is run.
+    let refused = run(&scratch, &kept).ended(2);
+    refused.tells(&["error[A001]"]);
+}
+
+#[test]
+fn the_output_of_a_graph_with_fewer_outputs_is_gone_on_with_in_the_columns_that_it_has() {
+    let scratch = desk("fewer");
+    let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
+    let more = GRAPH.to_owned() + "still = \"model:still\"\n";
+    let graph = scratch.file("graph.toml", &more);
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 9] = [
+        &"run", &graph, &"-i", &"-", &"-o", &out, &"--watch", &"--state", &state,
+    ];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .args(arguments.map(|argument| argument.as_ref()))
+        .stdin(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut feed = child.stdin.take().unwrap();
+    feed.write_all(b"time_s,Z\n").unwrap();
+    let last = || {
+        let text = std::fs::read_to_string(&out).unwrap_or_default();
+        text.lines().last().unwrap_or_default().to_owned()
+    };
+    let (began, mut time) = (Instant::now(), 0);
+    while !last().contains(",,") || time < 100 {
+        assert!(began.elapsed() < Duration::from_secs(60), "{}", last());
+        time += 10;
+        feed.write_all(format!("{time},{time}\n").as_bytes())
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+        if time == 100 {
+            scratch.file("graph.toml", GRAPH);
+        }
+    }
+    drop(feed);
+    assert!(child.wait().unwrap().success());
+    let before = std::fs::read_to_string(&out).unwrap();
+    let rows = format!("time_s,Z\n{},1\n", time + 10);
+    athermal_fed(&arguments, rows.as_bytes()).ended(0);
+    let after = std::fs::read_to_string(&out).unwrap();
+    let row = after.strip_prefix(&before).unwrap();
+    let cells: Vec<_> = row.trim_end().split(',').collect();
+    assert_eq!((cells.len(), cells[2]), (4, ""), "{row}");
 }

@@ -5,10 +5,11 @@ use std::time::{Duration, Instant as Clock};
 
 use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
-use athermal::{Engine, Instant};
+use athermal::{Engine, Instant, Model};
 
 use super::aside::{not_written, whole_aside};
-use crate::figures::length;
+use super::ran::Ran;
+use crate::figures::{count, length};
 use crate::terminal::{Failure, Terminal, outside};
 
 /// How long a run that is killed may have learned in vain.
@@ -19,24 +20,35 @@ pub struct Kept {
     terminal: Terminal,
     path: Option<PathBuf>,
     written: Clock,
+    /// Whether the first row is still to come: what is known before says nothing of where the data were.
+    is_before_first: bool,
+    /// What runs is kept with what it knows, where that may be another graph than the one given.
+    ran: Option<Ran>,
+    /// The revision of what ran when this was last written.
+    revision: String,
     /// The last instant that the run before had seen.
     seen: Option<Instant>,
 }
 
 impl Kept {
-    /// Lets an engine go on from a file, if it is there; without a file nothing is kept.
+    /// Lets the engine of a model go on from a file, if it is there; without a file nothing is kept.
     ///
     /// # Errors
     /// When the file is not one of the same graph and fit, or cannot be written.
     pub fn begin(
         terminal: &Terminal,
         path: Option<&Path>,
+        ran: Option<Ran>,
         engine: &mut Engine,
+        model: &Model,
     ) -> Result<Self, Failure> {
         let mut kept = Self {
             terminal: *terminal,
             path: path.map(Path::to_owned),
             written: Clock::now(),
+            is_before_first: true,
+            ran,
+            revision: String::new(),
             seen: None,
         };
         let Some(path) = path else { return Ok(kept) };
@@ -63,7 +75,7 @@ impl Kept {
             }
         }
         // Better now than after the first minute.
-        kept.write(engine).map_err(outside)?;
+        kept.write(engine, model).map_err(outside)?;
         Ok(kept)
     }
 
@@ -72,28 +84,46 @@ impl Kept {
         self.seen
     }
 
-    /// What the run before has not seen of a source.
-    pub fn rest<'a>(&self, terminal: &Terminal, source: &'a mut dyn Source) -> Rest<'a> {
+    /// What the run before has not seen of a source. `stood` is the last row of its output, up to which none is written again;
+    /// `at_once` says whether rows may never end.
+    pub fn rest<'a>(
+        &self,
+        source: &'a mut dyn Source,
+        stood: Option<Instant>,
+        at_once: bool,
+    ) -> Rest<'a> {
         Rest {
-            terminal: *terminal,
+            terminal: self.terminal,
             source,
             seen: self.seen,
-            passed_over: None,
+            stood: stood.filter(|_| self.path.is_some()),
+            at_once,
+            passed_over: 0,
+            before: athermal::Duration::ZERO,
         }
     }
 
-    /// Keeps what is known now and then, once what came of it has left the program: a run that goes on from there does not
+    /// Keeps what is known after the first row, when another graph has taken over and now and then, once what came of it has left the program: a run that goes on from there does not
     /// predict it again. Where it cannot be kept, as on a disk that is full, that is told and tried again: a machine goes without
     /// what it would know after a restart rather than without its predictions.
     ///
     /// # Errors
     /// When the sink fails.
-    pub fn after_tick(&mut self, engine: &Engine, sink: &mut dyn Sink) -> Result<(), SinkError> {
-        if self.path.is_none() || self.written.elapsed() < KEEP_EVERY {
+    pub fn after_tick(
+        &mut self,
+        engine: &Engine,
+        model: &Model,
+        sink: &mut dyn Sink,
+    ) -> Result<(), SinkError> {
+        let is_due = self.is_before_first
+            || self.written.elapsed() >= KEEP_EVERY
+            || engine.revision() != self.revision;
+        if self.path.is_none() || !is_due {
             return Ok(());
         }
+        self.is_before_first = false;
         sink.flush()?;
-        if let Err(error) = self.write(engine) {
+        if let Err(error) = self.write(engine, model) {
             self.terminal.warning(format_args!(
                 "{error}; the run goes on, and tries again in a minute"
             ));
@@ -105,23 +135,37 @@ impl Kept {
     ///
     /// # Errors
     /// When the sink fails, or the file cannot be written.
-    pub fn end(&mut self, engine: &Engine, sink: &mut dyn Sink) -> Result<(), SinkError> {
+    pub fn end(
+        &mut self,
+        engine: &Engine,
+        model: &Model,
+        sink: &mut dyn Sink,
+    ) -> Result<(), SinkError> {
         if self.path.is_some() {
             sink.flush()?;
         }
-        self.write(engine)
+        self.write(engine, model)
     }
 
     /// Keeps what is known.
     ///
     /// # Errors
     /// When the file cannot be written.
-    fn write(&mut self, engine: &Engine) -> Result<(), SinkError> {
+    fn write(&mut self, engine: &Engine, model: &Model) -> Result<(), SinkError> {
         let Some(path) = &self.path else {
             return Ok(());
         };
         self.written = Clock::now();
-        whole_aside(path, &engine.snapshot()).map_err(|error| not_written(path, &error).into())
+        engine.revision().clone_into(&mut self.revision);
+        if let Some(ran) = &mut self.ran {
+            let kept = ran.keep(model, &self.revision);
+            kept.map_err(|error| not_written(ran.paths()[0], &error))?;
+        }
+        whole_aside(path, &engine.snapshot()).map_err(|error| not_written(path, &error))?;
+        if let Some(ran) = &self.ran {
+            ran.let_go();
+        }
+        Ok(())
     }
 }
 
@@ -129,57 +173,82 @@ impl Kept {
 pub struct Rest<'a> {
     terminal: Terminal,
     source: &'a mut dyn Source,
+    /// The last instant that the run before had seen.
     seen: Option<Instant>,
-    /// How long before the last that had been seen the last row was that is passed over.
-    passed_over: Option<athermal::Duration>,
+    /// The last of which its output has a row.
+    stood: Option<Instant>,
+    at_once: bool,
+    /// How many rows nothing came of so far.
+    passed_over: u64,
+    /// How long the last of them was before the last of the run before.
+    before: athermal::Duration,
 }
 
 impl Rest<'_> {
     fn pass_over(&mut self, samples: &Samples, before: athermal::Duration) {
-        if self.passed_over.replace(before).is_none() {
+        self.passed_over += 1;
+        self.before = before;
+        if self.passed_over == 1 && self.seen.is_some() {
             self.terminal.note(format_args!(
                 "the row of {} was seen by the run before: it and all like it are passed over",
                 samples.time_text
+            ));
+        }
+        // 10, 100, 1,000 and so on: where the clock has been set back, it goes on for as long as that.
+        let rows = self.passed_over;
+        if self.at_once && rows >= 10 && 10_u64.pow(rows.ilog10()) == rows {
+            self.terminal.warning(format_args!(
+                "{} rows so far, up to that of {}, which is {} before the last of the run before: nothing is put out until rows come \
+                 after that; this is right where a log is read again, and not where a clock was ahead then: {BEGIN_COLD}",
+                count(rows),
+                samples.time_text,
+                length(before)
             ));
         }
     }
 
     /// Tells of an input that has come to its end while all of it was passed over: a clock may once have been ahead.
     fn tell_of_nothing(&self) {
-        let Some(before) = self.passed_over else {
-            return;
-        };
-        if before > athermal::Duration::ZERO {
+        if self.before > athermal::Duration::ZERO {
             self.terminal.warning(format_args!(
-                "the last row is {} before what the run before saw last: nothing was predicted; if a clock was ahead then, a \
-                 run with another `--state` file begins cold and goes on from there",
-                length(before)
+                "the last row is {} before what the run before saw last: nothing was predicted; if a clock was ahead then, {BEGIN_COLD}",
+                length(self.before)
             ));
         } else {
             self.terminal.note(
                 "no row is after what the run before saw last: nothing was predicted; where times begin anew with each file, a run \
-                 with another `--state` file takes them",
+                 with another `--state` and `--output` file takes them",
             );
         }
     }
 }
 
+/// What to do where a clock was ahead.
+const BEGIN_COLD: &str =
+    "a run with another `--state` and `--output` file begins cold and goes on from there";
+
 impl Source for Rest<'_> {
     fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
         loop {
             let event = self.source.next(samples)?;
-            match (event, self.seen) {
-                (Some(Event::Row(time)), Some(seen)) if time <= seen => {
-                    self.pass_over(samples, seen - time);
+            match event {
+                Some(Event::Row(time)) if self.seen.is_some_and(|seen| time <= seen) => {
+                    let last = self.seen.max(self.stood).unwrap_or(time);
+                    self.pass_over(samples, last - time);
+                    continue;
                 }
-                _ => {
-                    if event.is_none() && self.seen.is_some() {
-                        self.tell_of_nothing();
-                    }
+                Some(Event::Row(time)) => {
                     self.seen = None;
-                    return Ok(event);
+                    match self.stood.filter(|stood| time <= *stood) {
+                        Some(stood) => self.pass_over(samples, stood - time),
+                        None => (self.stood, self.passed_over) = (None, 0),
+                    }
                 }
+                Some(Event::Segment) => self.seen = None,
+                None if self.passed_over > 0 => self.tell_of_nothing(),
+                None => {}
             }
+            return Ok(event);
         }
     }
 }
@@ -205,8 +274,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_is_kept_once_a_minute_after_what_came_of_it_was_put_out_and_not_at_every_tick()
-    {
+    fn what_is_known_is_kept_after_the_first_row_and_once_a_minute_when_what_came_of_it_was_put_out()
+     {
         let name = format!("athermal-kept-{}", std::process::id());
         let folder = std::env::temp_dir().join(name);
         std::fs::create_dir_all(&folder).unwrap();
@@ -214,28 +283,32 @@ mod tests {
         let text = "schema = 1\nname = \"none\"\nsignals.room = { unit = \"Cel\", channels = [\"air\"] }\n\
                     time.column = \"time_s\"\noutputs.room = \"room\"\n";
         std::fs::write(&graph, text).unwrap();
-        let mut engine = athermal::Model::load(&graph).unwrap().engine().unwrap();
+        let model = Model::load(&graph).unwrap();
+        let mut engine = model.engine().unwrap();
         let terminal = Terminal::new(&crate::terminal::Options {
             format: "table".into(),
             quiet: true,
         });
         let path = folder.join("state");
-        let mut kept = Kept::begin(&terminal, Some(&path), &mut engine).unwrap();
-        let begun = std::fs::read(&path).unwrap();
-        engine.step(Instant::from_ns(1), &[20.0]).unwrap();
+        let mut kept = Kept::begin(&terminal, Some(&path), None, &mut engine, &model).unwrap();
         let mut sink = Flushed(0);
-        kept.after_tick(&engine, &mut sink).unwrap();
-        assert_eq!(sink.0, 0);
+        engine.step(Instant::from_ns(1), &[20.0]).unwrap();
+        kept.after_tick(&engine, &model, &mut sink).unwrap();
+        let begun = std::fs::read(&path).unwrap();
+        assert_eq!((sink.0, &begun), (1, &engine.snapshot()));
+        engine.step(Instant::from_ns(2), &[20.0]).unwrap();
+        kept.after_tick(&engine, &model, &mut sink).unwrap();
+        assert_eq!(sink.0, 1);
         assert_eq!(std::fs::read(&path).unwrap(), begun);
         kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
-        kept.after_tick(&engine, &mut sink).unwrap();
-        assert_eq!(sink.0, 1);
+        kept.after_tick(&engine, &model, &mut sink).unwrap();
+        assert_eq!(sink.0, 2);
         assert_eq!(std::fs::read(&path).unwrap(), engine.snapshot());
         std::fs::remove_dir_all(&folder).unwrap();
         // The run goes on without its folder too, and tells at the end that nothing is kept.
         kept.written = Clock::now().checked_sub(KEEP_EVERY).unwrap();
-        kept.after_tick(&engine, &mut sink).unwrap();
+        kept.after_tick(&engine, &model, &mut sink).unwrap();
         assert!(kept.written.elapsed() < KEEP_EVERY, "it was tried");
-        assert!(kept.write(&engine).is_err());
+        assert!(kept.write(&engine, &model).is_err());
     }
 }

@@ -21,6 +21,7 @@ mod new;
 mod nodes;
 mod numbers;
 mod parameters;
+mod ran;
 mod rejected;
 mod report;
 mod run;

@@ -8,7 +8,8 @@ use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair
 use athermal::core::recording::Event;
 use athermal::diagnosis::feedback;
 use athermal::files::{
-    FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, layout,
+    FileError, Flush, Layout, Options, Reader, STANDARD_INPUT, WithRevision, Writer, begun_columns,
+    layout,
 };
 use athermal::{Engine, Model};
 use clap::Args;
@@ -16,10 +17,12 @@ use clap::Args;
 use super::aside::check_apart;
 use super::kept::Kept;
 use super::model::{self, check_fitted};
+use super::ran::{self, Ran};
 use super::rejected::Ranged;
 use super::swap;
+use super::watched::Watched;
 use super::{beyond, data};
-use crate::figures::length;
+use crate::figures::{instant, length, seconds};
 use crate::terminal::{Answer, Failure, Terminal, outside};
 
 /// Run a model: rows in, predictions out
@@ -46,9 +49,10 @@ pub struct Run {
     /// Let no estimator learn while it runs; votes still go by recent errors
     #[arg(long)]
     frozen: bool,
-    /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: when the input ends, and at least once a
-    /// minute while rows come. Rows up to the last one known are passed over, and an output file of that run is gone on with. With
-    /// `--watch` it is kept of whatever graph runs
+    /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: after the first row, at least once a
+    /// minute while rows come, and when the input ends. Rows up to the last one known are passed over. An output file of an earlier run
+    /// is gone on with, also where the run begins cold, and never begun anew. With `--watch` it is
+    /// kept of whatever graph runs, and that graph beside it, in FILE.graph.json
     #[arg(long, value_name = "FILE", conflicts_with = "swap_at")]
     state: Option<PathBuf>,
     #[command(flatten)]
@@ -86,23 +90,26 @@ impl Run {
                 let told = "--state -: what a run knows is kept in a file, from one run to the next; name a file";
                 return Err(Failure::Request(told.to_owned()));
             }
-            let others = read.into_iter().chain([&*self.output]);
-            check_apart("--state", state, others)?;
+            // Where the output is a stream, the state is none.
+            let output = Some(&*self.output).filter(|path| path.as_os_str() != "-");
+            let others = || read.into_iter().chain(output);
+            check_apart("--state", state, others())?;
+            for beside in self.ran().iter().flat_map(Ran::paths) {
+                check_apart("--state", beside, others())?;
+            }
         }
-        let model = model::load(&self.model, Wanted::default(), terminal)?;
-        self.tell_unread(terminal, &model);
-        check_fitted(&model, &self.model)?;
+        let (model, watched) = self.load(terminal)?;
         if let Some(told) = feedback::in_words(&model.plan) {
             terminal.warning(told);
         }
         if self.swap.any() {
-            return self.run_replaceable(terminal, model);
+            return self.run_replaceable(terminal, model, watched);
         }
         let mut engine = model.engine()?;
         let plan = std::sync::Arc::clone(engine.plan());
         let options = self.reading();
         let mut reader = self.open(terminal, layout(&plan), options)?;
-        let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
+        let mut kept = Kept::begin(terminal, self.state.as_deref(), None, &mut engine, &model)?;
         engine.freeze(self.frozen);
         let columns: Vec<String> = plan
             .outputs
@@ -110,30 +117,69 @@ impl Run {
             .map(|output| output.name.clone())
             .collect();
         let mut writer = self.writer(terminal, &kept, reader.layout(), &columns)?;
-        let mut rest = kept.rest(terminal, &mut reader);
+        let mut rest = kept.rest(&mut reader, writer.stood(), !self.ends());
         let usual = model.sample_ranges();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
-        let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, sink);
+        let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, &model, sink);
         live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
-        kept.end(&engine, &mut writer).map_err(outside)?;
+        kept.end(&engine, &model, &mut writer).map_err(outside)?;
         self.tell(terminal, &engine, &reader, usual);
         Ok(Answer::Fine)
     }
 
+    /// What ran last, where that may be another graph than the one in the file that is given.
+    fn ran(&self) -> Option<Ran> {
+        let watched = self.state.as_ref().filter(|_| self.swap.watch());
+        watched.map(|state| Ran::beside(state))
+    }
+
+    /// The graph to go on with, and its file as it stands to that: what ran last and has been kept, where the file has another.
+    fn load(&self, terminal: &Terminal) -> Result<(Model, Watched), Failure> {
+        let ran = self.ran().zip(self.state.as_ref());
+        let last = ran.and_then(|(ran, state)| ran.of_state(state));
+        let given = model::load(&self.model, Wanted::default(), terminal);
+        if let Ok(given) = &given {
+            self.tell_unread(terminal, given);
+        }
+        let Some(last) = last else {
+            let given = given?;
+            check_fitted(&given, &self.model)?;
+            return Ok((given, Watched::of(&self.model)));
+        };
+        if let Ok(mut given) = given {
+            given.take_fits_of(&last);
+            if ran::revision(&given) == ran::revision(&last) {
+                return Ok((given, Watched::of(&self.model)));
+            }
+        }
+        terminal.warning(format_args!(
+            "{} is not what ran last: that goes on, and the file is taken as a change of it",
+            self.model.display()
+        ));
+        Ok((last, Watched::unlike(&self.model)))
+    }
+
     /// Runs so that the graph can be replaced; the rows say which revision made them.
-    fn run_replaceable(&self, terminal: &Terminal, model: Model) -> Result<Answer, Failure> {
+    fn run_replaceable(
+        &self,
+        terminal: &Terminal,
+        model: Model,
+        watched: Watched,
+    ) -> Result<Answer, Failure> {
         let swaps = self.swap.schedule(&model, terminal)?;
         let (feed, mut columns) = swap::union(&model, &swaps);
         let options = self.reading();
         let read = swap::reading(&model, &swaps, &feed);
         let mut reader = self.open(terminal, layout(&read), options)?;
         let mut engine = model.engine()?;
-        let mut kept = Kept::begin(terminal, self.state.as_deref(), &mut engine)?;
+        let state = self.state.as_deref();
+        let mut kept = Kept::begin(terminal, state, self.ran(), &mut engine, &model)?;
         columns.push("revision".to_owned());
+        self.widen(&mut columns);
         let writer = self.writer(terminal, &kept, reader.layout(), &columns)?;
         let names = &columns[..columns.len() - 1];
+        let mut rest = kept.rest(&mut reader, writer.stood(), !self.ends());
         let mut writer = WithRevision(writer);
-        let mut rest = kept.rest(terminal, &mut reader);
         let usual = model.sample_ranges().to_vec();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read), &usual);
         let live = LiveOptions {
@@ -143,14 +189,8 @@ impl Run {
         let (mut stepper, mut control) =
             pair_from(engine, live).map_err(|error| Failure::Request(error.to_string()))?;
         stepper.freeze(self.frozen);
-        let mut course = swap::Course::new(
-            terminal,
-            &self.swap,
-            &self.model,
-            model,
-            swaps,
-            names.to_vec(),
-        );
+        let mut course =
+            swap::Course::new(terminal, &self.swap, watched, model, swaps, names.to_vec());
         let mut shown = vec![f64::NAN; names.len()];
         let mut samples = Samples::default();
         let mut places = (std::ptr::null(), Vec::new());
@@ -187,11 +227,11 @@ impl Run {
                 outputs: &shown,
             };
             writer.put(&frame).map_err(outside)?;
-            let kept_on = kept.after_tick(stepper.engine(), &mut writer);
+            let kept_on = kept.after_tick(stepper.engine(), course.running(), &mut writer);
             kept_on.map_err(outside)?;
         }
         writer.finish().map_err(outside)?;
-        let ended = kept.end(stepper.engine(), &mut writer);
+        let ended = kept.end(stepper.engine(), course.running(), &mut writer);
         ended.map_err(outside)?;
         course.end(&mut control);
         let engine = stepper.engine();
@@ -248,7 +288,22 @@ impl Run {
         Ok(reader)
     }
 
-    /// Goes on with the output of the run before, as the run does with what that one knew.
+    /// Takes all columns of an output that is gone on with, where some are of outputs that graphs before had.
+    fn widen(&self, columns: &mut Vec<String>) {
+        let stood = self
+            .state
+            .as_ref()
+            .and_then(|_| begun_columns(&self.output));
+        if let Some((_time, stood)) = stood.as_deref().and_then(<[String]>::split_first)
+            && stood.last() == columns.last()
+            && columns.iter().all(|column| stood.contains(column))
+        {
+            *columns = stood.to_vec();
+        }
+    }
+
+    /// Goes on with the output of a run before where what runs know is kept, be this one cold: what stands there cannot be had again
+    /// from a source that only gives what is new.
     fn writer(
         &self,
         terminal: &Terminal,
@@ -256,19 +311,23 @@ impl Run {
         read: &Layout,
         columns: &[String],
     ) -> Result<Writer, Failure> {
-        let Some(seen) = kept.seen() else {
-            let time = read.time.columns.title();
+        let time = read.time.columns.title();
+        if self.state.is_none() {
             return Ok(Writer::create(&self.output, &time, columns, self.flush())?);
-        };
+        }
         let writer = Writer::resume(&self.output, &read.time, columns, self.flush())?;
-        if let Some(last) = writer.stood()
-            && last < seen
-        {
-            terminal.warning(format_args!(
-                "{}: its last row is {} before what the run before saw last: what was predicted between stands in another file, or is lost",
-                self.output.display(),
+        let output = self.output.display();
+        match (writer.stood(), kept.seen()) {
+            (Some(last), Some(seen)) if last < seen => terminal.warning(format_args!(
+                "{output}: its last row is {} before what the run before saw last: what was predicted between stands in another file, or is lost",
                 length(seen - last)
-            ));
+            )),
+            (Some(last), None) => terminal.warning(format_args!(
+                "{output}: rows of a run before stand there and stay, though this one begins cold: none up to the last of them, of {}, is \
+                 written again",
+                instant(seconds(last))
+            )),
+            _ => {}
         }
         Ok(writer)
     }

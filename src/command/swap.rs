@@ -41,7 +41,8 @@ pub struct Options {
         requires = "shadow"
     )]
     margin: f64,
-    /// Replace the graph whenever its file changes
+    /// Replace the graph whenever its file changes. With `--state` a run that is started again goes on with what ran last, and takes
+    /// another graph that it finds in the file as a change
     #[arg(long, group = "replaced")]
     watch: bool,
 }
@@ -74,6 +75,12 @@ impl Options {
     #[must_use]
     pub fn any(&self) -> bool {
         self.watch || !self.swap_at.is_empty()
+    }
+
+    /// Whether the graph's file is watched.
+    #[must_use]
+    pub fn watch(&self) -> bool {
+        self.watch
     }
 
     /// The files of the graphs named at the start.
@@ -188,16 +195,15 @@ pub struct Course<'a> {
 }
 
 impl<'a> Course<'a> {
-    /// The course that the options ask for.
+    /// The course that the options ask for; `watched` is the graph's file, which only the option lets watch.
     pub fn new(
         terminal: &'a Terminal,
         options: &'a Options,
-        path: &Path,
+        watched: Watched,
         running: Model,
         swaps: Vec<Swap>,
         columns: Vec<String>,
     ) -> Self {
-        let watched = options.watch.then(|| Watched::of(path));
         Self {
             terminal,
             options,
@@ -205,18 +211,23 @@ impl<'a> Course<'a> {
             first: None,
             running,
             staged: None,
-            watched,
+            watched: options.watch.then_some(watched),
             looked: std::time::Instant::now(),
             columns,
             rows: 0,
         }
     }
 
+    /// The graph that runs, once the row has been stepped before which it took over.
+    pub fn running(&self) -> &Model {
+        &self.running
+    }
+
     /// Does what is due before the row at `now`.
     ///
     /// # Errors
     /// When a graph named at the start cannot take over.
-    pub fn before(&mut self, control: &mut Control, now: Instant) -> Result<(), Failure> {
+    pub fn before(&mut self, control: &mut Control) -> Result<(), Failure> {
         self.rows += 1;
         let first = *self.first.get_or_insert_with(|| {
             // Of two for the same time, the first named takes over first.
@@ -287,7 +298,12 @@ impl<'a> Course<'a> {
         }
     }
 
-    fn stage(&mut self, control: &mut Control, model: Model, path: PathBuf) -> Result<(), Failure> {
+    fn stage(
+        &mut self,
+        control: &mut Control,
+        model: Model,
+        path: PathBuf,
+    ) -> Result<(), Failure> {
         let staged = control.stage(&model, false).map_err(refused)?;
         self.tell_lacking(&model, &path);
         self.terminal.note(report(&path, staged));

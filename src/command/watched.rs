@@ -41,6 +41,15 @@ impl Watched {
         }
     }
 
+    /// The same where something else runs, so that it has changed as soon as it is there.
+    pub(super) fn unlike(path: &Path) -> Self {
+        let mut watched = Self::of(path);
+        for (_, seen) in &mut watched.files {
+            *seen = None;
+        }
+        watched
+    }
+
     /// Whether a file has been written since, and none is being written: they are as they were at the last look. Half of a graph
     /// may be a graph too. A file that is gone is about to be written again.
     pub(super) fn changed(&mut self) -> bool {

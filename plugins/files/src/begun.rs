@@ -40,10 +40,7 @@ impl Begun {
         };
         let ends = ends.ok_or_else(|| other("it has no whole line".to_owned()))?;
         let expected = [&[time.columns.title()], columns].concat();
-        let found = match format {
-            Format::Csv => ends.csv_names(),
-            Format::JsonLines => ends.json_names(),
-        };
+        let found = ends.names(format);
         let found = found.map_err(|error| other(error.to_string()))?;
         if found != expected {
             return Err(other(format!(
@@ -67,6 +64,15 @@ impl Begun {
             last_ns,
         }))
     }
+}
+
+/// The columns of a file that was begun, that of the time first; none where it is no file, empty, or cannot be read.
+#[must_use]
+pub fn begun_columns(path: &Path) -> Option<Vec<String>> {
+    let is_file = path.metadata().is_ok_and(|of| of.is_file());
+    let ends = is_file.then(|| Ends::of(path).ok()).flatten().flatten()?;
+    let format = Format::from_path(path).unwrap_or(Format::Csv);
+    ends.names(format).ok()
 }
 
 /// The first and the last whole line of a file; `of` gives none where there is no whole line.
@@ -102,6 +108,13 @@ impl Ends {
             last: tail.split_off(before.map_or(0, |before| before + 1)),
             length: begin + end as u64 + 1,
         }))
+    }
+
+    fn names(&self, format: Format) -> Result<Vec<String>, FileError> {
+        match format {
+            Format::Csv => self.csv_names(),
+            Format::JsonLines => self.json_names(),
+        }
     }
 
     fn csv_names(&self) -> Result<Vec<String>, FileError> {

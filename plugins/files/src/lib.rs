@@ -48,6 +48,7 @@ mod stream;
 mod units;
 mod writer;
 
+pub use begun::begun_columns;
 pub use cell::{thousands_mark, with_decimal_point};
 pub use dataset::{Dataset, layout};
 pub use description::Description;
