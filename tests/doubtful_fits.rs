@@ -94,7 +94,7 @@ fn gradients_that_diverge_are_an_error_that_names_the_step_size() {
         "diverged",
         "`eta0` = 100",
         "a smaller `eta0`",
-        "wrote",
+        "no model is written",
     ]);
     assert!(!far.told.contains("evaluate"), "{}", far.told);
     let near = fit("diverged", &node("0.01"), &explained(200), &[]).ended(0);

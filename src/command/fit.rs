@@ -28,7 +28,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 ///
 /// Prints for each node that is fitted (estimators, and features that learn) the rows used and left out, the regressors chosen with their cross-validation scores (the mean,
 /// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
-/// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells.
+/// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells. A node that cannot be fitted is told, and gives
+/// nothing; where that is so of all, no model is written, one that is there stays, and the exit status is 1 in both cases.
 ///
 /// What is fed by estimators, such as a `stack`, learns from predictions of rows that those were not fitted on: all below it is
 /// fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with three.
@@ -87,6 +88,12 @@ impl Fit {
             ..FitOptions::default()
         };
         let told = fit_on(&mut model, &self.data, &options, terminal)?;
+        let failed = told.report.failed().count();
+        if failed > 0 && failed == told.report.estimators.len() {
+            self.tell(terminal, &told);
+            self.tell_of_no_model(terminal);
+            return Ok(Answer::No);
+        }
         let text = model.to_text().map_err(|error| {
             Failure::Outside(format!("the model cannot be written as JSON: {error}"))
         })?;
@@ -96,17 +103,25 @@ impl Fit {
             write_aside(&self.output, &text)?;
         }
         self.tell(terminal, &told);
-        let report = told.report;
-        let failed = report.failed().count();
         if to_stdout {
             print!("{text}");
         } else if terminal.format == Format::Table {
             terminal.note(format_args!("wrote {}", self.output.display()));
-            if report.estimators.is_empty() || failed < report.estimators.len() {
-                terminal.note(self.next(&model));
-            }
+            terminal.note(self.next(&model));
         }
         Ok(if failed > 0 { Answer::No } else { Answer::Fine })
+    }
+
+    /// A model in which nothing is fitted is worth less than the one that it would take the place of, which may be running.
+    fn tell_of_no_model(&self, terminal: &Terminal) {
+        let output = self.output.display();
+        if self.output.is_file() {
+            terminal.warning(format_args!(
+                "nothing could be fitted: no model is written, and {output} stays as it is"
+            ));
+        } else {
+            terminal.warning("nothing could be fitted: no model is written");
+        }
     }
 
     /// What to type next: a score on data that the fit has not seen; a run, where there is nothing to score.

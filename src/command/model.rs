@@ -58,6 +58,31 @@ pub fn check_fitted(model: &Model, path: &Path) -> Result<(), Failure> {
     Err(ModelError::NotFitted { path, nodes }.into())
 }
 
+/// Tells which nodes of a model have no fit, since the fit of it failed there.
+pub fn tell_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
+    let nodes = model.unfitted();
+    if !nodes.is_empty() {
+        terminal.warning(format_args!(
+            "{}: {} could not be fitted and {} nothing",
+            path.display(),
+            listed(&nodes),
+            if nodes.len() == 1 { "gives" } else { "give" },
+        ));
+    }
+}
+
+/// Names, the first few of many.
+pub fn listed(names: &[String]) -> String {
+    const MOST: usize = 6;
+    let more = names.len().saturating_sub(MOST);
+    let shown = names[..names.len().min(MOST)].join(", ");
+    if more > 0 {
+        format!("{shown} and {more} more")
+    } else {
+        shown
+    }
+}
+
 /// Refuses a limit that truths cannot have.
 ///
 /// # Errors

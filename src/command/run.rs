@@ -16,7 +16,7 @@ use clap::Args;
 
 use super::aside::check_apart;
 use super::kept::Kept;
-use super::model::{self, check_fitted};
+use super::model::{self, check_fitted, tell_unfitted};
 use super::ran::{self, Ran};
 use super::rejected::Ranged;
 use super::swap;
@@ -99,6 +99,7 @@ impl Run {
             }
         }
         let (model, watched) = self.load(terminal)?;
+        tell_unfitted(terminal, &model, &self.model);
         if let Some(told) = feedback::in_words(&model.plan) {
             terminal.warning(told);
         }

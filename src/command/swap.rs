@@ -11,7 +11,7 @@ use athermal::files::{TimeColumn, TimeForm};
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
-use super::model::check_fitted;
+use super::model::{check_fitted, listed, tell_unfitted};
 use super::watched::Watched;
 use crate::figures::{count, counted, length, number};
 use crate::terminal::{Failure, Terminal};
@@ -142,8 +142,23 @@ fn load<'a>(
     terminal: &Terminal,
 ) -> Result<Model, Failure> {
     let mut model = Model::load(path)?;
+    // A graph goes by the fits of what runs; a model in which some are missing was to bring its own.
+    let mut taken = model
+        .card
+        .as_ref()
+        .map_or_else(Vec::new, |_| model.unfitted());
     let doubtful: Vec<String> = known.flat_map(|known| model.take_fits_of(known)).collect();
     check_fitted(&model, path)?;
+    taken.retain(|node| model.fitted.contains_key(node));
+    if !taken.is_empty() {
+        terminal.warning(format_args!(
+            "{}: {} could not be fitted there, and {} the fit of what ran before",
+            path.display(),
+            listed(&taken),
+            if taken.len() == 1 { "keeps" } else { "keep" },
+        ));
+    }
+    tell_unfitted(terminal, &model, path);
     if !doubtful.is_empty() {
         terminal.warning(format_args!(
             "{}: {} {} as fitted before, though what they read is now made in another way: fit the graph anew to be sure",
