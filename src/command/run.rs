@@ -23,7 +23,7 @@ use super::swap;
 use super::watched::Watched;
 use super::{beyond, data};
 use crate::figures::{instant, length, seconds};
-use crate::terminal::{Answer, Failure, Terminal, outside};
+use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
 /// Run a model: rows in, predictions out
 ///
@@ -40,7 +40,7 @@ pub struct Run {
     /// CSV or JSON lines; `-` is standard input
     #[arg(long, short, value_name = "FILE")]
     input: PathBuf,
-    /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV
+    /// CSV or JSON lines by its ending, CSV without one; `-` is standard output, as CSV, or JSON lines with `--format json`
     #[arg(long, short, value_name = "FILE", default_value = "-")]
     output: PathBuf,
     /// Take cells and rows that cannot be read as missing, and count them
@@ -313,6 +313,18 @@ impl Run {
         columns: &[String],
     ) -> Result<Writer, Failure> {
         let time = read.time.columns.title();
+        if terminal.format == Format::Json && self.output.as_os_str() == "-" {
+            let (name, stream) = ("standard output", std::io::stdout());
+            let lines = athermal::files::Format::JsonLines;
+            return Ok(Writer::to_write(
+                name,
+                stream,
+                lines,
+                &time,
+                columns,
+                self.flush(),
+            )?);
+        }
         if self.state.is_none() {
             return Ok(Writer::create(&self.output, &time, columns, self.flush())?);
         }

@@ -94,3 +94,26 @@ fn a_model_that_takes_over_without_a_fit_of_its_own_says_whose_it_goes_by() {
         "took over before",
     ]);
 }
+
+#[test]
+fn what_is_run_for_programs_comes_as_json_lines() {
+    let (scratch, plain, data, _) = desk("json-lines");
+    let lines = scratch.path("lines.jsonl");
+    athermal(&[&"run", &plain, &"-i", &data, &"-o", &lines]).ended(0);
+    let run = athermal(&[&"run", &plain, &"-i", &data, &"--format", &"json"]).ended(0);
+    assert_eq!(run.out, std::fs::read_to_string(lines).unwrap());
+    let at = format!("300={}", plain.display());
+    let arguments: [&dyn AsRef<OsStr>; 8] = [
+        &"run",
+        &plain,
+        &"-i",
+        &data,
+        &"--format",
+        &"json",
+        &"--swap-at",
+        &at,
+    ];
+    let first = athermal(&arguments).ended(0).out;
+    let first: serde_json::Value = serde_json::from_str(first.lines().next().unwrap()).unwrap();
+    assert!(first["revision"].is_string(), "{first}");
+}
