@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use athermal::Instant;
 use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::recording::{Event, Recording, RecordingError, Rows};
 use athermal::diagnosis::leap::{self, Leaps};
@@ -21,6 +22,8 @@ pub enum Purpose {
     Fit,
     /// Models are set against it.
     Scores,
+    /// Models predict from it.
+    Run,
 }
 
 /// What is wrong with a channel.
@@ -55,8 +58,11 @@ pub struct FaultWatch<'a> {
 
 enum State {
     Unread,
-    Read(Vec<Looked>),
+    Read(Looks),
 }
+
+/// The channels of a plan, which are looked at row by row.
+pub struct Looks(Vec<Looked>);
 
 /// A channel that is looked at, with what is looked for.
 struct Looked {
@@ -79,27 +85,10 @@ impl<'a> FaultWatch<'a> {
 
     /// The channels of which something is wrong, in the order of the plan.
     pub fn found(self) -> Vec<Faulty> {
-        let State::Read(looked) = self.state.into_inner() else {
-            return Vec::new();
-        };
-        let all = looked.into_iter().map(|of| {
-            let stuck = of.stuck.and_then(|finder| {
-                // What never changes is named by a fit, and as a truth by its scores.
-                let counts =
-                    finder.changes() > 0 || (self.purpose == Purpose::Scores && !of.of_truth);
-                finder.found().filter(|_| counts)
-            });
-            let leaps = of.leaps.and_then(|finder| finder.found());
-            Faulty {
-                purpose: self.purpose,
-                channel: of.source.name,
-                of_truth: of.of_truth,
-                leaps: leaps.filter(|leaps| !stuck.is_some_and(|stuck| ends(leaps, &stuck))),
-                stuck,
-                silent: of.silent.and_then(silence::Finder::found),
-            }
-        });
-        all.filter(|of| !of.is_sound()).collect()
+        match self.state.into_inner() {
+            State::Unread => Vec::new(),
+            State::Read(looks) => looks.found(self.purpose),
+        }
     }
 }
 
@@ -117,7 +106,7 @@ impl Recording for FaultWatch<'_> {
         if let State::Read(_) = *state {
             return Ok(rows);
         }
-        *state = State::Read(looked(plan));
+        *state = State::Read(Looks::at(plan));
         Ok(Box::new(Looking {
             rows,
             state: &self.state,
@@ -125,24 +114,61 @@ impl Recording for FaultWatch<'_> {
     }
 }
 
-fn looked(plan: &Plan) -> Vec<Looked> {
-    let watched = health_reasons(plan);
-    let channels = plan.sources.iter().zip(leap::finders(plan));
-    let channels = channels.zip(of_truths(plan)).enumerate();
-    let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
-        let rests = source.optional;
-        // Such a node takes out what is stuck.
-        let watched = watched.contains_key(&slot);
-        Looked {
-            source: source.clone(),
-            of_truth,
-            leaps,
-            stuck: (!rests && !watched).then(Default::default),
-            // A position that is only measured now and then is none that fails.
-            silent: (!rests && !of_truth).then(Default::default),
+impl Looks {
+    /// Looks at the channels of this plan.
+    pub fn at(plan: &Plan) -> Self {
+        let watched = health_reasons(plan);
+        let channels = plan.sources.iter().zip(leap::finders(plan));
+        let channels = channels.zip(of_truths(plan)).enumerate();
+        let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
+            let rests = source.optional;
+            // Such a node takes out what is stuck.
+            let watched = watched.contains_key(&slot);
+            Looked {
+                source: source.clone(),
+                of_truth,
+                leaps,
+                stuck: (!rests && !watched).then(Default::default),
+                // A position that is only measured now and then is none that fails.
+                silent: (!rests && !of_truth).then(Default::default),
+            }
+        });
+        Self(looked.collect())
+    }
+
+    /// Takes the next row, its values in the order of the plan's channels.
+    pub fn row(&mut self, now: Instant, values: &[f64]) {
+        let at_s = seconds(now);
+        for (of, &value) in self.0.iter_mut().zip(values) {
+            of.row(at_s, value);
         }
-    });
-    looked.collect()
+    }
+
+    /// What follows is not set against what was.
+    pub fn interrupt(&mut self) {
+        self.0.iter_mut().for_each(Looked::interrupt);
+    }
+
+    /// The channels of which something is wrong, in the order of the plan.
+    pub fn found(self, purpose: Purpose) -> Vec<Faulty> {
+        let all = self.0.into_iter().map(|of| {
+            let stuck = of.stuck.and_then(|finder| {
+                // What never changes is named by a fit, and as a truth by its scores.
+                let counts = finder.changes() > 0 || (purpose != Purpose::Fit && !of.of_truth);
+                finder.found().filter(|_| counts)
+            });
+            let leaps = of.leaps.and_then(|finder| finder.found());
+            Faulty {
+                purpose,
+                channel: of.source.name,
+                of_truth: of.of_truth,
+                leaps: leaps.filter(|leaps| !stuck.is_some_and(|stuck| ends(leaps, &stuck))),
+                stuck,
+                silent: of.silent.and_then(silence::Finder::found),
+            }
+        });
+        all.filter(|of| !of.is_sound()).collect()
+    }
 }
 
 impl Looked {
@@ -182,15 +208,10 @@ struct Looking<'a> {
 impl Rows for Looking<'_> {
     fn next(&mut self, values: &mut [f64]) -> Result<Option<Event>, RecordingError> {
         let event = self.rows.next(values)?;
-        if let State::Read(looked) = &mut *self.state.borrow_mut() {
+        if let State::Read(looks) = &mut *self.state.borrow_mut() {
             match event {
-                Some(Event::Row(now)) => {
-                    let at_s = seconds(now);
-                    for (of, &value) in looked.iter_mut().zip(&*values) {
-                        of.row(at_s, value);
-                    }
-                }
-                Some(Event::Segment) => looked.iter_mut().for_each(Looked::interrupt),
+                Some(Event::Row(now)) => looks.row(now, values),
+                Some(Event::Segment) => looks.interrupt(),
                 None => {}
             }
         }
@@ -221,7 +242,7 @@ pub fn in_words(all: &[Faulty]) -> Vec<String> {
                 count(stuck.samples),
                 instant(stuck.from_s),
                 instant(stuck.to_s),
-                of_standstill(faulty)
+                of_standstill(faulty.of_truth, faulty.purpose)
             ));
         }
         if let Some(silent) = &faulty.silent {
@@ -233,7 +254,7 @@ pub fn in_words(all: &[Faulty]) -> Vec<String> {
                 instant(silent.to_s),
                 match faulty.purpose {
                     Purpose::Fit => "learns nothing",
-                    Purpose::Scores => "predicts nothing",
+                    Purpose::Scores | Purpose::Run => "predicts nothing",
                 }
             ));
         }
@@ -249,12 +270,13 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
                  `train.abs_truth`"
             }
             Purpose::Scores => "That counts as drift: begin another file there",
+            Purpose::Run => "That was taken for drift: begin another file there",
         };
         return format!("was it moved, or zeroed anew? {then}");
     }
     let then = match faulty.purpose {
         Purpose::Fit => "That is learned too",
-        Purpose::Scores => "Predictions from that mean nothing",
+        Purpose::Scores | Purpose::Run => "Predictions from that mean nothing",
     };
     format!(
         "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {} and {}",
@@ -264,16 +286,18 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
     )
 }
 
-fn of_standstill(faulty: &Faulty) -> &'static str {
-    match (faulty.of_truth, faulty.purpose) {
+/// What to think of a standstill.
+pub fn of_standstill(of_truth: bool, purpose: Purpose) -> &'static str {
+    match (of_truth, purpose) {
         (true, Purpose::Fit) => {
             "is its measurement stuck? That is learned as no drift: leave these rows out"
         }
         (true, Purpose::Scores) => "is its measurement stuck? That counts as no drift",
+        (true, Purpose::Run) => "is its measurement stuck? That is taken for no drift",
         (false, Purpose::Fit) => {
             "is the sensor stuck? That is learned too: leave these rows out, or have a `health` node take them out"
         }
-        (false, Purpose::Scores) => {
+        (false, Purpose::Scores | Purpose::Run) => {
             "is the sensor stuck? Predictions from that mean little; a `health` node takes such samples out"
         }
     }

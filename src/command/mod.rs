@@ -26,6 +26,7 @@ mod rejected;
 mod report;
 mod run;
 mod schema;
+mod sensors;
 mod show;
 mod simulate;
 mod swap;

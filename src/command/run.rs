@@ -19,6 +19,7 @@ use super::kept::Kept;
 use super::model::{self, check_fitted, tell_unfitted};
 use super::ran::{self, Ran};
 use super::rejected::Ranged;
+use super::sensors::Sensors;
 use super::swap;
 use super::watched::Watched;
 use super::{beyond, data};
@@ -121,9 +122,11 @@ impl Run {
         let mut rest = kept.rest(&mut reader, writer.stood(), !self.ends());
         let usual = model.sample_ranges();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
+        let mut sensors = Sensors::new(terminal, &mut ranged, &plan, !self.ends());
         let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, &model, sink);
-        live::run_keeping(&mut engine, &mut ranged, &mut writer, &mut keep)?;
+        live::run_keeping(&mut engine, &mut sensors, &mut writer, &mut keep)?;
         kept.end(&engine, &model, &mut writer).map_err(outside)?;
+        sensors.end();
         self.tell(terminal, &engine, &reader, usual);
         Ok(Answer::Fine)
     }
@@ -183,6 +186,7 @@ impl Run {
         let mut writer = WithRevision(writer);
         let usual = model.sample_ranges().to_vec();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read), &usual);
+        let mut sensors = Sensors::new(terminal, &mut ranged, &model.plan, !self.ends());
         let live = LiveOptions {
             channels: feed,
             ..LiveOptions::default()
@@ -195,7 +199,7 @@ impl Run {
         let mut shown = vec![f64::NAN; names.len()];
         let mut samples = Samples::default();
         let mut places = (std::ptr::null(), Vec::new());
-        while let Some(event) = ranged.next(&mut samples).map_err(outside)? {
+        while let Some(event) = sensors.next(&mut samples).map_err(outside)? {
             let Event::Row(time) = event else {
                 stepper.segment();
                 continue;
@@ -235,6 +239,7 @@ impl Run {
         let ended = kept.end(stepper.engine(), course.running(), &mut writer);
         ended.map_err(outside)?;
         course.end(&mut control);
+        sensors.end();
         let engine = stepper.engine();
         self.tell(terminal, engine, &reader, &usual);
         Ok(Answer::Fine)

@@ -54,6 +54,29 @@ impl Finder {
         }
     }
 
+    /// The silence that goes on while rows come, once it is so many times as long as is usual and lasts so long, in s: there a
+    /// share of all rows would be more from day to day.
+    #[must_use]
+    pub fn goes_on(&self, least_s: f64) -> Option<Silence> {
+        let Self { now, samples, .. } = self;
+        let is_long = now.rows * samples.max(&1) > TIMES * (self.rows - now.rows);
+        (now.rows > 0 && is_long && now.to_s - now.from_s >= least_s).then_some(Silence {
+            of_rows: self.rows,
+            ..*now
+        })
+    }
+
+    /// Whether there has been a sample.
+    #[must_use]
+    pub fn had_samples(&self) -> bool {
+        self.samples > 0
+    }
+
+    /// Lets the silence that goes on end, so that what is usual is not taken from it.
+    pub fn forget(&mut self) {
+        self.rows -= std::mem::take(&mut self.now).rows;
+    }
+
     /// The silence; none where there is none that is longer than usual. A channel without any sample is none that fell silent.
     #[must_use]
     pub fn found(mut self) -> Option<Silence> {
@@ -86,6 +109,25 @@ mod tests {
         let found = of((0..100).map(|nth| nth < 70)).unwrap();
         assert_eq!((found.rows, found.of_rows), (30, 100));
         assert_eq!((found.from_s, found.to_s), (70.0, 99.0));
+    }
+
+    #[test]
+    fn a_silence_is_found_while_it_goes_on_once_it_is_long_and_much_longer_than_usual() {
+        let mut finder = Finder::default();
+        for nth in 0..3000 {
+            finder.push(f64::from(nth), nth % 8 == 0);
+            assert_eq!(finder.goes_on(5.0), None, "at {nth} s");
+        }
+        for nth in 3000..4000 {
+            finder.push(f64::from(nth), false);
+            let lasts_s = f64::from(nth - 2993);
+            let found = finder.goes_on(100.0);
+            assert_eq!(found.is_some(), lasts_s >= 159.0, "for {lasts_s} s");
+        }
+        assert_eq!(finder.goes_on(100.0).unwrap().from_s, 2993.0);
+        finder.forget();
+        finder.push(4000.0, true);
+        assert_eq!(finder.goes_on(0.0), None);
     }
 
     #[test]

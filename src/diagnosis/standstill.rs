@@ -68,6 +68,27 @@ impl Finder {
         }
     }
 
+    /// The standstill that goes on while samples come. What has not often changed before is not known to change.
+    #[must_use]
+    pub fn goes_on(&self) -> Option<Standstill> {
+        let Self { run, longest, .. } = self;
+        let is_known = self.changes >= ENOUGH_CHANGES;
+        let stands = is_known && self.stands(run.samples, longest.samples);
+        stands.then_some(*run)
+    }
+
+    /// Lets the standstill that goes on end, so that none after it is measured by it.
+    pub fn forget(&mut self) {
+        self.samples -= std::mem::take(&mut self.run).samples;
+    }
+
+    /// Whether so many samples in a row are a standstill where no others are more than `second`.
+    fn stands(&self, most: u64, second: u64) -> bool {
+        let changes_else = (self.changes + most) as f64 > CHANGES * self.samples as f64;
+        let never_else = self.changes >= ENOUGH_CHANGES && most > LONGER * second;
+        most >= FEWEST && (changes_else || never_else)
+    }
+
     /// How often the next sample had another value.
     #[must_use]
     pub fn changes(&self) -> u64 {
@@ -78,11 +99,8 @@ impl Finder {
     #[must_use]
     pub fn longest(mut self) -> (Standstill, bool) {
         self.interrupt();
-        let (longest, most) = (self.longest, self.longest.samples);
-        let changes_else = (self.changes + most) as f64 > CHANGES * self.samples as f64;
-        let never_else = self.changes >= ENOUGH_CHANGES && most > LONGER * self.second;
-        let stands = most >= FEWEST && (changes_else || never_else);
-        (longest, stands)
+        let longest = self.longest;
+        (longest, self.stands(longest.samples, self.second))
     }
 
     /// The standstill; none where nothing stands still for longer than it usually does.
@@ -121,6 +139,23 @@ mod tests {
         assert_eq!(of(coarse.clone().chain([500.0; 60])).found(), None);
         let found = of(coarse.chain([500.0; 61])).found().unwrap();
         assert_eq!(found.samples, 61);
+    }
+
+    #[test]
+    fn a_standstill_is_found_while_it_goes_on_and_again_as_soon_when_it_was_over() {
+        let mut finder = of((0..100).map(|nth| (f64::from(nth) * 0.7).sin()));
+        for _ in 0..2 {
+            for nth in 1..100 {
+                finder.push(0.0, 5.0);
+                assert_eq!(finder.goes_on().is_some(), nth >= 20, "{nth}");
+            }
+            finder.forget();
+            for nth in 0..100 {
+                finder.push(0.0, f64::from(nth));
+                assert_eq!(finder.goes_on(), None);
+            }
+        }
+        assert_eq!(of([21.5; 1000]).goes_on(), None, "it may be a setpoint");
     }
 
     #[test]

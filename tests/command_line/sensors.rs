@@ -1,6 +1,6 @@
 //! What a run tells of sensors: at once beside a machine, at the end of a file.
 
-use super::workbench::{Finished, athermal_fed};
+use super::workbench::{Finished, athermal, athermal_fed};
 use super::{csv, desk, rows};
 
 /// Rows of three hours and more, with what stands in the cells of the room and the position while these rows come.
@@ -19,6 +19,89 @@ fn piped(test: &str, log: &str, more: &[&str]) -> Finished {
     let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"run", &plain, &"-i", &"-"];
     arguments.extend(more.iter().map(|more| more as &dyn AsRef<std::ffi::OsStr>));
     athermal_fed(&arguments, log.as_bytes()).ended(0)
+}
+
+#[track_caller]
+fn tells_once(finished: &Finished, parts: &[&str]) {
+    for part in parts {
+        let times = finished.told.matches(part).count();
+        assert_eq!(times, 1, "`{part}` in:\n{}", finished.told);
+    }
+}
+
+#[test]
+fn sensors_that_fall_silent_beside_a_machine_are_told_at_once_and_when_they_are_back() {
+    let dead = log(300..800, |_, cells| {
+        cells.iter_mut().for_each(String::clear);
+    });
+    let run = piped("silent", &dead, &[]);
+    tells_once(
+        &run,
+        &[
+            "temperature.room has no sample since 3000 s: did the sensor fail? What needs it predicts nothing",
+            "position.Z has no sample since 3000 s",
+            "temperature.room, position.Z have samples again, after 83.3 min",
+        ],
+    );
+    let brief = piped("silent", &dead, &["-q"]);
+    assert_eq!(brief.told.lines().count(), 2, "{}", brief.told);
+}
+
+#[test]
+fn a_sensor_that_stands_still_beside_a_machine_is_told_at_once_and_when_it_is_back() {
+    let stuck = log(300..800, |_, cells| "21.5".clone_into(&mut cells[0]));
+    let run = piped("stuck", &stuck, &[]);
+    tells_once(
+        &run,
+        &[
+            "temperature.room is 21.50 in all of its last 20 samples, since 3000 s: is the sensor stuck?",
+            "temperature.room changes again, after 83.3 min",
+        ],
+    );
+    let setpoint = log(0..1200, |nth, cells| {
+        cells[0] = if nth < 500 { "20" } else { "40" }.to_owned();
+    });
+    let run = piped("stuck", &setpoint, &[]);
+    assert!(!run.told.contains("temperature"), "{}", run.told);
+}
+
+#[test]
+fn a_sensor_that_comes_and_goes_is_told_at_most_once_an_hour() {
+    let loose = log(0..1200, |nth, cells| {
+        if nth % 100 >= 30 && nth > 200 {
+            cells[0].clear();
+        }
+    });
+    let run = piped("loose", &loose, &[]);
+    let times = run.told.matches("temperature.room has no sample").count();
+    assert!((2..=3).contains(&times), "{}", run.told);
+}
+
+#[test]
+fn sensors_that_fail_in_a_file_are_told_at_its_end() {
+    let (scratch, plain, _, _) = desk("failed");
+    let dead = log(300..800, |_, cells| cells[0].clear());
+    let run = athermal(&[&"run", &plain, &"-i", &scratch.file("dead.csv", dead)]).ended(0);
+    tells_once(
+        &run,
+        &[
+            "temperature.room has no sample in 500 of 1,200 rows, from 3000 s to 7990 s: did the sensor fail? What needs it predicts \
+             nothing there",
+        ],
+    );
+    let stuck = log(300..800, |_, cells| "21.5".clone_into(&mut cells[0]));
+    let stuck = scratch.file("stuck.csv", stuck);
+    let swap = format!("1h={}", plain.display());
+    for more in [&[][..], &["--swap-at", &swap]] {
+        let mut all: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"run", &plain, &"-i", &stuck];
+        all.extend(more.iter().map(|more| more as &dyn AsRef<std::ffi::OsStr>));
+        tells_once(
+            &athermal(&all).ended(0),
+            &[
+                "temperature.room is 21.50 in 500 samples one after the other, from 3000 s to 7990 s",
+            ],
+        );
+    }
 }
 
 #[test]

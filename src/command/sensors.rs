@@ -1,0 +1,251 @@
+//! Decides when a sensor that falls silent or stands still is told of by a run: at once where rows may never end, and again when it is
+//! back; else at the end. What such a fault is, is decided elsewhere.
+
+use athermal::core::compile::{Plan, SourceChannel};
+use athermal::core::live::{Samples, Source, SourceError};
+use athermal::core::recording::Event;
+use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
+
+use super::faults::{self, Looks, Purpose, of_standstill};
+use super::model::listed;
+use crate::figures::{count, instant, number, seconds, time};
+use crate::terminal::Terminal;
+
+/// So long, in s, a sensor is silent before that is told.
+const SILENT_S: f64 = 600.0;
+/// The same for what a truth is made of, which a machine measures when it can, and for a sensor that has not had a sample yet.
+const RARE_S: f64 = 3600.0;
+/// Not within so long, in s of the data, is a fault of the same channel told again.
+const AGAIN_S: f64 = 3600.0;
+
+/// Rows as they are read, while the sensors of a graph are watched.
+pub struct Sensors<'a> {
+    source: &'a mut dyn Source,
+    terminal: Terminal,
+    told: Told,
+}
+
+enum Told {
+    AtEnd(Looks),
+    AtOnce(Vec<Sensor>),
+}
+
+impl<'a> Sensors<'a> {
+    /// Watches the channels of a plan, whose values come first in a row.
+    pub fn new(
+        terminal: &Terminal,
+        source: &'a mut dyn Source,
+        plan: &Plan,
+        at_once: bool,
+    ) -> Self {
+        Self {
+            source,
+            terminal: *terminal,
+            told: if at_once {
+                Told::AtOnce(Sensor::of(plan))
+            } else {
+                Told::AtEnd(Looks::at(plan))
+            },
+        }
+    }
+
+    /// Tells what is told at the end.
+    pub fn end(self) {
+        if let Told::AtEnd(looks) = self.told {
+            faults::tell(&self.terminal, &looks.found(Purpose::Run));
+        }
+    }
+}
+
+impl Source for Sensors<'_> {
+    fn next(&mut self, samples: &mut Samples) -> Result<Option<Event>, SourceError> {
+        let event = self.source.next(samples)?;
+        match (&mut self.told, event) {
+            (Told::AtEnd(looks), Some(Event::Row(now))) => looks.row(now, &samples.values),
+            (Told::AtEnd(looks), Some(Event::Segment)) => looks.interrupt(),
+            (Told::AtOnce(sensors), Some(Event::Row(now))) => {
+                let at_s = seconds(now);
+                let mut is_news = false;
+                for (sensor, &value) in sensors.iter_mut().zip(&samples.values) {
+                    is_news |= sensor.row(at_s, value);
+                }
+                if is_news {
+                    tell(&self.terminal, sensors, at_s);
+                }
+            }
+            (Told::AtOnce(sensors), Some(Event::Segment)) => {
+                sensors.iter_mut().for_each(Sensor::interrupt);
+            }
+            (_, None) => {}
+        }
+        Ok(event)
+    }
+}
+
+/// What is wrong with a sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fault {
+    Silent { from_s: f64 },
+    Stuck(standstill::Standstill),
+}
+
+/// What there is to tell of a sensor at a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum News {
+    Fails(Fault),
+    IsBack(Fault),
+}
+
+/// A channel whose faults are told.
+#[derive(Debug)]
+struct Sensor {
+    source: SourceChannel,
+    of_truth: bool,
+    silent: silence::Finder,
+    /// None where a node takes out what is stuck.
+    stuck: Option<standstill::Finder>,
+    /// The fault that has been told and goes on.
+    fault: Option<Fault>,
+    /// When one was last told.
+    told_s: Option<f64>,
+    news: Option<News>,
+}
+
+impl Sensor {
+    fn of(plan: &Plan) -> Vec<Self> {
+        let watched = health_reasons(plan);
+        let channels = plan.sources.iter().zip(of_truths(plan)).enumerate();
+        let sensor = |(slot, (source, of_truth)): (usize, (&SourceChannel, bool))| Self {
+            source: source.clone(),
+            of_truth,
+            silent: silence::Finder::default(),
+            stuck: (!watched.contains_key(&slot)).then(Default::default),
+            fault: None,
+            told_s: None,
+            news: None,
+        };
+        channels.map(sensor).collect()
+    }
+
+    /// Takes the sample of a row, if it is one; whether there is something to tell then.
+    fn row(&mut self, at_s: f64, value: f64) -> bool {
+        if self.source.optional {
+            return false;
+        }
+        let is_sample = self.source.admits(value);
+        let is_over = is_sample
+            && match self.fault {
+                Some(Fault::Silent { .. }) => true,
+                Some(Fault::Stuck(stuck)) => stuck.value != value,
+                None => false,
+            };
+        self.news = self.fault.take_if(|_| is_over).map(News::IsBack);
+        self.push(at_s, value, is_sample);
+        let may_tell = |told_s: f64| at_s - told_s >= AGAIN_S || at_s < told_s;
+        if self.fault.is_none() && self.told_s.is_none_or(may_tell) {
+            self.fault = self.fails();
+            if let Some(fault) = self.fault {
+                self.told_s = Some(at_s);
+                self.news = Some(News::Fails(fault));
+            }
+        }
+        self.news.is_some()
+    }
+
+    fn push(&mut self, at_s: f64, value: f64, is_sample: bool) {
+        if is_sample && self.silent.goes_on(self.least_s()).is_some() {
+            self.silent.forget();
+        }
+        self.silent.push(at_s, is_sample);
+        if let Some(stuck) = self.stuck.as_mut().filter(|_| is_sample) {
+            if stuck.goes_on().is_some_and(|now| now.value != value) {
+                stuck.forget();
+            }
+            stuck.push(at_s, value);
+        }
+    }
+
+    /// The fault that goes on now.
+    fn fails(&self) -> Option<Fault> {
+        // A position that was never measured is none that is missing.
+        let counts = self.silent.had_samples() || !self.of_truth;
+        let silent = self.silent.goes_on(self.least_s()).filter(|_| counts);
+        let silent = silent.map(|silent| Fault::Silent {
+            from_s: silent.from_s,
+        });
+        let stuck = || self.stuck.as_ref()?.goes_on().map(Fault::Stuck);
+        silent.or_else(stuck)
+    }
+
+    fn least_s(&self) -> f64 {
+        if self.of_truth || !self.silent.had_samples() {
+            RARE_S
+        } else {
+            SILENT_S
+        }
+    }
+
+    /// What follows is not set against what was.
+    fn interrupt(&mut self) {
+        self.silent.interrupt();
+        if let Some(stuck) = &mut self.stuck {
+            if stuck.goes_on().is_some() {
+                stuck.forget();
+            }
+            stuck.interrupt();
+        }
+    }
+}
+
+/// Tells what there is to tell at a row; of many that fail or come back together in one sentence, as when a logger is unplugged.
+fn tell(terminal: &Terminal, sensors: &[Sensor], at_s: f64) {
+    let (mut silent, mut since_s) = (Vec::new(), f64::INFINITY);
+    let (mut back, mut fault_s) = (Vec::new(), f64::INFINITY);
+    for sensor in sensors {
+        let name = &sensor.source.name;
+        match sensor.news {
+            Some(News::Fails(Fault::Silent { from_s })) => {
+                silent.push(name.clone());
+                since_s = since_s.min(from_s);
+            }
+            Some(News::Fails(Fault::Stuck(stuck))) => terminal.warning(format_args!(
+                "{name} is {} in all of its last {} samples, since {}: {}",
+                number(stuck.value),
+                count(stuck.samples),
+                instant(stuck.from_s),
+                of_standstill(sensor.of_truth, Purpose::Run)
+            )),
+            Some(News::IsBack(Fault::Silent { from_s })) => {
+                back.push(name.clone());
+                fault_s = fault_s.min(from_s);
+            }
+            Some(News::IsBack(Fault::Stuck(stuck))) => terminal.note(format_args!(
+                "{name} changes again, after {}",
+                time(at_s - stuck.from_s)
+            )),
+            None => {}
+        }
+    }
+    let one = |names: &[String], one: &'static str, many: &'static str| match names.len() {
+        1 => one,
+        _ => many,
+    };
+    if !silent.is_empty() {
+        terminal.warning(format_args!(
+            "{} {} no sample since {}: did {} fail? What needs {} predicts nothing",
+            listed(&silent),
+            one(&silent, "has", "have"),
+            instant(since_s),
+            one(&silent, "the sensor", "the sensors"),
+            one(&silent, "it", "them"),
+        ));
+    }
+    if !back.is_empty() {
+        terminal.note(format_args!(
+            "{} {} samples again, after {}",
+            listed(&back),
+            one(&back, "has", "have"),
+            time(at_s - fault_s)
+        ));
+    }
+}
