@@ -178,6 +178,20 @@ fn a_graph_of_another_machine_is_told_by_the_outputs_that_it_leaves_empty() {
     ]);
     let own = run(&scratch, &[&swap(&scratch, "3000s", "still.toml")]).ended(0);
     assert!(!own.told.contains("gives no"), "{}", own.told);
+
+    // What runs gives none either: that is how this machine is.
+    scratch.file(
+        "graph.toml",
+        GRAPH.replace(
+            "channels = [\"Z\"]",
+            "channels = [\"Z\"]\noptional = [\"Z\"]\ncolumn = \"none\"",
+        ),
+    );
+    let slower = "schema = 1\nextends = \"graph.toml\"\nname = \"slower\"\nnodes.drift = { windows = [\"40s\"] }\n";
+    scratch.file("slower.toml", slower);
+    let same = run(&scratch, &[&swap(&scratch, "3000s", "slower.toml")]).ended(0);
+    same.tells(&["warmed by the past", "took over"]);
+    assert!(!same.told.contains("gives no"), "{}", same.told);
 }
 
 #[test]

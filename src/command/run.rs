@@ -225,6 +225,7 @@ impl Run {
             for (shown, place) in shown.iter_mut().zip(&places.1) {
                 *shown = place.map_or(f64::NAN, |place| stepped.outputs[place]);
             }
+            course.gave(&shown);
             let frame = Frame {
                 time,
                 time_text: &samples.time_text,

@@ -50,6 +50,9 @@ pub struct Options {
 /// How often a watched file is looked at, however fast or slowly rows come.
 const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(200);
 
+/// So few values of an output may be missing in the past by chance.
+const FEW: f64 = 10.0;
+
 fn percent(text: &str) -> Result<f64, String> {
     let digits = text.trim().strip_suffix('%').map(str::trim);
     match digits.and_then(|digits| digits.parse::<f64>().ok()) {
@@ -206,6 +209,8 @@ pub struct Course<'a> {
     watched: Option<Watched>,
     looked: std::time::Instant,
     columns: Vec<String>,
+    /// At how many rows each column had a value, of whichever graph.
+    gave: Vec<u64>,
     rows: u64,
 }
 
@@ -228,6 +233,7 @@ impl<'a> Course<'a> {
             staged: None,
             watched: options.watch.then_some(watched),
             looked: std::time::Instant::now(),
+            gave: vec![0; columns.len()],
             columns,
             rows: 0,
         }
@@ -238,11 +244,18 @@ impl<'a> Course<'a> {
         &self.running
     }
 
+    /// Counts which columns have a value at a row.
+    pub fn gave(&mut self, values: &[f64]) {
+        for (gave, value) in self.gave.iter_mut().zip(values) {
+            *gave += u64::from(!value.is_nan());
+        }
+    }
+
     /// Does what is due before the row at `now`.
     ///
     /// # Errors
     /// When a graph named at the start cannot take over.
-    pub fn before(&mut self, control: &mut Control) -> Result<(), Failure> {
+    pub fn before(&mut self, control: &mut Control, now: Instant) -> Result<(), Failure> {
         self.rows += 1;
         let first = *self.first.get_or_insert_with(|| {
             // Of two for the same time, the first named takes over first.
@@ -268,16 +281,16 @@ impl<'a> Course<'a> {
             }) = self.waiting.pop()
         {
             model.take_fits_of(&self.running);
-            return self.stage(control, model, path);
+            return self.stage(control, model, path, now);
         }
         if look {
-            self.look(control);
+            self.look(control, now);
         }
         Ok(())
     }
 
     /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
-    fn look(&mut self, control: &mut Control) {
+    fn look(&mut self, control: &mut Control, now: Instant) {
         self.looked = std::time::Instant::now();
         let Some(watched) = &mut self.watched else {
             return;
@@ -308,7 +321,7 @@ impl<'a> Course<'a> {
                 path.display(),
                 new.name
             ));
-        } else if let Err(failure) = self.stage(control, model, path) {
+        } else if let Err(failure) = self.stage(control, model, path, now) {
             self.terminal.error(&failure);
         }
     }
@@ -318,11 +331,14 @@ impl<'a> Course<'a> {
         control: &mut Control,
         model: Model,
         path: PathBuf,
+        now: Instant,
     ) -> Result<(), Failure> {
         let staged = control.stage(&model, false).map_err(refused)?;
         self.tell_lacking(&model, &path);
         self.terminal.note(report(&path, staged));
-        let (past, silent) = staged.silent();
+        let (past, mut silent) = staged.silent();
+        // What runs seldom gives any either, as a settle time, which there is when the set point has changed.
+        silent.retain(|name| !self.gives_seldom(name, now, past));
         if !silent.is_empty() {
             let named: Vec<_> = silent.iter().map(|name| format!("`{name}`")).collect();
             self.terminal.warning(format_args!(
@@ -339,6 +355,17 @@ impl<'a> Course<'a> {
                 .map_err(refused),
             None => self.commit(control),
         }
+    }
+
+    /// Whether what runs has an output of which no more than a few values are to be expected in so long a past.
+    fn gives_seldom(&self, name: &str, now: Instant, past: Duration) -> bool {
+        let mut columns = self.columns.iter().zip(&self.gave);
+        let mut outputs = self.running.plan.outputs.iter();
+        let gave = columns.find_map(|(column, gave)| (column == name).then_some(*gave));
+        let ran = self.first.map_or(Duration::ZERO, |first| now - first);
+        outputs.any(|output| output.name == name)
+            && gave
+                .is_some_and(|gave| gave as f64 * past.as_ns() as f64 <= FEW * ran.as_ns() as f64)
     }
 
     /// Tells of outputs of what runs that a new graph does not have, as one for another machine would not.
