@@ -2,14 +2,12 @@
 //! decide which variances the model has.
 
 use super::Structural;
+use super::matrix::{NOTHING_NEW, carry, diagonal, product, rank, shrink};
 use crate::NumericsError;
 use crate::checks::{check_length, check_parameter};
 use crate::scratch::Scratch;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
-
-/// Below this share of what a row could at most say about states of which nothing is known, it says nothing about them.
-const NOTHING_NEW: f64 = 1e-9;
 
 /// What is known of level, trend and coefficients, in this order.
 ///
@@ -253,21 +251,89 @@ impl Kalman {
     /// When `x` has not one value per coefficient.
     #[inline]
     pub fn observe_share(&mut self, x: &[f64], y: f64, share: f64) -> Option<Innovation> {
-        let order = self.state.len();
-        assert_eq!(
-            self.model.moving() + x.len(),
-            order,
-            "a row has a value per coefficient"
-        );
-        let error = y - self.expected(0.0, |regressor| x[regressor]);
-        if !error.is_finite() {
-            return None;
-        }
+        let error = self.error(x, y)?;
         if self.unknown > 0
             && let Some(innovation) = self.learn_of_the_unknown(x, error, share)
         {
             return Some(innovation);
         }
+        self.take(x, error, share, self.state.len())
+    }
+
+    /// The same for an observation that moves only the first so many states. The others stay as they are, and as uncertain,
+    /// which counts (the filter of Schmidt 1966, which considers states that it does not estimate). While something is
+    /// diffuse, nothing is moved.
+    ///
+    /// # Panics
+    /// When `x` has not one value per coefficient.
+    pub fn observe_with(
+        &mut self,
+        states: usize,
+        x: &[f64],
+        y: f64,
+        share: f64,
+    ) -> Option<Innovation> {
+        let error = self.error(x, y)?;
+        if self.unknown > 0 {
+            return None;
+        }
+        self.take(x, error, share, states)
+    }
+
+    /// Makes a state more uncertain by a variance of its own, as of a leap that nothing else tells of.
+    ///
+    /// # Panics
+    /// When there is no such state, or the variance is negative or not finite.
+    pub fn widen(&mut self, state: usize, variance: f64) {
+        let fine = variance >= 0.0 && variance.is_finite();
+        assert!(fine, "a variance is finite and not negative");
+        let order = self.state.len();
+        self.covariance[state * order + state] += variance;
+    }
+
+    /// The same with one more coefficient before the others, which is known to be 0. Only where nothing is diffuse.
+    ///
+    /// # Panics
+    /// When something is.
+    #[must_use]
+    pub fn with_coefficient(&self) -> Self {
+        assert!(self.unknown == 0, "all states are known");
+        let (order, place) = (self.state.len(), self.model.moving());
+        let mut state = self.state.clone();
+        state.insert(place, 0.0);
+        let mut covariance = Vec::with_capacity((order + 1).pow(2));
+        let none = vec![0.0; order];
+        let mut rows: Vec<&[f64]> = self.covariance.chunks_exact(order).collect();
+        rows.insert(place, &none);
+        for row in rows {
+            covariance.extend([&row[..place], &[0.0], &row[place..]].concat());
+        }
+        Self {
+            room: Scratch(vec![0.0; 2 * state.len()]),
+            model: self.model,
+            state,
+            covariance,
+            diffuse: Vec::new(),
+            unknown: 0,
+        }
+    }
+
+    /// By how much a prediction misses; none where that is not finite.
+    #[inline]
+    fn error(&self, x: &[f64], y: f64) -> Option<f64> {
+        assert_eq!(
+            self.model.moving() + x.len(),
+            self.state.len(),
+            "a row has a value per coefficient"
+        );
+        let error = y - self.expected(0.0, |regressor| x[regressor]);
+        error.is_finite().then_some(error)
+    }
+
+    /// Takes the error of an observation of which all is known, and moves the first so many states.
+    #[inline]
+    fn take(&mut self, x: &[f64], error: f64, share: f64, states: usize) -> Option<Innovation> {
+        let order = self.state.len();
         let (shared, _) = self.room.0.split_at_mut(order);
         let explained = product(&self.covariance, &self.model, x, shared);
         let variance = explained + self.model.observation / share;
@@ -279,11 +345,14 @@ impl Kalman {
         for share in shared.iter_mut() {
             *share /= root;
         }
-        for (state, share) in self.state.iter_mut().zip(&*shared) {
+        for (state, share) in self.state.iter_mut().zip(&*shared).take(states) {
             *state += share * step;
         }
-        for (row, a) in self.covariance.chunks_exact_mut(order).zip(&*shared) {
-            for (value, b) in row.iter_mut().zip(&*shared) {
+        let rows = self.covariance.chunks_exact_mut(order);
+        for (i, (row, a)) in rows.zip(&*shared).enumerate() {
+            // What two states that stay have in common stays too.
+            let columns = if i < states { order } else { states };
+            for (value, b) in row.iter_mut().zip(&*shared).take(columns) {
                 *value -= a * b;
             }
         }
@@ -454,143 +523,5 @@ impl Kalman {
             variance,
             diffuse: true,
         })
-    }
-}
-
-/// A matrix with these on its diagonal, row by row.
-#[must_use]
-pub(super) fn diagonal(values: &[f64]) -> Vec<f64> {
-    let order = values.len();
-    let mut matrix = vec![0.0; order * order];
-    for (i, value) in values.iter().enumerate() {
-        matrix[i * order + i] = *value;
-    }
-    matrix
-}
-
-/// How many directions of a diffuse covariance, given row by row, are diffuse: pivots of its elimination, largest first, each
-/// state on its own scale.
-fn rank(mut matrix: Vec<f64>, order: usize) -> usize {
-    let scales: Vec<f64> = (0..order)
-        .map(|i| matrix[i * order + i].max(1.0).sqrt())
-        .collect();
-    for i in 0..order {
-        for j in 0..order {
-            matrix[i * order + j] /= scales[i] * scales[j];
-        }
-    }
-    for found in 0..order {
-        let own = |i: &usize| matrix[i * order + i];
-        let pivot = (0..order).max_by(|a, b| own(a).total_cmp(&own(b)));
-        let Some(pivot) = pivot.filter(|pivot| own(pivot) > NOTHING_NEW) else {
-            return found;
-        };
-        let row = matrix[pivot * order..][..order].to_vec();
-        for i in 0..order {
-            for j in 0..order {
-                matrix[i * order + j] -= row[i] * row[j] / row[pivot];
-            }
-        }
-    }
-    order
-}
-
-/// Adds `time` times the trend's row and column to those of the level.
-#[inline]
-fn carry(matrix: &mut [f64], order: usize, time: f64) {
-    for j in 0..order {
-        matrix[j] += time * matrix[order + j];
-    }
-    for i in 0..order {
-        matrix[i * order] += time * matrix[i * order + 1];
-    }
-}
-
-/// Multiplies the row and column of the level by what is kept of it.
-#[inline]
-fn shrink(matrix: &mut [f64], order: usize, kept: f64) {
-    for j in 0..order {
-        matrix[j] *= kept;
-        matrix[j * order] *= kept;
-    }
-}
-
-/// Multiplies a symmetric matrix by the row `(1, 0, x)` of an observation; the answer is the row times the product.
-#[inline]
-fn product(matrix: &[f64], model: &Structural, x: &[f64], to: &mut [f64]) -> f64 {
-    let (order, moving) = (to.len(), model.moving());
-    for (to, row) in to.iter_mut().zip(matrix.chunks_exact(order)) {
-        let terms = row[moving..].iter().zip(x);
-        *to = terms.fold(row[0], |sum, (value, x)| sum + value * x);
-    }
-    let terms = to[moving..].iter().zip(x);
-    terms.fold(to[0], |sum, (value, x)| sum + value * x)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::Passage;
-    use super::*;
-
-    const OWN: Structural = Structural {
-        observation: 0.09,
-        level: 0.01,
-        trend: Some(0.0001),
-        returning: 0.0,
-        passage: Passage::Steps,
-    };
-
-    /// A level, a trend and a coefficient, followed in segments of so many rows, and whether all is known after each segment.
-    fn known_after_segments(rows: usize, trend: Option<f64>) -> Vec<bool> {
-        let model = Structural { trend, ..OWN };
-        let mut filter = Kalman::diffuse(model, 1).unwrap();
-        let mut x = 0.5;
-        let segments = (0..6).map(|_| {
-            filter.forget_level();
-            for row in 0..rows {
-                if row > 0 {
-                    filter.advance(1.0);
-                }
-                x = 3.7 * x * (1.0 - x);
-                filter.observe(&[x], 1.0 + x);
-            }
-            !filter.is_diffuse()
-        });
-        segments.collect()
-    }
-
-    #[test]
-    fn a_coefficient_is_not_known_from_segments_that_are_too_short_for_level_and_trend() {
-        // A row tells the level, another one the trend, and only one more in the same segment the coefficient.
-        assert_eq!(known_after_segments(1, None), [false; 6]);
-        assert_eq!(known_after_segments(2, None), [true; 6]);
-        assert_eq!(known_after_segments(1, OWN.trend), [false; 6]);
-        assert_eq!(known_after_segments(2, OWN.trend), [false; 6]);
-        assert_eq!(known_after_segments(3, OWN.trend), [true; 6]);
-    }
-
-    #[test]
-    fn a_segment_that_ends_while_its_trend_is_unknown_leaves_the_next_as_much_to_tell() {
-        let mut filter = Kalman::diffuse(OWN, 0).unwrap();
-        filter.observe(&[], 1.0);
-        // A row without an observation.
-        filter.advance(1.0);
-        filter.forget_level();
-        filter.observe(&[], 1.0);
-        assert!(filter.is_diffuse(), "the trend is not known");
-        filter.advance(1.0);
-        filter.observe(&[], 2.0);
-        assert!(!filter.is_diffuse());
-    }
-
-    #[test]
-    fn filters_that_know_the_same_are_equal_whatever_way_they_came() {
-        let mut filter = Kalman::diffuse(OWN, 1).unwrap();
-        filter.observe(&[0.5], 1.0);
-        let mut other = Kalman::diffuse(OWN, 1).unwrap();
-        assert!(other.resume(&filter));
-        assert_eq!(other, filter);
-        other.observe(&[0.5], 1.0);
-        assert_ne!(other, filter);
     }
 }

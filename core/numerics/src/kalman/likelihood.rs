@@ -1,6 +1,6 @@
 //! Decides which variances make a series of observations most likely.
 
-use super::filter::diagonal;
+use super::matrix::diagonal;
 use super::simplex::minimum;
 use super::{Kalman, Movement, Passage, Structural};
 use crate::NumericsError;

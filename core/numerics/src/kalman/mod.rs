@@ -5,6 +5,7 @@
 
 mod filter;
 mod likelihood;
+mod matrix;
 mod model;
 mod simplex;
 #[cfg(test)]

@@ -1,47 +1,6 @@
-//! The filter against statsmodels: the shared oracle, and series with regressors, gaps and irregular times of its own.
+//! What a filter knows after each observation.
 
-use super::{Kalman, Movement, Passage, Series, Structural, follow, most_likely};
-use crate::NumericsError;
-use crate::oracle::{own_table, own_text, table, text};
-
-const OWN: Structural = Structural {
-    observation: 0.09,
-    level: 0.01,
-    trend: Some(0.0001),
-    returning: 0.0,
-    passage: Passage::Steps,
-};
-
-fn number(scalars: &serde_json::Value, path: &[&str]) -> f64 {
-    let found = path.iter().fold(scalars, |value, key| &value[key]);
-    found.as_f64().unwrap()
-}
-
-fn own_scalars() -> serde_json::Value {
-    serde_json::from_str(&own_text("kalman/scalars.json")).unwrap()
-}
-
-/// The own series: times between rows, regressors row by row, observations.
-fn own_series() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let rows = own_table("kalman/series.csv").numbers();
-    let times = rows.iter().map(|row| row[0]).collect();
-    let regressors = rows.iter().flat_map(|row| [row[1], row[2]]).collect();
-    (times, regressors, rows.iter().map(|row| row[3]).collect())
-}
-
-fn in_steps(rows: usize) -> Vec<f64> {
-    let mut times = vec![1.0; rows];
-    times[0] = f64::NAN;
-    times
-}
-
-#[track_caller]
-fn near(found: f64, expected: f64, within: f64) {
-    assert!(
-        (found - expected).abs() <= within,
-        "{found} instead of {expected}"
-    );
-}
+use super::*;
 
 #[test]
 fn a_local_linear_trend_equals_the_oracle() {
@@ -145,95 +104,6 @@ fn forecasts_with_regressors_equal_the_oracle() {
 }
 
 #[test]
-fn the_diffuse_likelihood_equals_the_oracle() {
-    let (times, regressors, observations) = own_series();
-    let scalars = own_scalars();
-    let mut irregular = times;
-    irregular[0] = f64::NAN;
-    for (passage, times, name) in [
-        (Passage::Steps, in_steps(observations.len()), "regular_llf"),
-        (Passage::Continuous, irregular, "irregular_llf"),
-    ] {
-        let series = Series {
-            times: &times,
-            observations: &observations,
-            regressors: &regressors,
-            prior: f64::INFINITY,
-            shared: 0.0,
-        };
-        let found = follow(Structural { passage, ..OWN }, &series).unwrap();
-        near(found.log_likelihood, number(&scalars, &[name]), 1e-8);
-    }
-}
-
-#[test]
-fn the_most_likely_variances_equal_the_oracle() {
-    let (_, regressors, observations) = own_series();
-    let scalars = own_scalars();
-    let times = in_steps(observations.len());
-    let series = Series {
-        times: &times,
-        observations: &observations,
-        regressors: &regressors,
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
-    for (movement, name) in [
-        (Movement::Wanders, "most_likely_level"),
-        (Movement::Trend, "most_likely_trend"),
-    ] {
-        let found = most_likely(movement, Passage::Steps, &series).unwrap();
-        near(found.log_likelihood, number(&scalars, &[name, "llf"]), 1e-6);
-        let model = found.model;
-        let variances = [Some(model.observation), Some(model.level), model.trend];
-        for (nth, variance) in variances.into_iter().flatten().enumerate() {
-            let expected = scalars[name]["params"][nth].as_f64().unwrap();
-            near(variance, expected, 0.01 * expected);
-        }
-        let again = follow(model, &series).unwrap();
-        near(again.log_likelihood, found.log_likelihood, 1e-8);
-    }
-}
-
-#[test]
-fn the_search_is_no_worse_than_the_oracle_of_the_shared_series() {
-    let Some(input) = table("kalman_llt/input.csv") else {
-        return;
-    };
-    let scalars: serde_json::Value =
-        serde_json::from_str(&text("kalman_llt/scalars.json").unwrap()).unwrap();
-    let observations: Vec<f64> = input.numbers().iter().map(|row| row[0]).collect();
-    let times = in_steps(observations.len());
-    let series = Series {
-        times: &times,
-        observations: &observations,
-        regressors: &[],
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
-    let found = most_likely(Movement::Trend, Passage::Steps, &series).unwrap();
-    let variances: Vec<f64> = scalars["mle_params_default_init"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|value| value.as_f64().unwrap())
-        .collect();
-    let of_theirs = Structural {
-        observation: variances[0],
-        level: variances[1],
-        trend: Some(variances[2]),
-        returning: 0.0,
-        passage: Passage::Steps,
-    };
-    let of_theirs = follow(of_theirs, &series).unwrap().log_likelihood;
-    assert!(
-        found.log_likelihood >= of_theirs - 1e-6,
-        "{} below {of_theirs}",
-        found.log_likelihood
-    );
-}
-
-#[test]
 fn time_may_be_let_pass_at_once_or_in_parts() {
     let returning = Structural {
         trend: None,
@@ -306,88 +176,6 @@ fn a_level_that_stays_makes_ridge_of_the_regressors() {
     near(filter.state()[0], fit.intercept, 1e-10);
     near(filter.state()[1], fit.coefficients[0], 1e-10);
     near(filter.state()[2], fit.coefficients[1], 1e-10);
-}
-
-#[test]
-fn coefficients_are_those_of_all_observations_even_where_they_share_noise() {
-    use crate::{GramBlocks, LeastSquares};
-    let (_, regressors, mut observations) = own_series();
-    for y in &mut observations {
-        *y = if y.is_nan() { 0.0 } else { *y };
-    }
-    let times = in_steps(observations.len());
-    let series = Series {
-        times: &times,
-        observations: &observations,
-        regressors: &regressors,
-        prior: 0.25,
-        shared: 4.0,
-    };
-    let model = Structural {
-        observation: 0.3,
-        level: 0.0,
-        trend: None,
-        returning: 0.0,
-        passage: Passage::Steps,
-    };
-    let found = follow(model, &series).unwrap();
-    let mut blocks = GramBlocks::new(2);
-    for (x, &y) in regressors.chunks_exact(2).zip(&observations) {
-        blocks.push(x, y);
-    }
-    let ridge = LeastSquares::ridge(4.0);
-    let fit = ridge
-        .solve(&blocks.total(), &[0, 1], &[1.0, 1.0], None)
-        .unwrap();
-    for (nth, coefficient) in fit.coefficients.iter().enumerate() {
-        near(
-            found.filter.state()[1 + nth],
-            *coefficient,
-            2e-2 * coefficient.abs(),
-        );
-    }
-    // Four that share their noise are as sure as one.
-    let alone = Series {
-        shared: 0.0,
-        ..series
-    };
-    let alone = follow(model, &alone).unwrap();
-    let ratio = found.filter.covariance()[4] / alone.filter.covariance()[4];
-    near(ratio, 4.0, 0.3);
-}
-
-#[test]
-fn a_level_that_returns_is_found_as_an_autoregression() {
-    let mut normal = crate::draws::normal(7);
-    let kept: f64 = 0.8;
-    let mut level = 0.0;
-    let observations: Vec<f64> = (0..4000)
-        .map(|_| {
-            level = kept * level + normal();
-            level + 0.5 * normal()
-        })
-        .collect();
-    let times = in_steps(observations.len());
-    let series = Series {
-        times: &times,
-        observations: &observations,
-        regressors: &[],
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
-    let found = most_likely(Movement::Returns, Passage::Continuous, &series).unwrap();
-    near((-found.model.returning).exp(), kept, 0.05);
-    near(found.model.observation, 0.25, 0.15);
-    let stays = most_likely(Movement::Wanders, Passage::Continuous, &series).unwrap();
-    assert!(found.log_likelihood > stays.log_likelihood + 10.0);
-    assert!(found.innovation_rms < stays.innovation_rms);
-    let (now, later) = (
-        found.filter.forecast(0.0, &[]),
-        found.filter.forecast(9.0, &[]),
-    );
-    let (now, later) = (now.unwrap(), later.unwrap());
-    near(later.mean, now.mean * found.model.kept(9.0), 1e-12);
-    assert!(later.variance < 1.2 / (1.0 - kept * kept));
 }
 
 #[test]
@@ -514,6 +302,50 @@ fn a_level_restarts_from_a_finite_pair_for_each_of_its_parts_only() {
 }
 
 #[test]
+fn an_observation_that_moves_the_level_alone_counts_with_what_is_not_known_of_the_rest() {
+    let model = Structural { trend: None, ..OWN };
+    // Level 1 and coefficient 2, with a covariance of 0.1 between them.
+    let start = [0.5, 0.1, 0.1, 0.3];
+    let mut filter = Kalman::starting_at(model, vec![1.0, 2.0], &start).unwrap();
+    let x = 4.0;
+    let brought = filter.observe_with(1, &[x], 12.0, 0.5).unwrap();
+    let variance = 0.5 + 2.0 * x * 0.1 + x * x * 0.3 + model.observation / 0.5;
+    near(brought.error, 12.0 - 1.0 - 2.0 * x, 1e-12);
+    near(brought.variance, variance, 1e-12);
+    let (own, of_coefficient) = (0.5 + x * 0.1, 0.1 + x * 0.3);
+    let gain = own / variance;
+    near(filter.state()[0], 1.0 + gain * brought.error, 1e-12);
+    assert_eq!(filter.state()[1], 2.0);
+    let found = filter.covariance();
+    near(found[0], 0.5 - gain * own, 1e-12);
+    near(found[1], 0.1 - gain * of_coefficient, 1e-12);
+    assert_eq!((found[2], found[3]), (found[1], 0.3));
+    let mut diffuse = Kalman::diffuse(model, 1).unwrap();
+    assert!(diffuse.observe_with(1, &[x], 12.0, 1.0).is_none());
+}
+
+#[test]
+fn a_level_that_may_have_leapt_is_where_the_next_observation_puts_it_and_coefficients_stay() {
+    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+    for step in 0..200 {
+        let x = f64::from(step % 7);
+        filter.observe(&[x], 10.0 + 2.0 * x);
+        filter.advance(1.0);
+    }
+    let before = filter.clone();
+    for leap in [1e3, 1e5] {
+        let mut filter = before.clone();
+        filter.widen(0, leap * leap);
+        filter.observe(&[3.0], 16.0 + leap);
+        near(filter.state()[0], 10.0 + leap, 1e-3);
+        near(filter.state()[2], before.state()[2], 1e-4);
+        near(filter.covariance()[0], OWN.observation, 0.05);
+        let ratio = filter.covariance()[8] / before.covariance()[8];
+        near(ratio, 1.0, 1e-4);
+    }
+}
+
+#[test]
 fn what_is_no_number_is_no_observation() {
     let mut filter = Kalman::diffuse(OWN, 1).unwrap();
     let before = filter.clone();
@@ -524,41 +356,75 @@ fn what_is_no_number_is_no_observation() {
     assert_eq!(filter.covariance(), before.covariance());
 }
 
+/// A level, a trend and a coefficient, followed in segments of so many rows, and whether all is known after each segment.
+fn known_after_segments(rows: usize, trend: Option<f64>) -> Vec<bool> {
+    let model = Structural { trend, ..OWN };
+    let mut filter = Kalman::diffuse(model, 1).unwrap();
+    let mut x = 0.5;
+    let segments = (0..6).map(|_| {
+        filter.forget_level();
+        for row in 0..rows {
+            if row > 0 {
+                filter.advance(1.0);
+            }
+            x = 3.7 * x * (1.0 - x);
+            filter.observe(&[x], 1.0 + x);
+        }
+        !filter.is_diffuse()
+    });
+    segments.collect()
+}
+
 #[test]
-fn what_cannot_be_followed_is_refused() {
-    let negative = Structural {
-        level: f64::NAN,
-        ..OWN
-    };
-    assert!(matches!(
-        Kalman::diffuse(negative, 0),
-        Err(NumericsError::Parameter { name: "level", .. })
-    ));
-    let narrow = Kalman::starting_at(OWN, vec![0.0; 2], &[1.0]);
-    assert!(matches!(narrow, Err(NumericsError::Width { .. })));
-    let series = |observations, times| Series {
-        times,
-        observations,
-        regressors: &[],
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
-    let few = most_likely(
-        Movement::Wanders,
-        Passage::Steps,
-        &series(&[1.0, 2.0], &[f64::NAN, 1.0]),
+fn a_coefficient_is_not_known_from_segments_that_are_too_short_for_level_and_trend() {
+    // A row tells the level, another one the trend, and only one more in the same segment the coefficient.
+    assert_eq!(known_after_segments(1, None), [false; 6]);
+    assert_eq!(known_after_segments(2, None), [true; 6]);
+    assert_eq!(known_after_segments(1, OWN.trend), [false; 6]);
+    assert_eq!(known_after_segments(2, OWN.trend), [false; 6]);
+    assert_eq!(known_after_segments(3, OWN.trend), [true; 6]);
+}
+
+#[test]
+fn a_segment_that_ends_while_its_trend_is_unknown_leaves_the_next_as_much_to_tell() {
+    let mut filter = Kalman::diffuse(OWN, 0).unwrap();
+    filter.observe(&[], 1.0);
+    // A row without an observation.
+    filter.advance(1.0);
+    filter.forget_level();
+    filter.observe(&[], 1.0);
+    assert!(filter.is_diffuse(), "the trend is not known");
+    filter.advance(1.0);
+    filter.observe(&[], 2.0);
+    assert!(!filter.is_diffuse());
+}
+
+#[test]
+fn filters_that_know_the_same_are_equal_whatever_way_they_came() {
+    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+    filter.observe(&[0.5], 1.0);
+    let mut other = Kalman::diffuse(OWN, 1).unwrap();
+    assert!(other.resume(&filter));
+    assert_eq!(other, filter);
+    other.observe(&[0.5], 1.0);
+    assert_ne!(other, filter);
+}
+
+#[test]
+fn one_more_coefficient_that_is_known_to_be_0_changes_nothing() {
+    let mut filter = Kalman::diffuse(OWN, 1).unwrap();
+    for step in 0..20 {
+        let x = f64::from(step % 7);
+        filter.observe(&[x], 10.0 + 2.0 * x);
+        filter.advance(1.0);
+    }
+    let mut wider = filter.with_coefficient();
+    let brought = filter.observe(&[3.0], 15.0);
+    assert_eq!(wider.observe(&[1.0, 3.0], 15.0), brought);
+    assert_eq!(wider.state()[..2], filter.state()[..2]);
+    assert_eq!(wider.state()[2..], [0.0, filter.state()[2]]);
+    assert_eq!(
+        wider.forecast(3.0, &[1.0, 4.0]),
+        filter.forecast(3.0, &[4.0])
     );
-    assert!(matches!(
-        few,
-        Err(NumericsError::TooFewRows {
-            needed: 4,
-            found: 2
-        })
-    ));
-    let same = most_likely(
-        Movement::Wanders,
-        Passage::Steps,
-        &series(&[1.0; 6], &[1.0; 6]),
-    );
-    assert_eq!(same, Err(NumericsError::NoConvergence));
 }
