@@ -284,6 +284,18 @@ impl Rls {
         error
     }
 
+    /// Moves a coefficient without a row, and makes it more uncertain by a variance of its own in units of the noise variance.
+    ///
+    /// # Panics
+    /// When there is no such coefficient, or a number is not finite, or the variance negative.
+    pub fn shift(&mut self, coefficient: usize, by: f64, variance: f64) {
+        let fine = by.is_finite() && variance >= 0.0 && variance.is_finite();
+        assert!(fine, "a shift and its variance are finite");
+        let width = self.coefficients.len();
+        self.coefficients[coefficient] += by;
+        self.covariance[coefficient * (width + 1)] += variance;
+    }
+
     /// Goes on with other options.
     #[must_use]
     pub fn with(mut self, options: RlsOptions) -> Self {

@@ -180,6 +180,15 @@ impl Sgd {
         }
     }
 
+    /// Moves the intercept without a row.
+    ///
+    /// # Panics
+    /// When that is not finite.
+    pub fn shift(&mut self, by: f64) {
+        assert!(by.is_finite(), "a shift is finite");
+        self.intercept += by;
+    }
+
     /// Goes on with other options.
     #[must_use]
     pub fn with(mut self, options: SgdOptions) -> Self {

@@ -10,6 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::scaling::scale_mistakes;
 
+/// A truth that misses by more than so many deviations is a leap of the constant: it would move all coefficients by more than a
+/// memory of a thousand rows has found out.
+const LEAP: f64 = 100.0;
+/// How large the variance of a leap is at most, in that of the noise: beyond, rounding would be more than noise.
+const WIDEST: f64 = 1e12;
+
 /// Regressors as the recursion sees them: standardised as in the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Frame {
@@ -281,6 +287,28 @@ impl OnlineLearner {
         learner
     }
 
+    /// Moves the constant alone where a truth misses by so much that it has leapt; whether it has.
+    fn leapt(&mut self, regressors: &[f64], truth: f64, at: Instant) -> bool {
+        let by = truth - self.predict(regressors, at);
+        let usual = match &self.state.recursion {
+            Recursion::Sgd(_) => self.usual_error(),
+            Recursion::Rls { .. } => self.deviation(regressors, at),
+        };
+        // Written so that NaN fails.
+        let leapt = by.is_finite() && by.abs() > LEAP * usual && usual > 0.0;
+        if leapt {
+            match &mut self.state.recursion {
+                Recursion::Sgd(sgd) => sgd.shift(by),
+                Recursion::Rls { rls, noise } => {
+                    // Whether it stays there is told by the next truth.
+                    let variance = (by / *noise).powi(2).min(WIDEST);
+                    rls.shift(regressors.len(), by, variance);
+                }
+            }
+        }
+        leapt
+    }
+
     fn refresh(&mut self) {
         let OnlineState { frame, recursion } = &self.state;
         self.intercept = frame.unscaled(recursion, &mut self.coefficients);
@@ -305,7 +333,10 @@ impl Learner for OnlineLearner {
         self.rmse.unwrap_or(f64::NAN)
     }
 
-    fn learn(&mut self, regressors: &[f64], truth: f64, _at: Instant) {
+    fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
+        if self.leapt(regressors, truth, at) {
+            return self.refresh();
+        }
         let OnlineState { frame, recursion } = &mut self.state;
         frame.standardise(regressors, &mut self.row);
         let truth = truth - frame.level;

@@ -26,7 +26,8 @@ use crate::solver::Solver;
 /// The rows of the fit count as one memory's worth of rows, so that the first truths move the coefficients no more than later
 /// ones do. Where nothing excites a regressor for long, its past is not forgotten beyond ten times the uncertainty of the
 /// start, so that the next disturbance finds a model that is still sound. A regressor that is the same in all rows of the fit is
-/// left out of it and of what is learned later: it comes in with the next fit.
+/// left out of it and of what is learned later: it comes in with the next fit. A truth that misses by
+/// more than a hundred deviations, and is no outlier any more, moves the constant alone, as unsure as that until the next truth.
 ///
 /// The port `learning` tells what became of the newest truth: 0 learned from, 1 frozen on command, 2 frozen by a channel, 3
 /// an outlier, 4 a regressor outside the range of the fit, 5 outside `train.abs_truth`, 6 no complete row. The port
