@@ -15,5 +15,6 @@ mod freezing;
 mod gaps;
 mod kept;
 mod kinds;
+mod leaps;
 mod machine;
 mod world;

@@ -59,7 +59,8 @@ pub(crate) struct LearnLimits {
     #[schemars(extend("exclusiveMinimum" = 1.0))]
     pub(crate) outliers: f64,
     /// Rows of which a regressor lies farther outside the range of the fit than this multiple of its width; 0 where it is not
-    /// given. Not for kinds that follow a state, such as `kalman`, which is followed whatever the regressors are.
+    /// given. The level of `kalman` follows them all the same, and its coefficients stay. Not for kinds that follow a state
+    /// alone, such as `armax`, which is followed whatever the regressors are.
     #[schemars(with = "f64", range(min = 0.0))]
     pub(crate) margin: Option<f64>,
 }

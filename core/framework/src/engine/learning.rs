@@ -41,7 +41,7 @@ pub(crate) enum Became {
     FrozenByChannel = 2,
     /// It missed its prediction by too much.
     Outlier = 3,
-    /// A regressor lay outside the range of the fit.
+    /// A regressor lay outside the range of the fit: a level follows it all the same, and nothing else is learned.
     OutsideRange = 4,
     /// It lay outside the limits of `train.abs_truth`.
     OutsideLimits = 5,
@@ -277,7 +277,8 @@ impl Gate {
             return Became::OutsideLimits;
         }
         let range = self.predictor.trained_range();
-        if range.is_some_and(|range| !range.contains(row, self.planned.margin)) {
+        let outside = range.is_some_and(|range| !range.contains(row, self.planned.margin));
+        if outside && !learner.has_level() {
             return Became::OutsideRange;
         }
         let error = truth - learner.predict(row, arrived);
@@ -287,6 +288,10 @@ impl Gate {
         let starts_anywhere = learner.extrapolates();
         if learner.settled() && !self.recent.admits(error, deviation, most, starts_anywhere) {
             return Became::Outlier;
+        }
+        if outside {
+            learner.follow_level(row, truth, arrived);
+            return Became::OutsideRange;
         }
         learner.learn(row, truth, arrived);
         Became::Learned

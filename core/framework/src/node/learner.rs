@@ -144,6 +144,15 @@ pub trait Learner: Debug + Send {
     /// Nothing is allocated here.
     fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant);
 
+    /// Whether it has a level that truths move whatever becomes of its coefficients, by [`follow_level`](Self::follow_level). Where
+    /// a regressor lies outside the range of the fit, nothing is learned but the level goes on.
+    fn has_level(&self) -> bool {
+        false
+    }
+
+    /// The same as [`learn`](Self::learn), but for its level alone. Only asked of those that have one.
+    fn follow_level(&mut self, _regressors: &[f64], _truth: f64, _at: Instant) {}
+
     /// The next tick belongs to another segment of the data, whose clock is `shift` ahead of a seamless continuation.
     ///
     /// What was learned stays; instants that are kept move by `shift`.

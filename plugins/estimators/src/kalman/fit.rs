@@ -3,7 +3,7 @@
 use athermal_core::channel::Extremes;
 use athermal_core::diagnostic::digits;
 use athermal_core::node::{
-    Figure, Learner, Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Figure, Learner, Trained, TrainedRange, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -12,6 +12,7 @@ use athermal_numerics::{
     Movement, NumericsError, Passage, Series, Standardizer, Structural, follow, most_likely,
 };
 
+use super::follow::Following;
 use super::told::Hourly;
 use super::{Kalman, KalmanPredictor, Noises};
 use crate::conditioning::tell_rows;
@@ -39,6 +40,8 @@ pub(super) struct KalmanTrainer {
     segment_pending: bool,
     kept: Vec<Kept>,
     regressors: Vec<f64>,
+    /// Of the regressors in all rows.
+    range: TrainedRange,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -64,6 +67,7 @@ impl KalmanTrainer {
             parameters,
             unit: setup.error_unit.clone(),
             most: (setup.memory / bytes).clamp(16, MOST_ROWS),
+            range: TrainedRange::new(names.len()),
             names,
             stride: 1,
             rows: 0,
@@ -110,6 +114,8 @@ impl KalmanTrainer {
         if !varying.contains(&false) {
             return;
         }
+        let places: Vec<usize> = (0..width).filter(|&nth| varying[nth]).collect();
+        self.range = self.range.of(&places);
         let mut places = varying.iter().cycle();
         self.regressors.retain(|_| places.next() == Some(&true));
         let names = std::mem::take(&mut self.names).into_iter().zip(&varying);
@@ -196,6 +202,7 @@ impl KalmanTrainer {
             filter,
             at_large: followed.at_large,
             every: self.every,
+            range: Some(self.range.clone()),
         };
         report.in_sample_rmse = Some(self.in_sample_rmse(&predictor));
         Ok(predictor)
@@ -205,7 +212,7 @@ impl KalmanTrainer {
     fn in_sample_rmse(&self, predictor: &KalmanPredictor) -> f64 {
         let width = self.names.len();
         let row = |nth: usize| &self.regressors[nth * width..(nth + 1) * width];
-        let mut following = predictor.following();
+        let mut following = Following::new(predictor);
         // The first row that has not been learned from.
         let mut next = 0;
         let mut squares = 0.0;
@@ -297,6 +304,7 @@ impl Trainer for KalmanTrainer {
     fn row_at(&mut self, at: Instant, regressors: &[f64], truth: f64) {
         self.last = Some(at);
         self.rows += 1;
+        self.range.include(regressors);
         if !(self.rows - 1).is_multiple_of(self.stride) {
             return;
         }

@@ -1,21 +1,23 @@
 //! The estimator that follows a level and a trend while truths come in.
 
 use athermal_core::node::{
-    Coefficients, Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors, Restored,
-    State, Trainer, TrainingSetup,
+    Coefficients, Estimator, InputPort, Learner, Learns, Mistake, Predictor, Regressors,
+    TrainedRange, Trainer, TrainingSetup,
 };
 use athermal_core::quantity::Quantity;
-use athermal_core::time::{Duration, Instant};
+use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
 use athermal_numerics::Kalman as Filter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 mod fit;
+mod follow;
 mod told;
 
 use crate::scaling::Scaling;
 use fit::KalmanTrainer;
+use follow::{Following, deviation};
 
 /// Kalman filter of a structural model: a level that wanders, maybe with a trend, and linear regression on features.
 ///
@@ -29,13 +31,24 @@ use fit::KalmanTrainer;
 /// `learn = false` it stays where the fit ended, which is regression on the features. Without features it is a forecast from the past of the truth
 /// alone.
 ///
+/// The fit knows nothing of level and trend where it starts, nor at the start of a segment (a diffuse start). A level is one
+/// that returns only where that makes the rows likelier by a factor of 60, as one in twenty does that does not return. What is
+/// not known of the variances and of that rate is no part of `deviation`; what is not known of level, trend and coefficients is.
+///
+/// A truth of which a feature lies outside the range of the fit, by more than `learn.margin` says, moves level and trend and
+/// leaves the coefficients as they are (Schmidt 1966), so that a dead sensor cannot spoil them. One that misses by more than
+/// ten deviations, and is no outlier any more since so many before it did too, is a leap of the level: the level is where the
+/// truth is, as unsure as it has leapt until the next truth tells whether it stays there, and the coefficients hardly move. Of
+/// the variance of the leap, the mean `ȳ` of a level that returns has a hundredth, so that the mean has moved where the level
+/// stays away, and a trend what a ramp since the truth before could tell. In a new segment the mean is as unsure as it has moved.
+///
 /// Truths whose windows overlap share their noise, which the model would take for a level that moves; so a truth that comes
 /// sooner than `every` after the one before counts for its share of that time, its variance being multiplied by the inverse.
 /// The coefficients are so those of all rows; the variances are found from rows `every` apart. In a new segment level and
 /// trend start from what the fit knew of them at large. The port `deviation` is the standard deviation of the truth about its
 /// prediction; it grows while no truth comes. The port `learning` tells what became of the newest truth, in the numbers of
-/// `rls`, and what is not learned from is not followed either. The answer changes with time alone, so the node runs at every
-/// tick.
+/// `rls`, and what is not learned from is not followed either, but for 4, a feature outside the range of the fit. The answer
+/// changes with time alone, so the node runs at every tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kalman {
@@ -46,7 +59,7 @@ pub struct Kalman {
     #[serde(default)]
     pub noises: Option<Noises>,
     /// The penalty on the coefficients of standardised features, at least 0, as in ridge: their prior variance is the sum
-    /// of the model's variances over a typical step divided by it. 0 says that nothing is known of them; a smaller one than
+    /// of the model's variances over a typical step, the mean gap between rows, divided by it. 0 says that nothing is known of them; a smaller one than
     /// 1e-10 counts as that, since differences of larger variances would be rounding alone.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0))]
@@ -128,10 +141,6 @@ impl Estimator for Kalman {
 
     fn learns(&self) -> Learns {
         Learns::UnlessTold
-    }
-
-    fn keeps_range(&self) -> bool {
-        false
     }
 
     fn deviates(&self) -> bool {
@@ -233,6 +242,9 @@ struct KalmanPredictor {
     /// Mean and variance of level and trend at large.
     at_large: Vec<(f64, f64)>,
     every: Duration,
+    /// The range of the regressors in the fit; of models before it was kept, none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    range: Option<TrainedRange>,
 }
 
 impl Predictor for KalmanPredictor {
@@ -256,6 +268,7 @@ impl Predictor for KalmanPredictor {
             let message = "`at_large` must have a finite mean and a finite variance of at least 0 for the level, and for the trend where there is one";
             mistakes.push(Mistake::at("at_large", message));
         }
+        mistakes.extend(self.range.iter().flat_map(|range| range.mistakes(width)));
         mistakes
     }
 
@@ -272,127 +285,14 @@ impl Predictor for KalmanPredictor {
     }
 
     fn learner(&self) -> Option<Box<dyn Learner>> {
-        Some(Box::new(self.following()))
+        Some(Box::new(Following::new(self)))
+    }
+
+    fn trained_range(&self) -> Option<&TrainedRange> {
+        self.range.as_ref()
     }
 }
 
 athermal_core::predictor!(KalmanPredictor, "kalman");
 
-impl KalmanPredictor {
-    fn following(&self) -> Following {
-        Following {
-            known: Known {
-                filter: self.filter.clone(),
-                scaling: self.scaling.clone(),
-                last: None,
-            },
-            at_large: self.at_large.clone(),
-            every: self.every,
-            row: vec![0.0; self.regressors.len()],
-        }
-    }
-}
-
-fn deviation(filter: &Filter, time: f64, regressors: impl Fn(usize) -> f64) -> f64 {
-    let forecast = filter.forecast_of(time, regressors);
-    forecast.map_or(f64::NAN, |forecast| {
-        (forecast.variance + filter.model().observation).sqrt()
-    })
-}
-
-/// Follows the level as truths come in.
-#[derive(Debug)]
-struct Following {
-    known: Known,
-    at_large: Vec<(f64, f64)>,
-    every: Duration,
-    row: Vec<f64>,
-}
-
-/// What is known of level, trend and coefficients.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Known {
-    /// As of the last truth.
-    filter: Filter,
-    scaling: Scaling,
-    /// When that was.
-    last: Option<Instant>,
-}
-
-impl Known {
-    /// The time in seconds from the last truth.
-    fn since(&self, of: Instant) -> f64 {
-        self.last.map_or(0.0, |last| (of - last).secs().max(0.0))
-    }
-}
-
-impl Learner for Following {
-    fn extrapolates(&self) -> bool {
-        true
-    }
-
-    fn predict(&self, regressors: &[f64], of: Instant) -> f64 {
-        let Known {
-            filter, scaling, ..
-        } = &self.known;
-        scaling.truth + filter.expected(self.known.since(of), scaling.of(regressors))
-    }
-
-    fn deviation(&self, regressors: &[f64], of: Instant) -> f64 {
-        let Known {
-            filter, scaling, ..
-        } = &self.known;
-        deviation(filter, self.known.since(of), scaling.of(regressors))
-    }
-
-    fn learn(&mut self, regressors: &[f64], truth: f64, at: Instant) {
-        let since = self.known.since(at);
-        let Known {
-            filter,
-            scaling,
-            last,
-        } = &mut self.known;
-        let scaled = scaling.of(regressors);
-        for (nth, value) in self.row.iter_mut().enumerate() {
-            *value = scaled(nth);
-        }
-        let share = match *last {
-            Some(_) if since > 0.0 && since < self.every.secs() => since / self.every.secs(),
-            _ => 1.0,
-        };
-        filter.advance(since);
-        filter.observe_share(&self.row, truth - scaling.truth, share);
-        *last = Some(at);
-    }
-
-    fn segment(&mut self, _shift: Duration) {
-        // How long the machine was not watched is unknown, and so is where the level has gone meanwhile.
-        self.known.filter.restart_level(&self.at_large);
-        self.known.last = None;
-    }
-
-    fn snapshot(&self) -> Box<dyn State> {
-        Box::new(self.known.clone())
-    }
-
-    fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        let known = match state.known::<Known>() {
-            Ok(known) => known,
-            Err(cold) => return cold,
-        };
-        if known.scaling != self.known.scaling {
-            return Restored::cold("its coefficients are for features on another scale");
-        }
-        if known.filter.is_diffuse() {
-            return Restored::cold("it knows nothing of a state");
-        }
-        if !self.known.filter.resume(&known.filter) {
-            return Restored::cold("it has other states: a trend more or less, or other features");
-        }
-        self.known.last = known.last;
-        Restored::Accepted
-    }
-}
-
-athermal_core::state!(Known, "kalman/1");
 athermal_core::register!(Kalman, Estimator, "kalman");
