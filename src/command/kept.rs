@@ -103,9 +103,10 @@ impl Kept {
         }
     }
 
-    /// Keeps what is known after the first row, when another graph has taken over and now and then, once what came of it has left the program: a run that goes on from there does not
-    /// predict it again. Where it cannot be kept, as on a disk that is full, that is told and tried again: a machine goes without
-    /// what it would know after a restart rather than without its predictions.
+    /// Keeps what is known after the first row, when another graph has taken over and now and then, once what came of it has left
+    /// the program: a run that goes on from there does not predict it again. Where it cannot be kept, as on a disk that is full,
+    /// that is told and tried again: a machine goes without what it would know after a restart rather than without its
+    /// predictions.
     ///
     /// # Errors
     /// When the sink fails.

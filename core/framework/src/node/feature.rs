@@ -99,7 +99,8 @@ pub trait Feature: Debug + Send + Sync {
         Vec::new()
     }
 
-    /// What runs. `wanted[i]` says whether anybody reads output port `i`.
+    /// What runs. `wanted[i]` says whether anybody reads output port `i`, so that what nobody reads need not be computed. All ports
+    /// keep their places among the outputs, wanted or not.
     fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator>;
 
     /// How it is fitted, for a kind that learns from a truth before it runs: see [`Encoder`].
