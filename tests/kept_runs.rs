@@ -225,7 +225,8 @@ fn a_run_that_begins_cold_goes_on_with_its_output_too_and_loses_no_row_of_it() {
     let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
     let arguments: [&dyn AsRef<std::ffi::OsStr>; 8] =
         [&"run", &model, &"-i", &"-", &"-o", &out, &"--state", &state];
-    let run = |rows: &[&str]| athermal_fed(&arguments, rows.join("\n").as_bytes()).ended(0);
+    let run =
+        |rows: &[&str]| athermal_fed(&arguments, (rows.join("\n") + "\n").as_bytes()).ended(0);
     run(&lines[..2001]);
     let before = std::fs::read_to_string(&out).unwrap();
     std::fs::remove_file(&state).unwrap();
@@ -427,8 +428,8 @@ fn rows_of_a_pipe_that_are_passed_over_are_told_at_ten_a_hundred_and_so_on_also_
     let state = scratch.path("state");
     let arguments: [&dyn AsRef<std::ffi::OsStr>; 7] =
         [&"run", &model, &"-i", &"-", &"--state", &state, &"-q"];
-    athermal_fed(&arguments, lines[..2001].join("\n").as_bytes()).ended(0);
-    let back = [&lines[..1], &lines[1001..2500]].concat().join("\n");
+    athermal_fed(&arguments, (lines[..2001].join("\n") + "\n").as_bytes()).ended(0);
+    let back = [&lines[..1], &lines[1001..2500]].concat().join("\n") + "\n";
     let told = athermal_fed(&arguments, back.as_bytes()).ended(0).told;
     for part in [
         "10 rows so far, up to that of 10090.0, which is 2h45min before the last of the run before: nothing is put out until",

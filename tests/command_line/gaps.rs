@@ -47,6 +47,7 @@ expect = [{ of = "vote.Z1", given_above = 0.5, rmse_belw = "1 nm" }]
         (5, "parsec"),
         (14, "no input `other`"),
         (15, "no key \"windws\""),
+        (16, "`min_coverage` is 3"),
         (19, "`power` is 99"),
         (21, "as_printed_rw"),
         (25, "slpe"),

@@ -170,7 +170,9 @@ impl Errors {
     /// Takes the error of one vote whose truth has arrived.
     pub(crate) fn observe_one(&mut self, voter: usize, vote: f64, truth: f64, arrived: Instant) {
         let square = (vote - truth) * (vote - truth);
-        if !square.is_nan() {
+        // A truth beyond all sizes says nothing of who was nearer to it; a vote beyond them was wrong.
+        let is_told = truth * truth <= LARGEST;
+        if is_told && !square.is_nan() {
             self.remember(voter, arrived, square.min(LARGEST));
         }
     }

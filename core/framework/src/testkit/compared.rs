@@ -53,6 +53,16 @@ impl Course {
 
     /// The first difference in bits or stamps to another course, in words.
     pub(super) fn difference(&self, other: &Self, fixture: &Fixture) -> Option<String> {
+        self.difference_where(other, fixture, |_| true)
+    }
+
+    /// The same of some slots.
+    pub(super) fn difference_where(
+        &self,
+        other: &Self,
+        fixture: &Fixture,
+        counts: impl Fn(usize) -> bool,
+    ) -> Option<String> {
         if self.ticks.len() != other.ticks.len() {
             return Some(format!(
                 "one run has {} ticks and the other {}",
@@ -63,8 +73,8 @@ impl Course {
         let ticks = self.ticks.iter().zip(&other.ticks).enumerate();
         for (nth, ((now, one), (_, two))) in ticks {
             for (number, (one, two)) in one.iter().zip(two).enumerate() {
-                if !alike(*one, *two) {
-                    let slot = fixture.slots().start + number;
+                let slot = fixture.slots().start + number;
+                if counts(slot) && !alike(*one, *two) {
                     return Some(format!(
                         "at tick {nth} ({now} s) `{}` is {} in one run and {} in the other",
                         fixture.plan.channels[slot].name,

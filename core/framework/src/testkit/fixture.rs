@@ -30,9 +30,21 @@ impl Fixture {
         parameters: &toml::Table,
         given: &[Given],
     ) -> Result<Self, String> {
-        let text = graph(kind, parameters, given, &[]);
-        let ports = compiled(&text)?.ports();
-        compiled(&graph(kind, parameters, given, &ports))
+        let ports = Self::reading(kind, parameters, given, &[])?.ports();
+        Self::reading(kind, parameters, given, &ports)
+    }
+
+    /// The same, where beside the default port only these are read.
+    ///
+    /// # Errors
+    /// As for [`Fixture::new`].
+    pub(super) fn reading(
+        kind: &Kind,
+        parameters: &toml::Table,
+        given: &[Given],
+        ports: &[String],
+    ) -> Result<Self, String> {
+        compiled(&graph(kind, parameters, given, ports))
     }
 
     /// An engine for it, cold.
@@ -53,7 +65,7 @@ impl Fixture {
         }
     }
 
-    fn default_port(&self) -> &'static str {
+    pub(super) fn default_port(&self) -> &'static str {
         let node = &self.plan.nodes[0];
         match (node.spec.role(), &node.role) {
             (Role::Feature(feature), PlannedRole::Feature { inputs, .. }) => feature
@@ -66,7 +78,7 @@ impl Fixture {
     }
 
     /// All output ports but the default one.
-    fn ports(&self) -> Vec<String> {
+    pub(super) fn ports(&self) -> Vec<String> {
         let mut ports: Vec<String> = self
             .slots()
             .map(|slot| port(&self.plan.channels[slot].name).to_owned())

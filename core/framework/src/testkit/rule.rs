@@ -32,6 +32,10 @@ pub enum Rule {
     Past,
     /// A new segment starts afresh, at whatever time it begins.
     Segments,
+    /// A port gives the same bits whatever is read beside it.
+    Wanted,
+    /// However many channels come, where it takes so many, it runs, and gives the same bits again.
+    Widths,
     /// The same samples in other units give the same outputs in theirs.
     Units,
     /// Once warm, a tick allocates nothing.
@@ -70,6 +74,8 @@ impl Rule {
             Self::Infinity => "infinity",
             Self::Past => "past",
             Self::Segments => "segments",
+            Self::Wanted => "wanted",
+            Self::Widths => "widths",
             Self::Units => "units",
             Self::Allocation => "allocation",
             Self::Votes => "votes",
@@ -131,7 +137,16 @@ impl Rule {
                  all that a channel is made of; give no stamp that is later than `tick.now`"
             }
             Self::Segments => {
-                "clear in `segment` all that `step` has gathered, the last instant included; what was learned may stay"
+                "clear in `segment` all that `step` has gathered, the last instant included; what was learned may stay, and its instants \
+                 move by the shift that `segment` is told"
+            }
+            Self::Wanted => {
+                "count the places of outputs over all ports in their order, those that `wanted` says nobody reads included, and leave these \
+                 unset"
+            }
+            Self::Widths => {
+                "take the number of channels from `Inputs` in `build`, or of regressors from `TrainingSetup`, and refuse numbers that cannot be \
+                 by a `Mistake`; go through nothing in the order of a hash map"
             }
             Self::Units => {
                 "convert parameters given with a unit into the unit of the channel (`Quantity::in_unit`), state the right unit for \

@@ -6,7 +6,9 @@ mod combiner;
 mod encoder;
 mod estimator;
 mod feature;
+mod instants;
 mod parameters;
+mod ports;
 
 use std::collections::BTreeSet;
 

@@ -302,7 +302,6 @@ impl Feature for Misnamed {
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let mut channels = inputs.port("signal").to_vec();
-        channels.truncate(1);
         for channel in &mut channels {
             channel.name = format!("{} (mean)", channel.name);
         }

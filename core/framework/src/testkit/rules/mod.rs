@@ -10,6 +10,7 @@ mod parameters;
 mod past;
 mod repeat;
 mod schema;
+mod shapes;
 mod snapshots;
 mod traces;
 mod units;
@@ -47,7 +48,7 @@ pub(super) struct Subject<'a> {
 type Check = fn(&Subject<'_>, others: &[Subject<'_>]) -> Result<(), String>;
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 21] = [
+pub(super) const ALL: [(Rule, Check); 23] = [
     (Rule::Names, |subject, _| names::names(subject)),
     (Rule::Answers, |subject, _| subject.answers()),
     (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
@@ -62,6 +63,8 @@ pub(super) const ALL: [(Rule, Check); 21] = [
     (Rule::Infinity, |subject, _| absence::infinity(subject)),
     (Rule::Past, |subject, _| past::past(subject)),
     (Rule::Segments, |subject, _| repeat::segments(subject)),
+    (Rule::Wanted, |subject, _| shapes::wanted(subject)),
+    (Rule::Widths, |subject, _| shapes::widths(subject)),
     (Rule::Units, |subject, _| units::units(subject)),
     (Rule::Allocation, |subject, _| {
         allocation::allocation(subject)

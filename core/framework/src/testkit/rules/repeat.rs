@@ -77,12 +77,41 @@ pub(super) fn segments(subject: &Subject<'_>) -> Result<(), String> {
         engine.segment();
         let broken_off = course(fixture, &mut engine, after.events());
         if !subject.is_feature() {
+            elsewhen(subject, before, &after, &broken_off, when)?;
             continue;
         }
         let afresh = course(fixture, &mut subject.engine(), after.events());
         if let Some(difference) = afresh.difference(&broken_off, fixture) {
             return Err(format!(
                 "in a segment whose time {when} it gives other outputs than a new node: {difference}"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// What was learned before a break goes on after it, and is as old then whenever that is.
+fn elsewhen(
+    subject: &Subject<'_>,
+    before: &[(Event, Vec<f64>)],
+    after: &Table,
+    found: &Course,
+    when: &str,
+) -> Result<(), String> {
+    let later = shifted(after.events(), Duration::from_ns(3_600_000_000_000));
+    let mut engine = subject.engine();
+    course(&subject.fixture, &mut engine, before);
+    engine.segment();
+    let other = course(&subject.fixture, &mut engine, later.events());
+    for number in 0..subject.fixture.slots().len() {
+        let mut pairs = found.values(number).zip(other.values(number));
+        let differs = |&(one, two): &(f64, f64)| {
+            one.to_bits() != two.to_bits() && !(one.is_nan() && two.is_nan())
+        };
+        if let Some((one, two)) = pairs.find(differs) {
+            return Err(format!(
+                "in a segment whose time {when} `{}` is {one:?}, and {two:?} where that begins an hour later",
+                subject.name(number)
             ));
         }
     }

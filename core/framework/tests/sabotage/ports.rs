@@ -1,0 +1,116 @@
+//! A feature of several ports that is sound, and the same with one fault at a time.
+
+use athermal_core::node::{
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
+};
+use athermal_core::testkit::{Case, Rule};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{breaks, breaks_only};
+
+/// Each channel once, twice and thrice.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Multiples {
+    /// What is wrong with it; nothing by default.
+    #[serde(default)]
+    fault: Fault,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Fault {
+    #[default]
+    None,
+    /// Moves ports up where others before them are not read.
+    Packs,
+    /// Reads the second channel.
+    NeedsTwo,
+}
+
+const PORTS: [&str; 3] = ["once", "twice", "thrice"];
+
+impl Feature for Multiples {
+    fn inputs() -> &'static [InputPort] {
+        const { &[InputPort::fresh("signal", "what is multiplied")] }
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        let channels = || inputs.port("signal").to_vec();
+        Ok(PORTS
+            .map(|name| OutputPort {
+                name,
+                channels: channels(),
+            })
+            .into())
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
+    }
+
+    fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator> {
+        let mut place = 0;
+        let places = wanted.iter().map(|&wanted| {
+            let own = place;
+            if wanted || self.fault != Fault::Packs {
+                place += inputs.port("signal").len();
+            }
+            wanted.then_some(own)
+        });
+        Box::new(Multiplying {
+            places: places.collect(),
+            fault: self.fault,
+        })
+    }
+}
+
+struct Multiplying {
+    /// Where each port begins that is read.
+    places: Vec<Option<usize>>,
+    fault: Fault,
+}
+
+impl Operator for Multiplying {
+    fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
+        if self.fault == Fault::NeedsTwo {
+            let _ = tick.port(0)[1];
+        }
+        for (nth, place) in self.places.iter().enumerate() {
+            let Some(place) = place else { continue };
+            for (i, &value) in tick.port(0).iter().enumerate() {
+                if !value.is_nan() {
+                    outputs.set(place + i, value * (nth + 1) as f64);
+                }
+            }
+        }
+    }
+
+    fn segment(&mut self) {}
+}
+
+athermal_core::register!(Multiples, Feature, "sabotaged_ports");
+
+fn with(fault: &str) -> Case {
+    Case::new(format!("fault = \"{fault}\""))
+}
+
+#[test]
+fn a_sound_node_of_several_ports_breaks_no_rule() {
+    breaks_only::<Multiples>(with("none"), &[]);
+}
+
+#[test]
+fn a_port_that_moves_where_another_is_not_read_is_found() {
+    breaks::<Multiples>(
+        with("packs"),
+        Rule::Wanted,
+        "beside its first port only `thrice` is read",
+    );
+}
+
+#[test]
+fn a_node_that_takes_for_granted_how_many_channels_come_is_found() {
+    breaks::<Multiples>(with("needs_two"), Rule::Widths, "panics");
+}
