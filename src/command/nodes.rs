@@ -121,7 +121,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
             tell(
                 "learn (true, false or table) – whether it goes on learning while it runs; `{ outliers = 6.0, margin = 0.0 }`: not from \
                  truths that miss by more than so many times the recent error (both in units of `deviation` where the kind tells it), \
-                 nor so many widths outside the range of the fit, without `margin` where it keeps none, as of `kalman`",
+                 nor so many widths outside the range of the fit, without `margin` where it keeps none, as of `armax`",
             );
         }
     }
@@ -134,10 +134,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
 
 /// The output ports that nodes of a kind may have, and when.
 fn outputs(kind: &Kind) -> Vec<(&'static str, &'static str)> {
-    const PREDICTION: (&str, &str) = (
-        "prediction",
-        "what the truth will be, in its unit; a combiner's is made from the votes",
-    );
+    const PREDICTION: (&str, &str) = ("prediction", "what the truth will be, in its unit");
     match kind.role {
         // Each kind names its own, on its page.
         RoleName::Feature => Vec::new(),
