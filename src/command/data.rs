@@ -267,7 +267,12 @@ pub fn tell(
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    for told in doubts(plan, reports, refused, rejected) {
+    tell_doubts(terminal, &doubts(plan, reports, refused, rejected), reports);
+}
+
+/// The same of doubts that are known already.
+pub fn tell_doubts(terminal: &Terminal, doubts: &[String], reports: &[(String, Report)]) {
+    for told in doubts {
         terminal.warning(told);
     }
     if let Some(told) = without_zone(reports) {
@@ -275,7 +280,7 @@ pub fn tell(
     }
 }
 
-/// The same but for the last.
+/// What is told of data but for dates without a zone.
 #[must_use]
 pub fn doubts(
     plan: &Plan,

@@ -218,12 +218,7 @@ pub fn fit_on(
 ) -> Result<Told, Failure> {
     let told = fit_without_card(model, data, options, terminal)?;
     let (dataset, report) = (&told.dataset, &told.report);
-    for doubt in &told.doubts {
-        terminal.warning(doubt);
-    }
-    if let Some(told) = data::without_zone(&dataset.reports()) {
-        terminal.note(told);
-    }
+    data::tell_doubts(terminal, &told.doubts, &dataset.reports());
     faults::tell(terminal, &told.faults);
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),

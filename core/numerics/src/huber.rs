@@ -432,6 +432,18 @@ mod tests {
         }
     }
 
+    /// The fit that is usual, without a penalty.
+    fn usual(blocks: &GramBlocks, columns: &[usize]) -> HuberFit {
+        let how = Huber {
+            epsilon: 1.35,
+            alpha: 0.0,
+        };
+        let standard = Standardization::of(&blocks.total());
+        let rows = blocks.rows().unwrap();
+        how.solve(rows, columns, &standard.means, &standard.scales)
+            .unwrap()
+    }
+
     #[test]
     fn rows_without_noise_give_the_line_through_most_of_them() {
         let mut blocks = GramBlocks::new(2);
@@ -440,21 +452,11 @@ mod tests {
             let y = if i % 10 == 0 { 1000.0 } else { 3.0 * x + 2.0 };
             blocks.push(&[x, x], y);
         }
-        let how = Huber {
-            epsilon: 1.35,
-            alpha: 0.0,
-        };
-        let standard = Standardization::of(&blocks.total());
-        let rows = blocks.rows().unwrap();
-        let fit = how
-            .solve(rows, &[0], &standard.means, &standard.scales)
-            .unwrap();
+        let fit = usual(&blocks, &[0]);
         assert!((fit.coefficients[0] - 3.0).abs() < 1e-6 && (fit.intercept - 2.0).abs() < 1e-6);
         assert_eq!(fit.outliers, 30);
         // Two equal columns share what one would have.
-        let fit = how
-            .solve(rows, &[0, 1], &standard.means, &standard.scales)
-            .unwrap();
+        let fit = usual(&blocks, &[0, 1]);
         assert!((fit.coefficients.iter().sum::<f64>() - 3.0).abs() < 1e-4);
     }
 
@@ -470,15 +472,7 @@ mod tests {
             let far = if i % 10 == 0 { 1000.0 } else { 0.0 };
             blocks.push(&[x], 3.0 * x + error + far);
         }
-        let how = Huber {
-            epsilon: 1.35,
-            alpha: 0.0,
-        };
-        let standard = Standardization::of(&blocks.total());
-        let rows = blocks.rows().unwrap();
-        let fit = how
-            .solve(rows, &[0], &standard.means, &standard.scales)
-            .unwrap();
+        let fit = usual(&blocks, &[0]);
         let share = |rows: u64| rows as f64 / f64::from(count);
         assert!(
             (0.1..0.11).contains(&share(fit.outliers)),

@@ -62,13 +62,7 @@ fn the_search_is_no_worse_than_the_oracle_of_the_shared_series() {
         serde_json::from_str(&text("kalman_llt/scalars.json").unwrap()).unwrap();
     let observations: Vec<f64> = input.numbers().iter().map(|row| row[0]).collect();
     let times = in_steps(observations.len());
-    let series = Series {
-        times: &times,
-        observations: &observations,
-        regressors: &[],
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
+    let series = of_truths(&times, &observations);
     let found = most_likely(Movement::Trend, Passage::Steps, &series).unwrap();
     let variances: Vec<f64> = scalars["mle_params_default_init"]
         .as_array()
@@ -151,13 +145,7 @@ fn a_level_that_returns_is_found_as_an_autoregression() {
         })
         .collect();
     let times = in_steps(observations.len());
-    let series = Series {
-        times: &times,
-        observations: &observations,
-        regressors: &[],
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
+    let series = of_truths(&times, &observations);
     let found = most_likely(Movement::Returns, Passage::Continuous, &series).unwrap();
     near((-found.model.returning).exp(), kept, 0.05);
     near(found.model.observation, 0.25, 0.15);
@@ -186,13 +174,7 @@ fn a_level_that_wanders_is_not_taken_for_one_that_returns() {
                 })
                 .collect();
             let times = in_steps(observations.len());
-            let series = Series {
-                times: &times,
-                observations: &observations,
-                regressors: &[],
-                prior: f64::INFINITY,
-                shared: 0.0,
-            };
+            let series = of_truths(&times, &observations);
             let found = most_likely(Movement::Returns, Passage::Continuous, &series).unwrap();
             u32::from(found.model.returning > 0.0)
         });
@@ -215,13 +197,7 @@ fn what_cannot_be_followed_is_refused() {
     ));
     let narrow = Kalman::starting_at(OWN, vec![0.0; 2], &[1.0]);
     assert!(matches!(narrow, Err(NumericsError::Width { .. })));
-    let series = |observations, times| Series {
-        times,
-        observations,
-        regressors: &[],
-        prior: f64::INFINITY,
-        shared: 0.0,
-    };
+    let series = |observations, times| of_truths(times, observations);
     let few = most_likely(
         Movement::Wanders,
         Passage::Steps,

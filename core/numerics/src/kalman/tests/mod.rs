@@ -38,6 +38,17 @@ fn in_steps(rows: usize) -> Vec<f64> {
     times
 }
 
+/// A series of truths alone.
+fn of_truths<'a>(times: &'a [f64], observations: &'a [f64]) -> Series<'a> {
+    Series {
+        times,
+        observations,
+        regressors: &[],
+        prior: f64::INFINITY,
+        shared: 0.0,
+    }
+}
+
 #[track_caller]
 fn near(found: f64, expected: f64, within: f64) {
     assert!(
