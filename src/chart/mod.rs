@@ -285,12 +285,15 @@ impl Chart<'_> {
 
     /// The legend, and how many rows it has beyond the first.
     fn legend(&self) -> (Vec<Shape>, usize) {
-        let mut shapes = vec![text(LEFT, TOP - 9.0, Anchor::Start, self.y_label.clone())];
+        let room = self.width - LEFT - RIGHT;
+        let y_label = elided(&self.y_label, room);
         let length = |text: &str| LETTER * text.chars().count() as f64;
-        let (mut x, mut row) = (LEFT + length(&self.y_label) + 16.0, 0);
+        let (mut x, mut row) = (LEFT + length(&y_label) + 16.0, 0);
+        let mut shapes = vec![text(LEFT, TOP - 9.0, Anchor::Start, y_label)];
         for layer in self.layers.iter().filter(|layer| !layer.label.is_empty()) {
-            let end = x + 23.0 + length(&layer.label);
-            if end > self.width - RIGHT && x > LEFT {
+            let label = elided(&layer.label, room - 23.0);
+            let width = 23.0 + length(&label);
+            if x + width > self.width - RIGHT && x > LEFT {
                 (x, row) = (LEFT, row + 1);
             }
             let y = TOP - 9.0 + ROW * row as f64;
@@ -299,11 +302,25 @@ impl Chart<'_> {
                 x,
                 y: y - 4.0,
             });
-            shapes.push(text(x + 23.0, y, Anchor::Start, layer.label.clone()));
-            x += 23.0 + length(&layer.label) + 18.0;
+            shapes.push(text(x + 23.0, y, Anchor::Start, label));
+            x += width + 18.0;
         }
         (shapes, row)
     }
+}
+
+/// A text that has room in so many user units: one that is too long loses what stands before its end, where windows and units are.
+fn elided(text: &str, room: f64) -> String {
+    let (letters, most) = (text.chars().count(), (room / LETTER) as usize);
+    if letters <= most || most < 3 {
+        return text.to_owned();
+    }
+    let (before, after) = (most / 3, most - 1 - most / 3);
+    let (start, end) = (
+        text.chars().take(before),
+        text.chars().skip(letters - after),
+    );
+    start.chain(['…']).chain(end).collect()
 }
 
 fn text(x: f64, y: f64, anchor: Anchor, text: String) -> Shape {

@@ -23,7 +23,10 @@ pub mod window;
 
 pub use observation::{Observation, SourceStatistics, is_asked, is_called, observe};
 pub use plot::plots;
-pub(crate) use plot::{Picture, responses as response_pictures, with_truth as truth_picture};
+pub(crate) use plot::{
+    Picture, autocorrelation as autocorrelation_picture, responses as response_pictures,
+    with_truth as truth_picture,
+};
 pub use rest::Untold;
 
 use std::collections::BTreeMap;

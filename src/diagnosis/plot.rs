@@ -8,7 +8,7 @@ use super::response::{Response, Responses};
 use super::window::{Width, Windows};
 use super::{Diagnosis, Main, is_asked};
 use crate::chart::{Chart, LINES, Layer, Mark, Plot};
-use crate::figures::TimeUnit;
+use crate::figures::{TimeUnit, time};
 
 /// Lines whose labels have room beside each other.
 const MOST_FEATURES: usize = 4;
@@ -105,8 +105,11 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
         .filter(|main| is_asked(&main.prediction, asked))
         .collect();
     let is_main = |name: &str| main.iter().any(|main| main.prediction == name);
+    // All that are asked for by name, as in the tables.
+    let shown = |name: &str| is_main(name) || !asked.is_empty() && is_asked(name, asked);
     let residuals = diagnosis.residuals.iter();
-    for of in residuals.filter(|of| is_main(&of.prediction) && !of.bound.is_empty()) {
+    let residuals: Vec<&Residuals> = residuals.filter(|of| shown(&of.prediction)).collect();
+    for of in residuals.iter().filter(|of| !of.bound.is_empty()) {
         add(
             format!("autocorrelation-{}", of.prediction),
             autocorrelation(of),
@@ -128,7 +131,8 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
         }
     }
     if let Some(days) = diagnosis.days.as_ref().filter(|of| of.curve.len() > 1) {
-        add("days".to_owned(), learning(&main, days));
+        let names: Vec<&str> = residuals.iter().map(|of| &*of.prediction).collect();
+        add("days".to_owned(), learning(&names, days));
     }
     let is_shown = |of: &&Windows| main.iter().any(|main| main.truth == of.truth);
     let of_windows: Vec<&Windows> = diagnosis.windows.iter().filter(is_shown).collect();
@@ -138,16 +142,16 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
     plots
 }
 
-fn learning(main: &[&Main], days: &Days) -> Picture {
+fn learning(predictions: &[&str], days: &Days) -> Picture {
     let x: Vec<f64> = days.curve.iter().map(|point| point.days as f64).collect();
-    let curve = main.iter().enumerate().map(|(nth, main)| {
+    let curve = predictions.iter().enumerate().map(|(nth, prediction)| {
         let score = |point: &CurvePoint| {
             let mut scores = point.scores.iter();
-            let score = scores.find(|score| score.prediction == main.prediction);
+            let score = scores.find(|score| score.prediction == *prediction);
             score.and_then(DayScore::ratio).unwrap_or(f64::NAN)
         };
         let y = days.curve.iter().map(score).collect();
-        Points::line(nth, &main.prediction, x.clone(), y)
+        Points::line(nth, prediction, x.clone(), y)
     });
     let points: Vec<Points> = curve.collect();
     let ratios = points.iter().flat_map(|of| &of.y).filter(|y| !y.is_nan());
@@ -160,10 +164,16 @@ fn learning(main: &[&Main], days: &Days) -> Picture {
         ""
     };
     let most = days.count - 1;
+    let length = days.day_s;
+    let days = if length == 86_400.0 {
+        "days".to_owned()
+    } else {
+        format!("stretches of {}", time(length))
+    };
     Picture {
-        title: format!("Error of fits on some days over that of fits on {most}"),
-        x_label: "days that a fit has seen; dashed: 5 % worse than all".to_owned(),
-        y_label: format!("RMSE, 1 being that of a fit on {most} days{cut}"),
+        title: format!("Error of fits on some {days} over that of fits on {most}"),
+        x_label: format!("{days} that a fit has seen; dashed: 5 % worse than all"),
+        y_label: format!("RMSE, 1 being that of a fit on {most} of them{cut}"),
         y_range: Some((low - 0.05, high.min(RATIOS_SHOWN) + 0.02)),
         limits: vec![ENOUGH],
         points,
@@ -197,16 +207,24 @@ fn windows(windows: &[&Windows]) -> Picture {
         [one] => format!(", that of the graph is {}", (100.0 * one).round() / 100.0),
         _ => String::new(),
     };
+    let count = |of: &Windows| of.widths.iter().filter(|of| of.ratio.is_finite()).count();
+    let cut = windows.iter().any(|of| shown(of).len() < count(of));
+    let cut = if cut {
+        "; wider ones: in the table"
+    } else {
+        ""
+    };
     Picture {
         title: "Signal to noise of the drift against its window".to_owned(),
-        x_label: format!("window in {}{own}", unit.name),
+        x_label: format!("window in {}{own}{cut}", unit.name),
         y_label: "signal to noise (standard error of the slope)".to_owned(),
         points: lines.collect(),
         ..Picture::default()
     }
 }
 
-fn autocorrelation(of: &Residuals) -> Picture {
+/// How long what a prediction leaves lasts.
+pub(crate) fn autocorrelation(of: &Residuals) -> Picture {
     let count = of.autocorrelation.len();
     let unit = TimeUnit::of(count as f64 * of.spacing_s);
     let x: Vec<f64> = (1..=count)
@@ -295,12 +313,15 @@ fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Pictu
     }
     shown.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
     shown.truncate(MOST_FEATURES);
-    let lines = shown.iter().enumerate();
+    let names: Vec<&str> = shown.iter().map(|of| &*of.feature).collect();
+    let lines = shown.iter().zip(short(&names)).enumerate();
     let lines =
-        lines.map(|(nth, of)| Points::line(nth, short(&of.feature), x.clone(), side(of).r.clone()));
+        lines.map(|(nth, (of, name))| Points::line(nth, name, x.clone(), side(of).r.clone()));
     let mut points: Vec<Points> = lines.collect();
     let widest = shown.iter().map(|of| side(of).bound).fold(0.0, f64::max);
-    points.extend(Points::bounds(&x, widest, "99 % by chance, at most"));
+    if widest < 1.0 {
+        points.extend(Points::bounds(&x, widest, "99 % by chance, at most"));
+    }
     Picture {
         title: format!("Correlation of features with {title}"),
         x_label: format!("{} by which {} follows the feature", unit.name, of.truth),
@@ -310,9 +331,16 @@ fn lags(of: &Lags, title: &str, side: fn(&FeatureLags) -> &Correlogram) -> Pictu
     }
 }
 
-/// A channel without its node, for a legend.
-fn short(name: &str) -> &str {
-    name.split_once('.').map_or(name, |(_, channel)| channel)
+/// Channels without their nodes, for a legend; with them where two would be called the same.
+fn short<'a>(names: &[&'a str]) -> Vec<&'a str> {
+    let channel = |name: &'a str| name.split_once('.').map_or(name, |(_, channel)| channel);
+    let once = |name: &'a str| {
+        let alike = names.iter().filter(|of| channel(of) == channel(name));
+        alike.count() == 1
+    };
+    let each = names.iter();
+    each.map(|&name| if once(name) { channel(name) } else { name })
+        .collect()
 }
 
 /// How an estimator answers the sensors that it answers most: a step of one unit, or one unit for one minute. What a kelvin moves
@@ -341,15 +369,23 @@ fn response(of: &Responses, of_unit: &str, impulse: bool) -> Picture {
     largest.truncate(LINES.len());
     let times = largest.iter().flat_map(|of| &of.time_s).copied();
     let time = TimeUnit::of(times.fold(0.0, f64::max));
-    let lines = largest.iter().enumerate().map(|(nth, sensor)| {
-        let x = sensor.time_s.iter().map(|at| at / time.seconds).collect();
-        let y = if impulse {
-            let per_unit = sensor.impulse.iter().map(|y| y * time.seconds / 60.0);
-            per_unit.collect()
+    let names: Vec<&str> = largest.iter().map(|of| &*of.sensor).collect();
+    let lines = largest.iter().zip(short(&names)).enumerate();
+    let lines = lines.map(|(nth, (sensor, name))| {
+        // What is predicted of the time until the horizon has been said before anything happened.
+        let ahead_s = sensor.time_s.first().copied().filter(|ahead| *ahead > 0.0);
+        let before = ahead_s.map_or(Vec::new(), |ahead| vec![0.0, ahead]);
+        let scale = if impulse { time.seconds / 60.0 } else { 1.0 };
+        let answer = if impulse {
+            &sensor.impulse
         } else {
-            sensor.step.clone()
+            &sensor.step
         };
-        Points::line(nth, short(&sensor.sensor), x, y)
+        let y = before.iter().map(|_| 0.0);
+        let y = y.chain(answer.iter().map(|y| y * scale)).collect();
+        let x = before.iter().chain(&sensor.time_s);
+        let x = x.map(|at| at / time.seconds).collect();
+        Points::line(nth, name, x, y)
     });
     let lines: Vec<Points> = lines.collect();
     let (what, unit) = if impulse {

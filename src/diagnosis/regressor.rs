@@ -1,11 +1,11 @@
 //! Decides how well the data determine what an estimator has learned: condition, variance inflation, and what each regressor
 //! moves.
 
-use athermal_core::compile::{PlannedRole, TrainingLimits};
+use athermal_core::compile::{PlannedNode, PlannedRole, TrainingLimits};
 use athermal_core::engine::{Engine, Pairing};
 use athermal_core::fit::FitError;
 use athermal_core::model::{Model, number_or_none};
-use athermal_core::node::Predictor;
+use athermal_core::node::{Of, Predictor};
 use athermal_core::recording::{Event, Recording};
 use athermal_core::score::trace;
 use athermal_core::time::Instant;
@@ -21,8 +21,8 @@ pub struct Design {
     pub unit: String,
     /// Truths within the limits of its fit before which it had run, as far before as it predicts, with all its regressors.
     pub rows: u64,
-    /// The condition number of the standardised regressors; NaN (null in JSON) without rows, infinite (`"inf"`) where they are
-    /// collinear.
+    /// The condition number of the standardised regressors; NaN (null in JSON) without rows, and of a model that filters its
+    /// inputs or its past, which other columns determine; infinite (`"inf"`) where they are collinear.
     #[serde(serialize_with = "or_null")]
     pub condition: f64,
     /// Each regressor.
@@ -36,7 +36,8 @@ pub struct RegressorFacts {
     pub name: String,
     /// How much the prediction moves when it moves by one standard deviation and the others stay at their means.
     pub effect: f64,
-    /// Its variance inflation factor; NaN (null in JSON) where it is constant, infinite (`"inf"`) where the others tell the same.
+    /// Its variance inflation factor; NaN (null in JSON) where it is constant, and where there is no condition number, infinite
+    /// (`"inf"`) where the others tell the same.
     #[serde(serialize_with = "or_null")]
     pub inflation: f64,
 }
@@ -118,6 +119,26 @@ fn collecting(model: &Model) -> Vec<Collecting<'_>> {
     collecting
 }
 
+/// Whether a model filters its inputs or its past, so that its regressors are not the columns that determine it.
+fn filters(node: &PlannedNode, predictor: &dyn Predictor) -> bool {
+    match predictor.coefficients() {
+        Some(of) => {
+            let mut terms = of.terms.iter();
+            terms.any(|term| matches!(term.of, Of::Power { .. }))
+        }
+        None => {
+            predictor.linear().is_none()
+                && matches!(
+                    node.role,
+                    PlannedRole::Estimator {
+                        every_tick: true,
+                        ..
+                    }
+                )
+        }
+    }
+}
+
 impl Collecting<'_> {
     fn look(&mut self, engine: &Engine, now: Instant) {
         let Self {
@@ -160,11 +181,12 @@ impl Collecting<'_> {
         };
         let node = &model.plan.nodes[self.node];
         let truth = &model.plan.channels[self.truth].channel;
+        let told = found.as_ref().filter(|_| !filters(node, self.predictor));
         Design {
             node: node.instance(),
             unit: truth.unit.difference().to_string(),
             rows: gram.count(),
-            condition: found.as_ref().map_or(f64::NAN, |of| of.condition),
+            condition: told.map_or(f64::NAN, |of| of.condition),
             regressors: self
                 .predictor
                 .uses()
@@ -177,7 +199,7 @@ impl Collecting<'_> {
                     } else {
                         f64::NAN
                     },
-                    inflation: found.as_ref().map_or(f64::NAN, |of| of.inflation[nth]),
+                    inflation: told.map_or(f64::NAN, |of| of.inflation[nth]),
                 })
                 .collect(),
         }

@@ -30,7 +30,7 @@ const MOST_INSTANTS: i64 = 2_000;
 const SMALLER: [f64; 3] = [1.0, 1e-2, 1e-4];
 /// A step response below this share of the largest of its estimator is none.
 const NOTHING: f64 = 1e-9;
-/// A step response that ends above this share of its largest value has not come back to nothing.
+/// A step response that ends below this share of its largest value has come back to nothing, unless it rests there.
 const LASTS: f64 = 0.01;
 /// The last of a step response is shown as long as it is further than this share of its largest value from where it ends.
 const SHOWN: f64 = 1e-3;
@@ -438,10 +438,18 @@ impl Answer<'_> {
         let total = *sums.last()?;
         let end = *step.last()?;
         let near = |value: f64, of: f64| (value - of).abs() <= (1.0 - SETTLED) * of.abs();
-        let comes_back = end.abs() <= LASTS * peak.abs();
         // One that ran to the last instant that there is may be on its way still.
         let quarter = step[step.len() - step.len().div_ceil(4)];
-        let lasts = !comes_back && (end - quarter).abs() <= LASTS * peak.abs();
+        let moves = (end - quarter).abs();
+        // A slope answers a step so much more than a level does that what the level leaves for good is small beside it.
+        let small = end.abs() <= LASTS * peak.abs();
+        let rests = end.abs() > AT_REST * peak.abs() && moves <= LASTS * end.abs();
+        let comes_back = small && !rests;
+        let lasts = if small {
+            rests
+        } else {
+            moves <= LASTS * peak.abs()
+        };
         let outside = if comes_back {
             sums.iter().rposition(|&sum| !near(sum, total))
         } else {

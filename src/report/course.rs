@@ -43,12 +43,17 @@ pub struct Axis {
     pub name: String,
     /// Its unit.
     pub unit: String,
+    /// The unit of a difference of two of its values, such as an error.
+    pub error_unit: String,
     /// The measured truth.
     pub truth: Series,
     /// Every prediction of it, paired as in scoring: one value per truth.
     pub voters: Vec<Voter>,
     /// Which of them is what the graph puts out.
     pub main: usize,
+    /// Its channel: `vote.Z1`.
+    #[serde(skip)]
+    pub(super) prediction: String,
     /// How far ahead that looks, in s.
     pub ahead_s: f64,
     /// The weights of a vote's voters at each truth; empty where nothing is weighed.
@@ -218,9 +223,14 @@ fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
         let axis = Axis {
             name: of.name.clone(),
             unit: of.unit.to_string(),
+            error_unit: of.unit.difference().to_string(),
             truth: Series::default(),
             voters: all().map(voter).collect(),
             main,
+            prediction: truth
+                .predictions
+                .get(main)
+                .map_or_else(String::new, |of| plan.channels[of.slot].name.clone()),
             ahead_s: truth
                 .predictions
                 .get(main)

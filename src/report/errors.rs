@@ -1,12 +1,10 @@
 //! Decides how the errors of a prediction are summarised: their spread and how long they last.
 
-use athermal_numerics::{NORMAL_95, autocorrelation};
 use serde::Serialize;
 
 use super::{Axis, rms};
+use crate::diagnosis::residual::Residuals;
 
-/// Lags of the autocorrelation that are worked out.
-const LAGS: usize = 40;
 const BINS: usize = 41;
 
 /// The errors of an axis: histogram and autocorrelation.
@@ -20,13 +18,8 @@ pub struct Errors {
     pub centres: Vec<f64>,
     /// How many errors lie in each; the outermost take what lies beyond.
     pub counts: Vec<f64>,
-    /// Lags in truths, from 1.
-    pub lags: Vec<f64>,
-    /// The autocorrelation at each lag; pairs of which one is absent do not count.
-    pub autocorrelation: Vec<f64>,
-    /// Beyond this lie 5 % of the autocorrelations of a white series: 1.96 / √n. Truths over windows that overlap share noise,
-    /// so that even the errors of a perfect model go beyond it at lags within their windows.
-    pub bound: f64,
+    /// What is left of the truth, one per window or horizon, and how long it lasts; none where nothing was measured.
+    pub residuals: Option<Residuals>,
 }
 
 impl Axis {
@@ -42,7 +35,7 @@ impl Axis {
 }
 
 impl Errors {
-    pub(super) fn of(axis: &Axis) -> Self {
+    pub(super) fn of(axis: &Axis, residuals: &[Residuals]) -> Self {
         let errors = axis.errors();
         let present: Vec<f64> = errors.iter().copied().filter(|e| e.is_finite()).collect();
         let largest = present.iter().fold(0.0_f64, |edge, e| edge.max(e.abs()));
@@ -63,9 +56,10 @@ impl Errors {
                 .map(|bin| (bin as f64 + 0.5) * width - edge)
                 .collect(),
             counts,
-            lags: (1..=LAGS).map(|lag| lag as f64).collect(),
-            autocorrelation: autocorrelation(&errors, LAGS).split_off(1),
-            bound: NORMAL_95 / (present.len() as f64).sqrt(),
+            residuals: residuals
+                .iter()
+                .find(|of| of.prediction == axis.prediction)
+                .cloned(),
         }
     }
 }

@@ -3,6 +3,7 @@
 //! [`gather`] steps the model over a recording and collects [`Facts`]; [`page`] makes one self-contained HTML page of
 //! them, [`plots`] single pictures, [`text`] what fits on a terminal.
 
+mod change;
 mod course;
 mod departure;
 mod errors;
@@ -15,6 +16,7 @@ mod track;
 mod verdict;
 mod worth;
 
+pub use change::{Settling, StepLoss};
 pub use course::{Axis, Course, Voter, Weight};
 pub use departure::Departure;
 pub use errors::Errors;
@@ -24,7 +26,7 @@ pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
 pub use text::text;
 pub use verdict::Verdict;
-pub use worth::{Settling, StepLoss, Worth};
+pub use worth::Worth;
 
 use athermal_core::diagnostic::digits;
 use athermal_core::model::{Card, Model};
@@ -34,6 +36,7 @@ use serde::Serialize;
 
 use crate::diagnosis::lag::{Lags, lags};
 use crate::diagnosis::observe;
+use crate::diagnosis::residual::residuals;
 use crate::diagnosis::response::{Responses, responses};
 
 /// All that a report says.
@@ -140,12 +143,17 @@ pub fn gather(
         .map(|mut track| worth::worth(&mut track))
         .transpose()?;
     let verdict = |axis| Verdict::of(axis, &scores, worth.as_ref());
+    let residuals = residuals(&model.plan, &observation);
     Ok(Facts {
         graph: model.plan.name.clone().unwrap_or_default(),
         data,
         verdicts: course.axes.iter().map(verdict).collect(),
         published: published::published(&course),
-        errors: course.axes.iter().map(Errors::of).collect(),
+        errors: course
+            .axes
+            .iter()
+            .map(|axis| Errors::of(axis, &residuals))
+            .collect(),
         lags: lags(model, recording, &observation, &[])?,
         responses: responses(model, &observation)?,
         scores,

@@ -179,6 +179,8 @@ mod tests {
         };
         Axis {
             name: name.to_owned(),
+            error_unit: "nm/min".into(),
+            prediction: String::new(),
             unit: "nm/min".to_owned(),
             truth: Series {
                 time_s: (0..truth.len()).map(|i| i as f64).collect(),

@@ -38,7 +38,8 @@ pub struct SensorFacts {
     pub most_unchanged: u64,
     /// Where it leaps, of a temperature and of what a truth is made of.
     pub leaps: Option<Leaps>,
-    /// The noise of single samples, `sqrt(mean of squared second differences / 6)`, which a steady change leaves alone.
+    /// The standard deviation of the noise of single samples: the median of the absolute second differences over 0.6745 √6, which
+    /// a steady change leaves alone, as do steps if they are rare. None where that is below what a sample resolves.
     pub noise: Option<f64>,
     /// Lowest and highest sample.
     pub range: Option<(f64, f64)>,
@@ -62,8 +63,8 @@ struct Looking {
     finder: Option<Finder>,
     /// Whether a truth is made of it.
     wanders: bool,
-    /// Squared second differences, and how many.
-    squares: (f64, u64),
+    /// Absolute second differences.
+    bends: Vec<f64>,
     lengths: Vec<f64>,
     /// The channel's range in the graph.
     limits: (f64, f64),
@@ -71,6 +72,14 @@ struct Looking {
     optional: bool,
     /// The slot in which a `health` node says what is wrong.
     reason: Option<usize>,
+}
+
+/// The median of the sizes of normal numbers, in standard deviations.
+const NORMAL_50: f64 = 0.674_489_750_196_081_7;
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len().checked_sub(1)? / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// One for each measured channel.
@@ -137,8 +146,7 @@ impl SensorFacts {
             self.mean_gap_s += (gap - self.mean_gap_s) / looking.lengths.len() as f64;
             let difference = value - last;
             if let Some(before) = looking.difference.replace(difference) {
-                looking.squares.0 += (difference - before).powi(2);
-                looking.squares.1 += 1;
+                looking.bends.push((difference - before).abs());
             }
         }
         looking.stillness.push(now_s, value);
@@ -171,8 +179,10 @@ impl SensorFacts {
         let lengths = std::mem::take(&mut self.looking.lengths);
         let limit = self.max_age_s.unwrap_or(5.0 * self.mean_gap_s);
         self.gaps = lengths.iter().filter(|gap| **gap > limit).count() as u64;
-        let (sum, count) = self.looking.squares;
-        self.noise = (count > 0).then(|| (sum / (6.0 * count as f64)).sqrt());
+        let mut bends = std::mem::take(&mut self.looking.bends);
+        self.noise = median(&mut bends)
+            .filter(|bend| *bend > 0.0)
+            .map(|bend| bend / (NORMAL_50 * 6.0_f64.sqrt()));
     }
 
     /// What somebody should look at.

@@ -10,7 +10,7 @@ use super::{Axis, Worth, figure, rms};
 /// The share of predictions from which on those that lack are not spoken of; the first windows of a recording are among them.
 const NEARLY_ALWAYS: f64 = 0.95;
 
-/// What a model is worth on an axis. Figures are root mean squares in the unit of the axis.
+/// What a model is worth on an axis. Figures are root mean squares in the unit of an error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
     /// The axis.
@@ -19,6 +19,8 @@ pub struct Verdict {
     pub node: String,
     /// The unit.
     pub unit: String,
+    /// Whether the truth is a point on a scale, such as a temperature in °C, of which no model says nothing.
+    pub on_scale: bool,
     /// Error of the prediction on the instants on which it is scored, or, where these leave many out, wherever there is one; none
     /// where it gave nothing.
     pub error: Option<f64>,
@@ -68,7 +70,8 @@ impl Verdict {
         Self {
             axis: axis.name.clone(),
             node: node.clone(),
-            unit: axis.unit.clone(),
+            unit: axis.error_unit.clone(),
+            on_scale: axis.error_unit != axis.unit,
             error: figures.map(|of| of.0),
             no_model: figures.map(|of| of.1),
             measured: measured > 0,
@@ -101,18 +104,25 @@ impl Verdict {
                 format!("these data have no truth to compare {} with.", self.node)
             };
         };
-        let mut text = format!(
-            "{} predicts the drift of {} {} RMS to {}",
-            self.node,
-            figure(Some(no_model)),
-            self.unit,
-            figure(Some(error)),
-        );
         let less = |with: f64, without: f64| 100.0 * (1.0 - with / without);
-        let _ = if error < no_model {
-            write!(text, ", {:.0} % less than no model", less(error, no_model))
+        let (node, unit) = (&self.node, &self.unit);
+        let left = figure(Some(error));
+        let mut text = if self.on_scale {
+            format!("{node} predicts it to {left} {unit} RMS")
         } else {
-            write!(text, ", worse than no model")
+            let all = figure(Some(no_model));
+            let worth = if error < no_model {
+                format!("{:.0} % less than no model", less(error, no_model))
+            } else {
+                "worse than no model".to_owned()
+            };
+            // A rate is a drift; what else there is has no name of its own.
+            let drift = if unit.contains('/') {
+                "the drift of "
+            } else {
+                ""
+            };
+            format!("{node} predicts {drift}{all} {unit} RMS to {left}, {worth}")
         };
         if self.valid < NEARLY_ALWAYS {
             let none = 100.0 * (1.0 - self.valid);
@@ -159,6 +169,7 @@ mod tests {
             axis: "Z1".into(),
             node: "vote".into(),
             unit: "nm/min".into(),
+            on_scale: false,
             error: Some(20.0),
             no_model: Some(50.0),
             measured: true,
@@ -185,6 +196,12 @@ mod tests {
                 && verdict
                     .sentence()
                     .ends_with("61.0 of 60.0 remain: worse than without.")
+        );
+        (verdict.on_scale, verdict.unit) = (true, "K".into());
+        assert!(
+            verdict
+                .sentence()
+                .starts_with("vote predicts it to 20.0 K RMS, and gives")
         );
         verdict.error = None;
         assert_eq!(verdict.sentence(), "vote gave no prediction on these data.");

@@ -4,14 +4,16 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use athermal_core::compile::{Wanted, compile};
+use athermal_core::compile::{Plan, Wanted, compile};
 use athermal_core::diagnostic::{Diagnostics, Sources};
 use athermal_core::document::{Memory, declare, load_text};
 use athermal_core::engine::{Engine, Fitted};
 use athermal_core::time::Instant;
+use athermal_core::unit::Unit;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::change::{Changes, Settling, StepLoss};
 use super::departure::{Departure, departures};
 use super::track::{Track, TrackAxis};
 use super::{ReportError, Series};
@@ -51,41 +53,34 @@ pub struct Worth {
     pub steps: Vec<StepLoss>,
 }
 
-/// The largest losses in dB after all changes from one set point to another, until the next change.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StepLoss {
-    /// The set point before.
-    pub from: f64,
-    /// The set point after; the same for the time before any change.
-    pub to: f64,
-    /// How many such changes there were.
-    pub changes: usize,
-    /// Largest loss without the correction.
-    pub largest_without: f64,
-    /// The same with it.
-    pub largest_with: f64,
-}
-
-/// A change of the set point.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Settling {
-    /// When it was noticed, in s.
-    pub at_s: f64,
-    /// The set point before, and ten minutes later.
-    pub from: f64,
-    /// See `from`.
-    pub to: f64,
-    /// Minutes until the first ten stable ones, without the correction; none where they did not come.
-    pub without_min: Option<f64>,
-    /// The same with the correction.
-    pub with_min: Option<f64>,
-    /// Largest loss in dB until the next change, without and with.
-    pub largest_without: f64,
-    /// See `largest_without`.
-    pub largest_with: f64,
-}
-
 impl Worth {
+    /// What is known before the first row.
+    fn before(track: &Track) -> Self {
+        let of_axes = |of: fn(&TrackAxis) -> &String| track.axes.iter().map(of).cloned().collect();
+        let empty = || vec![Series::default(); track.axes.len()];
+        let decibel = Unit::parse("dB").ok();
+        let limit = track.settled.as_ref().zip(decibel.as_ref());
+        Self {
+            axes: of_axes(|axis| &axis.name),
+            units: of_axes(|axis| &axis.drift),
+            drift_without: empty(),
+            drift_with: empty(),
+            correction: empty(),
+            correction_units: of_axes(|axis| &axis.position),
+            departures: departures(track),
+            loss_without: Series::default(),
+            loss_with: Series::default(),
+            loss_limit: limit
+                .and_then(|(settled, unit)| settled.below.in_unit(unit))
+                .unwrap_or(LIMIT_DB),
+            set_point: Vec::new(),
+            set_point_unit: track.set_point.clone(),
+            below_limit: None,
+            settling: Vec::new(),
+            steps: Vec::new(),
+        }
+    }
+
     /// What the correction does for light and waiting, in a sentence; none without losses.
     #[must_use]
     pub fn headline(&self) -> Option<String> {
@@ -195,6 +190,30 @@ fn engine(track: &Track) -> Result<Engine, ReportError> {
     Ok(Engine::new(Arc::new(plan), &Fitted::new())?)
 }
 
+/// Where the graph puts out what; an output that it lacks is nowhere. Of two ways, the first is without the correction.
+struct Places {
+    /// Of each axis.
+    drifts: Vec<[Option<usize>; 2]>,
+    losses: [Option<usize>; 2],
+    settled: [Option<usize>; 2],
+    since: Option<usize>,
+}
+
+impl Places {
+    fn of(plan: &Plan, track: &Track) -> Self {
+        let place = |name: &str| plan.outputs.iter().position(|output| output.name == name);
+        let drifts = |axis: &TrackAxis| {
+            ["without", "with"].map(|way| place(&format!("{way}.{}", axis.name)))
+        };
+        Self {
+            drifts: track.axes.iter().map(drifts).collect(),
+            losses: ["loss_without.loss", "loss_with.loss"].map(place),
+            settled: ["settled_without.settle_time", "settled_with.settle_time"].map(place),
+            since: place("since_without.since"),
+        }
+    }
+}
+
 pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
     let mut engine = match engine(track) {
         // The graph's loss may be of other axes than are corrected; the drifts are told all the same.
@@ -204,48 +223,10 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
         }
         engine => engine?,
     };
-    let plan = Arc::clone(engine.plan());
-    let place = |name: &str| plan.outputs.iter().position(|output| output.name == name);
-    let drift = |way: &str| -> Vec<Option<usize>> {
-        track
-            .axes
-            .iter()
-            .map(|axis| place(&format!("{way}.{}", axis.name)))
-            .collect()
-    };
-    let drifts = [drift("without"), drift("with")];
-    let losses = ["loss_without.loss", "loss_with.loss"].map(&place);
-    let settled = ["settled_without.settle_time", "settled_with.settle_time"].map(&place);
-    let since = place("since_without.since");
+    let places = Places::of(engine.plan(), track);
+    let mut worth = Worth::before(track);
     let count = track.axes.len();
-    let of_axes = |of: fn(&TrackAxis) -> &String| track.axes.iter().map(of).cloned().collect();
-    let empty = || vec![Series::default(); count];
-    let decibel = athermal_core::unit::Unit::parse("dB").ok();
-    let limit = track.settled.as_ref().zip(decibel.as_ref());
-    let mut worth = Worth {
-        axes: of_axes(|axis| &axis.name),
-        units: of_axes(|axis| &axis.drift),
-        drift_without: empty(),
-        drift_with: empty(),
-        correction: empty(),
-        correction_units: of_axes(|axis| &axis.position),
-        departures: departures(track),
-        loss_without: Series::default(),
-        loss_with: Series::default(),
-        loss_limit: limit
-            .and_then(|(settled, unit)| settled.below.in_unit(unit))
-            .unwrap_or(LIMIT_DB),
-        set_point: Vec::new(),
-        set_point_unit: track.set_point.clone(),
-        below_limit: None,
-        settling: Vec::new(),
-        steps: Vec::new(),
-    };
-    // The change whose losses are counted, and the largest ones before any.
-    let (mut current, mut steady) = (None::<usize>, None::<StepLoss>);
-    // For each way, which change it waits for.
-    let mut waits: [Option<usize>; 2] = [None; 2];
-    let (mut first, mut set_point) = (f64::NAN, f64::NAN);
+    let mut changes = Changes::default();
     let mut samples = vec![f64::NAN; 2 * count + usize::from(track.set_point.is_some())];
     for row in &track.rows {
         for i in 0..count {
@@ -255,15 +236,12 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
         if track.set_point.is_some() {
             samples[2 * count] = row.set_point;
         }
-        if !row.set_point.is_nan() {
-            set_point = row.set_point;
-            first = if first.is_nan() { set_point } else { first };
-        }
+        changes.set(row.set_point);
         let outputs = engine.step(row.at, &samples)?;
         let at_s = (row.at - Instant::from_ns(0)).secs();
         let get = |place: Option<usize>| place.map_or(f64::NAN, |place| outputs[place]);
-        for (i, (&without, &with)) in drifts[0].iter().zip(&drifts[1]).enumerate() {
-            let (without, with) = (get(without), get(with));
+        for (i, &drifts) in places.drifts.iter().enumerate() {
+            let [without, with] = drifts.map(get);
             if !without.is_nan() {
                 worth.drift_without[i].push(at_s, without);
                 worth.drift_with[i].push(at_s, with);
@@ -272,65 +250,18 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
                 worth.correction[i].push(at_s, row.correction[i]);
             }
         }
-        let [without, with] = losses.map(get);
+        let losses @ [without, with] = places.losses.map(get);
         // Both over the same windows: those in which there is a correction at all.
         if !without.is_nan() && !with.is_nan() {
             worth.loss_without.push(at_s, without);
             worth.loss_with.push(at_s, with);
-            worth.set_point.push(set_point);
-            let (largest_without, largest_with) = match current {
-                Some(nth) => {
-                    let settling = &mut worth.settling[nth];
-                    (&mut settling.largest_without, &mut settling.largest_with)
-                }
-                None => {
-                    let steady = steady.get_or_insert(StepLoss {
-                        from: set_point,
-                        to: set_point,
-                        changes: 0,
-                        largest_without: 0.0,
-                        largest_with: 0.0,
-                    });
-                    (&mut steady.largest_without, &mut steady.largest_with)
-                }
-            };
-            *largest_without = largest_without.max(without);
-            *largest_with = largest_with.max(with);
+            worth.set_point.push(changes.set_point());
+            changes.lose(losses);
         }
-        // The time since an unsettled change tells when that was, to the instant.
-        let start_s = at_s - 60.0 * get(since);
-        let known = current.is_some_and(|nth| (worth.settling[nth].at_s - start_s).abs() < 1.0);
-        if get(since) > 0.0 && !known {
-            let from = current.map_or(first, |nth| worth.settling[nth].to);
-            worth.settling.push(Settling {
-                at_s: start_s,
-                from,
-                to: set_point,
-                without_min: None,
-                with_min: None,
-                largest_without: 0.0,
-                largest_with: 0.0,
-            });
-            current = Some(worth.settling.len() - 1);
-            waits = [current; 2];
-        }
-        for (way, place) in settled.into_iter().enumerate() {
-            let time = get(place);
-            if !time.is_nan()
-                && let Some(nth) = waits[way].take()
-            {
-                let settling = &mut worth.settling[nth];
-                *[&mut settling.without_min, &mut settling.with_min][way] = Some(time);
-            }
-        }
-        if let Some(nth) = current
-            && at_s - worth.settling[nth].at_s <= 600.0
-        {
-            worth.settling[nth].to = set_point;
-        }
+        changes.go_on(at_s, get(places.since), places.settled.map(get));
         if row.begins {
             engine.segment();
-            (first, set_point, waits, current) = (f64::NAN, f64::NAN, [None; 2], None);
+            changes.segment();
         }
     }
     let below = |losses: &[f64]| {
@@ -347,33 +278,8 @@ pub(super) fn worth(track: &mut Track) -> Result<Worth, ReportError> {
         .settled
         .as_ref()
         .map_or(0.0, |settled| settled.change.value);
-    worth.steps = steps(steady, &worth.settling, change);
+    (worth.settling, worth.steps) = changes.told(change);
     Ok(worth)
-}
-
-/// Changes between the same set points, up to half of what counts as a change, taken together.
-fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<StepLoss> {
-    let mut steps: Vec<StepLoss> = Vec::new();
-    for s in settling {
-        let same = |step: &&mut StepLoss| {
-            (step.from - s.from).abs() < 0.5 * change && (step.to - s.to).abs() < 0.5 * change
-        };
-        match steps.iter_mut().find(same) {
-            Some(step) => {
-                step.changes += 1;
-                step.largest_without = step.largest_without.max(s.largest_without);
-                step.largest_with = step.largest_with.max(s.largest_with);
-            }
-            None => steps.push(StepLoss {
-                from: s.from,
-                to: s.to,
-                changes: 1,
-                largest_without: s.largest_without,
-                largest_with: s.largest_with,
-            }),
-        }
-    }
-    steady.into_iter().chain(steps).collect()
 }
 
 #[cfg(test)]
@@ -413,28 +319,5 @@ mod tests {
             "Five-minute losses below 0.2 dB: 50.0 % without, 97.5 % with correction; \
              longest wait after a change of the set point: never settling without, 32 min with."
         );
-    }
-
-    #[test]
-    fn changes_between_the_same_set_points_are_one_kind_of_step() {
-        let change = |from, to, without, with| Settling {
-            at_s: 0.0,
-            from,
-            to,
-            without_min: None,
-            with_min: None,
-            largest_without: without,
-            largest_with: with,
-        };
-        let settling = [
-            change(20.001, 49.999, 2.0, 0.2),
-            change(50.0, 20.0, 1.0, 0.3),
-            change(20.0, 50.002, 3.0, 0.1),
-        ];
-        let found: Vec<_> = steps(None, &settling, 3.0)
-            .iter()
-            .map(|step| (step.changes, step.largest_without, step.largest_with))
-            .collect();
-        assert_eq!(found, [(2, 3.0, 0.2), (1, 1.0, 0.3)]);
     }
 }

@@ -360,7 +360,7 @@ impl Writer<'_> {
         let selection = "selection = { method = \"forward\", folds = 3, tolerance = 1e-3 }";
         let _ = write!(
             text,
-            "\n[nodes.thermal]                    # from {causes} alone\n\
+            "\n[nodes.thermal]                    # from {causes}\n\
              type = \"linear\"\n{each}inputs.features = {features}\ninputs.truth = \"drift.{axis}\"\n\
              {}\n{selection}\n\
              # train.abs_truth = {{ below = \"{} {unit}\" }}   # leave out the wildest rows; 99 % are below\n\
@@ -381,9 +381,9 @@ impl Writer<'_> {
             number(limit),
             self.clock.length(3.0 * self.choice.drift_s),
             causes = if self.temperatures.is_empty() {
-                "the inputs"
+                "the inputs and what they have come to"
             } else {
-                "the temperatures"
+                "the temperatures alone"
             },
             member = if self.many() { ".{axis}" } else { "" },
         );

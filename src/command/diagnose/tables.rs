@@ -137,9 +137,13 @@ impl<'a> Tables<'a> {
                     .collect();
                 found.sort_by(|a, b| side(b).best.abs().total_cmp(&side(a).best.abs()));
                 let more = found.len().saturating_sub(FEATURES);
+                let too_short = |of: &FeatureLags| side(of).bound >= 1.0;
                 let told = match (found.is_empty(), !all && more > 0) {
+                    (true, _) if !all && of.features.iter().any(too_short) => {
+                        format!("  {title}: too short a recording to tell")
+                    }
                     (true, _) => format!("  {title}: nothing"),
-                    (_, true) => format!("  {title}, and {more} more"),
+                    (_, true) => format!("  {title}, and {more} features more"),
                     _ => format!("  {title}"),
                 };
                 rows.push(vec![told]);
@@ -149,7 +153,11 @@ impl<'a> Tables<'a> {
                         format!("    {}", feature.feature),
                         format!("{:.2}", correlogram.best),
                         seconds(correlogram.best_lag_s),
-                        format!("±{:.2}", correlogram.bound),
+                        if correlogram.bound < 1.0 {
+                            format!("±{:.2}", correlogram.bound)
+                        } else {
+                            "too short".to_owned()
+                        },
                     ]
                 }));
                 if all && unknown > 0 {
@@ -188,7 +196,8 @@ impl<'a> Tables<'a> {
         let mut text = String::from(
             "how well the data determine each estimator: condition number of its regressors,\n\
              and the largest variance inflation factor (VIF); beyond 10 the regressor is\n\
-             named: others tell nearly the same, its coefficient means little by itself\n",
+             named: others tell nearly the same, its coefficient means little by itself;\n\
+             - of models that filter their inputs or past, which other columns determine\n",
         );
         let rows: Vec<Vec<String>> = shown
             .iter()
@@ -261,7 +270,7 @@ impl<'a> Tables<'a> {
         });
         errors.insert(0, ("as it is".to_owned(), as_it_is.collect()));
         format!(
-            "what each sensor moves the predictions by, in {unit} RMS\n{}\
+            "what each sensor moves the predictions by, in {unit} (standard deviation)\n{}\
              RMSE in {unit} with a sensor at rest at its mean, nothing fitted anew\n{}",
             matrix("sensor", &columns, &moves),
             matrix("at rest", &columns, &errors)

@@ -1,6 +1,8 @@
 //! Decides which pictures there are of an axis and of a correction; how one is drawn is decided by [`crate::chart`].
 
-use super::super::{Axis, Errors, Facts, Hours, Worth};
+use std::fmt::Write as _;
+
+use super::super::{Axis, Errors, Facts, Hours, Voter, Weight, Worth};
 use crate::chart::{Chart, LINES, Layer, Mark};
 
 /// Stretches that are quasi-stable or transient, run together where they follow each other.
@@ -45,6 +47,12 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
         let i = worth.axes.iter().position(|name| *name == axis.name)?;
         Some(&worth.drift_with[i])
     });
+    let mut chart = over_time(axis, "Drift", &Hours::of(&facts.course));
+    if axis.states.is_some() {
+        chart
+            .x_label
+            .push_str("; shaded: quasi-stable, darker: transient");
+    }
     Chart {
         height: 260.0,
         layers: vec![
@@ -57,49 +65,69 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
             ),
             match corrected {
                 Some(with) => Layer::line(&with.time_s, &with.value, "c3", "left after correction"),
-                None => Layer::line(time_s, errors, "c3", "residual"),
+                None => Layer::line(time_s, errors, "c3", "predicted − measured"),
             },
         ],
         bands: bands(axis),
-        ..over_time(axis, "Drift", &Hours::of(&facts.course))
+        ..chart
     }
 }
 
 /// What each voter says.
 pub(super) fn votes<'a>(axis: &'a Axis, hours: &Hours) -> Chart<'a> {
-    let voters = axis.voters.iter().zip(LINES.iter().cycle());
-    Chart {
-        layers: voters
-            .map(|(voter, class)| {
-                Layer::line(&axis.truth.time_s, &voter.value, class, voter.node.as_str())
-            })
-            .collect(),
-        ..over_time(axis, "Predictions", hours)
+    let shown = shown(axis);
+    let mut chart = over_time(axis, "Predictions", hours);
+    if shown.len() < axis.voters.len() {
+        let (some, all) = (shown.len(), axis.voters.len());
+        let _ = write!(chart.y_label, ", {some} of {all} predictions");
     }
+    chart.layers = shown
+        .iter()
+        .zip(LINES)
+        .map(|(voter, class)| {
+            Layer::line(&axis.truth.time_s, &voter.value, class, voter.node.as_str())
+        })
+        .collect();
+    chart
+}
+
+/// The voters of which lines can be told apart: all, or of many what is put out and those that weigh most.
+fn shown(axis: &Axis) -> Vec<&Voter> {
+    let weight = |voter: &Voter| {
+        let of = axis.weights.iter().find(|of| of.voter == voter.node);
+        of.map_or(0.0, |of| {
+            of.value.iter().filter(|weight| **weight > 0.0).sum::<f64>()
+        })
+    };
+    let is_main = |nth: usize| nth == axis.main;
+    let mut order: Vec<usize> = (0..axis.voters.len()).collect();
+    order.sort_by(|&a, &b| {
+        let weights = weight(&axis.voters[b]).total_cmp(&weight(&axis.voters[a]));
+        is_main(b).cmp(&is_main(a)).then(weights)
+    });
+    order.truncate(LINES.len());
+    order.sort_unstable();
+    order.into_iter().map(|nth| &axis.voters[nth]).collect()
 }
 
 /// How much each voter counts; none where nothing is weighed.
 pub(super) fn weights<'a>(axis: &'a Axis, hours: &Hours) -> Option<Chart<'a>> {
     let first = axis.weights.first()?;
-    let colour = |name: &str| {
-        let nth = axis.voters.iter().position(|voter| voter.node == name);
-        LINES[nth.unwrap_or(0) % LINES.len()]
+    let shown = shown(axis);
+    let layer = |weight: &'a Weight| {
+        let nth = shown.iter().position(|voter| voter.node == weight.voter)?;
+        let name = weight.voter.as_str();
+        Some(Layer::line(
+            &axis.truth.time_s,
+            &weight.value,
+            LINES[nth],
+            name,
+        ))
     };
     Some(Chart {
         y_label: format!("{} weights in {}", axis.name, first.node),
         height: 160.0,
-        layers: axis
-            .weights
-            .iter()
-            .map(|weight| {
-                Layer::line(
-                    &axis.truth.time_s,
-                    &weight.value,
-                    colour(&weight.voter),
-                    weight.voter.as_str(),
-                )
-            })
-            .collect(),
+        layers: axis.weights.iter().filter_map(layer).collect(),
         y_range: Some((0.0, 1.0)),
         ..over_time(axis, "Weights", hours)
     })
@@ -107,7 +135,7 @@ pub(super) fn weights<'a>(axis: &'a Axis, hours: &Hours) -> Option<Chart<'a>> {
 
 fn small<'a>(
     title: String,
-    x_label: &str,
+    x_label: String,
     y_label: String,
     x: &'a [f64],
     y: &'a [f64],
@@ -115,7 +143,7 @@ fn small<'a>(
 ) -> Chart<'a> {
     Chart {
         title,
-        x_label: x_label.to_owned(),
+        x_label,
         y_label,
         width: 460.0,
         height: 250.0,
@@ -130,39 +158,29 @@ fn small<'a>(
     }
 }
 
-/// Predictions against truths, and the spread and memory of the errors.
-pub(super) fn errors<'a>(axis: &'a Axis, errors: &'a Errors) -> [(&'static str, Chart<'a>); 3] {
+/// Predictions against truths, and the spread of the errors.
+pub(super) fn errors<'a>(axis: &'a Axis, errors: &'a Errors) -> [(&'static str, Chart<'a>); 2] {
     let name = &axis.name;
     let scatter = small(
         format!("Predicted against measured, {name}"),
-        "measured",
-        format!("{name} predicted, {}", axis.unit),
+        format!("measured, in {}", axis.unit),
+        format!("{name} predicted, in {}", axis.unit),
         &axis.truth.value,
         &axis.voters[axis.main].value,
         Mark::Dots,
     );
     let histogram = small(
         format!("Errors of {name}"),
-        "predicted − measured",
+        format!(
+            "predicted − measured, in {}; the outermost hold all beyond",
+            axis.error_unit
+        ),
         format!("{name} errors, count"),
         &errors.centres,
         &errors.counts,
         Mark::Bars,
     );
-    let mut correlation = small(
-        format!("Autocorrelation of the errors of {name}"),
-        "lag in truths",
-        format!("{name} autocorrelation"),
-        &errors.lags,
-        &errors.autocorrelation,
-        Mark::Bars,
-    );
-    correlation.limits = vec![-errors.bound, errors.bound];
-    [
-        ("scatter", scatter),
-        ("histogram", histogram),
-        ("autocorrelation", correlation),
-    ]
+    [("scatter", scatter), ("histogram", histogram)]
 }
 
 /// Optical loss without and with the correction; none without losses.
@@ -171,7 +189,10 @@ pub(super) fn loss<'a>(worth: &'a Worth, hours: &Hours) -> Option<Chart<'a>> {
     (!with.value.is_empty()).then(|| Chart {
         title: "Optical loss over five minutes".into(),
         x_label: hours.label.clone(),
-        y_label: "loss in dB".into(),
+        y_label: format!(
+            "loss in dB, cut at {}; dashed: its limit",
+            10.0 * worth.loss_limit
+        ),
         height: 260.0,
         layers: vec![
             Layer::line(&without.time_s, &without.value, "c1", "without correction"),

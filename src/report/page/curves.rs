@@ -3,7 +3,7 @@
 use super::super::verdict::is_channel;
 use super::super::{Axis, Facts};
 use crate::chart::Chart;
-use crate::diagnosis::{Picture, response_pictures, truth_picture};
+use crate::diagnosis::{Picture, autocorrelation_picture, response_pictures, truth_picture};
 
 /// A picture of an axis.
 pub(super) struct Curves {
@@ -23,9 +23,13 @@ impl Curves {
     }
 }
 
-/// The pictures of an axis: correlation against the lag, and step and impulse responses of what is put out, or, where that is a
-/// vote, of the first voter that answers any sensor.
+/// The pictures of an axis: correlation against the lag, step and impulse responses of what is put out, or, where that is a vote,
+/// of the first voter that answers any sensor, and the autocorrelation of what is left.
 pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
+    let left = facts.errors.iter().find(|of| of.axis == axis.name);
+    let left = left.and_then(|of| of.residuals.as_ref());
+    let left = left.filter(|of| !of.bound.is_empty());
+    let left = left.map(|of| ("autocorrelation".to_owned(), autocorrelation_picture(of)));
     let lags = facts.lags.iter();
     let lags = lags.filter(|of| is_channel(&of.truth, &axis.name)).take(1);
     let lags = lags.map(|of| ("lags".to_owned(), truth_picture(of)));
@@ -33,8 +37,7 @@ pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
         let all = facts.responses.iter();
         all.filter(|of| is_channel(&of.truth, &axis.name))
     };
-    let main = format!("{}.{}", axis.voters[axis.main].node, axis.name);
-    let answers = of_axis().find(|of| of.node == main);
+    let answers = of_axis().find(|of| of.node == axis.prediction);
     let answers = answers.or_else(|| of_axis().next()).into_iter();
     let responses = answers.flat_map(|of| {
         [("steps", false), ("impulses", true)].map(|(kind, impulse)| {
@@ -43,6 +46,7 @@ pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
         })
     });
     lags.chain(responses.flatten())
+        .chain(left)
         .map(|(kind, picture)| Curves { kind, picture })
         .collect()
 }

@@ -166,7 +166,7 @@ fn chosen(html: &mut String, facts: &Facts) {
         return;
     }
     html.push_str(
-        "<h2>Chosen features</h2><p class=\"muted\">Sensor and window, in the order chosen, with the cross-validated R² after each. The window is the time constant that the feature sees.</p>",
+        "<h2>Chosen features</h2><p class=\"muted\">Sensor and window, in the order chosen, with the cross-validated R² after each. A slope over a window follows what happens half of it later.</p>",
     );
     for estimator in chosen {
         let steps = estimator

@@ -1,16 +1,12 @@
 //! Decides which predictions a combiner may put together.
 
-use super::conversion::{factor, mismatch};
-use super::estimator::{self, DEVIATION};
+use super::estimator::{DEVIATION, deviation_of};
 use super::instance::Instance;
 use super::plan::{Beside, PlannedRole, TruthLink};
-use super::problem::CompileProblem;
 use super::provenance::Provenance;
-use super::reference::Reference;
 use super::resolver::{Resolver, Suspect};
-use super::scope::Found;
 use crate::channel::Channel;
-use crate::node::{Combiner, OutputPort};
+use crate::node::{Combiner, InputPort, OutputPort};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -70,25 +66,14 @@ impl Resolver<'_> {
             unit,
             ..self.channels[first].channel.clone()
         };
-        // Predictions have been looked at with the nodes that make them; what else votes or tells a state may see the answer too.
-        let unseen = voters.iter().copied();
-        let unseen = unseen.filter(|&slot| self.channels[slot].predicts.is_none());
-        let unseen = [(port.name, unseen.collect::<Vec<usize>>())];
-        let state_of = state.map(|(port, slot)| (port.name, vec![slot]));
-        for (input, features) in unseen.into_iter().chain(state_of) {
-            let Some(predicts) = predicts else { continue };
-            self.suspects.push(Suspect {
-                place: instance.input_place(input),
-                context: instance.context(),
-                features,
-                lag: Duration::ZERO,
-                link: TruthLink {
-                    slot: predicts,
-                    ahead,
-                    span: self.provenance[predicts].span(),
-                    limit: Duration::ZERO,
-                },
-            });
+        if let Some(predicts) = predicts {
+            let link = TruthLink {
+                slot: predicts,
+                ahead,
+                span: self.provenance[predicts].span(),
+                limit: Duration::ZERO,
+            };
+            self.suspect(instance, (port.name, &voters), state, link);
         }
         let slots = voters.iter().copied().chain(state.map(|(_, slot)| slot));
         let behind = Provenance::of(slots.map(|slot| (&self.provenance[slot], Duration::ZERO)));
@@ -100,52 +85,7 @@ impl Resolver<'_> {
             }
             None => None,
         };
-        let reason = self.beside(first, combined.name.clone());
-        let mut outputs = vec![OutputPort {
-            name: "prediction",
-            channels: vec![combined.clone()],
-        }];
-        let mut beside = Beside::default();
-        let mut next = self.channels.len() + 1;
-        if combiner.weighs() {
-            outputs.push(OutputPort {
-                name: "weights",
-                channels: self.weights(&voters),
-            });
-            beside.weights = Some(next);
-            next += voters.len();
-        }
-        if combiner.reasons() {
-            outputs.push(OutputPort {
-                name: "reason",
-                channels: vec![reason],
-            });
-            beside.reason = Some(next);
-            next += 1;
-        }
-        if combiner.covers().is_some() {
-            for name in ["lower", "upper"] {
-                outputs.push(OutputPort {
-                    name,
-                    channels: vec![combined.clone()],
-                });
-            }
-            beside.bounds = Some((next, next + 1));
-            next += 2;
-        }
-        if combiner.weighs()
-            && let Some(of_voters) = self.deviations(&voters)
-        {
-            let deviation = estimator::deviation_of(&combined);
-            let unit = deviation
-                .channels
-                .first()
-                .map(|channel| channel.unit.clone());
-            let lags = [Duration::ZERO];
-            let gather = self.gather(instance, &port, &of_voters, &lags, unit.as_ref())?;
-            outputs.push(deviation);
-            beside.deviation = Some((next, gather));
-        }
+        let (outputs, beside) = self.ports(instance, combiner, combined, (&port, &voters))?;
         let channels = outputs.iter().map(|port| port.channels.len()).sum();
         let behind = vec![behind; channels];
         let role = PlannedRole::Combiner {
@@ -155,6 +95,73 @@ impl Resolver<'_> {
             beside,
         };
         self.add(instance, outputs, role, behind, predicts)
+    }
+
+    /// Notes what may see the answer beside predictions, which have been looked at with the nodes that make them: what else
+    /// votes, and what tells a state.
+    fn suspect(
+        &mut self,
+        instance: &Instance<'_>,
+        (input, voters): (&'static str, &[usize]),
+        state: Option<(InputPort, usize)>,
+        link: TruthLink,
+    ) {
+        let unseen = voters.iter().copied();
+        let unseen = unseen.filter(|&slot| self.channels[slot].predicts.is_none());
+        let unseen = (input, unseen.collect::<Vec<usize>>());
+        let state = state.map(|(port, slot)| (port.name, vec![slot]));
+        for (input, features) in std::iter::once(unseen).chain(state) {
+            self.suspects.push(Suspect {
+                place: instance.input_place(input),
+                context: instance.context(),
+                features,
+                lag: Duration::ZERO,
+                link,
+            });
+        }
+    }
+
+    /// What comes out of a combiner, and where in the plan that is which stands beside the prediction.
+    fn ports(
+        &mut self,
+        instance: &Instance<'_>,
+        combiner: &dyn Combiner,
+        combined: Channel,
+        (port, voters): (&InputPort, &[usize]),
+    ) -> Option<(Vec<OutputPort>, Beside)> {
+        let reason = self.beside(voters[0], combined.name.clone());
+        let deviation = deviation_of(&combined);
+        let mut outputs = vec![OutputPort {
+            name: "prediction",
+            channels: vec![combined.clone()],
+        }];
+        let mut next = self.channels.len() + 1;
+        let mut put = |name, channels: Vec<Channel>| {
+            let first = next;
+            next += channels.len();
+            outputs.push(OutputPort { name, channels });
+            first
+        };
+        let mut beside = Beside::default();
+        if combiner.weighs() {
+            beside.weights = Some(put("weights", self.weights(voters)));
+        }
+        if combiner.reasons() {
+            beside.reason = Some(put("reason", vec![reason]));
+        }
+        if combiner.covers().is_some() {
+            let mut bound = |name| put(name, vec![combined.clone()]);
+            beside.bounds = Some((bound("lower"), bound("upper")));
+        }
+        if combiner.weighs()
+            && let Some(of_voters) = self.deviations(voters)
+        {
+            let unit = deviation.channels[0].unit.clone();
+            let lags = [Duration::ZERO];
+            let gather = self.gather(instance, port, &of_voters, &lags, Some(&unit))?;
+            beside.deviation = Some((put(deviation.name, deviation.channels), gather));
+        }
+        Some((outputs, beside))
     }
 
     /// The standard deviation that stands beside each of these predictions, where all have one.
@@ -199,109 +206,5 @@ impl Resolver<'_> {
             ahead: Duration::ZERO,
             max_age: self.channels[slot].channel.default_max_age(),
         }
-    }
-
-    /// Whether no voter is what an estimator or combiner gives beside its prediction. What else there is may vote: a feature of
-    /// a prediction, such as its `scale`, is one for all that is known.
-    pub(super) fn are_predictions(&mut self, instance: &Instance<'_>, input: &str) -> bool {
-        let mut all = true;
-        for (text, place) in instance
-            .input(input)
-            .map_or(&[][..], |input| &input.references)
-        {
-            let Ok(Found::Slots(slots)) = self.scopes.look_up(text) else {
-                continue;
-            };
-            let mut told_of = slots.iter().map(|&slot| (slot, self.told_of(slot)));
-            let Some((slot, Some(prediction))) = told_of.find(|(_, of)| of.is_some()) else {
-                continue;
-            };
-            let reference = Reference::parse(text);
-            let problem = CompileProblem::NoPrediction {
-                channel: self.channels[slot].name.clone(),
-                prediction: match reference.channel {
-                    Some(_) => self.channels[prediction].name.clone(),
-                    None => reference.node.to_owned(),
-                },
-            };
-            self.diagnostics.report(*place, problem);
-            all = false;
-        }
-        all
-    }
-
-    /// The prediction beside which an estimator or combiner gives this slot.
-    pub(super) fn told_of(&self, slot: usize) -> Option<usize> {
-        let node = &self.nodes[self.channels[slot].node?];
-        let (_, predictions) = node.ports.first()?;
-        let predicts = !matches!(node.role, PlannedRole::Feature { .. });
-        (predicts && !predictions.contains(&slot)).then_some(predictions.start)
-    }
-
-    /// Whether predictions may be put together.
-    pub(super) fn votes_agree(
-        &mut self,
-        instance: &Instance<'_>,
-        input: &str,
-        voters: &[usize],
-    ) -> bool {
-        let mut agree = true;
-        for &other in voters.iter().skip(1) {
-            agree &= self.agree(instance, input, voters[0], other, true);
-        }
-        agree
-    }
-
-    /// Whether two channels are different members of the same port or signal, as `drift.X` and `drift.Y` are. Of other channels,
-    /// such as two slopes of the same position, it is not known whether they are the same quantity.
-    fn are_members(&self, one: usize, other: usize) -> bool {
-        let of = |slot: usize| self.channels[slot].name.split_once('.').map(|(of, _)| of);
-        one != other && of(one).is_some() && of(one) == of(other)
-    }
-
-    /// Whether two channels may stand for the same quantity, and where both are votes, for the same instant. The second is another
-    /// vote, or the truth.
-    pub(super) fn agree(
-        &mut self,
-        instance: &Instance<'_>,
-        input: &str,
-        first: usize,
-        second: usize,
-        votes: bool,
-    ) -> bool {
-        let (a, b) = (&self.channels[first], &self.channels[second]);
-        let problem = if factor(&b.channel.unit, &a.channel.unit).is_none() {
-            mismatch(&b.name, &b.channel.unit, &a.name, &a.channel.unit)
-        } else if a.channel.span != b.channel.span {
-            CompileProblem::Spans {
-                first: a.name.clone(),
-                first_span: a.channel.span,
-                second: b.name.clone(),
-                second_span: b.channel.span,
-            }
-        } else if votes && a.channel.ahead != b.channel.ahead {
-            CompileProblem::Horizons {
-                first: a.name.clone(),
-                first_ahead: a.channel.ahead,
-                second: b.name.clone(),
-                second_ahead: b.channel.ahead,
-            }
-        } else if let Some(of_first) = a.predicts
-            && let Some(of_second) = if votes { b.predicts } else { Some(second) }
-            && self.are_members(of_first, of_second)
-        {
-            let name = |slot: usize| self.channels[slot].name.clone();
-            CompileProblem::Truths {
-                first: a.name.clone(),
-                first_truth: name(of_first),
-                second: b.name.clone(),
-                second_truth: name(of_second),
-            }
-        } else {
-            return true;
-        };
-        self.diagnostics
-            .report(instance.input_place(input), problem);
-        false
     }
 }

@@ -1,6 +1,7 @@
 //! Decides what a graph file means: references resolved, units, spans and horizons checked, an order, slots, a [`Plan`];
 //! not when it runs.
 
+mod agreement;
 mod column_unit;
 mod combiner;
 mod conversion;
