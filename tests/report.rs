@@ -455,6 +455,14 @@ fn a_sensor_that_failed_is_told_with_what_was_wrong() {
     // The column is slow, so that what differs from sample to sample is the noise of 1 mK.
     let noise = sensor("t3")["noise"].as_f64().unwrap();
     assert!((0.9e-3..1.1e-3).contains(&noise), "{noise}");
+    // Axes drift, and far in some minutes; the scatter of a position is 12 nm.
+    let sensors = facts["course"]["sensors"].as_array().unwrap();
+    let position = sensors
+        .iter()
+        .find(|of| of["name"] == "position.X")
+        .unwrap();
+    let noise = position["noise"].as_f64().unwrap();
+    assert!((11.0..14.0).contains(&noise), "{noise}");
     assert_eq!(sensor("t3")["rejected"], 3);
 }
 

@@ -383,3 +383,15 @@ impl Layer<'_> {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_without_room_keeps_its_end() {
+        let room = 12.0 * LETTER;
+        assert_eq!(elided("gradients", room), "gradients");
+        assert_eq!(elided("gradients.near_holder@150s", room), "grad…er@150s");
+    }
+}

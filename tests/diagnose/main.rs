@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod lags;
+mod pictures;
 mod program;
 mod reach;
 #[path = "../workbench/mod.rs"]
@@ -159,6 +160,25 @@ fn an_answer_that_lasts_has_a_gain_and_no_sum() {
     assert_eq!((of.total, of.settled_s, of.peak_s), (None, Some(0.0), 0.0));
     assert!(of.gain.is_some_and(|gain| (gain - 3.0).abs() < 1e-9));
     assert!(of.step.iter().all(|step| (step - 3.0).abs() < 1e-9));
+}
+
+#[test]
+fn what_a_level_leaves_for_good_is_told_beside_slopes_that_answer_far_more() {
+    let text = TWO_SENSORS.replace(
+        "inputs.features = \"gradients\"",
+        "inputs.features = [\"gradients\", \"temperature\"]",
+    );
+    let terms = [("gradients.a@150s", 0.4), ("temperature.a", -0.03)];
+    let model = model("for-good", &text, &[("thermal", linear(&terms, 0.0))]);
+    let table = wandering(600, |course, row| 1000.0 * course[row][0]);
+    let observation = observe(&model, &table).unwrap();
+    let found = response::responses(&model, &observation).unwrap();
+    let [of] = &found[0].sensors[..] else {
+        panic!("{found:?}")
+    };
+    assert!(of.peak > 100.0 * 0.03, "{}", of.peak);
+    assert_eq!(of.total, None);
+    assert!(of.gain.is_some_and(|gain| (gain + 0.03).abs() < 1e-9));
 }
 
 #[test]

@@ -367,58 +367,6 @@ fn the_rows_that_tell_how_well_data_determine_a_model_are_those_of_its_fit() {
 }
 
 #[test]
-fn answers_to_sensors_of_different_units_are_drawn_apart() {
-    let scratch = Scratch::new("diagnose-units");
-    let graph = scratch.file(
-        "graph.toml",
-        r#"schema = 1
-[time]
-column = "time_s"
-[signals.temperature]
-unit = "Cel"
-channels = ["bed"]
-max_age = "1min"
-[signals.load]
-unit = "%"
-channels = ["spindle"]
-max_age = "1min"
-[signals.position]
-unit = "um"
-channels = ["Z"]
-max_age = "1min"
-[nodes.model]
-type = "linear"
-inputs = { features = ["temperature", "load"], truth = "position.Z" }
-ahead = "0s"
-[outputs]
-predicted = "model"
-"#,
-    );
-    let mut rows = String::from("time_s,bed,spindle,Z\n");
-    for row in 0..200 {
-        let (bed, spindle) = (f64::from(row % 17), f64::from(row % 5));
-        let _ = writeln!(
-            rows,
-            "{},{bed},{spindle},{}",
-            10 * row,
-            2.0 * bed + 0.1 * spindle
-        );
-    }
-    let log = scratch.file("log.csv", rows);
-    let (model, plots) = (scratch.path("model.json"), scratch.path("plots"));
-    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
-    athermal_on("diagnose", &model, &log, &[&"--no-fit", &"--plots", &plots]).ended(0);
-    for (name, label, sensor, other) in [
-        ("step-model.svg", "um per K", ">bed<", ">spindle<"),
-        ("step-model-2.svg", "um per %", ">spindle<", ">bed<"),
-    ] {
-        let svg = std::fs::read_to_string(plots.join(name)).unwrap();
-        assert!(svg.contains(label) && svg.contains(sensor), "{name}: {svg}");
-        assert!(!svg.contains(other), "{name}: {svg}");
-    }
-}
-
-#[test]
 fn answers_of_instances_that_predict_the_same_are_told_by_the_instances() {
     let scratch = Scratch::new("diagnose-same-truth");
     let (head, rest) = TWO_SENSORS.split_once("[nodes.thermal]").unwrap();
@@ -452,4 +400,33 @@ fn answers_of_instances_that_predict_the_same_are_told_by_the_instances() {
     let heading = answers.lines().nth(1).unwrap();
     let columns: Vec<&str> = heading.split_whitespace().collect();
     assert_eq!(columns, ["sensor", "a", "b"]);
+}
+
+#[test]
+fn a_condition_is_told_of_models_that_their_regressors_determine_and_of_no_others() {
+    let scratch = Scratch::new("diagnose-filters");
+    let (signals, nodes) = DIRECT.split_once("[nodes.model]\n").unwrap();
+    let (node, _) = nodes.split_once("[outputs]").unwrap();
+    let past = node.replace("\"linear\"", "\"arx\"\nlags = [\"0s\"]");
+    let filter = node.replace("\"linear\"", "\"oe\"");
+    let text = format!(
+        "{signals}[nodes.past]\n{past}[nodes.filter]\n{filter}[outputs]\npast = \"past\"\nfilter = \"filter\"\n"
+    );
+    let graph = scratch.file("graph.toml", text);
+    let log = scratch.file("log.csv", with_gaps());
+    let model = scratch.path("model.json");
+    athermal_on("fit", &graph, &log, &[&"-o", &model]).ended(0);
+    let more: [&dyn AsRef<std::ffi::OsStr>; 3] = [&"--no-fit", &"--format", &"json"];
+    let facts = athermal_on("diagnose", &model, &log, &more).json();
+    let designs = facts["diagnosis"]["designs"].as_array().unwrap();
+    let of = |node: &str| {
+        designs
+            .iter()
+            .find(|of| of["node"] == node)
+            .unwrap_or_else(|| panic!("{designs:?}"))
+    };
+    assert!(of("past")["condition"].as_f64().unwrap() >= 1.0);
+    assert!(of("filter")["condition"].is_null());
+    let inflation = |of: &serde_json::Value| of["regressors"][0]["inflation"].clone();
+    assert!(inflation(of("past")).is_f64() && inflation(of("filter")).is_null());
 }
