@@ -131,11 +131,13 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         let mut line = String::new();
         for (column, cell) in row.iter().enumerate() {
             match widths.get(column) {
-                Some(&width) if column == 0 => {
-                    let _ = write!(line, "{cell:<width$}");
-                }
                 Some(&width) => {
-                    let _ = write!(line, "  {cell:>width$}");
+                    // A width of `format!` ends at 65,535, and a name may be longer.
+                    let room = " ".repeat(width - cell.chars().count());
+                    let _ = match column {
+                        0 => write!(line, "{cell}{room}"),
+                        _ => write!(line, "  {room}{cell}"),
+                    };
                 }
                 None => {
                     let _ = write!(line, "  {cell}");
@@ -323,5 +325,12 @@ mod tests {
         assert_eq!(told(300_000_000_000), "5min");
         assert_eq!(told(12_345), "12.345us");
         assert_eq!(told(0), "0s");
+    }
+
+    #[test]
+    fn a_cell_may_be_longer_than_formatting_allows() {
+        let long = "x".repeat(70_000);
+        let told = table(&["name", "value"], &[vec!["a".to_owned(), long.clone()]]);
+        assert_eq!(told.lines().nth(1), Some(&*format!("a     {long}")));
     }
 }

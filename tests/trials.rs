@@ -147,6 +147,22 @@ expect = [
 }
 
 #[test]
+fn a_fault_after_the_end_of_the_data_has_not_been_survived() {
+    let tests = r#"
+[[tests]]
+name = "survives what never happens"
+inputs = { "temperature.room" = { ramp = "1 mK/s", for = "10min", every = "5s" } }
+faults = [{ channel = "temperature.room", kind = "stuck", from = "1d" }]
+expect = [{ of = "slopes.room", at = "5min", equals = "60 mK/min", within = 1e-6 }]
+"#;
+    let told = told("late-fault", tests, 2);
+    assert!(
+        told.contains("the fault of `temperature.room` begins 1d after the first row, and the data last 9min55s"),
+        "{told}"
+    );
+}
+
+#[test]
 fn a_machine_that_there_is_not_is_told_by_check_and_by_test() {
     let tests = r#"
 [[tests]]

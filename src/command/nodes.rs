@@ -1,7 +1,9 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
 use athermal::core::diagnostic::nearest;
-use athermal::core::node::{FREEZE, Kind, Read, RoleName, kind, kinds, written_names};
+use athermal::core::node::{
+    FREEZE, Kind, Learns, Read, Role, RoleName, kind, kinds, written_names,
+};
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -135,41 +137,65 @@ fn explain(terminal: &Terminal, kind: &Kind) {
 /// The output ports that nodes of a kind may have, and when.
 fn outputs(kind: &Kind) -> Vec<(&'static str, &'static str)> {
     const PREDICTION: (&str, &str) = ("prediction", "what the truth will be, in its unit");
+    const DEVIATION: (&str, &str) = (
+        "deviation",
+        "the standard deviation of the truth about the prediction",
+    );
+    // Where only parameters tell, they may be there.
+    let by_default = kind.by_default();
+    let role = by_default.as_ref().map(|spec| spec.role());
     match kind.role {
-        // Each kind names its own, on its page.
-        RoleName::Feature => Vec::new(),
-        RoleName::Estimator => {
-            let mut ports = vec![PREDICTION];
-            if (kind.inputs)().iter().any(|port| port.name == FREEZE) {
-                ports.push((
-                    "learning",
-                    "with `learn`: what became of the newest truth. 0 learned, 1 frozen on command, 2 frozen by a channel, 3 an outlier, \
-                     4 outside the range of the fit, 5 outside `train.abs_truth`, 6 a regressor was missing",
-                ));
-            }
-            ports.push((
-                "deviation",
-                "the standard deviation of the truth about the prediction, of kinds that tell it",
-            ));
-            ports
+        RoleName::Feature => {
+            let ports = (kind.ports)().iter();
+            ports.map(|port| (port.name, port.summary)).collect()
         }
-        RoleName::Combiner => vec![
-            PREDICTION,
-            (
-                "weights",
-                "of kinds that weigh: the weight of each voter, by its name",
-            ),
-            (
-                "reason",
-                "of kinds that switch: the number of why it does what it does",
-            ),
-            ("lower", "of kinds that give intervals: where they begin"),
-            ("upper", "the same: where they end"),
-            (
-                "deviation",
-                "of kinds that weigh, where all voters have one: that of the truth about the prediction",
-            ),
-        ],
+        RoleName::Estimator => {
+            let (learns, deviates) = match role {
+                Some(Role::Estimator(of)) => {
+                    (!matches!(of.learns(), Learns::Never { .. }), of.deviates())
+                }
+                _ => (true, true),
+            };
+            let learning = (
+                "learning",
+                "with `learn`: what became of the newest truth. 0 learned, 1 frozen on command, 2 frozen by a channel, 3 an outlier, \
+                 4 outside the range of the fit, 5 outside `train.abs_truth`, 6 a regressor was missing",
+            );
+            let more = [(learns, learning), (deviates, DEVIATION)];
+            let more = more.into_iter().filter(|(there, _)| *there);
+            std::iter::once(PREDICTION)
+                .chain(more.map(|(_, port)| port))
+                .collect()
+        }
+        RoleName::Combiner => {
+            let (weighs, reasons, covers) = match role {
+                Some(Role::Combiner(of)) => (of.weighs(), of.reasons(), of.covers().is_some()),
+                _ => (true, true, true),
+            };
+            let more = [
+                (weighs, ("weights", "the weight of each voter, by its name")),
+                (
+                    reasons,
+                    (
+                        "reason",
+                        "the number of why it does what it does, as told above",
+                    ),
+                ),
+                (covers, ("lower", "where the interval begins")),
+                (covers, ("upper", "where it ends")),
+                (
+                    weighs,
+                    (
+                        DEVIATION.0,
+                        "where all voters have one: that of the truth about the prediction",
+                    ),
+                ),
+            ];
+            let more = more.into_iter().filter(|(there, _)| *there);
+            std::iter::once(PREDICTION)
+                .chain(more.map(|(_, port)| port))
+                .collect()
+        }
     }
 }
 

@@ -182,7 +182,9 @@ pub(super) fn answers(
             of.step.iter().rposition(far)
         };
         let last = sensors.iter().filter_map(last).max().unwrap_or(0);
-        sensors.iter_mut().for_each(|of| of.end_after(last + 2));
+        sensors
+            .iter_mut()
+            .for_each(|of| of.end_after(last + 2 + last / 10));
         Responses {
             node: node.instance(),
             truth: truth.map_or_else(String::new, |of| of.name.clone()),

@@ -34,6 +34,18 @@ fn options_that_need_another_are_refused_without_it() {
 }
 
 #[test]
+fn a_log_in_the_place_of_a_model_is_refused_by_its_beginning() {
+    let (scratch, _, data, model) = desk("swapped");
+    // What comes after is no text, and would be told instead if it were read.
+    let mut log = std::fs::read(&data).unwrap();
+    log.extend([0xff; 20_000]);
+    let log = scratch.file("odd.csv", log);
+    athermal_on("evaluate", &log, &model, &[])
+        .ended(2)
+        .tells(&["odd.csv", "no model"]);
+}
+
+#[test]
 fn a_limit_in_a_unit_of_something_else_is_refused() {
     let (_scratch, _, data, model) = desk("limit");
     let limited = |limit: &str| {

@@ -46,3 +46,23 @@ fn what_is_wrong_with_a_parameter_is_told_though_the_inputs_are_wrong_too() {
         }
     }
 }
+
+#[test]
+fn channels_that_every_node_multiplies_are_stopped() {
+    let lags: Vec<String> = (0..101).map(|lag| format!("\"{lag}s\"")).collect();
+    let lags = lags.join(", ");
+    let mut text =
+        "schema = 1\n[signals.n0]\nunit = \"nm\"\nchannels = [\"X\"]\nmax_age = \"3min\"\n"
+            .to_owned();
+    for node in 1..=3 {
+        let last = node - 1;
+        text += &format!(
+            "[nodes.n{node}]\ntype = \"lag\"\ninputs.signal = \"n{last}\"\nlags = [{lags}]\n"
+        );
+    }
+    let told = Read::new(&(text + "[outputs]\nout = \"n3\"\n")).told();
+    assert!(
+        told.contains("with its channels the graph has 1040604, more than 1000000"),
+        "{told}"
+    );
+}

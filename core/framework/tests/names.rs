@@ -76,6 +76,7 @@ athermal_core::inventory::submit! {
         role: RoleName::Feature,
         package: "keepers",
         version: "0.3.1",
+        ports: || &[],
         inputs: Keeper::inputs,
         read: athermal_core::node::read::<Keeper>,
         schema: || schemars::schema_for!(Keeper),

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -187,6 +187,18 @@ impl Feature for Compensate {
                 )
                 .in_unit("1")
                 .or_none(),
+            ]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("correction", "what is to be added to each position"),
+                PortSummary::new(
+                    "why",
+                    "what held it back: 0 nothing, 1 no valid prediction, 2 stable, 3 below the deadband, 4 rate cut, 5 at the end of the range, 6 slewing",
+                ),
             ]
         }
     }

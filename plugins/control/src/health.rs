@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -154,6 +154,18 @@ impl Health {
 impl Feature for Health {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "the channels to watch")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("signal", "each channel while it can be trusted"),
+                PortSummary::new(
+                    "reason",
+                    "0 healthy, 1 out of range, 2 changes too fast, 3 stuck, 4 too little noise, 5 too much noise, 6 silent, 7 recovering",
+                ),
+            ]
+        }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

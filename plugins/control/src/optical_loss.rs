@@ -2,7 +2,7 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::Duration;
@@ -159,6 +159,15 @@ impl Feature for OpticalLoss {
                 "drift",
                 "the drifts of all axes of the coupling",
             )]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("loss", "the loss of all axes together, in dB"),
+                PortSummary::new("share", "what each axis adds, in dB"),
+            ]
         }
     }
 

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::Channel;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -119,6 +119,18 @@ impl Feature for SafeState {
                     "other than 0 where the signal must not be trusted: one, or one per channel",
                 )
                 .or_none(),
+            ]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("safe", "the signal, or what stands for it"),
+                PortSummary::new(
+                    "why",
+                    "0 trusted, 1 absent, 2 distrusted, 3 and 4 the same and past `after`, 5 on the way back",
+                ),
             ]
         }
     }

@@ -2,7 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Restored, State, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Restored,
+    State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -80,6 +81,18 @@ impl Feature for Settled {
                 InputPort::fresh(
                     "set_point",
                     "what is set, or a temperature that follows it at once: one channel",
+                ),
+            ]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("settle_time", "in min, once it is known"),
+                PortSummary::new(
+                    "since",
+                    "the time in min since a change that has not settled; 0 when it has",
                 ),
             ]
         }

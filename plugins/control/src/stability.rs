@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -96,6 +96,18 @@ impl Stability {
 impl Feature for Stability {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("drift", "the drift of the axes")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new(
+                    "state",
+                    "0 stable, 1 quasi-stable, 2 transient, of each axis",
+                ),
+                PortSummary::new("worst", "that of the least stable axis"),
+            ]
+        }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

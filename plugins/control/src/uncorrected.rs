@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,15 @@ impl Feature for Uncorrected {
                     "the corrections that the machine reports as applied, one per position",
                 ),
             ]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[PortSummary::new(
+                "position",
+                "each position without the correction",
+            )]
         }
     }
 

@@ -2,7 +2,7 @@
 
 use athermal_core::channel::Channel;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::unit::Unit;
@@ -99,6 +99,10 @@ impl Feature for Sum {
         const { &[TERMS] }
     }
 
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("sum", "the sum")] }
+    }
+
     fn mistakes(&self) -> Vec<Mistake> {
         let mut weights = self.weights.iter().flatten();
         let wild = weights.find(|weight| !weight.is_finite());
@@ -172,6 +176,10 @@ impl Feature for Product {
         const { &[TERMS] }
     }
 
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("product", "the product")] }
+    }
+
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         if inputs.port("signal").is_empty() {
             return Err(vec![Mistake::at(
@@ -226,6 +234,10 @@ impl Scale {
 impl Feature for Scale {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is scaled")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("scaled", "each channel, scaled")] }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

@@ -5,8 +5,8 @@ use std::fmt;
 
 use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
@@ -96,6 +96,10 @@ impl JsonSchema for Lateness {
 impl Feature for Delay {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is given later")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("delayed", "each channel, later")] }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

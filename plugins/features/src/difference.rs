@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -56,6 +56,15 @@ impl Difference {
 impl Feature for Difference {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what changes")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[PortSummary::new(
+                "difference",
+                "how much each channel has changed",
+            )]
+        }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

@@ -1,8 +1,8 @@
 //! First-order lags: the thermal masses between a sensor and what it explains.
 
 use athermal_core::node::{
-    Feature, Forms, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored,
-    State, Tick,
+    Feature, Forms, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
@@ -123,6 +123,10 @@ impl Grid {
 impl Feature for FirstOrder {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is followed")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("lagged", "each channel behind each lag")] }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -100,6 +100,15 @@ impl Hampel {
 impl Feature for Hampel {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what may have spikes")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("signal", "each channel without its outliers"),
+                PortSummary::new("outlier", "1 where a sample was one, 0 where it was none"),
+            ]
+        }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

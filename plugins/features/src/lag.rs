@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{Channel, is_unchanged};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use schemars::JsonSchema;
@@ -31,6 +31,10 @@ pub struct Lag {
 impl Feature for Lag {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is looked back at")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("lagged", "each channel as it was")] }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

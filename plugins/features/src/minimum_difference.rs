@@ -2,8 +2,8 @@
 
 use athermal_core::channel::Channel;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::quantity::Quantity;
 use schemars::JsonSchema;
@@ -50,6 +50,15 @@ impl MinimumDifference {
 impl Feature for MinimumDifference {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what has noise")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[PortSummary::new(
+                "signal",
+                "each channel without changes below the minimum",
+            )]
+        }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
@@ -61,6 +61,20 @@ impl Feature for Moving {
                 "signal",
                 "what the statistics are taken of",
             )]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("mean", "the mean of the samples in the window"),
+                PortSummary::new("std", "their standard deviation, by n − 1"),
+                PortSummary::new("min", "the smallest"),
+                PortSummary::new("max", "the largest"),
+                PortSummary::new("range", "the largest less the smallest"),
+                PortSummary::new("median", "the median"),
+                PortSummary::new("count", "how many there are"),
+            ]
         }
     }
 

@@ -2,7 +2,7 @@
 
 use athermal_core::channel::is_unchanged;
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,10 @@ pub struct Pick {
 impl Feature for Pick {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "the channels to pass on")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("signal", "the channels as they are")] }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

@@ -2,8 +2,8 @@
 
 use athermal_core::channel::{ABSENT, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::{Duration, Instant};
 use schemars::JsonSchema;
@@ -57,6 +57,15 @@ impl Feature for Resample {
             &[InputPort::fresh(
                 "signal",
                 "what is brought to a regular clock",
+            )]
+        }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[PortSummary::new(
+                "signal",
+                "each channel at regular instants",
             )]
         }
     }

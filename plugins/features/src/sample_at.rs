@@ -1,7 +1,7 @@
 //! Samples taken when another channel is measured.
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,6 +26,10 @@ impl Feature for SampleAt {
                 InputPort::fresh("instants", "the channels whose new values say when"),
             ]
         }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const { &[PortSummary::new("signal", "each channel at those instants")] }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {

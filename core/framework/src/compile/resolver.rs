@@ -23,6 +23,9 @@ use crate::node::{Mistake, OutputPort, Role};
 use crate::time::Duration;
 use crate::unit::Unit;
 
+/// The most channels that a graph may have; a few hundred bytes each.
+const MOST_CHANNELS: usize = 1_000_000;
+
 /// The name of a channel among those of all members; the only one of an instance has its member's name.
 fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
     match member {
@@ -220,6 +223,20 @@ impl<'g> Resolver<'g> {
     ) -> Option<()> {
         let index = self.nodes.len();
         let start = self.channels.len();
+        let more: usize = ports.iter().map(|port| port.channels.len()).sum();
+        if start.saturating_add(more) > MOST_CHANNELS {
+            let message = format!(
+                "with its channels the graph has {}, more than {MOST_CHANNELS}",
+                start.saturating_add(more)
+            );
+            let help = "give it or the nodes before it fewer windows, lags or inputs";
+            let port = (instance.kind.inputs)()
+                .first()
+                .map_or("", |port| port.name);
+            let at = format!("inputs.{port}");
+            self.mistakes(instance, vec![Mistake::at(at, message).help(help)]);
+            return None;
+        }
         let mut ranges: Vec<(&'static str, Range<usize>)> = Vec::new();
         let mut behind = behind.into_iter();
         let mut whole = true;

@@ -63,6 +63,15 @@ pub enum FaultError {
         /// The unit of the channel.
         unit: Box<Unit>,
     },
+    /// It begins after the last row, and nothing has failed.
+    Late {
+        /// The channel.
+        channel: String,
+        /// When it begins, after the first row.
+        from: Duration,
+        /// From the first row to the last, of the longest segment.
+        length: Duration,
+    },
     /// The text is not a fault.
     Text {
         /// The part that is not understood.
@@ -108,6 +117,15 @@ impl fmt::Display for FaultError {
                     kind.name()
                 )
             }
+            Self::Late {
+                channel,
+                from,
+                length,
+            } => write!(
+                f,
+                "the fault of `{channel}` begins {from} after the first row, and the data last {length}: nothing has failed; let it begin \
+                 sooner"
+            ),
             Self::UnknownChannel {
                 channel,
                 nearest,

@@ -1,6 +1,8 @@
 //! Decides how a model is read and written.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufRead as _, BufReader, Read as _};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,6 +17,9 @@ use crate::node::{Mistake, Predictor};
 
 /// The format that this version writes.
 pub(super) const FORMAT: u64 = 1;
+
+/// The most bytes that a model may have.
+const LARGEST: u64 = 1_000_000_000;
 
 /// A graph with what was fitted: all that is needed to run.
 #[derive(Debug, Clone)]
@@ -64,6 +69,27 @@ fn sound(written: serde_json::Value) -> Result<Box<dyn Predictor>, Vec<Mistake>>
     }
 }
 
+/// The text of a file that may be a model. Of what does not begin as one, such as a log, the beginning is enough to be refused:
+/// its end may be far away.
+fn text_of(path: &Path) -> io::Result<String> {
+    let mut file = BufReader::new(File::open(path)?);
+    let begins = file
+        .fill_buf()?
+        .iter()
+        .find(|byte| !byte.is_ascii_whitespace());
+    if begins.is_some_and(|byte| byte.is_ascii_graphic() && *byte != b'{') {
+        let beginning = file.fill_buf()?;
+        return Ok(String::from_utf8_lossy(beginning).into_owned());
+    }
+    let mut text = String::new();
+    file.take(LARGEST + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > LARGEST {
+        let large = format!("it has more than {} MB", LARGEST / 1_000_000);
+        return Err(io::Error::other(large));
+    }
+    Ok(text)
+}
+
 impl Model {
     /// Reads a model, or a graph file in whose place nothing has been fitted.
     ///
@@ -100,7 +126,7 @@ impl Model {
         {
             return Self::load_graph(path, wanted, sources, doubts);
         }
-        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Unreadable {
+        let text = text_of(path).map_err(|source| ModelError::Unreadable {
             path: path.to_owned(),
             source,
         })?;

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, Reach, Restored, State};
+use super::{Encoder, InputPort, Inputs, Mistake, OutputPort, PortSummary, Reach, Restored, State};
 use crate::channel::unless_infinite;
 use crate::engine::{Gathered, Given};
 use crate::time::{Duration, Instant};
@@ -82,6 +82,15 @@ pub trait Feature: Debug + Send + Sync {
     fn inputs() -> &'static [InputPort]
     where
         Self: Sized;
+
+    /// All output ports that [`outputs`](Self::outputs) may give, in that order, as they are told of the kind. Without them a node
+    /// of several ports has to name them in its documentation.
+    fn ports() -> &'static [PortSummary]
+    where
+        Self: Sized,
+    {
+        &[]
+    }
 
     /// Mistakes in the parameters that their types do not exclude, whatever the inputs are: they are told though an input is wrong.
     fn mistakes(&self) -> Vec<Mistake> {

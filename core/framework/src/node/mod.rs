@@ -40,7 +40,7 @@ pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
 pub use linear_form::LinearForm;
 pub(crate) use linear_form::Strands;
-pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, Read};
+pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read};
 #[doc(hidden)]
 pub use predictor::InModel;
 pub use predictor::Predictor;

@@ -16,6 +16,23 @@ pub enum Read {
     Truth,
 }
 
+/// An output port of a kind, as it is told before there is a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PortSummary {
+    /// The name after a colon in a reference: `stderr` of `drift:stderr`.
+    pub name: &'static str,
+    /// One line for people: what it gives.
+    pub summary: &'static str,
+}
+
+impl PortSummary {
+    /// A port of this name.
+    #[must_use]
+    pub const fn new(name: &'static str, summary: &'static str) -> Self {
+        Self { name, summary }
+    }
+}
+
 /// The name of the port by which channels freeze the learning of an estimator; the framework reads it, not the node.
 pub const FREEZE: &str = "freeze";
 

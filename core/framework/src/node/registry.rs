@@ -8,9 +8,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Combiner, Estimator, Feature, InputPort, Read};
-use crate::diagnostic::Diagnostics;
-use crate::document::{Decoded, Value, Wanted, decode_rest};
+use super::{Combiner, Estimator, Feature, InputPort, PortSummary, Read};
+use crate::diagnostic::{Diagnostics, Place, SourceId};
+use crate::document::{Data, Decoded, Table, Value, Wanted, decode_rest};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -79,6 +79,8 @@ pub struct Kind {
     pub version: &'static str,
     /// The input ports.
     pub inputs: fn() -> &'static [InputPort],
+    /// Of a feature, the output ports as it tells them: see [`Feature::ports`].
+    pub ports: fn() -> &'static [PortSummary],
     /// Reads its parameters, telling every mistake in them; after one, what could be read beside it. The keys are those of the node
     /// that are read elsewhere.
     pub read: fn(&Value, &[&str], &mut Diagnostics) -> ReadSpec,
@@ -87,6 +89,16 @@ pub struct Kind {
 }
 
 impl Kind {
+    /// A specification with all defaults; none of a kind that has parameters without.
+    #[must_use]
+    pub fn by_default(&self) -> Option<Box<dyn NodeSpec>> {
+        let nothing = Value {
+            place: Place::new(SourceId(0), 0, 0),
+            data: Data::Table(Table::default()),
+        };
+        (self.read)(&nothing, &[], &mut Diagnostics::new())?.whole()
+    }
+
     /// The keys of a node's table that the framework reads itself.
     #[must_use]
     pub fn framework_keys(&self) -> &'static [&'static str] {
@@ -203,10 +215,12 @@ pub fn kind(name: &str) -> Option<&'static Kind> {
 /// documentation of the kind.
 #[macro_export]
 macro_rules! register {
-    ($spec:ty, Feature, $name:literal) => { $crate::register!(@ $spec, Feature, $name); };
-    ($spec:ty, Estimator, $name:literal) => { $crate::register!(@ $spec, Estimator, $name); };
-    ($spec:ty, Combiner, $name:literal) => { $crate::register!(@ $spec, Combiner, $name); };
-    (@ $spec:ty, $role:ident, $name:literal) => {
+    ($spec:ty, Feature, $name:literal) => {
+        $crate::register!(@ $spec, Feature, $name, <$spec as $crate::node::Feature>::ports);
+    };
+    ($spec:ty, Estimator, $name:literal) => { $crate::register!(@ $spec, Estimator, $name, || &[]); };
+    ($spec:ty, Combiner, $name:literal) => { $crate::register!(@ $spec, Combiner, $name, || &[]); };
+    (@ $spec:ty, $role:ident, $name:literal, $ports:expr) => {
         impl $crate::node::NodeSpec for $spec {
             fn role(&self) -> $crate::node::Role<'_> {
                 $crate::node::Role::$role(self)
@@ -228,6 +242,7 @@ macro_rules! register {
                 package: env!("CARGO_PKG_NAME"),
                 version: env!("CARGO_PKG_VERSION"),
                 inputs: <$spec as $crate::node::$role>::inputs,
+                ports: $ports,
                 read: $crate::__private::read::<$spec>,
                 schema: || $crate::__private::schemars::schema_for!($spec),
             }

@@ -7,9 +7,10 @@ use super::judge::{Finding, judge};
 use super::observed::Observed;
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted};
-use crate::fault::WithFaults;
+use crate::fault::{FaultError, WithFaults};
 use crate::fit::{FitError, drive};
-use crate::recording::Recording;
+use crate::recording::{Event, Recording};
+use crate::time::Duration;
 
 /// The seed of the spikes and noise of faults.
 const FAULT_SEED: u64 = 1;
@@ -36,7 +37,7 @@ impl Verdict {
 /// The plan is one that [`super::observe`] has been told of the test.
 ///
 /// # Errors
-/// When the data cannot be read, or the fit does not belong to the plan.
+/// When the data cannot be read, a fault begins after their end, or the fit does not belong to the plan.
 pub fn run(
     plan: &Arc<Plan>,
     trial: &Trial,
@@ -51,9 +52,22 @@ pub fn run(
     };
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
     let mut observed = Observed::new(plan, trial);
+    let (mut first, mut length) = (None, Duration::ZERO);
     let passed = drive(&mut engine, data, |engine, event| {
         observed.look(engine, event);
+        match event {
+            Event::Row(at) => length = length.max(at - *first.get_or_insert(at)),
+            Event::Segment => first = None,
+        }
     })?;
+    if let Some(late) = trial.faults.iter().find(|fault| fault.from > length) {
+        let late = FaultError::Late {
+            channel: late.channel.clone(),
+            from: late.from,
+            length,
+        };
+        return Err(FitError::Recording(Box::new(late)));
+    }
     let expectations = trial.expect.iter();
     Ok(Verdict {
         findings: expectations

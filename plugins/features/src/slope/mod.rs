@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use athermal_core::channel::{ABSENT, COLD, Channel};
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Restored, State,
-    Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
+    Restored, State, Tick,
 };
 use athermal_core::time::Duration;
 use athermal_core::unit::Unit;
@@ -93,6 +93,23 @@ impl Slope {
 impl Feature for Slope {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what the slope is taken of")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("slope", "the slope of the line"),
+                PortSummary::new(
+                    "stderr",
+                    "the standard error of that, from its own residuals",
+                ),
+                PortSummary::new("value", "the value of the line at the end of the window"),
+                PortSummary::new(
+                    "r2",
+                    "its coefficient of determination: the share of the variance that it explains",
+                ),
+            ]
+        }
     }
 
     fn mistakes(&self) -> Vec<Mistake> {

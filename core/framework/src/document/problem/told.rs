@@ -333,7 +333,10 @@ impl Problem for DocumentProblem {
                 }
             }
             Self::TooManyInstances { .. } | Self::TooLargeExpanded { .. } => {
-                Some("use fewer members, or split the graph into several".to_owned())
+                Some(
+                    "use fewer members, repeat less of what a module is given, or split the graph into several"
+                        .to_owned(),
+                )
             }
             Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error
                 .advice()

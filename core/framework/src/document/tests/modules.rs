@@ -169,6 +169,38 @@ fn an_extending_file_changes_the_nodes_of_a_module() {
 }
 
 #[test]
+fn values_that_each_module_repeats_are_weighed_before_they_are_made() {
+    for (given, repeated) in [
+        (
+            "inputs.x = [\"n0\"]",
+            "inputs.x = [\"{x}\", \"{x}\", \"{x}\", \"{x}\"]",
+        ),
+        ("p = [1]", "p = [\"{p}\", \"{p}\", \"{p}\", \"{p}\"]"),
+        ("p = \"a\"", "p = \"{p}{p}{p}{p}\""),
+    ] {
+        let (head, tail) = match given.starts_with('p') {
+            true => ("parameters.p = {}\n", "p = \"{p}\""),
+            false => ("inputs = [\"x\"]\n", "inputs.x = \"{x}\""),
+        };
+        let mut text = "schema = 1\n".to_owned();
+        for level in 0..30 {
+            let next = level + 1;
+            text += &format!(
+                "[modules.m{level}]\n{head}[modules.m{level}.nodes.n]\nmodule = \"m{next}\"\n{repeated}\n"
+            );
+        }
+        text += &format!("[modules.m30]\n{head}[modules.m30.nodes.n]\ntype = \"x\"\n{tail}\n");
+        text += &format!("[nodes.n0]\ntype = \"x\"\n[nodes.all]\nmodule = \"m0\"\n{given}\n");
+        let Outcome {
+            graph, diagnostics, ..
+        } = read(&[("a.toml", &text)]);
+        assert!(graph.is_none());
+        let codes: Vec<_> = diagnostics.iter().map(|found| found.code).collect();
+        assert_eq!(codes, ["A016"], "{repeated}");
+    }
+}
+
+#[test]
 fn modules_that_multiply_are_stopped() {
     let mut text = "schema = 1\n".to_owned();
     for level in 0..15 {

@@ -218,7 +218,7 @@ struct Expansion<'a> {
 
 impl Expansion<'_> {
     fn node(&mut self, name: &str, entry: &Entry, level: &Level<'_>) {
-        if self.full {
+        if self.full || !self.has_room(name, entry, level) {
             return;
         }
         if is_instance(entry) {
@@ -240,6 +240,23 @@ impl Expansion<'_> {
         self.place(name, entry, level);
     }
 
+    /// Whether what a node of a module says has room with its parameters in place: each level may repeat what it was given.
+    fn has_room(&mut self, name: &str, entry: &Entry, level: &Level<'_>) -> bool {
+        let filled = |given: &Given| given.weight_filled(&entry.value);
+        let fits = level.given.as_ref().map_or(0, filled) <= MOST_VALUES;
+        if !fits {
+            self.too_large(level.name(name), entry);
+        }
+        fits
+    }
+
+    fn too_large(&mut self, node: String, entry: &Entry) {
+        let limit = MOST_VALUES;
+        let problem = DocumentProblem::TooLargeExpanded { node, limit };
+        self.diagnostics.report(entry.key, problem);
+        self.full = true;
+    }
+
     fn place(&mut self, name: &str, entry: Entry, level: &Level<'_>) {
         if level.given.is_some() {
             self.values += weight(&entry.value);
@@ -253,12 +270,7 @@ impl Expansion<'_> {
                 self.diagnostics.report(entry.key, problem);
                 self.full = true;
             } else if self.values > MOST_VALUES {
-                let problem = DocumentProblem::TooLargeExpanded {
-                    node: name(),
-                    limit: MOST_VALUES,
-                };
-                self.diagnostics.report(entry.key, problem);
-                self.full = true;
+                self.too_large(name(), &entry);
             }
         }
         self.placed.push(Placed {

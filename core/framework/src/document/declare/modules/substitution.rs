@@ -2,6 +2,7 @@
 
 use super::Given;
 use crate::diagnostic::{Diagnostics, Place};
+use crate::document::declare::each::weight;
 use crate::document::declare::placeholder;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Value};
@@ -41,6 +42,24 @@ impl Given {
             scalar => scalar.clone(),
         };
         Value::new(value.place, data)
+    }
+
+    /// How much a value weighs once all that it names stands in it, at most.
+    pub(super) fn weight_filled(&self, value: &Value) -> usize {
+        let add = |sum: usize, value: &Value| sum.saturating_add(self.weight_filled(value));
+        match &value.data {
+            Data::Text(text) => {
+                let given = |name: &str| {
+                    let of = self.parameters.get(name).or(self.inputs.get(name));
+                    of.map_or(0, weight)
+                };
+                let named = placeholder::names(text).map(given);
+                named.fold(weight(value), usize::saturating_add)
+            }
+            Data::List(values) => values.iter().fold(1, add),
+            Data::Table(entries) => entries.iter().map(|(_, entry)| &entry.value).fold(1, add),
+            _ => weight(value),
+        }
     }
 
     fn whole(&self, text: &str) -> Option<&Value> {

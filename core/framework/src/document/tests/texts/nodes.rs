@@ -37,7 +37,7 @@ error[A016]: with node "n" the graph has 1000000 instances, more than 200000
 5 | [nodes.n]
   |        ^
   |
-  = help: use fewer members, or split the graph into several
+  = help: use fewer members, repeat less of what a module is given, or split the graph into several
 "#
     );
 }
@@ -57,7 +57,7 @@ error[A016]: with node "n" the expanded graph has more than 4000000 values
 5 | [nodes.n]
   |        ^
   |
-  = help: use fewer members, or split the graph into several
+  = help: use fewer members, repeat less of what a module is given, or split the graph into several
 "#
     );
 }
