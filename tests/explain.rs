@@ -11,8 +11,8 @@ use athermal::core::diagnostic::{CODES, Diagnostics, Severity, Sources, explain}
 use athermal::core::document::{Memory, declare, load};
 use athermal::core::trial;
 
-/// Two crates with a node type of the same name, and a program too small for a graph: no file shows these.
-const WITHOUT_FILE: [&str; 1] = ["A041"];
+/// Two crates with a node type of the same name, and a type whose code is at fault: no file shows these.
+const WITHOUT_FILE: [&str; 2] = ["A041", "A180"];
 
 fn check(text: &str) -> (Diagnostics, Sources) {
     let base = explain("A062").unwrap().right;

@@ -1,6 +1,6 @@
 //! How long a held value counts: by its stamp, which is the oldest among what it was made of.
 
-use super::workbench::{Bench, linear, problems};
+use super::workbench::{Bench, Read, linear, problems};
 use super::{SAMPLES, SLOPES};
 
 /// An estimator on both temperatures, held, and a vote that holds its answer.
@@ -238,4 +238,28 @@ out = "warm"
             assert_eq!(given[0].is_nan(), held.is_nan(), "{method} at {now}");
         }
     }
+}
+
+#[test]
+fn an_age_at_a_port_that_holds_nothing_is_doubted_with_the_reason() {
+    let read = Read::new(&format!(
+        r#"{SAMPLES}
+[nodes.drift]
+type = "slope"
+inputs.signal = {{ from = "position", max_age = "1min" }}
+windows = ["5min"]
+[nodes.all]
+type = "sum"
+inputs.signal = {{ from = "temperature", max_age = "1min" }}
+[outputs]
+out = "drift"
+all = "all"
+"#
+    ));
+    let told = read.told();
+    assert!(read.plan.is_some(), "{told}");
+    let doubt = "warning[A065]: `max_age` does nothing here: `inputs.signal` takes new values only";
+    assert_eq!(told.matches(doubt).count(), 1, "{told}");
+    assert!(told.contains("node `drift`"), "{told}");
+    assert!(told.contains("leave `max_age` out"), "{told}");
 }

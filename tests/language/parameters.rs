@@ -66,3 +66,17 @@ fn channels_that_every_node_multiplies_are_stopped() {
         "{told}"
     );
 }
+
+#[test]
+fn the_keys_that_a_node_may_have_are_listed_with_those_of_all_nodes() {
+    let read = Read::new(
+        "schema = 1\n[signals.position]\nunit = \"nm\"\nchannels = [\"X\"]\nmax_age = \"3min\"\n\
+         [nodes.a]\ntype = \"scale\"\ninputs.signal = \"position\"\nxyzzy_unlike_any = 1\n[outputs]\no = \"a\"\n",
+    );
+    let told = read.told();
+    let keys = told.lines().find(|line| line.contains("the keys are"));
+    let keys = keys.unwrap_or_else(|| panic!("{told}"));
+    for key in ["type", "inputs", "each", "factor"] {
+        assert!(keys.contains(&format!("\"{key}\"")), "{key}: {keys}");
+    }
+}

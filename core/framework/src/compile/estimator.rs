@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::instance::Instance;
 use super::keys::Limits;
+use super::kind_fault::KindFault;
 use super::learning;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
@@ -11,7 +12,7 @@ use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
 use super::resolver::{Resolver, Suspect};
 use crate::channel::Channel;
 use crate::diagnostic::Place;
-use crate::node::{Estimator, FREEZE, OutputPort, Regressor, Role, TruthLags};
+use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -70,6 +71,9 @@ impl Resolver<'_> {
             return None;
         };
         let wanted = estimator.regressors();
+        if sound {
+            self.sound(instance, KindFault::of_regressors(&wanted))?;
+        }
 
         let mut gathers = Vec::new();
         let mut regressors = Vec::new();
@@ -180,7 +184,10 @@ impl Resolver<'_> {
             learning,
             deviation,
         };
-        self.add(instance, ports, role, behind, Some(truth))
+        self.add(instance, ports, role, behind, Some(truth))?;
+        // Asked for later by whoever wants to know whether it needs a fit, and to fail here where it fails.
+        let added = self.nodes.last();
+        added.map(|node| drop(node.fixed()))
     }
 
     /// How far ahead of now the truth is that is learned from.
@@ -277,12 +284,10 @@ impl Resolver<'_> {
                 continue;
             };
             let node = &self.nodes[node];
-            let (PlannedRole::Feature { gathers, .. }, Role::Feature(feature)) =
-                (&node.role, node.spec.role())
-            else {
+            let PlannedRole::Feature { gathers, .. } = &node.role else {
                 continue;
             };
-            if feature.is_endless() {
+            if node.endless {
                 return Some(node.name.clone());
             }
             let entries = gathers

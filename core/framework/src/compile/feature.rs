@@ -1,6 +1,7 @@
 //! Decides what a feature of a graph is given and what it gives.
 
 use super::instance::Instance;
+use super::kind_fault::KindFault;
 use super::plan::{PlannedFit, PlannedRole};
 use super::provenance::Provenance;
 use super::resolver::{Resolver, Suspect};
@@ -37,9 +38,10 @@ impl Resolver<'_> {
     ) -> Option<()> {
         let encoder = feature.encoder();
         let lags = encoder.map_or_else(|| vec![Duration::ZERO], |encoder| encoder.lags());
+        let sound = self.sound(instance, KindFault::of_encoder(&lags)).is_some();
         let mut ports = Vec::new();
         let mut gathers = Vec::new();
-        let mut whole = true;
+        let mut whole = sound;
         for port in (instance.kind.inputs)() {
             if closes {
                 ports.push((*port, Vec::new()));
@@ -80,6 +82,7 @@ impl Resolver<'_> {
                 return None;
             }
         };
+        self.sound(instance, KindFault::of_outputs(&outputs))?;
         self.doubts(instance, feature.warnings(&inputs));
         let widths = outputs.iter().map(|port| (port.name, port.channels.len()));
         let behind = self.behind(feature, &slots, widths);

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::ops::Deref;
 use std::sync::Arc;
 
+use super::guard::Panics;
 use super::keys::EstimatorKeys;
 use super::problem::CompileProblem;
 use crate::diagnostic::{Diagnostics, Place};
@@ -25,6 +26,8 @@ pub(crate) struct ReadParts {
     pub(super) spec: Option<Decoded<Arc<dyn NodeSpec>>>,
     /// The keys that the framework reads itself.
     pub(super) estimator: Option<Decoded<EstimatorKeys>>,
+    /// Whether it takes its inputs for later ticks only.
+    closes_loops: bool,
 }
 
 /// The specification of one instance, with the keys that the framework reads itself.
@@ -57,11 +60,7 @@ impl ReadParts {
 impl ReadNode {
     /// Whether the node takes its inputs for later ticks only.
     pub(crate) fn closes_loops(&self) -> bool {
-        let mut specs = self.instances.iter().filter_map(ReadParts::spec);
-        specs.any(|spec| match spec.role() {
-            Role::Feature(feature) => feature.closes_loops(),
-            _ => false,
-        })
+        self.instances.iter().any(|read| read.closes_loops)
     }
 
     /// Whether it is known of all instances what they are.
@@ -71,15 +70,19 @@ impl ReadNode {
 }
 
 /// Looks every node's kind up and reads its parameters.
-pub(crate) fn read_kinds(graph: &GraphFile, diagnostics: &mut Diagnostics) -> Vec<ReadNode> {
+pub(super) fn read_kinds(
+    graph: &GraphFile,
+    panics: Panics,
+    diagnostics: &mut Diagnostics,
+) -> Vec<ReadNode> {
     graph
         .nodes
         .iter()
-        .map(|node| read_node(node, diagnostics))
+        .map(|node| read_node(node, panics, diagnostics))
         .collect()
 }
 
-fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
+fn read_node(node: &NodeDecl, panics: Panics, diagnostics: &mut Diagnostics) -> ReadNode {
     let kind = (node.kind.as_ref()).and_then(|(name, place)| find(name, *place, diagnostics));
     let mut own = diagnostics.aside();
     // Instances of a module share places: a mistake in all of them is told once only where it is told beside the others.
@@ -96,7 +99,7 @@ fn read_node(node: &NodeDecl, diagnostics: &mut Diagnostics) -> ReadNode {
             (Some(before), Some(read), _) if read.is_whole() && is_shared(before, instance) => {
                 read.clone()
             }
-            (.., Some(kind)) => read_instance(kind, node, instance, told),
+            (.., Some(kind)) => read_instance(kind, node, instance, panics, told),
             (.., None) => ReadParts::default(),
         };
         instances.push(read);
@@ -159,6 +162,7 @@ fn read_instance(
     kind: &Kind,
     node: &NodeDecl,
     instance: &InstanceDecl,
+    panics: Panics,
     diagnostics: &mut Diagnostics,
 ) -> ReadParts {
     let mut parameters = instance.parameters.clone();
@@ -178,14 +182,28 @@ fn read_instance(
         }
     }
     let context = context(node, instance);
-    diagnostics.within(context, |diagnostics| {
+    diagnostics.within(context.clone(), |diagnostics| {
         let estimator =
             decode_rest::<EstimatorKeys>(&framework, "the node", &[], &|_| None, diagnostics);
-        let elsewhere = [kind.framework_keys(), &["each"]].concat();
-        let spec = (kind.read)(&parameters, &elsewhere, diagnostics);
+        let elsewhere = [&["type", "inputs", "each"], kind.framework_keys()].concat();
+        let read = panics.caught(kind, &context, || {
+            let spec = (kind.read)(&parameters, &elsewhere, diagnostics)?;
+            let spec = spec.map(Arc::<dyn NodeSpec>::from);
+            let closes_loops = spec.as_whole().is_some_and(|spec| match spec.role() {
+                Role::Feature(feature) => feature.closes_loops(),
+                _ => false,
+            });
+            Some((spec, closes_loops))
+        });
+        let read = read.unwrap_or_else(|fault| {
+            diagnostics.report(node.place, CompileProblem::of_kind(kind, fault));
+            None
+        });
+        let (spec, closes_loops) = read.unzip();
         ReadParts {
-            spec: spec.map(|spec| spec.map(Arc::from)),
+            spec,
             estimator,
+            closes_loops: closes_loops.unwrap_or_default(),
         }
     })
 }

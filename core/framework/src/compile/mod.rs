@@ -8,9 +8,11 @@ mod conversion;
 mod diff;
 mod estimator;
 mod feature;
+mod guard;
 mod inputs;
 mod instance;
 mod keys;
+mod kind_fault;
 mod leak;
 mod learning;
 mod order;
@@ -29,6 +31,7 @@ pub use diff::{
     Change, NodeChange, OutputChange, ParameterChange, PlanDiff, SignalChange, diff, meaning,
 };
 pub(crate) use keys::EstimatorKeys;
+pub use kind_fault::KindFault;
 pub use plan::{
     Beside, Conversion, Entry, Gather, Plan, PlannedChannel, PlannedFit, PlannedLearning,
     PlannedNode, PlannedOutput, PlannedRole, SourceChannel, Step, TrainingLimits, TruthLink,
@@ -44,6 +47,7 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
+use guard::Panics;
 
 /// What a plan must offer beyond what its graph itself reads.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -83,11 +87,14 @@ impl Part {
 }
 
 /// Compiles a graph. All mistakes are told; without one there is a plan.
+///
+/// # Panics
+/// Where the code of a kind does, after a line on standard error that names the node: with [`compile_part`] that is a mistake too.
 pub fn compile(graph: &GraphFile, wanted: Wanted, diagnostics: &mut Diagnostics) -> Option<Plan> {
-    compile_part(graph, wanted, diagnostics).ok()
+    made(graph, wanted, Panics::GoOn, diagnostics).ok()
 }
 
-/// As [`compile`], with what could be made of a graph that has mistakes.
+/// As [`compile`], with what could be made of a graph that has mistakes. A kind whose code panics is one of them.
 ///
 /// # Errors
 ///
@@ -97,9 +104,18 @@ pub fn compile_part(
     wanted: Wanted,
     diagnostics: &mut Diagnostics,
 ) -> Result<Plan, Box<Part>> {
-    let nodes = instance::read_kinds(graph, diagnostics);
+    made(graph, wanted, Panics::AreTold, diagnostics)
+}
+
+fn made(
+    graph: &GraphFile,
+    wanted: Wanted,
+    panics: Panics,
+    diagnostics: &mut Diagnostics,
+) -> Result<Plan, Box<Part>> {
+    let nodes = instance::read_kinds(graph, panics, diagnostics);
     let order = order::order(graph, &nodes, diagnostics);
-    let resolver = resolver::Resolver::new(graph, diagnostics);
+    let resolver = resolver::Resolver::new(graph, panics, diagnostics);
     let (plan, mut broken) = resolver.resolve(&nodes, &order, wanted);
     if !diagnostics.has_errors() {
         return Ok(plan);

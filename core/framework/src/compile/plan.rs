@@ -138,6 +138,10 @@ pub struct PlannedNode {
     pub spec: Arc<dyn NodeSpec>,
     /// What it does.
     pub role: PlannedRole,
+    /// How far back its inputs reach that its outputs depend on, or what it learned counts, as its kind says.
+    pub memory: Duration,
+    /// Whether its values depend on all of the past.
+    pub endless: bool,
     /// The slots of its outputs: all ports, one after the other.
     pub slots: Range<usize>,
     /// Its output ports, as ranges of slots.

@@ -4,8 +4,9 @@ mod told;
 
 use std::sync::Arc;
 
+use super::kind_fault::KindFault;
 use crate::diagnostic::Names;
-use crate::node::Written;
+use crate::node::{Kind, Written};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -139,6 +140,12 @@ pub enum CompileProblem {
         kind: &'static str,
         help: Option<&'static str>,
     },
+    /// A mistake in the code of a kind.
+    Kind {
+        kind: &'static str,
+        author: String,
+        fault: KindFault,
+    },
     /// An estimator without a horizon.
     NoHorizon { kind: &'static str },
     /// A truth that is a prediction.
@@ -178,4 +185,15 @@ pub enum CompileProblem {
     Unreachable { output: String },
     /// A graph without outputs.
     NoOutputs,
+}
+
+impl CompileProblem {
+    /// A mistake in the code of a kind.
+    pub(super) fn of_kind(kind: &Kind, fault: KindFault) -> Self {
+        Self::Kind {
+            kind: kind.name,
+            author: kind.author(),
+            fault,
+        }
+    }
 }

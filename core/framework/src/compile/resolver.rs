@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use indexmap::IndexSet;
 
+use super::guard::Panics;
 use super::instance::{Declared, Instance, ReadNode, context};
+use super::kind_fault::KindFault;
 use super::order::Order;
 use super::plan::{
     Gather, Plan, PlannedChannel, PlannedNode, PlannedOutput, PlannedRole, SourceChannel, TruthLink,
@@ -19,7 +21,7 @@ use super::{Wanted, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::GraphFile;
-use crate::node::{Mistake, OutputPort, Role};
+use crate::node::{Kind, Mistake, OutputPort, Role};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -38,6 +40,7 @@ fn outward_name(member: Option<&str>, single: bool, channel: &str) -> String {
 /// The state of resolving a graph.
 pub(crate) struct Resolver<'g> {
     pub(crate) graph: &'g GraphFile,
+    panics: Panics,
     pub(crate) diagnostics: &'g mut Diagnostics,
     pub(crate) channels: Vec<PlannedChannel>,
     pub(crate) provenance: Vec<Provenance>,
@@ -65,9 +68,14 @@ pub(super) struct Suspect {
 }
 
 impl<'g> Resolver<'g> {
-    pub(crate) fn new(graph: &'g GraphFile, diagnostics: &'g mut Diagnostics) -> Self {
+    pub(super) fn new(
+        graph: &'g GraphFile,
+        panics: Panics,
+        diagnostics: &'g mut Diagnostics,
+    ) -> Self {
         let mut resolver = Self {
             graph,
+            panics,
             diagnostics,
             channels: Vec::new(),
             provenance: Vec::new(),
@@ -113,14 +121,21 @@ impl<'g> Resolver<'g> {
                 let whole = parts.whole().filter(|_| sound);
                 let Some((kind, read)) = kind.zip(whole) else {
                     self.scopes.get_mut(&node.name).broken = true;
-                    self.survey(node, decl, kind, parts);
+                    self.guarded(kind, &context(node, decl), node.place, |resolver| {
+                        resolver.survey(node, decl, kind, parts);
+                        Some(())
+                    });
                     self.diagnostics.scope(outer);
                     continue;
                 };
                 let declared = Declared { node, decl, kind };
                 let instance = Instance { declared, read };
                 let before = self.nodes.len();
-                if self.instance(&instance, closes).is_none() {
+                let resolved =
+                    self.guarded(Some(kind), &instance.context(), node.place, |resolver| {
+                        resolver.instance(&instance, closes)
+                    });
+                if resolved.is_none() {
                     self.scopes.get_mut(&node.name).broken = true;
                 }
                 self.diagnostics.scope(outer);
@@ -181,12 +196,47 @@ impl<'g> Resolver<'g> {
     /// Resolves one instance; `None` when an error about it has been told.
     fn instance(&mut self, instance: &Instance<'_>, closes: bool) -> Option<()> {
         self.known_inputs(instance);
+        self.sound(instance, KindFault::of_ports((instance.kind.inputs)()))?;
         let spec = Arc::clone(&instance.read.spec);
         match spec.role() {
             Role::Feature(feature) => self.feature(instance, feature, closes),
             Role::Estimator(estimator) => self.estimator(instance, estimator),
             Role::Combiner(combiner) => self.combiner(instance, combiner),
         }
+    }
+
+    /// Does what takes code of a kind, for a node; nothing comes of it where that panics, which is told.
+    fn guarded(
+        &mut self,
+        kind: Option<&'static Kind>,
+        context: &str,
+        place: Place,
+        work: impl FnOnce(&mut Self) -> Option<()>,
+    ) -> Option<()> {
+        let Some(kind) = kind else {
+            return work(self);
+        };
+        let done = self.panics.caught(kind, context, || work(self));
+        done.unwrap_or_else(|fault| {
+            self.diagnostics
+                .report(place, CompileProblem::of_kind(kind, fault));
+            None
+        })
+    }
+
+    /// Tells what is wrong with a kind itself, at a node of it; none where nothing is.
+    pub(super) fn sound(
+        &mut self,
+        instance: &Instance<'_>,
+        faults: impl IntoIterator<Item = KindFault>,
+    ) -> Option<()> {
+        let mut sound = Some(());
+        for fault in faults {
+            let problem = CompileProblem::of_kind(instance.kind, fault);
+            self.diagnostics.report(instance.node.place, problem);
+            sound = None;
+        }
+        sound
     }
 
     pub(crate) fn mistakes(&mut self, instance: &Declared<'_>, mistakes: Vec<Mistake>) {
@@ -285,12 +335,20 @@ impl<'g> Resolver<'g> {
             }
             ranges.push((port.name, first..self.channels.len()));
         }
+        let (memory, endless) = match instance.read.spec.role() {
+            Role::Feature(feature) => (feature.memory(), feature.is_endless()),
+            Role::Combiner(combiner) => (combiner.memory(), false),
+            Role::Estimator(_) => (Duration::ZERO, false),
+        };
+        self.sound(instance, KindFault::of_memory(memory))?;
         self.nodes.push(PlannedNode {
             name: instance.node.name.clone(),
             member: instance.decl.member.clone(),
             kind: instance.kind,
             spec: Arc::clone(&instance.read.spec),
             role,
+            memory,
+            endless,
             slots: start..self.channels.len(),
             ports: ranges,
         });

@@ -9,7 +9,6 @@ use super::problem::CompileProblem;
 use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
 use crate::document::GraphFile;
-use crate::node::Role;
 use crate::time::Duration;
 
 /// The steps: each gather right before its first reader, each node after those that it reads, captures last.
@@ -76,17 +75,13 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
         let ages = all.map(|entry| slot_warm_up[entry.slot] + entry.lag + entry.max_age);
         ages.max().unwrap_or(Duration::ZERO)
     };
-    match (&node.role, node.spec.role()) {
-        (PlannedRole::Feature { .. }, Role::Feature(feature)) => feature.memory() + before(),
-        (PlannedRole::Combiner { truth, .. }, Role::Combiner(combiner)) => {
-            let learned = truth.map_or(Duration::ZERO, |truth| {
-                truth.embargo() + truth.ahead + truth.limit
-            });
-            combiner.memory() + learned + before()
-        }
-        (PlannedRole::Estimator { .. }, _) => before(),
-        _ => unreachable!("a plan gives each node the role of its specification"),
-    }
+    let learned = match &node.role {
+        PlannedRole::Combiner {
+            truth: Some(truth), ..
+        } => truth.embargo() + truth.ahead + truth.limit,
+        _ => Duration::ZERO,
+    };
+    node.memory + learned + before()
 }
 
 /// Notes which ports of features somebody reads. The first is always computed.

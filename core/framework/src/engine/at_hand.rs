@@ -64,6 +64,24 @@ impl Drop for AtHand<'_> {
     }
 }
 
+/// The node of a name, while what it was fitted to is read: as [`AtHand`], and looked for only where a panic ends it.
+pub(crate) struct FitAtHand<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) name: &'a str,
+}
+
+impl Drop for FitAtHand<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let mut nodes = self.plan.nodes.iter();
+            let node = nodes.find(|node| node.instance() == self.name);
+            if let Some(node) = node {
+                eprintln!("{}", told(node, When::Start));
+            }
+        }
+    }
+}
+
 fn told(node: &PlannedNode, when: When) -> String {
     let when = match when {
         When::Tick(now) => format!("at {now} s"),
@@ -71,10 +89,8 @@ fn told(node: &PlannedNode, when: When) -> String {
         When::Start => "before its first tick".to_owned(),
     };
     format!(
-        "the node `{}` panicked {when}; what it said stands above, and is for the author of `{}`, from {} {}",
+        "the node `{}` panicked {when}; what it said stands above, and is for {}",
         node.instance(),
-        node.kind.name,
-        node.kind.package,
-        node.kind.version
+        node.kind.author()
     )
 }

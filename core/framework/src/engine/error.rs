@@ -35,6 +35,13 @@ pub enum EngineError {
         /// The node.
         node: String,
     },
+    /// A node that is to learn while it runs, of a kind that needs no fit and gives nothing that learns: a mistake of the kind.
+    NoLearner {
+        /// The node.
+        node: String,
+        /// Whom that is for.
+        author: String,
+    },
     /// Something fitted for a node of this graph that needs no fit, or for none.
     NotAnEstimator {
         /// The node.
@@ -67,6 +74,11 @@ impl fmt::Display for EngineError {
             Self::DoesNotLearn { node } => write!(
                 f,
                 "`{node}` is to learn while it runs, and its fit was not made for that: fit the graph again"
+            ),
+            Self::NoLearner { node, author } => write!(
+                f,
+                "`{node}` is to learn while it runs, and its kind gives nothing that does, which is a mistake of its own: for {author}: \
+                 `Predictor::learner` gives a learner, or `Estimator::learns` is `Never`; until then `learn = false` does without"
             ),
             Self::NotAnEstimator { node } => {
                 write!(

@@ -130,22 +130,25 @@ impl Engine {
     }
 
     fn node_states(&self) -> BTreeMap<String, NodeState> {
-        let states = self
-            .plan
-            .nodes
-            .iter()
-            .zip(&self.nodes)
-            .map(|(node, running)| {
-                let state = match running {
-                    Running::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
-                    Running::Estimate { estimate, .. } => estimate
-                        .as_ref()
-                        .map(Estimate::snapshot)
-                        .unwrap_or_default(),
-                    Running::Vote(vote) => vote.snapshot(),
-                };
-                (node.instance(), state)
-            });
+        let mut at_hand = AtHand::at(&self.plan, self.last);
+        let states =
+            self.plan
+                .nodes
+                .iter()
+                .zip(&self.nodes)
+                .enumerate()
+                .map(|(index, (node, running))| {
+                    at_hand.is(index);
+                    let state = match running {
+                        Running::Operator { operator, .. } => NodeState::pack(operator.snapshot()),
+                        Running::Estimate { estimate, .. } => estimate
+                            .as_ref()
+                            .map(Estimate::snapshot)
+                            .unwrap_or_default(),
+                        Running::Vote(vote) => vote.snapshot(),
+                    };
+                    (node.instance(), state)
+                });
         states.collect()
     }
 

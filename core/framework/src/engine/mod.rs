@@ -41,7 +41,7 @@ pub use revision::{Fnv1a, fnv_1a, revision};
 pub use sample_range::SampleRange;
 pub use state::{EngineState, RestoreError};
 
-pub(crate) use at_hand::AtHand;
+pub(crate) use at_hand::{AtHand, FitAtHand};
 pub(crate) use carry::Heritage;
 pub(crate) use gather::Gathered;
 pub use history::{Cursor, History};
@@ -376,6 +376,8 @@ impl Engine {
 
     /// How many truths a combiner has been told, and how many of them it goes by; none for other nodes.
     pub(crate) fn evidence(&self, node: usize) -> Option<(u64, Evidence)> {
+        let mut at_hand = AtHand::at(&self.plan, self.last);
+        at_hand.is(node);
         match &self.nodes[node] {
             Running::Vote(vote) => vote.evidence(),
             Running::Operator { .. } | Running::Estimate { .. } => None,

@@ -131,7 +131,16 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                 Running::Estimate {
                     estimate: predictor
                         .map(|p| Estimate::new(node, p, &widths))
-                        .transpose()?,
+                        .transpose()
+                        .map_err(|error| match error {
+                            EngineError::DoesNotLearn { node: instance } if given.is_none() => {
+                                EngineError::NoLearner {
+                                    node: instance,
+                                    author: node.kind.author(),
+                                }
+                            }
+                            error => error,
+                        })?,
                     trigger: if *every_tick {
                         None
                     } else {

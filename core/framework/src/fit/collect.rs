@@ -7,7 +7,7 @@ use super::between::Between;
 use super::candidates::Validity;
 use super::report::Dropped;
 use crate::compile::{Plan, Rows, TrainingLimits, TruthLink};
-use crate::engine::{Engine, Pairing};
+use crate::engine::{AtHand, Engine, Pairing};
 use crate::node::{Role, Runs, TrainingError};
 use crate::recording::Event;
 use crate::time::{Duration, Instant};
@@ -228,6 +228,7 @@ impl Collector {
             } else if !trainee.limits.admits(truth) {
                 trainee.dropped.outside_limits += 1;
             } else if let Some(live) = &mut live {
+                let _at_hand = AtHand::in_fit(engine.plan(), trainee.node);
                 if std::mem::take(&mut trainee.segment_pending) {
                     live[index].segment();
                 }

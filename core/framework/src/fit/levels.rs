@@ -9,7 +9,7 @@ use super::drive::{Passed, drive};
 use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
-use crate::engine::{Engine, Fitted};
+use crate::engine::{AtHand, Engine, Fitted};
 use crate::recording::{Event, Recording};
 
 /// A fit under way.
@@ -247,7 +247,10 @@ impl<'a> Fitting<'a> {
         }
         let ended = collector.trainees.iter().zip(makings);
         Ok(ended
-            .map(|(trainee, making)| end(self.plan, &collector, trainee, making, true))
+            .map(|(trainee, making)| {
+                let _at_hand = AtHand::in_fit(self.plan, trainee.node);
+                end(self.plan, &collector, trainee, making, true)
+            })
             .collect())
     }
 
@@ -262,6 +265,7 @@ impl<'a> Fitting<'a> {
         let (mut nodes, mut makings) = (Vec::new(), Vec::new());
         for (trainee, constant) in trainees {
             nodes.push(trainee.node);
+            let _at_hand = AtHand::in_fit(self.plan, trainee.node);
             makings.push(begin(self.plan, trainee, memory, constant));
         }
         let mut collector = Collector::new(self.plan, &nodes, 0);

@@ -212,6 +212,13 @@ pub(super) fn end(
             None => making.trainer.finish(),
         }
     };
+    let trained = trained.and_then(|trained| {
+        if making.learns && trained.predictor.learner().is_none() {
+            let author = node.kind.author();
+            return Err(TrainingError::NoLearner { author });
+        }
+        Ok(trained)
+    });
     let (outcome, predictor) = match trained {
         Ok(Trained {
             predictor,

@@ -1,6 +1,7 @@
 //! Decides the course of a replacement on the control thread: stage, shadow, commit, roll back.
 
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -162,6 +163,14 @@ impl Control {
             return Err(StageError::Busy);
         }
         StageError::between(&self.running, &model.plan).map_or(Ok(()), Err)?;
+        // What runs goes on whatever the code of a node does to what is being made.
+        let made = catch_unwind(AssertUnwindSafe(|| self.made_ready(model, carry_learned)));
+        let staged = made.unwrap_or(Err(StageError::Panicked))?;
+        Ok(self.staged.insert(staged))
+    }
+
+    /// A graph that is ready to take over.
+    fn made_ready(&self, model: &Model, carry_learned: bool) -> Result<Staged, StageError> {
         let engine =
             Engine::new(Arc::clone(&model.plan), &model.fitted).map_err(StageError::Engine)?;
         let mut seated = Seated::new(engine, &self.feed, 0)
@@ -193,13 +202,13 @@ impl Control {
             None => cold(&seated.engine, warmed),
         };
         seated.event = self.event;
-        Ok(self.staged.insert(Staged {
+        Ok(Staged {
             seated,
             carry,
             past: self.retained.span(),
             gave,
             shadow: None,
-        }))
+        })
     }
 
     /// Compares the staged graph with what runs for a while; see [`Control::verdict`].

@@ -9,10 +9,10 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Card, ModelError};
-use crate::compile::{Change, Plan, PlannedNode, Wanted, compile, diff};
+use crate::compile::{Change, Plan, PlannedNode, Wanted, compile_part, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
-use crate::engine::{Engine, Fitted, SampleRange};
+use crate::engine::{Engine, FitAtHand, Fitted, SampleRange};
 use crate::node::{Mistake, Predictor};
 
 /// The format that this version writes.
@@ -169,7 +169,7 @@ impl Model {
         let graph = document::declare(Document::new(source, tree), &mut diagnostics);
         let plan = graph
             .as_ref()
-            .and_then(|graph| compile(graph, wanted, &mut diagnostics));
+            .and_then(|graph| compile_part(graph, wanted, &mut diagnostics).ok());
         let (Some(graph), Some(plan)) = (graph, plan) else {
             return Err(ModelError::Graph {
                 diagnostics: Box::new(diagnostics),
@@ -178,7 +178,13 @@ impl Model {
         };
         let (mut fitted, mut refused) = (Fitted::new(), Vec::new());
         for (node, written) in read.fitted {
-            match sound(written) {
+            let at_hand = FitAtHand {
+                plan: &plan,
+                name: &node,
+            };
+            let read = sound(written);
+            drop(at_hand);
+            match read {
                 Ok(predictor) => _ = fitted.insert(node, Arc::from(predictor)),
                 Err(mistakes) => refused.push((node, mistakes)),
             }
@@ -208,7 +214,7 @@ impl Model {
             .and_then(|read| document::declare(read, &mut diagnostics));
         let plan = graph
             .as_ref()
-            .and_then(|graph| compile(graph, wanted, &mut diagnostics));
+            .and_then(|graph| compile_part(graph, wanted, &mut diagnostics).ok());
         match (graph, plan) {
             (Some(graph), Some(plan)) if !diagnostics.has_errors() => {
                 doubts.extend(diagnostics);

@@ -110,6 +110,15 @@ impl Kind {
         }
     }
 
+    /// Whom a mistake in its code is for.
+    #[must_use]
+    pub fn author(&self) -> String {
+        format!(
+            "the author of `{}`, from {} {}",
+            self.name, self.package, self.version
+        )
+    }
+
     /// The first paragraph of the documentation.
     #[must_use]
     pub fn summary(&self) -> String {

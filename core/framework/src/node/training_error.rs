@@ -60,6 +60,11 @@ pub enum TrainingError {
         /// The largest, in size.
         largest: f64,
     },
+    /// The estimator is to go on learning, and nothing that does comes of its fit: a mistake of its kind.
+    NoLearner {
+        /// Whom that is for.
+        author: String,
+    },
     /// The numbers allow no solution.
     Unsolvable {
         /// What is wrong with them, in words.
@@ -165,6 +170,12 @@ impl std::fmt::Display for TrainingError {
                 f,
                 "values of `{name}` are as large as {largest:.0e}, of which no squares can be summed; a `range` on its signal \
                  takes such values as missing"
+            ),
+            Self::NoLearner { author } => write!(
+                f,
+                "its kind says that it learns while it runs, and gives nothing that does, which is a mistake of its own and not of \
+                 the data: for {author}: `Predictor::learner` gives a learner, or `Estimator::learns` is `Never`; until then \
+                 `learn = false` does without"
             ),
             Self::Unsolvable { reason } => write!(f, "{reason}"),
         }

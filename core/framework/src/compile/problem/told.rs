@@ -87,6 +87,7 @@ impl Problem for CompileProblem {
             Self::Repeated { .. } => "A068",
             Self::NeverLearns { .. } => "A110",
             Self::EndlessTruth { .. } => "A160",
+            Self::Kind { .. } => "A180",
         }
     }
 
@@ -138,6 +139,7 @@ impl Problem for CompileProblem {
             | Self::KindTwice { .. }
             | Self::WrittenTwice { .. }
             | Self::UnknownInput { .. }
+            | Self::Kind { .. }
             | Self::Parameter { .. } => false,
         }
     }
@@ -240,6 +242,7 @@ impl Problem for CompileProblem {
             Self::NeverLearns { kind, .. } => {
                 format!("`{kind}`, as it is here, does not learn while it runs")
             }
+            Self::Kind { kind, fault, .. } => format!("`{kind}` {}", fault.found()),
             Self::NoHorizon { kind } => {
                 format!("`{kind}` needs to know how far `ahead` it predicts")
             }
@@ -334,6 +337,7 @@ impl Problem for CompileProblem {
             Self::Parameter { .. } | Self::Doubt { .. } => "here",
             Self::NoHorizon { .. } => "`ahead` is missing",
             Self::NeverLearns { .. } => "stays as it was fitted",
+            Self::Kind { .. } => "a mistake of its kind, not of the graph",
             Self::PredictedTruth { .. } | Self::TruthOfPrediction { .. } => "not measured",
             Self::EndlessTruth { .. } => "of no span",
             Self::LimitUnit { .. } => "another unit",
@@ -429,6 +433,7 @@ impl Problem for CompileProblem {
             Self::NeverLearns { help, .. } => help
                 .unwrap_or("leave `learn` out, or choose a kind that learns")
                 .to_owned(),
+            Self::Kind { author, fault, .. } => format!("for {author}: {}", fault.remedy()),
             Self::NoHorizon { .. } => {
                 "`ahead = \"5min\"` is a forecast, `ahead = \"0s\"` a virtual sensor".to_owned()
             }

@@ -30,7 +30,7 @@ macro_rules! code {
 }
 
 /// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for their tests,
-/// A110 for learning while they run.
+/// A110 for learning while they run, A180 for mistakes in the code of a node's kind.
 pub const CODES: &[Code] = &[
     code!(
         "A001",
@@ -402,6 +402,12 @@ pub const CODES: &[Code] = &[
         "A170",
         "schedule of a machine",
         "`schedule` names a file of set points over time, the same as `athermal simulate --schedule` takes; every mistake in it is told where it stands."
+    ),
+    code!(
+        "A180",
+        "mistake of a plugin",
+        "The code of the node's type does what no node may: it panics, or asks for values from the future. The graph is not at \
+         fault, and can only do without the type until its author has mended it; `athermal nodes TYPE` names the crate."
     ),
 ];
 
