@@ -373,6 +373,7 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
                 let n = count(found.count);
+                let first = first.taken();
                 told.push(format!("{file}: {n} × {what}, {then}; the first: {first}"));
             }
         }

@@ -56,12 +56,23 @@ impl Lines {
 
     /// A file, or standard input for `-`.
     pub fn open(path: &Path) -> Result<Self, FileError> {
+        Self::open_through(path, |input| input)
+    }
+
+    /// The same, with something between it and the lines.
+    pub fn open_through(
+        path: &Path,
+        through: impl FnOnce(Box<dyn Read + Send>) -> Box<dyn Read + Send>,
+    ) -> Result<Self, FileError> {
         if path == Path::new("-") {
-            return Ok(Self::new(STANDARD_INPUT.into(), io::stdin()));
+            return Ok(Self::new(
+                STANDARD_INPUT.into(),
+                through(Box::new(io::stdin())),
+            ));
         }
         let file: Arc<str> = path.display().to_string().into();
         match File::open(path) {
-            Ok(input) => Ok(Self::new(file, input)),
+            Ok(input) => Ok(Self::new(file, through(Box::new(input)))),
             Err(source) => Err(FileError::cannot_open(path, source)),
         }
     }

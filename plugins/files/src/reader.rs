@@ -91,9 +91,23 @@ impl Reader {
         layout: Layout,
         options: Options,
     ) -> Result<Self, FileError> {
+        Self::open_through(path, layout, options, |input| input)
+    }
+
+    /// The same, with something between the file and what reads it, such as one that ends where the program is told to stop.
+    ///
+    /// # Errors
+    /// As for [`Reader::open`].
+    pub fn open_through(
+        path: impl AsRef<Path>,
+        layout: Layout,
+        options: Options,
+        through: impl FnOnce(Box<dyn Read + Send>) -> Box<dyn Read + Send>,
+    ) -> Result<Self, FileError> {
         let path = path.as_ref();
         let format = options.format.or_else(|| Format::from_path(path));
-        Self::from_lines(Lines::open(path)?, layout, Options { format, ..options })
+        let options = Options { format, ..options };
+        Self::from_lines(Lines::open_through(path, through)?, layout, options)
     }
 
     /// Reads from any stream of bytes; `name` stands for it in messages.

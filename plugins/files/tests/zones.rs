@@ -58,7 +58,7 @@ fn a_time_over_which_the_clock_is_set_forward_is_refused_with_what_it_may_be() {
     assert_eq!(
         refused.to_string(),
         "plc.csv:3: column `Zeit`: `29.03.2026 02:00:00` is no time in Europe/Berlin: the clocks are set forward over it; a logger \
-         whose clock is not set forward has `zone = \"+01:00\"` in `[time]`; or read leniently (`--lenient`) to leave the row out"
+         whose clock is not set forward has `zone = \"+01:00\"` in `[time]`, or read leniently (`--lenient`) to leave the row out"
     );
     let mut lenient = reader(text.to_owned(), true);
     let read = seconds(&mut lenient).unwrap();

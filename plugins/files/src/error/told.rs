@@ -17,7 +17,25 @@ fn is_date(text: &str) -> bool {
 
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.tell(&mut OneLine(f))
+        self.tell(&mut OneLine(f), true)
+    }
+}
+
+/// What was taken as missing, or left out, in a recording that is read leniently.
+struct Taken<'a>(&'a FileError);
+
+impl fmt::Display for Taken<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.tell(&mut OneLine(f), false)
+    }
+}
+
+/// Another way out, unless it has been taken already.
+fn or_leniently(f: &mut dyn Write, is_open: bool, then: &str) -> fmt::Result {
+    if is_open {
+        write!(f, ", or read leniently (`--lenient`) to {then}")
+    } else {
+        Ok(())
     }
 }
 
@@ -44,7 +62,14 @@ fn moves(character: char) -> bool {
 }
 
 impl FileError {
-    fn tell(&self, f: &mut dyn Write) -> fmt::Result {
+    /// The same of what is read leniently, without the advice to do so.
+    #[must_use]
+    pub fn taken(&self) -> impl fmt::Display + '_ {
+        Taken(self)
+    }
+
+    /// Says what it is; `strict` is whether it may still be read leniently.
+    fn tell(&self, f: &mut dyn Write, strict: bool) -> fmt::Result {
         match self {
             Self::Open { file, source } => {
                 write!(
@@ -68,15 +93,19 @@ impl FileError {
                     "{place}: is not text; save the recording as CSV or JSON lines in UTF-8: a spreadsheet calls that \"CSV UTF-8\""
                 )
             }
-            Self::TooLong { place, limit } => write!(
-                f,
-                "{place}: a row longer than {limit} bytes starts here; look for missing line ends, or read leniently (`--lenient`) to leave it out"
-            ),
+            Self::TooLong { place, limit } => {
+                write!(
+                    f,
+                    "{place}: a row longer than {limit} bytes starts here; look for missing line ends"
+                )?;
+                or_leniently(f, strict, "leave it out")
+            }
             Self::UnclosedQuote { place } => {
                 write!(
                     f,
-                    "{place}: a quoted cell starts here that does not end; close the quote or remove it, or read leniently (`--lenient`) to leave the row out"
-                )
+                    "{place}: a quoted cell starts here that does not end; close the quote or remove it"
+                )?;
+                or_leniently(f, strict, "leave the row out")
             }
             Self::DuplicateColumn {
                 place,
@@ -109,14 +138,14 @@ impl FileError {
                     "{place}: column `{column}`: expected a number, found `{found}`; "
                 )?;
                 match cell::thousands_mark(found) {
-                    Some(mark) => write!(
-                        f,
-                        "write numbers without {mark} between thousands, or read leniently (`--lenient`) to take such as absent"
-                    ),
-                    None => write!(
-                        f,
-                        "leave the cell empty where there is no value, or read leniently (`--lenient`) to take it as absent"
-                    ),
+                    Some(mark) => {
+                        write!(f, "write numbers without {mark} between thousands")?;
+                        or_leniently(f, strict, "take such as absent")
+                    }
+                    None => {
+                        f.write_str("leave the cell empty where there is no value")?;
+                        or_leniently(f, strict, "take it as absent")
+                    }
                 }
             }
             Self::MixedMarks {
@@ -134,19 +163,20 @@ impl FileError {
                     Some(_) => " and none between thousands",
                     None => "",
                 };
-                write!(
-                    f,
-                    "write all numbers of a file with one mark{thousands}, or read leniently (`--lenient`) to leave out those with another"
-                )
+                write!(f, "write all numbers of a file with one mark{thousands}")?;
+                or_leniently(f, strict, "leave out those with another")
             }
             Self::TimeBeyond {
                 place,
                 column,
                 found,
-            } => write!(
-                f,
-                "{place}: column `{column}`: the time `{found}` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`, or read leniently (`--lenient`) to leave the row out"
-            ),
+            } => {
+                write!(
+                    f,
+                    "{place}: column `{column}`: the time `{found}` is more than 292 years from the origin of time, and no such instant fits; correct the time or its `unit` in `[time]`"
+                )?;
+                or_leniently(f, strict, "leave the row out")
+            }
             Self::BadTime {
                 place,
                 column,
@@ -174,10 +204,8 @@ impl FileError {
                         "; `[time]` reads dates and times by their `format`, e.g. `format = \"%d.%m.%Y %H:%M:%S\"` for 31.12.2026 23:59:59"
                     );
                 }
-                write!(
-                    f,
-                    "; correct the time or how it is to be read, or read leniently (`--lenient`) to leave the row out"
-                )
+                f.write_str("; correct the time or how it is to be read")?;
+                or_leniently(f, strict, "leave the row out")
             }
             Self::TimeSkipped {
                 place,
@@ -190,10 +218,11 @@ impl FileError {
                 write!(
                     f,
                     "{place}: column `{column}`: `{found}` is no time in {zone}: the clocks are set forward over it; a logger whose clock is not \
-                     set forward has `zone = \"{sign}{:02}:{:02}\"` in `[time]`; or read leniently (`--lenient`) to leave the row out",
+                     set forward has `zone = \"{sign}{:02}:{:02}\"` in `[time]`",
                     minutes / 60,
                     minutes % 60
-                )
+                )?;
+                or_leniently(f, strict, "leave the row out")
             }
             Self::TimeAgain { place, time, why } => {
                 write!(f, "{place}: the time `{time}` is that of the row before")?;
@@ -269,14 +298,20 @@ impl FileError {
                 place,
                 expected,
                 found,
-            } => write!(
-                f,
-                "{place}: {found} cells where the header has {expected}; correct the row, or read leniently (`--lenient`) to leave it out"
-            ),
-            Self::BadObject { place, reason } => write!(
-                f,
-                "{place}: expected one JSON object on the line: {reason}; write one object per line, or read leniently (`--lenient`) to leave the line out"
-            ),
+            } => {
+                write!(
+                    f,
+                    "{place}: {found} cells where the header has {expected}; correct the row"
+                )?;
+                or_leniently(f, strict, "leave it out")
+            }
+            Self::BadObject { place, reason } => {
+                write!(
+                    f,
+                    "{place}: expected one JSON object on the line: {reason}; write one object per line"
+                )?;
+                or_leniently(f, strict, "leave the line out")
+            }
             Self::JsonArray { place } => write!(
                 f,
                 "{place}: a JSON array begins here, where one object a line is expected; leave out its brackets and the commas between the objects, as `jq -c '.[]'` does"
