@@ -238,6 +238,21 @@ fn a_crate_that_is_not_made_for_this_athermal_is_refused_before_anything_is_buil
             ["no-nodes does not depend on athermal-core", "no node type"],
         ),
         (
+            with_core(
+                &scratch,
+                "tested-nodes",
+                &format!(
+                    "athermal-core = {{ path = {:?}, features = [\"testkit\"] }}",
+                    format!("{ROOT}/core/framework")
+                ),
+            ),
+            2,
+            [
+                "tested-nodes has athermal-core with the feature `testkit` under `[dependencies]`",
+                "`[dev-dependencies]`",
+            ],
+        ),
+        (
             format!("path:{}", scratch.path("nothing").display()),
             3,
             ["there is no crate in", "nothing"],
@@ -289,4 +304,43 @@ fn a_project_of_somebody_else_is_not_written_over() {
         &scratch.path("vendor"),
     ]);
     absent.ended(3).tells(&["no vendored crates in"]);
+}
+
+/// A cargo that notes how it is called to build, and builds nothing.
+#[cfg(unix)]
+#[test]
+fn cargo_is_as_quiet_as_the_program_is_asked_to_be() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let scratch = Scratch::new("build-quiet");
+    let core = format!("{ROOT}/core/framework");
+    let with = with_core(
+        &scratch,
+        "quiet-nodes",
+        &format!("athermal-core = {{ path = {core:?} }}"),
+    );
+    let called = scratch.path("called");
+    let script = format!(
+        "#!/bin/sh\nif [ \"$1\" = build ]; then echo \"$@\" >> {called:?}; exit 1; fi\nexec {:?} \"$@\"\n",
+        env!("CARGO")
+    );
+    let cargo = scratch.file("cargo", script);
+    std::fs::set_permissions(&cargo, std::fs::Permissions::from_mode(0o755)).unwrap();
+    for quiet in [false, true] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_athermal"))
+            .args(["build", "--with", &with, "--offline", "-o"])
+            .arg(scratch.path("ours"))
+            .args(quiet.then_some("-q"))
+            .env("CARGO", &cargo)
+            .output()
+            .unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(told.contains("cargo could not build"), "{told}");
+    }
+    let called = std::fs::read_to_string(called).unwrap();
+    let quiet: Vec<bool> = called
+        .lines()
+        .map(|line| line.contains("--quiet"))
+        .collect();
+    assert_eq!(quiet, [false, true], "{called}");
 }

@@ -13,13 +13,16 @@ use crate::terminal::Failure;
 pub(super) struct Cargo {
     program: OsString,
     offline: bool,
+    quiet: bool,
 }
 
 impl Cargo {
-    pub(super) fn new(offline: bool) -> Self {
+    /// With `quiet` it says only what goes wrong.
+    pub(super) fn new(offline: bool, quiet: bool) -> Self {
         Self {
             program: std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()),
             offline,
+            quiet,
         }
     }
 
@@ -46,13 +49,16 @@ impl Cargo {
             .map_err(|error| Failure::Outside(format!("cargo metadata is no JSON: {error}")))
     }
 
-    /// Builds the crate in a folder; cargo tells its progress itself.
+    /// Builds the crate in a folder; cargo tells its progress itself, unless it is to be quiet.
     ///
     /// # Errors
     /// When cargo is not there or fails.
     pub(super) fn build(&self, folder: &Path) -> Result<(), Failure> {
         let mut command = self.command(folder, "build");
         command.arg("--release").stdout(Stdio::null());
+        if self.quiet {
+            command.arg("--quiet");
+        }
         let status = command.status().map_err(|error| self.missing(&error))?;
         if status.success() {
             return Ok(());

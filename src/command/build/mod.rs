@@ -56,7 +56,7 @@ impl Build {
     /// When athermal or a crate is not found, they do not go together, or cargo fails.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let checkout = Checkout::find(self.athermal.as_deref())?;
-        let cargo = Cargo::new(self.offline || self.vendored.is_some());
+        let cargo = Cargo::new(self.offline || self.vendored.is_some(), terminal.quiet);
         let (mut wishes, mut registry) = (Vec::new(), false);
         for text in &self.with {
             let wish = Wish::read(text)?;
@@ -73,6 +73,7 @@ impl Build {
         )?;
         let resolved = cargo.metadata(project.folder(), true)?;
         one_core(&resolved, &wishes)?;
+        wish::without_testkit(resolved["packages"].as_array().into_iter().flatten())?;
         cargo.build(project.folder())?;
         let target = resolved["target_directory"].as_str().unwrap_or_default();
         let built = Path::new(target)

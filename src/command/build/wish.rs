@@ -119,8 +119,11 @@ impl Wish {
         let metadata = cargo.metadata(folder, false)?;
         let all = metadata["packages"].as_array().into_iter().flatten();
         let found = all.filter(|found| found["name"] == package.as_str());
-        let mut dependencies =
-            found.flat_map(|found| found["dependencies"].as_array().into_iter().flatten());
+        let found: Vec<&Value> = found.collect();
+        without_testkit(found.iter().copied())?;
+        let mut dependencies = found
+            .into_iter()
+            .flat_map(|found| found["dependencies"].as_array().into_iter().flatten());
         let core = dependencies.find(|dependency| {
             dependency["name"] == "athermal-core" && dependency["kind"].is_null()
         });
@@ -132,6 +135,33 @@ impl Wish {
         made_for(package, core, checkout)?;
         Ok(core["path"].is_null())
     }
+}
+
+/// The conformance kit is for the tests of a crate: it counts what a program allocates.
+///
+/// # Errors
+/// When a package takes it into programs.
+pub(super) fn without_testkit<'a>(
+    packages: impl Iterator<Item = &'a Value>,
+) -> Result<(), Failure> {
+    let brings_it = |dependency: &Value| {
+        let mut features = dependency["features"].as_array().into_iter().flatten();
+        dependency["name"] == "athermal-core"
+            && dependency["kind"].is_null()
+            && dependency["optional"] != true
+            && features.any(|feature| feature == "testkit")
+    };
+    for package in packages {
+        let mut dependencies = package["dependencies"].as_array().into_iter().flatten();
+        if dependencies.any(brings_it) {
+            let name = package["name"].as_str().unwrap_or_default();
+            return Err(Failure::Request(format!(
+                "{name} has athermal-core with the feature `testkit` under `[dependencies]`, which would count every allocation of the \
+                 program: leave the feature out there, and have athermal-core under `[dev-dependencies]` too, with `features = [\"testkit\"]`"
+            )));
+        }
+    }
+    Ok(())
 }
 
 fn made_for(package: &str, core: &Value, checkout: &Checkout) -> Result<(), Failure> {
