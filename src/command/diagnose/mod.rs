@@ -137,7 +137,7 @@ impl Diagnose {
             write_plots(terminal, folder, &plots(&diagnosis, &self.of))?;
         }
         if terminal.format == Format::Table
-            && let Some(next) = self.next(&tables, drifts)
+            && let Some(next) = self.next(&tables, &model, drifts)
         {
             terminal.note(format_args!("\n{next}"));
         }

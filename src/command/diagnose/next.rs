@@ -1,7 +1,8 @@
 //! Decides which commands are worth trying after a diagnosis: only those that what was found asks for, two at most.
 
-use athermal::diagnosis::Main;
+use athermal::Model;
 use athermal::diagnosis::lag::FeatureLags;
+use athermal::diagnosis::{Main, is_called};
 
 use super::Diagnose;
 use super::tables::{Tables, is_of};
@@ -10,8 +11,8 @@ use crate::invocation::{command, program, quoted};
 
 impl Diagnose {
     /// What to try next, each with its reason; nothing where nothing follows. `drifts` says whether any truth is a slope.
-    pub(super) fn next(&self, tables: &Tables, drifts: bool) -> Option<String> {
-        let left = self.what_is_left(tables);
+    pub(super) fn next(&self, tables: &Tables, model: &Model, drifts: bool) -> Option<String> {
+        let left = self.what_is_left(tables, model);
         let left = left.or_else(|| self.wider_windows(tables).filter(|_| drifts));
         let found: Vec<String> = left.into_iter().chain(self.more_days(tables)).collect();
         (!found.is_empty()).then(|| found.join("\n"))
@@ -24,13 +25,22 @@ impl Diagnose {
     }
 
     /// A feature tells something of what a prediction leaves: does no estimator use it, or is it of little use there?
-    fn what_is_left(&self, tables: &Tables) -> Option<String> {
+    fn what_is_left(&self, tables: &Tables, model: &Model) -> Option<String> {
         let (main, feature) = most_left(tables)?;
         let name = &feature.feature;
         let users: Vec<&str> = tables.users_of(main, name).collect();
         let why = format!("What {} leaves goes with {name}, ", main.prediction);
         let own = users.iter().find(|user| is_of(&main.prediction, user));
-        let (why, look) = if let Some(own) = own {
+        let (why, look) = if let Some(own) = own.filter(|own| !has_coefficients(model, own)) {
+            if self.of.iter().any(|asked| is_called(own, asked)) {
+                return None;
+            }
+            let look = self.command("diagnose", &["--of", &quoted(own), "--no-fit"]);
+            (
+                why + "which it uses; how it answers each of its sensors:",
+                look,
+            )
+        } else if let Some(own) = own {
             let model = quoted(&self.model.display().to_string());
             // Without `each` a node is called by its own name, and its prediction by that of its axis too.
             let node = quoted(own);
@@ -87,4 +97,56 @@ fn most_left<'a>(tables: &Tables<'a>) -> Option<(&'a Main, &'a FeatureLags)> {
         Some((main, most))
     });
     left.max_by(|a, b| a.1.residual.best.abs().total_cmp(&b.1.residual.best.abs()))
+}
+
+/// Whether what an estimator was fitted to tells its coefficients: not every kind does.
+fn has_coefficients(model: &Model, node: &str) -> bool {
+    let fit = model.fitted.get(node);
+    fit.is_some_and(|fit| fit.coefficients().is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use athermal::core::node::{Coefficients, Predictor};
+    use serde::{Deserialize, Serialize};
+
+    use super::*;
+
+    /// Predicts zero, and tells of it or not.
+    #[derive(Debug, Serialize, Deserialize)]
+    struct Reserved {
+        tells: bool,
+    }
+
+    impl Predictor for Reserved {
+        fn uses(&self) -> &[String] {
+            &[]
+        }
+
+        fn predict(&self, _regressors: &[f64]) -> f64 {
+            0.0
+        }
+
+        fn coefficients(&self) -> Option<Coefficients> {
+            self.tells.then(|| Coefficients::linear(0.0, &[], None))
+        }
+    }
+
+    athermal::core::predictor!(Reserved, "reserved");
+
+    #[test]
+    fn only_what_tells_its_coefficients_is_asked_for_them() {
+        let text = r#"{"athermal_model": 1, "card": null, "fitted": {}, "graph": {
+            "signals": {"room": {"unit": "nm", "channels": ["a"]}}, "nodes": {}, "outputs": {"out": "room"}
+        }}"#;
+        let mut model = Model::from_text("model.json", text.to_owned()).unwrap();
+        for (node, tells) in [("open", true), ("closed", false)] {
+            let fit: Arc<dyn Predictor> = Arc::new(Reserved { tells });
+            model.fitted.insert(node.to_owned(), fit);
+        }
+        let asked = ["open", "closed", "none"].map(|node| has_coefficients(&model, node));
+        assert_eq!(asked, [true, false, false]);
+    }
 }
