@@ -250,7 +250,7 @@ inputs.signal = {{ from = "position", max_age = "1min" }}
 windows = ["5min"]
 [nodes.all]
 type = "sum"
-inputs.signal = {{ from = "temperature", max_age = "1min" }}
+inputs.signal = {{ from = "position", max_age = "1min" }}
 [outputs]
 out = "drift"
 all = "all"

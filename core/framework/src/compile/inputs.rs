@@ -152,6 +152,24 @@ impl Resolver<'_> {
         self.diagnostics.report(place, problem);
     }
 
+    /// Tells of ages at ports that hold nothing.
+    pub(super) fn idle_ages(&mut self, instance: &Instance<'_>) {
+        let ports = (instance.kind.inputs)().iter();
+        for port in ports.filter(|port| port.read == Read::Fresh) {
+            let given = instance.input(port.name).and_then(|input| input.max_age);
+            if let Some((_, place)) = given {
+                let problem = CompileProblem::Doubt {
+                    message: format!(
+                        "`max_age` does nothing here: `inputs.{}` takes new values only, and holds none",
+                        port.name
+                    ),
+                    help: Some("leave `max_age` out".to_owned()),
+                };
+                self.diagnostics.report(place, problem);
+            }
+        }
+    }
+
     /// How long a held value of each slot counts at an input.
     pub(crate) fn max_age(
         &mut self,

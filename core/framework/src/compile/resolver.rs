@@ -196,6 +196,7 @@ impl<'g> Resolver<'g> {
     /// Resolves one instance; `None` when an error about it has been told.
     fn instance(&mut self, instance: &Instance<'_>, closes: bool) -> Option<()> {
         self.known_inputs(instance);
+        self.idle_ages(instance);
         self.sound(instance, KindFault::of_ports((instance.kind.inputs)()))?;
         let spec = Arc::clone(&instance.read.spec);
         match spec.role() {

@@ -99,22 +99,9 @@ impl Resolver<'_> {
         whole.then_some(ports)
     }
 
-    /// Tells of inputs that the kind does not have, and of ages at which none is held.
+    /// Tells of inputs that the kind does not have.
     pub(super) fn known_inputs(&mut self, declared: &Declared<'_>) {
         let ports = (declared.kind.inputs)();
-        for port in ports.iter().filter(|port| port.read == Read::Fresh) {
-            let given = declared.input(port.name).and_then(|input| input.max_age);
-            if let Some((_, place)) = given {
-                let problem = CompileProblem::Doubt {
-                    message: format!(
-                        "`max_age` does nothing here: `inputs.{}` takes new values only, and none that is held",
-                        port.name
-                    ),
-                    help: Some("leave `max_age` out".to_owned()),
-                };
-                self.diagnostics.report(place, problem);
-            }
-        }
         let strange = |port: &str| !ports.iter().any(|known| known.name == port);
         for input in declared
             .decl
