@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use athermal::Instant;
 use athermal::core::compile::{Plan, SourceChannel};
+use athermal::core::live::Feed;
 use athermal::core::recording::{Event, Recording, RecordingError, Rows};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
@@ -62,7 +63,11 @@ enum State {
 }
 
 /// The channels of a plan, which are looked at row by row.
-pub struct Looks(Vec<Looked>);
+pub struct Looks {
+    channels: Vec<Looked>,
+    /// Where in a row the value of each stands; nowhere once a graph has taken over that does not read it.
+    places: Vec<Option<usize>>,
+}
 
 /// A channel that is looked at, with what is looked for.
 struct Looked {
@@ -133,25 +138,60 @@ impl Looks {
                 silent: (!rests && !of_truth).then(Default::default),
             }
         });
-        Self(looked.collect())
+        let channels: Vec<Looked> = looked.collect();
+        Self {
+            places: (0..channels.len()).map(Some).collect(),
+            channels,
+        }
     }
 
-    /// Takes the next row, its values in the order of the plan's channels.
+    /// Goes on with the channels of a graph that has taken over, which reads them among those of a feed.
+    pub fn follow(&mut self, plan: &Plan, feed: &[Feed]) {
+        let mut before = std::mem::take(&mut self.places);
+        let mut added = Vec::new();
+        for (new, place) in Self::at(plan).channels.into_iter().zip(places(plan, feed)) {
+            let known = before.iter().position(|of| of.is_some() && *of == place);
+            match known {
+                Some(nth) if self.channels[nth].is_looked_at_as(&new) => {
+                    self.channels[nth].source = new.source;
+                }
+                // What was found of it until now is told as it was looked at then.
+                known => {
+                    known.into_iter().for_each(|nth| before[nth] = None);
+                    added.push((new, place));
+                }
+            }
+        }
+        let read: Vec<_> = places(plan, feed).collect();
+        before
+            .iter_mut()
+            .filter(|place| !read.contains(place))
+            .for_each(|place| *place = None);
+        self.places = before;
+        for (new, place) in added {
+            self.channels.push(new);
+            self.places.push(place);
+        }
+    }
+
+    /// Takes the next row, its values in the order of the plan's channels, or in that of the feed.
     pub fn row(&mut self, now: Instant, values: &[f64]) {
         let at_s = seconds(now);
-        for (of, &value) in self.0.iter_mut().zip(values) {
-            of.row(at_s, value);
+        for (of, place) in self.channels.iter_mut().zip(&self.places) {
+            if let Some(&value) = place.and_then(|place| values.get(place)) {
+                of.row(at_s, value);
+            }
         }
     }
 
     /// What follows is not set against what was.
     pub fn interrupt(&mut self) {
-        self.0.iter_mut().for_each(Looked::interrupt);
+        self.channels.iter_mut().for_each(Looked::interrupt);
     }
 
     /// The channels of which something is wrong, in the order of the plan.
     pub fn found(self, purpose: Purpose) -> Vec<Faulty> {
-        let all = self.0.into_iter().map(|of| {
+        let all = self.channels.into_iter().map(|of| {
             let stuck = of.stuck.and_then(|finder| {
                 // What never changes is named by a fit, and as a truth by its scores.
                 let counts = finder.changes() > 0 || (purpose != Purpose::Fit && !of.of_truth);
@@ -171,7 +211,22 @@ impl Looks {
     }
 }
 
+/// Where each channel of a plan stands among those of a feed.
+pub fn places<'a>(plan: &'a Plan, feed: &'a [Feed]) -> impl Iterator<Item = Option<usize>> + 'a {
+    let place = |fed: Feed| feed.iter().position(|of| *of == fed);
+    Feed::of(plan).into_iter().map(place)
+}
+
 impl Looked {
+    /// Whether the same is looked for as in another.
+    fn is_looked_at_as(&self, other: &Self) -> bool {
+        let what = |of: &Self| {
+            let finders = (of.leaps.is_some(), of.stuck.is_some(), of.silent.is_some());
+            (of.of_truth, finders)
+        };
+        what(self) == what(other)
+    }
+
     fn row(&mut self, at_s: f64, value: f64) {
         let admitted = self.source.admits(value);
         if let Some(silent) = &mut self.silent {

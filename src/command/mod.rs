@@ -29,6 +29,7 @@ mod schema;
 mod sensors;
 mod show;
 mod simulate;
+mod stop;
 mod swap;
 mod test;
 mod threads;

@@ -1,9 +1,9 @@
 //! Decides when a sample that does not count, or lies far outside of what the fit saw, is told of while rows still come: the first, and
 //! again the first after some time in order; which samples count is decided by the graph.
 
-use athermal::core::compile::SourceChannel;
+use athermal::core::compile::{Plan, SourceChannel};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{Samples, Source, SourceError};
+use athermal::core::live::{Feed, Samples, Source, SourceError};
 use athermal::core::recording::Event;
 
 use athermal::{Duration, Instant};
@@ -20,8 +20,8 @@ const IN_ORDER: Duration = Duration::from_ns(3600 * 1_000_000_000);
 pub struct Ranged<'a> {
     source: &'a mut dyn Source,
     terminal: Terminal,
-    /// The channels in the order of a row's values.
-    channels: Vec<Channel>,
+    /// The channels in the order of a row's values; none of what the graph does not read.
+    channels: Vec<Option<Channel>>,
 }
 
 /// A channel of which is told.
@@ -44,21 +44,48 @@ impl<'a> Ranged<'a> {
         channels: &[SourceChannel],
         usual: &[SampleRange],
     ) -> Self {
-        let channels = channels.iter().map(|channel| Channel {
-            source: channel.clone(),
-            usual: beyond::usual(usual, &channel.name).cloned(),
-            rejected: None,
-            beyond: None,
-        });
+        let channels = channels.iter();
         Self {
             source,
             terminal: *terminal,
-            channels: channels.collect(),
+            channels: channels
+                .map(|channel| Some(Channel::new(channel, usual)))
+                .collect(),
         }
+    }
+
+    /// Goes on with the graph that has taken over, which reads its channels among those of a feed; where all is told at the end,
+    /// that is no matter.
+    pub fn follow(&mut self, plan: &Plan, feed: &[Feed], usual: &[SampleRange]) {
+        if self.channels.is_empty() {
+            return;
+        }
+        let mut before = std::mem::take(&mut self.channels);
+        before.resize_with(feed.len(), || None);
+        let followed = before.into_iter().zip(feed).map(|(before, fed)| {
+            let source = fed.source(plan)?;
+            let mut now = Channel::new(source, usual);
+            if let Some(before) = before {
+                (now.rejected, now.beyond) = (before.rejected, before.beyond);
+                // A graph goes by the fits of what ran before.
+                now.usual = now.usual.or(before.usual);
+            }
+            Some(now)
+        });
+        self.channels = followed.collect();
     }
 }
 
 impl Channel {
+    fn new(source: &SourceChannel, usual: &[SampleRange]) -> Self {
+        Self {
+            source: source.clone(),
+            usual: beyond::usual(usual, &source.name).cloned(),
+            rejected: None,
+            beyond: None,
+        }
+    }
+
     fn sample(&mut self, terminal: &Terminal, now: Instant, time: &str, value: f64) {
         if value.is_nan() {
             return;
@@ -92,7 +119,9 @@ impl Source for Ranged<'_> {
         let event = self.source.next(samples)?;
         if let Some(Event::Row(now)) = event {
             for (channel, &value) in self.channels.iter_mut().zip(&samples.values) {
-                channel.sample(&self.terminal, now, &samples.time_text, value);
+                if let Some(channel) = channel {
+                    channel.sample(&self.terminal, now, &samples.time_text, value);
+                }
             }
         }
         Ok(event)

@@ -20,6 +20,7 @@ use super::model::{self, check_fitted, tell_unfitted};
 use super::ran::{self, Ran};
 use super::rejected::Ranged;
 use super::sensors::Sensors;
+use super::stop;
 use super::swap;
 use super::watched::Watched;
 use super::{beyond, data};
@@ -188,7 +189,7 @@ impl Run {
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read), &usual);
         let mut sensors = Sensors::new(terminal, &mut ranged, &model.plan, !self.ends());
         let live = LiveOptions {
-            channels: feed,
+            channels: feed.clone(),
             ..LiveOptions::default()
         };
         let (mut stepper, mut control) =
@@ -221,6 +222,7 @@ impl Run {
                     std::ptr::from_ref(stepped.plan),
                     names.iter().map(place).collect(),
                 );
+                sensors.follow(stepped.plan, &feed, course.running().sample_ranges());
             }
             for (shown, place) in shown.iter_mut().zip(&places.1) {
                 *shown = place.map_or(f64::NAN, |place| stepped.outputs[place]);
@@ -279,19 +281,28 @@ impl Run {
         layout: Layout,
         options: Options,
     ) -> Result<Reader, Failure> {
-        let mut reader = Reader::open(&self.input, layout, options)?;
-        if !self.ends() {
-            let terminal = *terminal;
-            reader.tell_first(move |first| match first {
-                FileError::MissingColumns { .. } => {
-                    terminal.warning(format_args!("{first} (missing until a line has it)"));
-                }
-                FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { moved: true, .. } => {
-                    terminal.warning(format_args!("{first}"));
-                }
-                _ => terminal.warning(format_args!("{first}; others like it are counted")),
-            });
+        if self.ends() {
+            return Ok(Reader::open(&self.input, layout, options)?);
         }
+        let opened = Reader::open_through(&self.input, layout, options, stop::until_told);
+        let mut reader = match opened {
+            // Told to stop before there was anything.
+            Err(FileError::Empty { .. }) if stop::is_told() => return Err(Failure::Told(0)),
+            opened => opened?,
+        };
+        let terminal = *terminal;
+        reader.tell_first(move |first| match first {
+            FileError::MissingColumns { .. } => {
+                terminal.warning(format_args!("{first} (missing until a line has it)"));
+            }
+            FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { moved: true, .. } => {
+                terminal.warning(format_args!("{first}"));
+            }
+            _ => terminal.warning(format_args!(
+                "{}; others like it are counted",
+                first.taken()
+            )),
+        });
         Ok(reader)
     }
 
@@ -374,6 +385,9 @@ impl Run {
     }
 
     fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader, usual: &[SampleRange]) {
+        if stop::is_told() {
+            terminal.note("told to stop: what had been read until then has been put out");
+        }
         let input = if self.input_is_standard() {
             STANDARD_INPUT.to_owned()
         } else {

@@ -2,12 +2,14 @@
 //! back; else at the end. What such a fault is, is decided elsewhere.
 
 use athermal::core::compile::{Plan, SourceChannel};
-use athermal::core::live::{Samples, Source, SourceError};
+use athermal::core::engine::SampleRange;
+use athermal::core::live::{Feed, Samples, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
 
-use super::faults::{self, Looks, Purpose, of_standstill};
+use super::faults::{self, Looks, Purpose, of_standstill, places};
 use super::model::listed;
+use super::rejected::Ranged;
 use crate::figures::{count, instant, number, seconds, time};
 use crate::terminal::Terminal;
 
@@ -20,21 +22,22 @@ const AGAIN_S: f64 = 3600.0;
 
 /// Rows as they are read, while the sensors of a graph are watched.
 pub struct Sensors<'a> {
-    source: &'a mut dyn Source,
+    source: &'a mut Ranged<'a>,
     terminal: Terminal,
     told: Told,
 }
 
 enum Told {
     AtEnd(Looks),
-    AtOnce(Vec<Sensor>),
+    /// In the order of a row's values; none of what the graph does not read.
+    AtOnce(Vec<Option<Sensor>>),
 }
 
 impl<'a> Sensors<'a> {
     /// Watches the channels of a plan, whose values come first in a row.
     pub fn new(
         terminal: &Terminal,
-        source: &'a mut dyn Source,
+        source: &'a mut Ranged<'a>,
         plan: &Plan,
         at_once: bool,
     ) -> Self {
@@ -42,10 +45,29 @@ impl<'a> Sensors<'a> {
             source,
             terminal: *terminal,
             told: if at_once {
-                Told::AtOnce(Sensor::of(plan))
+                Told::AtOnce(Sensor::of(plan).map(Some).collect())
             } else {
                 Told::AtEnd(Looks::at(plan))
             },
+        }
+    }
+
+    /// Goes on with the graph that has taken over, which reads its channels among those of a feed. `usual` is where samples lay in
+    /// its fit.
+    pub fn follow(&mut self, plan: &Plan, feed: &[Feed], usual: &[SampleRange]) {
+        self.source.follow(plan, feed, usual);
+        match &mut self.told {
+            Told::AtEnd(looks) => looks.follow(plan, feed),
+            Told::AtOnce(sensors) => {
+                let mut before = std::mem::take(sensors);
+                before.resize_with(feed.len(), || None);
+                sensors.resize_with(feed.len(), || None);
+                for (new, place) in Sensor::of(plan).zip(places(plan, feed)) {
+                    if let Some(place) = place {
+                        sensors[place] = Some(new.after(before[place].take()));
+                    }
+                }
+            }
         }
     }
 
@@ -67,14 +89,16 @@ impl Source for Sensors<'_> {
                 let at_s = seconds(now);
                 let mut is_news = false;
                 for (sensor, &value) in sensors.iter_mut().zip(&samples.values) {
-                    is_news |= sensor.row(at_s, value);
+                    if let Some(sensor) = sensor {
+                        is_news |= sensor.row(at_s, value);
+                    }
                 }
                 if is_news {
-                    tell(&self.terminal, sensors, at_s);
+                    tell(&self.terminal, sensors.iter().flatten(), at_s);
                 }
             }
             (Told::AtOnce(sensors), Some(Event::Segment)) => {
-                sensors.iter_mut().for_each(Sensor::interrupt);
+                sensors.iter_mut().flatten().for_each(Sensor::interrupt);
             }
             (_, None) => {}
         }
@@ -112,10 +136,10 @@ struct Sensor {
 }
 
 impl Sensor {
-    fn of(plan: &Plan) -> Vec<Self> {
+    fn of(plan: &Plan) -> impl Iterator<Item = Self> + '_ {
         let watched = health_reasons(plan);
         let channels = plan.sources.iter().zip(of_truths(plan)).enumerate();
-        let sensor = |(slot, (source, of_truth)): (usize, (&SourceChannel, bool))| Self {
+        let sensor = move |(slot, (source, of_truth)): (usize, (&SourceChannel, bool))| Self {
             source: source.clone(),
             of_truth,
             silent: silence::Finder::default(),
@@ -124,7 +148,24 @@ impl Sensor {
             told_s: None,
             news: None,
         };
-        channels.map(sensor).collect()
+        channels.map(sensor)
+    }
+
+    /// The same of a graph that has taken over, after what the one before knew of the channel.
+    fn after(self, before: Option<Self>) -> Self {
+        let Some(before) = before else {
+            return self;
+        };
+        // A node that takes out what is stuck from here on has nothing told of it.
+        let tells_stuck = self.stuck.is_some();
+        let is_told = |fault: &Fault| tells_stuck || !matches!(fault, Fault::Stuck(_));
+        Self {
+            stuck: self.stuck.map(|new| before.stuck.unwrap_or(new)),
+            fault: before.fault.filter(is_told),
+            silent: before.silent,
+            told_s: before.told_s,
+            ..self
+        }
     }
 
     /// Takes the sample of a row, if it is one; whether there is something to tell then.
@@ -198,7 +239,7 @@ impl Sensor {
 }
 
 /// Tells what there is to tell at a row; of many that fail or come back together in one sentence, as when a logger is unplugged.
-fn tell(terminal: &Terminal, sensors: &[Sensor], at_s: f64) {
+fn tell<'a>(terminal: &Terminal, sensors: impl Iterator<Item = &'a Sensor>, at_s: f64) {
     let (mut silent, mut since_s) = (Vec::new(), f64::INFINITY);
     let (mut back, mut fault_s) = (Vec::new(), f64::INFINITY);
     for sensor in sensors {

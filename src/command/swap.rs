@@ -480,10 +480,8 @@ pub fn reading(running: &Model, swaps: &[Swap], feed: &[Feed]) -> athermal::core
     let mut plan = (*Arc::clone(&running.plan)).clone();
     let models = || std::iter::once(running).chain(swaps.iter().map(|swap| &swap.model));
     let source = |channel: &Feed| {
-        let mut sources = models().flat_map(|model| &model.plan.sources);
-        sources
-            .find(|source| source.name == channel.name && source.column == channel.column)
-            .cloned()
+        let mut read = models().filter_map(|model| channel.source(&model.plan));
+        read.next().cloned()
     };
     plan.sources = feed.iter().filter_map(source).collect();
     plan

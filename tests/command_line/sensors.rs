@@ -126,3 +126,28 @@ fn samples_out_of_range_are_told_again_after_an_hour_in_order() {
     });
     assert_eq!(told(&flapping), 1);
 }
+
+#[test]
+fn sensors_are_watched_by_the_graph_that_has_taken_over() {
+    let (scratch, plain, _, _) = desk("followed");
+    let other = super::PLAIN.replace("\"room\"", "\"hall\"");
+    let other = scratch.file("other.toml", other);
+    // The room is not measured once nothing needs it, and the hall fails long after it began to count.
+    let all = rows(0, 1500).into_iter().enumerate().map(|(nth, row)| {
+        let cells: Vec<&str> = row.split(',').collect();
+        let room = if nth < 350 { cells[1] } else { "" };
+        let hall = if nth < 700 { cells[1] } else { "" };
+        format!("{},{room},{},{hall}", cells[0], cells[2])
+    });
+    let all: Vec<String> = all.collect();
+    let log = csv(&all).replacen('\n', ",hall\n", 1);
+    let swap = format!("3000={}", other.display());
+    let streamed = [&"run" as &dyn AsRef<std::ffi::OsStr>, &plain, &"-i", &"-"];
+    let streamed = [&streamed[..], &[&"--swap-at", &swap]].concat();
+    let file = scratch.file("log.csv", &log);
+    let recorded = athermal(&[&"run", &plain, &"-i", &file, &"--swap-at", &swap]).ended(0);
+    for run in [athermal_fed(&streamed, log.as_bytes()).ended(0), recorded] {
+        run.tells(&["took over", "temperature.hall has no sample"]);
+        assert!(!run.told.contains("temperature.room"), "{}", run.told);
+    }
+}

@@ -1,6 +1,6 @@
 //! Decides what passes between the engine thread and the control thread: ticks one way, engines both ways.
 
-use crate::compile::Plan;
+use crate::compile::{Plan, SourceChannel};
 use crate::engine::Engine;
 use crate::time::Instant;
 
@@ -17,11 +17,18 @@ impl Feed {
     /// What a plan reads.
     #[must_use]
     pub fn of(plan: &Plan) -> Vec<Self> {
-        let feed = |source: &crate::compile::SourceChannel| Self {
+        let feed = |source: &SourceChannel| Self {
             name: source.name.clone(),
             column: source.column.clone(),
         };
         plan.sources.iter().map(feed).collect()
+    }
+
+    /// The channel as a plan reads it, where it does.
+    #[must_use]
+    pub fn source<'a>(&self, plan: &'a Plan) -> Option<&'a SourceChannel> {
+        let mut sources = plan.sources.iter();
+        sources.find(|source| source.name == self.name && source.column == self.column)
     }
 }
 

@@ -1,0 +1,138 @@
+//! Decides how a run beside a machine ends that is told to stop: as at the end of its input. What that is, is decided elsewhere.
+
+use std::io::{self, Read};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+/// Bytes read at a time, at most.
+const PIECE: usize = 64 * 1024;
+/// Pieces that may wait to be taken.
+const WAITING: usize = 2;
+
+/// Whether the program has been told to stop.
+static TOLD: AtomicBool = AtomicBool::new(false);
+
+/// Whether the program has been told to stop.
+pub fn is_told() -> bool {
+    TOLD.load(Ordering::Relaxed)
+}
+
+/// A piece of an input; an empty one is its end.
+type Piece = io::Result<Vec<u8>>;
+
+/// An input that may never end by itself: from here on SIGINT or SIGTERM ends it, after all that has been read of it until then, and a
+/// second one ends the program at once. Where there are no signals it is as it was.
+pub fn until_told(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
+    let (give, pieces) = sync_channel(WAITING);
+    if !listen(give.clone()) {
+        return input;
+    }
+    // The thread may wait for an input that gives nothing more, and goes with the program.
+    std::thread::spawn(move || read(input, &give));
+    Box::new(Pieces::new(pieces))
+}
+
+/// Ends the input at the first signal; whether signals can be listened to.
+#[cfg(unix)]
+fn listen(give: SyncSender<Piece>) -> bool {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    use signal_hook::low_level::emulate_default_handler;
+
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
+        return false;
+    };
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            if TOLD.swap(true, Ordering::Relaxed) {
+                let _ = emulate_default_handler(signal);
+            }
+            // There may be no room yet, and the second signal is listened to meanwhile.
+            let give = give.clone();
+            std::thread::spawn(move || give.send(Ok(Vec::new())));
+        }
+    });
+    true
+}
+
+#[cfg(not(unix))]
+fn listen(_give: SyncSender<Piece>) -> bool {
+    false
+}
+
+/// Reads an input piece by piece, to its end or until the program is told to stop.
+fn read(mut input: impl Read, give: &SyncSender<Piece>) {
+    let mut piece = vec![0; PIECE];
+    while !is_told() {
+        let read = match input.read(&mut piece) {
+            Ok(read) => Ok(piece[..read].to_vec()),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => Err(error),
+        };
+        let is_last = !read.as_ref().is_ok_and(|piece| !piece.is_empty());
+        if give.send(read).is_err() || is_last {
+            return;
+        }
+    }
+}
+
+/// The pieces of an input, one after the other.
+struct Pieces {
+    pieces: Receiver<Piece>,
+    piece: Vec<u8>,
+    taken: usize,
+    /// Whether the end has been met, which is met again by whoever asks again.
+    is_over: bool,
+}
+
+impl Pieces {
+    fn new(pieces: Receiver<Piece>) -> Self {
+        Self {
+            pieces,
+            piece: Vec::new(),
+            taken: 0,
+            is_over: false,
+        }
+    }
+}
+
+impl Read for Pieces {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.taken == self.piece.len() && !self.is_over {
+            // What gives pieces has gone where there is no more.
+            self.piece = self.pieces.recv().unwrap_or(Ok(Vec::new()))?;
+            self.taken = 0;
+            self.is_over = self.piece.is_empty();
+        }
+        let read = (&self.piece[self.taken..]).read(into)?;
+        self.taken += read;
+        Ok(read)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_is_the_same_in_pieces() {
+        let (give, pieces) = sync_channel(WAITING);
+        let bytes: Vec<u8> = (0..3 * PIECE + 7).map(|nth| nth as u8).collect();
+        let input = io::Cursor::new(bytes.clone());
+        std::thread::spawn(move || read(input, &give));
+        let mut whole = Vec::new();
+        let mut input = Pieces::new(pieces);
+        input.read_to_end(&mut whole).unwrap();
+        assert!(whole == bytes);
+    }
+
+    #[test]
+    fn what_has_ended_is_not_waited_for_again() {
+        let (give, pieces) = sync_channel(WAITING);
+        let mut input = Pieces::new(pieces);
+        give.send(Ok(vec![7])).unwrap();
+        give.send(Ok(Vec::new())).unwrap();
+        let mut read = || input.read(&mut [0; 4]).unwrap();
+        assert_eq!([read(), read(), read()], [1, 0, 0]);
+    }
+}

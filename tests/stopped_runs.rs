@@ -1,0 +1,158 @@
+//! A run beside a machine that is told to stop ends as at the end of its input: what came of it is out, and nothing of what it knows is
+//! lost.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use workbench::{Scratch, athermal, athermal_fed};
+
+const GRAPH: &str = r#"
+schema = 1
+name = "stopped"
+[time]
+column = "time_s"
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+column = "{channel}"
+max_age = "3min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["30s"]
+unit = "nm/min"
+[outputs]
+now = "drift"
+"#;
+
+/// Rows from one number to before another; every tenth cell is none.
+fn rows(from: u32, to: u32) -> String {
+    let cell = |nth: u32| match nth % 10 {
+        9 => "off".to_owned(),
+        _ => format!("{}", nth * nth % 17),
+    };
+    (from..to)
+        .map(|nth| format!("{},{}\n", 10 * nth, cell(nth)))
+        .collect()
+}
+
+/// A run whose input goes on.
+struct Live {
+    child: Child,
+    rows: ChildStdin,
+    out: BufReader<ChildStdout>,
+}
+
+impl Live {
+    fn new(scratch: &Scratch, more: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+            .arg("run")
+            .arg(scratch.path("graph.toml"))
+            .args(["--input", "-", "--lenient", "--state"])
+            .arg(scratch.path("state"))
+            .args(more)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        Self {
+            rows: child.stdin.take().unwrap(),
+            out: BufReader::new(child.stdout.take().unwrap()),
+            child,
+        }
+    }
+
+    /// Feeds rows, and waits until so many lines have come of them.
+    fn feed(&mut self, text: &str, lines: usize) -> String {
+        self.rows.write_all(text.as_bytes()).unwrap();
+        self.rows.flush().unwrap();
+        let mut read = String::new();
+        for _ in 0..lines {
+            self.out.read_line(&mut read).unwrap();
+        }
+        read
+    }
+
+    fn tell(&self, signal: &str) {
+        let told = Command::new("kill")
+            .args(["-s", signal, &self.child.id().to_string()])
+            .status();
+        assert!(told.unwrap().success());
+    }
+
+    /// The status, what else was put out, and what was told, while the input is still open.
+    fn ended(mut self) -> (Option<i32>, String, String) {
+        let (mut rest, mut told) = (String::new(), String::new());
+        self.out.read_to_string(&mut rest).unwrap();
+        let mut stderr = self.child.stderr.take().unwrap();
+        stderr.read_to_string(&mut told).unwrap();
+        (self.child.wait().unwrap().code(), rest, told)
+    }
+}
+
+fn desk(test: &str) -> Scratch {
+    let scratch = Scratch::new(&format!("stopped-{test}"));
+    scratch.file("graph.toml", GRAPH);
+    scratch
+}
+
+#[test]
+fn a_run_that_is_told_to_stop_ends_in_order_and_the_next_goes_on_from_there() {
+    for (signal, more) in [("TERM", &[][..]), ("INT", &["--watch"][..])] {
+        let scratch = desk(signal);
+        let names = "time_s,Z\n".to_owned();
+        let mut live = Live::new(&scratch, more);
+        let first = live.feed(&(names.clone() + &rows(0, 50)), 51);
+        // What is begun is no row yet.
+        live.rows.write_all(b"500,1").unwrap();
+        live.tell(signal);
+        let (status, rest, told) = live.ended();
+        assert_eq!((status, rest.as_str()), (Some(0), ""), "{told}");
+        assert!(told.contains("5 × unreadable cell"), "{told}");
+        assert!(told.contains("told to stop"), "{told}");
+        assert!(!told.contains("(`--lenient`)"), "{told}");
+
+        let (graph, state) = (scratch.path("graph.toml"), scratch.path("state"));
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"run", &graph, &"-i", &"-", &"--lenient"];
+        arguments.extend(more.iter().map(|more| more as &dyn AsRef<std::ffi::OsStr>));
+        let whole = athermal_fed(&arguments, (names.clone() + &rows(0, 100)).as_bytes()).ended(0);
+        arguments.extend([&"--state" as &dyn AsRef<std::ffi::OsStr>, &state]);
+        let after = athermal_fed(&arguments, (names + &rows(50, 100)).as_bytes()).ended(0);
+        let after = after.out.split_once('\n').unwrap().1.to_owned();
+        assert_eq!(first + &after, whole.out, "{signal}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_is_told_to_stop_before_anything_came_is_fine() {
+    let scratch = desk("early");
+    let live = Live::new(&scratch, &[]);
+    // One thread runs, one reads and one listens; until then a signal ends the program as it does any other.
+    let threads = format!("/proc/{}/task", live.child.id());
+    while std::fs::read_dir(&threads).unwrap().count() < 3 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    live.tell("TERM");
+    let (status, rest, told) = live.ended();
+    assert_eq!((status, rest.as_str()), (Some(0), ""), "{told}");
+    assert!(!told.contains("error"), "{told}");
+}
+
+#[test]
+fn an_input_that_ends_ends_the_run_as_before() {
+    let scratch = desk("whole");
+    let log = scratch.file("log.csv", format!("time_s,Z\n{}", rows(0, 100)));
+    let graph = scratch.path("graph.toml");
+    let of_file = athermal(&[&"run", &graph, &"-i", &log, &"--lenient"]).ended(0);
+    let text = std::fs::read(&log).unwrap();
+    let piped = athermal_fed(&[&"run", &graph, &"-i", &"-", &"--lenient"], &text).ended(0);
+    assert_eq!(of_file.out, piped.out);
+}
