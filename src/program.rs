@@ -1,9 +1,11 @@
 //! Decides what the command line is made of; each command says what it does.
 
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
 use clap::Parser;
 
+use crate::terminal::{Answer, Failure};
 use crate::{command, terminal};
 
 /// Predicts and corrects the thermal drift of precision machines.
@@ -25,14 +27,16 @@ Start here:
   athermal run model.json --input - --output -
 
 `athermal COMMAND --help` says more, with examples.
-Exit status: 0 fine, 1 the answer is no, 2 the request was wrong, 3 something outside failed.";
+Exit status: 0 fine, 1 the answer is no, 2 the request was wrong, 3 something
+outside failed, such as reading a file.";
 
 /// The command line of athermal, with every plugin that the program links: all that its `main` has to do.
 #[must_use]
 pub fn command_line() -> ExitCode {
     let arguments = Arguments::parse();
     let terminal = terminal::Terminal::new(&arguments.terminal);
-    match arguments.command.run(&terminal) {
+    told_in_a_line();
+    match caught(|| arguments.command.run(&terminal)) {
         Ok(answer) => answer.into(),
         Err(failure) => {
             terminal.error(&failure);
@@ -41,11 +45,46 @@ pub fn command_line() -> ExitCode {
     }
 }
 
+/// What a command answers, or that code of the program or of a plugin panicked in it.
+fn caught(command: impl FnOnce() -> Result<Answer, Failure>) -> Result<Answer, Failure> {
+    panic::catch_unwind(AssertUnwindSafe(command)).unwrap_or_else(|_| {
+        Err(Failure::Outside(
+            "the program cannot go on: its own code or that of a plugin has a mistake, of which is told above; `RUST_BACKTRACE=1` \
+             shows the way to it"
+                .to_owned(),
+        ))
+    })
+}
+
+/// Lets a panic be told in a line, unless the way to it is asked for.
+fn told_in_a_line() {
+    let in_full = panic::take_hook();
+    panic::set_hook(Box::new(move |panic| {
+        if std::env::var_os("RUST_BACKTRACE").is_some_and(|wanted| wanted != "0") {
+            in_full(panic);
+        } else {
+            eprintln!("{}", in_a_line(panic));
+        }
+    }));
+}
+
+fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
+    let payload = panic.payload();
+    let owned = payload.downcast_ref::<String>().map(String::as_str);
+    let said = owned.or_else(|| payload.downcast_ref::<&str>().copied());
+    let said = said.unwrap_or("it does not say why");
+    match panic.location() {
+        Some(place) => format!("panic at {place}: {said}"),
+        None => format!("panic: {said}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use clap::{Command, CommandFactory};
 
     use super::Arguments;
+    use crate::terminal::{Answer, Failure};
 
     /// What is told of each argument of a command, and of those inside it, that is given a text instead of what it takes.
     fn told(command: &Command, words: &[String]) -> Vec<String> {
@@ -63,6 +102,17 @@ mod tests {
             all.extend(told(inner, &words));
         }
         all
+    }
+
+    #[test]
+    fn a_panic_in_a_command_ends_it_with_a_status_of_its_own() {
+        let failed = super::caught(|| panic!("within a plugin"));
+        let Err(Failure::Outside(told)) = failed else {
+            panic!("{failed:?}")
+        };
+        assert!(told.contains("RUST_BACKTRACE=1"), "{told}");
+        let fine = super::caught(|| Ok(Answer::Fine));
+        assert!(matches!(fine, Ok(Answer::Fine)));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use athermal::ModelError;
-use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
 use athermal::core::fit::FitError;
 use athermal::core::live::RunError;
 use athermal::files::FileError;
@@ -264,12 +264,25 @@ impl Failure {
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Self::Request(_) | Self::Graph { .. } => 2,
+            Self::Request(_) => 2,
+            Self::Graph { diagnostics, .. } => status_of(diagnostics),
             Self::Outside(_) => 3,
             Self::Told(code) => *code,
         })
     }
 }
+
+/// The exit status that tells of mistakes: 3 where all of them are that a file which the command was given cannot be read, as it is of
+/// models and data, and 2 where there is any in what was read.
+#[must_use]
+pub fn status_of(mistakes: &Diagnostics) -> u8 {
+    let is_unread = |of: &Diagnostic| of.code == UNREADABLE && of.place.is_none();
+    let mut errors = mistakes.iter().filter(|of| of.severity == Severity::Error);
+    if errors.all(is_unread) { 3 } else { 2 }
+}
+
+/// A file that cannot be read; one that another names has a place.
+const UNREADABLE: &str = "A002";
 
 impl From<ModelError> for Failure {
     fn from(error: ModelError) -> Self {

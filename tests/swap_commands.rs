@@ -280,7 +280,6 @@ fn what_cannot_be_swapped_is_told_before_the_first_row() {
             vec!["--swap-at=1200".to_owned()],
             "--swap-at takes TIME=GRAPH, such as 3600=new.toml or 1h=new.toml, found \"1200\"",
         ),
-        (vec![swap(&scratch, "1200", "nowhere.toml")], "nowhere.toml"),
         (
             vec![
                 swap(&scratch, "1200", "still.toml"),
@@ -301,6 +300,9 @@ fn what_cannot_be_swapped_is_told_before_the_first_row() {
         finished.tells(&[told]);
         assert_eq!(finished.out, "", "{told}");
     }
+    let nowhere = run(&scratch, &[&swap(&scratch, "1200", "nowhere.toml")]).ended(3);
+    nowhere.tells(&["nowhere.toml"]);
+    assert_eq!(nowhere.out, "");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use athermal::core::trial::{self, Trial};
 use clap::Args;
 
 use crate::figures::counted;
-use crate::terminal::{Answer, Failure, Format, Terminal};
+use crate::terminal::{Answer, Failure, Format, Terminal, status_of};
 
 /// Look for mistakes in a graph file
 ///
@@ -86,7 +86,7 @@ impl Check {
             }
         }
         if diagnostics.has_errors() {
-            Err(Failure::Told(2))
+            Err(Failure::Told(status_of(&diagnostics)))
         } else if self.strict && !diagnostics.is_empty() {
             Ok(Answer::No)
         } else {

@@ -350,7 +350,7 @@ fn a_graph_and_a_model_that_are_no_text_in_utf_8_are_told_to_be_saved_as_that_an
     };
     let graph = in_utf_16("other-graph.toml", &graph);
     athermal(&[&"check", &graph])
-        .ended(2)
+        .ended(3)
         .tells(&["other-graph.toml\": it is not text in UTF-8; save it as that"]);
     let other = in_utf_16("other-model.json", &model);
     athermal(&[&"show", &other])

@@ -135,7 +135,7 @@ fn a_graph_without_mistakes_is_fine_and_one_with_warnings_only_when_not_strict()
     athermal(&[&"check", &"--strict", &warned]).ended(1);
     athermal(&[&"check", &"--strict", &plain]).ended(0);
     athermal(&[&"check", &scratch.path("nowhere.toml")])
-        .ended(2)
+        .ended(3)
         .tells(&["nowhere.toml"]);
 }
 

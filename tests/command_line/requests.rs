@@ -117,3 +117,28 @@ fn the_page_of_a_node_names_its_output_ports() {
     assert!(page("linear").contains("deviation"));
     assert!(page("auto_weighted").contains("weights"));
 }
+
+#[test]
+fn a_file_that_is_not_there_ends_with_the_same_status_whatever_it_was_to_be() {
+    let (scratch, plain, data, model) = desk("not-there");
+    let [graph, fitted, log] = ["no.toml", "no.json", "no.csv"].map(|name| scratch.path(name));
+    for gone in [&graph, &fitted] {
+        for command in ["show", "check", "test"] {
+            athermal(&[&command, gone]).ended(3).tells(&["no."]);
+        }
+        athermal_on("evaluate", gone, &data, &[]).ended(3);
+        athermal(&[&"run", gone, &"--input", &data]).ended(3);
+        let swap = format!("60={}", gone.display());
+        athermal(&[&"run", &plain, &"--input", &data, &"--swap-at", &swap]).ended(3);
+    }
+    athermal_on("fit", &graph, &data, &[&"-o", &scratch.path("m.json")]).ended(3);
+    athermal_on("evaluate", &model, &log, &[]).ended(3);
+    athermal(&[&"run", &plain, &"--input", &log]).ended(3);
+    // What is wrong in a file that can be read is another matter, even where it names one that cannot be.
+    let text = format!("schema = 1\nextends = {graph:?}\n");
+    let extending = scratch.file("extending.toml", text);
+    athermal(&[&"check", &extending])
+        .ended(2)
+        .tells(&["error[A002]"]);
+    athermal(&[&"check", &graph, &extending]).ended(2);
+}

@@ -22,7 +22,7 @@ use work::Status;
 ///
 /// Each `[[tests]]` of a graph names data (files, a simulated machine, or made-up measurements), faults of sensors and what must
 /// come out; the graph is fitted and run over the data by the engine that runs live. One line is printed per test, in the order of
-/// the files, and the figures of those that fail. The exit status is 1 if any fails, 2 if a file has mistakes, 3 if data are missing.
+/// the files, and the figures of those that fail. The exit status is 1 if any fails, 2 if a file has mistakes, 3 if one cannot be read.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  athermal test graphs/die-tester.toml\n  \
                         athermal test graphs/*.toml --junit tests.xml\n  \

@@ -8,7 +8,7 @@ use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::trial::{self, DataSet, On, Trial};
 
 use crate::command::check::plan_and_tests;
-use crate::terminal::{Failure, Terminal};
+use crate::terminal::{Failure, Terminal, status_of};
 
 /// A graph file and its tests.
 pub(super) struct Suite {
@@ -75,7 +75,7 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
     }
     if diagnostics.has_errors() {
         terminal.diagnostics(&diagnostics, &sources);
-        return Err(Failure::Told(2));
+        return Err(Failure::Told(status_of(&diagnostics)));
     }
     terminal.doubts(&diagnostics, &sources);
     Ok(suites)
