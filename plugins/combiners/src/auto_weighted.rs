@@ -112,6 +112,10 @@ impl Combiner for AutoWeighted {
         self.memory.longest()
     }
 
+    fn is_endless(&self) -> bool {
+        self.memory.is_endless()
+    }
+
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         let weigher = Weigher {
             parameters: self.clone(),

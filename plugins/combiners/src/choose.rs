@@ -50,6 +50,10 @@ impl Combiner for Best {
         self.memory.longest()
     }
 
+    fn is_endless(&self) -> bool {
+        self.memory.is_endless()
+    }
+
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         Box::new(ByErrors::new(OfLate, voters, self.memory))
     }

@@ -84,6 +84,11 @@ impl Combiner for Conformal {
         self.memory
     }
 
+    fn is_endless(&self) -> bool {
+        // The miscoverage sums up all misses.
+        self.gain > 0.0
+    }
+
     fn build(&self, _voters: usize) -> Box<dyn Combine> {
         Box::new(Calibrating {
             parameters: self.clone(),

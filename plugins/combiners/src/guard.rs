@@ -82,6 +82,10 @@ impl Combiner for Guard {
         self.memory.longest()
     }
 
+    fn is_endless(&self) -> bool {
+        self.memory.is_endless()
+    }
+
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         let rule = Guarding {
             min_truths: self.min_truths as f64,

@@ -86,6 +86,10 @@ impl Combiner for Hedge {
         Fading { half_life }.longest()
     }
 
+    fn is_endless(&self) -> bool {
+        self.half_life.is_none()
+    }
+
     fn build(&self, voters: usize) -> Box<dyn Combine> {
         Box::new(Hedging {
             parameters: self.clone(),

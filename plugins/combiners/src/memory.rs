@@ -91,6 +91,11 @@ impl Memory {
         mistake.into_iter().collect()
     }
 
+    /// Whether no time can be told after which nothing counts: so many truths may take as long as they please.
+    pub(crate) fn is_endless(&self) -> bool {
+        matches!(self, Self::Truths(_))
+    }
+
     /// How long anything counts; nothing is known of it where truths are counted.
     pub(crate) fn longest(&self) -> Duration {
         match *self {

@@ -248,6 +248,11 @@ impl Combiner for PageHinkley {
         true
     }
 
+    fn is_endless(&self) -> bool {
+        // What was seen last counts until a change is found.
+        true
+    }
+
     fn build(&self, _voters: usize) -> Box<dyn Combine> {
         let test = numerics::PageHinkley::new(self.options())
             .expect("a graph with parameters out of range is not compiled");
@@ -296,6 +301,11 @@ impl Combiner for Adwin {
     }
 
     fn reasons(&self) -> bool {
+        true
+    }
+
+    fn is_endless(&self) -> bool {
+        // What was seen last counts until a change is found.
         true
     }
 

@@ -80,6 +80,12 @@ pub trait Combiner: Debug + Send + Sync {
         Duration::ZERO
     }
 
+    /// Whether what was learned counts for ever, or for so many truths however long they take to come, so that no length of the past
+    /// brings it back: [`memory`](Self::memory) is then what warms it best.
+    fn is_endless(&self) -> bool {
+        false
+    }
+
     /// What runs, for this many voters.
     fn build(&self, voters: usize) -> Box<dyn Combine>;
 }
