@@ -113,6 +113,13 @@ conformance!(
         "#
     )
     .input("prediction", 2, "nm"),
+    Case::new(
+        r#"
+        memory = "5min"
+        gain = 0.0
+        "#
+    )
+    .input("prediction", 1, "nm"),
 );
 
 conformance!(

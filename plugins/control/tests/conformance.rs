@@ -21,7 +21,8 @@ conformance!(
     )
     .input("rate", 2, "nm/min")
     .speaks_without_input(&["correction", "why"])
-    .except(Rule::Past, IS_TAKEN_OUT),
+    .except(Rule::Past, IS_TAKEN_OUT)
+    .except(Rule::Memory, IS_TAKEN_OUT),
     Case::new(
         r#"
         range = "100 nm"
@@ -39,7 +40,8 @@ conformance!(
     .input("realigned", 1, "1")
     .between("realigned", 0.0, 1.0)
     .speaks_without_input(&["correction", "why"])
-    .except(Rule::Past, IS_TAKEN_OUT),
+    .except(Rule::Past, IS_TAKEN_OUT)
+    .except(Rule::Memory, IS_TAKEN_OUT),
 );
 
 conformance!(
@@ -129,6 +131,10 @@ conformance!(
     .except(
         Rule::Past,
         "how long settling took is told until the next change"
+    )
+    .except(
+        Rule::Memory,
+        "a change of any time ago may not have settled yet"
     ),
 );
 

@@ -292,6 +292,13 @@ conformance!(
         "#
     )
     .input("features", 1, "K"),
+    Case::new(
+        r#"
+        ahead = "1min"
+        learn = false
+        "#
+    )
+    .speaks_without_input(&["prediction", "deviation"]),
 );
 
 conformance!(

@@ -136,6 +136,10 @@ conformance!(
         .except(
             Rule::Past,
             "within `difference` of the sample, which is all of the range here, it is that of any time before"
+        )
+        .except(
+            Rule::Memory,
+            "it is that of any time before, and as near to the sample whichever that is"
         ),
 );
 

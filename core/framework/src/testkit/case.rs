@@ -1,29 +1,50 @@
 //! Decides what a node is tried with: its parameters, and what reaches its ports.
 
 use super::Rule;
-use crate::node::{InputPort, Kind, Read};
+use crate::node::{FREEZE, InputPort, Kind, Read};
+use crate::time::Duration;
 use crate::unit::Unit;
+
+/// How many ticks a run has, unless a case needs more.
+const TICKS: usize = 600;
+
+/// How far apart they are on average, unless a case says otherwise.
+pub(super) const EVERY: Duration = Duration::from_ns(10_000_000_000);
+
+/// The shortest time between ticks: instants are rounded to a ten-thousandth of it.
+const SHORTEST_NS: i64 = 10_000;
+
+/// For how many ticks a value is held.
+const HELD_TICKS: i64 = 6;
 
 /// Parameters to try a kind with, and the channels that it is fed.
 ///
 /// Every port that a graph may not leave out is fed, two channels of it in nm by default (three of `features`, in K, and of
 /// `voters`; one of `truth`). Values wander between −100 and 100, or between 20 and 30 of a temperature; estimators get a
 /// truth that hangs on their features, combiners get voters that follow the truth.
+///
+/// Beside the stated cases the kit tries some of its own: of a kind that can go on learning, each case that does not learn with
+/// `learn = true` and, where all of them do, the first with `learn = false`; and where no case connects all the ports that a
+/// graph may leave out, one in which they are.
 #[derive(Debug, Clone)]
 pub struct Case {
     pub(super) parameters: String,
-    inputs: Vec<Given>,
+    pub(super) inputs: Vec<Given>,
     pub(super) exceptions: Vec<(Rule, String)>,
     pub(super) without_input: Vec<String>,
+    pub(super) ticks: usize,
+    pub(super) every: Duration,
 }
 
 /// What a port is fed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Given {
     pub(super) port: String,
     pub(super) channels: usize,
     pub(super) unit: String,
     pub(super) range: Option<(f64, f64)>,
+    /// How long a value is held.
+    pub(super) max_age: Duration,
 }
 
 impl Case {
@@ -35,6 +56,8 @@ impl Case {
             inputs: Vec::new(),
             exceptions: Vec::new(),
             without_input: Vec::new(),
+            ticks: TICKS,
+            every: EVERY,
         }
     }
 
@@ -47,6 +70,7 @@ impl Case {
             channels,
             unit: unit.to_owned(),
             range: None,
+            max_age: self.held(),
         });
         self
     }
@@ -57,6 +81,29 @@ impl Case {
         for given in self.inputs.iter_mut().filter(|given| given.port == port) {
             given.range = Some((low, high));
         }
+        self
+    }
+
+    /// The same, run for so many ticks rather than 600: for a node that takes more of them to have anything to say. It is never run
+    /// for fewer.
+    #[must_use]
+    pub fn ticks(mut self, ticks: usize) -> Self {
+        self.ticks = ticks.max(TICKS);
+        self
+    }
+
+    /// The same, with ticks about so far apart (`"1s"`) rather than 10 s, to which windows and horizons of the case should fit. Values
+    /// are held for six of them, and wander as fast by the tick as they do at 10 s.
+    ///
+    /// # Panics
+    /// Where that is no time from 10 µs to 10 days.
+    #[must_use]
+    pub fn every(mut self, every: &str) -> Self {
+        let longest = Duration::from_ns(864_000_000_000_000);
+        self.every = match every.parse::<Duration>() {
+            Ok(every) if every >= Duration::from_ns(SHORTEST_NS) && every <= longest => every,
+            _ => panic!("`{every}` is no time from 10 µs to 10 days, such as \"1s\""),
+        };
         self
     }
 
@@ -72,6 +119,11 @@ impl Case {
     pub fn except(mut self, rule: Rule, reason: &str) -> Self {
         self.exceptions.push((rule, reason.to_owned()));
         self
+    }
+
+    /// How long values are held.
+    pub(super) fn held(&self) -> Duration {
+        Duration::from_ns(HELD_TICKS * self.every.as_ns())
     }
 
     pub(super) fn asks_for(&self, rule: Rule) -> bool {
@@ -92,22 +144,28 @@ impl Case {
         let known = |given: &&Given| !all.iter().any(|known| known.port == given.port);
         let unknown: Vec<_> = self.inputs.iter().filter(known).cloned().collect();
         all.extend(unknown);
+        for given in &mut all {
+            given.max_age = self.held();
+        }
         all
     }
 }
 
-fn by_default(port: &InputPort) -> Given {
-    let (channels, unit) = match (port.name, port.read) {
-        (_, Read::Truth) => (1, "nm"),
-        ("features", _) => (3, "K"),
-        ("voters", _) => (3, "nm"),
-        _ => (2, "nm"),
+/// What a port is fed of which a case says nothing.
+pub(super) fn by_default(port: &InputPort) -> Given {
+    let (channels, unit, range) = match (port.name, port.read) {
+        (_, Read::Truth) => (1, "nm", None),
+        ("features", _) => (3, "K", None),
+        ("voters", _) => (3, "nm", None),
+        (FREEZE, _) => (1, "1", Some((0.0, 1.0))),
+        _ => (2, "nm", None),
     };
     Given {
         port: port.name.to_owned(),
         channels,
         unit: port.unit.unwrap_or(unit).to_owned(),
-        range: None,
+        range,
+        max_age: Duration::from_ns(HELD_TICKS * EVERY.as_ns()),
     }
 }
 

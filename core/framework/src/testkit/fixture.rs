@@ -117,7 +117,7 @@ fn graph(kind: &Kind, parameters: &toml::Table, given: &[Given], ports: &[String
             "channels".to_owned(),
             toml::Value::Array(channels.collect()),
         );
-        signal.insert("max_age".to_owned(), text("1min"));
+        signal.insert("max_age".to_owned(), text(&input.max_age.to_string()));
         signals.insert(input.port.clone(), toml::Value::Table(signal));
         inputs.insert(input.port.clone(), text(&input.port));
     }

@@ -46,6 +46,7 @@
 mod bench;
 mod case;
 mod compared;
+mod derived;
 mod fixture;
 mod rule;
 mod rules;

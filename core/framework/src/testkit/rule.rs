@@ -9,12 +9,12 @@ pub enum Rule {
     Explained,
     /// The kind, its states and its predictors have names that no other has, and its ports and channels such as a reference can name.
     Names,
-    /// A case compiles, and something comes out of the node in it.
+    /// A case compiles, and something comes out of the node in it; out of each channel in one case or another.
     Answers,
     /// The parameters written out and read back are the same.
     ReadsBack,
     /// A parameter out of the range that its schema states is refused by its name, as is one that is no number; all that the
-    /// schema allows is taken and runs.
+    /// schema allows is taken and runs, its defaults, words and switches among it.
     Ranges,
     /// The same samples give the same bits, again and on another thread.
     Deterministic,
@@ -30,6 +30,10 @@ pub enum Rule {
     Infinity,
     /// A value is made of the channels that `reach` names, as far back as its span, and of nothing yet to come.
     Past,
+    /// What fills a gap is as old as the sample that it was.
+    Stamps,
+    /// What starts as far back as `memory` reaches gives what one gives that has always run.
+    Memory,
     /// A new segment starts afresh, at whatever time it begins.
     Segments,
     /// A port gives the same bits whatever is read beside it.
@@ -42,7 +46,7 @@ pub enum Rule {
     Allocation,
     /// A combiner takes no absent vote for zero, and its answer is the sum of the votes by its weights where it weighs.
     Votes,
-    /// A deviation is not negative, and an interval stands about the prediction.
+    /// A deviation that is promised comes, and is not negative; an interval stands about the prediction.
     Uncertainty,
     /// An answer that is asked for leaves no trace.
     NoTrace,
@@ -73,6 +77,8 @@ impl Rule {
             Self::Absence => "absence",
             Self::Infinity => "infinity",
             Self::Past => "past",
+            Self::Stamps => "stamps",
+            Self::Memory => "memory",
             Self::Segments => "segments",
             Self::Wanted => "wanted",
             Self::Widths => "widths",
@@ -110,7 +116,7 @@ impl Rule {
             Self::Ranges => {
                 "say the range in the schema (`#[schemars(range(min = 0.0, max = 1.0))]`, or `#[schemars(extend(\"exclusiveMinimum\" \
                  = 0.0))]`), refuse everything outside with a `Mistake::at(\"name\", …)`, written so that NaN fails: \
-                 `!(0.0..=1.0).contains(&x)`, and run with everything inside"
+                 `!(0.0..=1.0).contains(&x)`, and run with everything inside, the default and each of the words of an `enum` included"
             }
             Self::Deterministic => {
                 "take no time, no random number without a seed, no order of a hash map and no address into account"
@@ -123,7 +129,7 @@ impl Rule {
             }
             Self::Versions => {
                 "name the state `kind/1`; in `restore`, answer `Restored::cold(reason)` to a state that is not `known`, or whose \
-                 lists have other lengths than this node's"
+                 lists have other lengths than this node's, and `Restored::Migrated` with its name to an older form of its own alone"
             }
             Self::Absence => {
                 "where an input is NaN, set no output or NaN, never 0. Ports that have something to say of nothing are named by \
@@ -135,6 +141,14 @@ impl Rule {
             Self::Past => {
                 "state in `outputs` the span that a value summarises, or `is_endless` where it depends on all of the past; name in `reach` \
                  all that a channel is made of; give no stamp that is later than `tick.now`"
+            }
+            Self::Stamps => {
+                "give a value that is held, or stands for one that is missing, at the time of the sample that it was (`Outputs::set_stamped` \
+                 with `Tick::stamps`), or none at all, and never 0; say `every_tick` where the answer changes with time alone"
+            }
+            Self::Memory => {
+                "state in `memory` how far back the inputs reach that outputs depend on, the longest window or dwell, with what still counts of \
+                 what fades; say `is_endless` where that is all of the past"
             }
             Self::Segments => {
                 "clear in `segment` all that `step` has gathered, the last instant included; what was learned may stay, and its instants \
@@ -161,7 +175,8 @@ impl Rule {
             }
             Self::Uncertainty => {
                 "give NaN where no deviation or interval is known; else a deviation of 0 or more, and the lower end before the upper, \
-                 with the combination between them"
+                 with the combination between them. An estimator that says `deviates` gives one in `Predictor::deviation`, and in \
+                 `Learner::deviation` if it learns"
             }
             Self::NoTrace => {
                 "let `predict` and `combine` change nothing, not even behind a `Cell`, that later answers depend on"
@@ -169,7 +184,8 @@ impl Rule {
             Self::Fits => {
                 "in `Trainer::finish`, answer `TrainingError` where there are too few rows or no solution, and start random numbers \
                  from a seed; let `Predictor::uses` name regressors of `TrainingSetup`; a feature that is fitted has an `Encoder`, a \
-                 port `truth`, and nothing to say without a fit"
+                 port `truth`, and nothing to say without a fit. A learner's `Predictor::trained_range` holds the `TrainedRange` of its rows, or \
+                 `Estimator::keeps_range` says that there is none"
             }
             Self::Models => {
                 "let the predictor's serde form hold every number that it predicts with, and use `athermal_core::model::number` where \

@@ -1,12 +1,18 @@
 //! Decides what the nodes under test measure: signals that wander, with gaps, at irregular instants, the same at every call.
 
-use super::case::Given;
+use super::case::{EVERY, Given};
 use super::fixture::channel;
 use crate::channel::ABSENT;
-use crate::node::{Kind, Read};
+use crate::node::{FREEZE, Kind, Read};
 use crate::prng::Prng;
 use crate::recording::Table;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
+
+/// From where on in its wave what freezes learning does so: about a third of the time.
+const FROZEN: f64 = 0.65;
+
+/// In how many parts the time between ticks is divided.
+const PARTS: i64 = 10_000;
 
 /// How samples come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,19 +23,34 @@ pub(super) enum Coming {
     Always,
 }
 
-/// So many ticks of all channels, in the order of the plan's sources.
-pub(super) fn samples(kind: &Kind, given: &[Given], ticks: usize, coming: Coming) -> Table {
+/// So many ticks of all channels, about so far apart, in the order of the plan's sources.
+pub(super) fn samples(
+    kind: &Kind,
+    given: &[Given],
+    ticks: usize,
+    every: Duration,
+    coming: Coming,
+) -> Table {
+    // Whole milliseconds where ticks are 10 s apart, as data have them.
+    let unit_ns = every.as_ns() / PARTS;
+    let slower = every.secs() / EVERY.secs();
     let mut waves = Waves::new(kind, given);
     let mut random = Prng::stream(17, "ticks");
     let mut table = Table::default();
+    // Whether what freezes learning is connected changes nothing else.
+    let mut of_freeze = Prng::stream(19, "ticks");
     let mut row = vec![ABSENT; waves.channels.len()];
     let mut gap_until = vec![0_usize; row.len()];
     let mut ns = 0_i64;
     for tick in 0..ticks {
-        waves.at(ns as f64 / 1e9, &mut row);
+        waves.at(ns as f64 / 1e9 / slower, &mut row);
         if coming == Coming::WithGaps {
             let empty = tick % 41 == 40;
             for (i, value) in row.iter_mut().enumerate() {
+                let random = match waves.channels[i].what {
+                    What::Freeze => &mut of_freeze,
+                    _ => &mut random,
+                };
                 if random.uniform() < 0.01 {
                     gap_until[i] = tick + 3 + (random.uniform() * 20.0) as usize;
                 }
@@ -40,9 +61,8 @@ pub(super) fn samples(kind: &Kind, given: &[Given], ticks: usize, coming: Coming
         }
         table.push(Instant::from_ns(ns), &row);
         ns += match coming {
-            // Whole milliseconds, as data have them.
-            Coming::WithGaps => random.between(4_000.0, 16_000.0) as i64 * 1_000_000,
-            Coming::Always => 5_000_000_000,
+            Coming::WithGaps => random.between(4_000.0, 16_000.0) as i64 * unit_ns,
+            Coming::Always => PARTS / 2 * unit_ns,
         };
     }
     table
@@ -68,6 +88,8 @@ enum What {
     /// What an estimator predicts from.
     Feature,
     Truth,
+    /// Now 0, now 1.
+    Freeze,
     /// Follows the truth, the less well the higher its number.
     Voter(usize),
 }
@@ -81,6 +103,7 @@ impl Waves {
             for number in 0..input.channels {
                 let what = match (input.port.as_str(), port.map(|port| port.read)) {
                     (_, Some(Read::Truth)) => What::Truth,
+                    (FREEZE, _) => What::Freeze,
                     ("features", _) => What::Feature,
                     ("voters", _) => What::Voter(number),
                     _ => What::Own,
@@ -112,9 +135,13 @@ impl Waves {
         let truth = self.channels.iter().find(|wave| wave.what == What::Truth);
         let truth = truth.map_or(0.5, |wave| 0.4 * wave.at(t) + 0.3 + 0.4 * of_features);
         for (value, wave) in row.iter_mut().zip(&self.channels) {
+            if wave.what == What::Freeze {
+                *value = if wave.at(t) > FROZEN { 1.0 } else { 0.0 };
+                continue;
+            }
             let noise = 0.01 * self.noise.normal();
             let share = match wave.what {
-                What::Own | What::Feature => wave.at(t) + noise,
+                What::Own | What::Feature | What::Freeze => wave.at(t) + noise,
                 What::Truth => truth + noise,
                 What::Voter(number) => truth + noise * (3 + 4 * number) as f64,
             };

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
+use super::derived;
 use super::rules::{self, Subject};
 use super::tried::{PANICS, tried};
 use super::{Case, Examined, Rule};
@@ -62,16 +63,11 @@ pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
             "there is no case to try it in".to_owned(),
         ));
     }
-    let mut subjects = Vec::new();
-    for case in cases {
-        match tried(|| Subject::new(kind, case)) {
-            Ok(subject) => match subject.belongs() {
-                Ok(()) => subjects.push(subject),
-                Err(found) => broken.push(broken_in(Rule::Fits, Some(case), found)),
-            },
-            Err(found) => broken.push(broken_in(Rule::Answers, Some(case), found)),
-        }
-    }
+    let mut subjects = subjects(kind, cases, &mut broken);
+    let of_learning = derived::of_learning(&subjects);
+    subjects.extend(self::subjects(kind, &of_learning, &mut broken));
+    let of_ports: Vec<Case> = derived::of_ports(kind, &subjects).into_iter().collect();
+    subjects.extend(self::subjects(kind, &of_ports, &mut broken));
     for subject in &subjects {
         for (rule, check) in rules::ALL {
             if subject.case.asks_for(rule)
@@ -82,6 +78,25 @@ pub fn broken<T: NodeSpec>(cases: &[Case]) -> Vec<Broken> {
         }
     }
     broken
+}
+
+/// The kind in each of the cases in which it can be tried.
+fn subjects<'a>(
+    kind: &'static Kind,
+    cases: &'a [Case],
+    broken: &mut Vec<Broken>,
+) -> Vec<Subject<'a>> {
+    let mut subjects = Vec::new();
+    for case in cases {
+        match tried(|| Subject::new(kind, case)) {
+            Ok(subject) => match subject.belongs() {
+                Ok(()) => subjects.push(subject),
+                Err(found) => broken.push(broken_in(Rule::Fits, Some(case), found)),
+            },
+            Err(found) => broken.push(broken_in(Rule::Answers, Some(case), found)),
+        }
+    }
+    subjects
 }
 
 fn broken_in(rule: Rule, case: Option<&Case>, found: String) -> Broken {

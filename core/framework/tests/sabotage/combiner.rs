@@ -15,10 +15,11 @@ use super::{breaks, breaks_only, finds};
 pub struct Votes {
     /// What is wrong with it; nothing by default.
     #[serde(default)]
+    #[schemars(with = "String")]
     fault: Fault,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Fault {
     #[default]

@@ -19,10 +19,11 @@ use super::{breaks, breaks_only, finds};
 struct Ratio {
     /// What is wrong with it; nothing by default.
     #[serde(default)]
+    #[schemars(with = "String")]
     fault: Fault,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Fault {
     #[default]
@@ -43,6 +44,8 @@ enum Fault {
     Mislearnt,
     /// Is surer than sure.
     Negative,
+    /// Says how sure it is, and never is.
+    Unsure,
     /// Predicts from what it was not given.
     UsesOther,
 }
@@ -65,7 +68,7 @@ impl Estimator for Ratio {
     }
 
     fn deviates(&self) -> bool {
-        self.fault == Fault::Negative
+        matches!(self.fault, Fault::Negative | Fault::Unsure)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
@@ -125,6 +128,7 @@ impl Trainer for Averaging {
             regressors: self.regressors,
             means: vec![if written { mean } else { 0.0 }],
             trusting: self.fault == Fault::Trusting,
+            unsure: self.fault == Fault::Unsure,
             misstated: (self.fault == Fault::Misstated).then(|| vec![0.0; width]),
             mislearnt: self.fault == Fault::Mislearnt,
             unwritten: if written { 0.0 } else { mean },
@@ -142,6 +146,7 @@ struct Fitted {
     /// Of the truths, the only one.
     means: Vec<f64>,
     trusting: bool,
+    unsure: bool,
     misstated: Option<Vec<f64>>,
     mislearnt: bool,
     #[serde(skip)]
@@ -165,7 +170,11 @@ impl Predictor for Fitted {
     }
 
     fn deviation(&self, _regressors: &[f64]) -> f64 {
-        -self.means[0].abs()
+        if self.unsure {
+            f64::NAN
+        } else {
+            -self.means[0].abs()
+        }
     }
 
     fn linear(&self) -> Option<LinearForm<'_>> {
@@ -271,6 +280,16 @@ fn a_deviation_is_not_negative() {
         with("negative"),
         Rule::Uncertainty,
         "`node:deviation.a` is -0.8019520665777313 at 8.189 s",
+    );
+}
+
+#[test]
+fn a_deviation_that_is_promised_comes() {
+    breaks_only::<Ratio>(with("unsure"), &[Rule::Uncertainty]);
+    finds::<Ratio>(
+        with("unsure"),
+        Rule::Uncertainty,
+        "`node:deviation.a` is never there in the second half of the run, though predictions are",
     );
 }
 

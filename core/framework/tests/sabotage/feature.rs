@@ -23,10 +23,11 @@ use super::{breaks, breaks_only, finds};
 struct Averages {
     /// What is wrong with it; nothing by default.
     #[serde(default)]
+    #[schemars(with = "String")]
     fault: Fault,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Fault {
     #[default]
@@ -47,6 +48,14 @@ enum Fault {
     TakesAnyState,
     /// Takes a state of another number of channels.
     TakesAnyShape,
+    /// Says that it migrates what is not its own.
+    MigratesAny,
+    /// Takes an older form as if it were the present one.
+    TakesOlder,
+    /// Says that it migrates another form than it does.
+    MigratesOther,
+    /// Goes on in the older form.
+    StaysOld,
     /// Its state has no version.
     Unversioned,
     /// Takes nothing for zero.
@@ -123,6 +132,7 @@ impl Feature for Averages {
             counts: vec![0.0; channels],
             seen: Vec::new(),
             cleared: false.into(),
+            old: false,
         })
     }
 }
@@ -134,6 +144,8 @@ struct Averaging {
     counts: Vec<f64>,
     seen: Vec<f64>,
     cleared: std::cell::Cell<bool>,
+    /// Whether it goes on from an older form, and says so.
+    old: bool,
 }
 
 thread_local! {
@@ -212,6 +224,12 @@ impl Operator for Averaging {
         if self.fault == Fault::Unversioned {
             return Some(Box::new(Nameless {}));
         }
+        if self.old {
+            return Some(Box::new(Older {
+                sums: self.sums.clone(),
+                counts: self.counts.clone(),
+            }));
+        }
         self.cleared.set(self.fault == Fault::ClearedBySnapshot);
         (self.fault != Fault::ForgetsAll).then(|| {
             Box::new(Known {
@@ -222,7 +240,23 @@ impl Operator for Averaging {
     }
 
     fn restore(&mut self, state: Box<dyn State>) -> Restored {
-        match state.known::<Known>() {
+        let state = match state.into_any().downcast::<Older>() {
+            Ok(older) => {
+                let from = match self.fault {
+                    Fault::TakesOlder => return Restored::Accepted,
+                    Fault::MigratesOther => "sabotaged_feature/7".to_owned(),
+                    _ => "sabotaged_feature/0".to_owned(),
+                };
+                self.old = self.fault == Fault::StaysOld;
+                if older.sums.len() != self.sums.len() {
+                    return Restored::cold("the number of channels differs");
+                }
+                (self.sums, self.counts) = (older.sums, older.counts);
+                return Restored::Migrated { from };
+            }
+            Err(state) => state,
+        };
+        match state.downcast::<Known>() {
             Ok(known)
                 if known.sums.len() == self.sums.len() || self.fault == Fault::TakesAnyShape =>
             {
@@ -234,7 +268,10 @@ impl Operator for Averaging {
             }
             Ok(_) => Restored::cold("the number of channels differs"),
             Err(_) if self.fault == Fault::TakesAnyState => Restored::Accepted,
-            Err(cold) => cold,
+            Err(_) if self.fault == Fault::MigratesAny => Restored::Migrated {
+                from: String::new(),
+            },
+            Err(_) => Restored::cold("the state belongs to another kind of node"),
         }
     }
 }
@@ -246,6 +283,15 @@ struct Known {
 }
 
 athermal_core::state!(Known, "sabotaged_feature/1");
+
+/// What it wrote before.
+#[derive(Debug, Serialize, Deserialize)]
+struct Older {
+    sums: Vec<f64>,
+    counts: Vec<f64>,
+}
+
+athermal_core::state!(Older, "sabotaged_feature/0");
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Nameless {}
@@ -311,6 +357,31 @@ fn a_state_of_another_version_kind_or_shape_is_not_taken() {
 }
 
 #[test]
+fn a_state_is_migrated_from_an_older_form_of_its_own_to_the_present_one() {
+    for (fault, found) in [
+        (
+            "migrates_any",
+            "it says that it has migrated a state of another kind from ``, which it cannot have",
+        ),
+        (
+            "takes_older",
+            "a state `sabotaged_feature/0` is taken without saying that it is migrated",
+        ),
+        (
+            "migrates_other",
+            "a state `sabotaged_feature/0` is said to be migrated from `sabotaged_feature/7`",
+        ),
+        (
+            "stays_old",
+            "migrated from `sabotaged_feature/0`, its next state is `sabotaged_feature/0` and not `sabotaged_feature/1`",
+        ),
+    ] {
+        breaks_only::<Averages>(with(fault), &[Rule::Versions]);
+        finds::<Averages>(with(fault), Rule::Versions, found);
+    }
+}
+
+#[test]
 fn nothing_is_not_zero() {
     breaks::<Averages>(
         with("zero_for_absent"),
@@ -355,7 +426,8 @@ fn room_is_made_before_the_steady_state() {
 
 #[test]
 fn a_value_is_made_of_what_its_kind_says() {
-    for fault in ["forgets_span", "mixes", "early"] {
+    breaks_only::<Averages>(with("forgets_span"), &[Rule::Past, Rule::Memory]);
+    for fault in ["mixes", "early"] {
         breaks_only::<Averages>(with(fault), &[Rule::Past]);
     }
     finds::<Averages>(

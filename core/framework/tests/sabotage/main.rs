@@ -6,9 +6,15 @@ mod combiner;
 mod encoder;
 mod estimator;
 mod feature;
+mod gaps;
 mod instants;
+mod learning;
+mod memory;
+mod optional;
+mod pace;
 mod parameters;
 mod ports;
+mod words;
 
 use std::collections::BTreeSet;
 
@@ -51,7 +57,7 @@ fn a_kind_that_is_tried_in_no_case_has_proved_nothing() {
 }
 
 #[test]
-#[should_panic(expected = "no `conformance!` for [\"sabotaged_estimator\", \"sabotaged_feature\"")]
+#[should_panic(expected = "no `conformance!` for [\"sabotaged_choices\", \"sabotaged_errors\"")]
 fn a_kind_that_is_registered_and_not_examined_is_told() {
     assert_every_kind_conforms(env!("CARGO_PKG_NAME"));
 }

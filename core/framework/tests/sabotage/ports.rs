@@ -15,10 +15,11 @@ use super::{breaks, breaks_only};
 struct Multiples {
     /// What is wrong with it; nothing by default.
     #[serde(default)]
+    #[schemars(with = "String")]
     fault: Fault,
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Fault {
     #[default]
@@ -27,6 +28,8 @@ enum Fault {
     Packs,
     /// Reads the second channel.
     NeedsTwo,
+    /// Never gives the second channel of its last port.
+    Skips,
 }
 
 const PORTS: [&str; 3] = ["once", "twice", "thrice"];
@@ -80,7 +83,8 @@ impl Operator for Multiplying {
         for (nth, place) in self.places.iter().enumerate() {
             let Some(place) = place else { continue };
             for (i, &value) in tick.port(0).iter().enumerate() {
-                if !value.is_nan() {
+                let skipped = self.fault == Fault::Skips && (nth, i) == (2, 1);
+                if !value.is_nan() && !skipped {
                     outputs.set(place + i, value * (nth + 1) as f64);
                 }
             }
@@ -108,6 +112,20 @@ fn a_port_that_moves_where_another_is_not_read_is_found() {
         Rule::Wanted,
         "beside its first port only `thrice` is read",
     );
+}
+
+#[test]
+fn a_channel_that_no_case_gives_a_value_is_found() {
+    breaks_only::<Multiples>(with("skips"), &[Rule::Answers]);
+    breaks::<Multiples>(
+        with("skips"),
+        Rule::Answers,
+        "`node:thrice.b` has no value at any tick of any case",
+    );
+    breaks_only::<Multiples>(with("skips").input("signal", 1, "K"), &[]);
+    let cases = [with("skips").input("signal", 3, "K"), with("none")];
+    let broken = athermal_core::testkit::broken::<Multiples>(&cases);
+    assert_eq!(broken, [], "it has one in the other case");
 }
 
 #[test]

@@ -1,14 +1,16 @@
 //! Decides whether missing, huge and infinite samples do harm.
 
 use super::super::compared::{Course, course};
-use super::super::samples::{Coming, samples};
 use super::Subject;
 use crate::channel::ABSENT;
 use crate::recording::{Event, Table};
 
+/// How many ticks a long gap lasts.
+const LONG: i64 = 720;
+
 /// Ticks that measure nothing, each channel missing for a while and for all time, and gaps of hours.
 pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
-    let fixture = &subject.fixture;
+    let (fixture, ticks) = (&subject.fixture, subject.ticks());
     let mut nothing = subject.table.clone();
     for (_, row) in nothing.events_mut() {
         row.fill(ABSENT);
@@ -25,8 +27,8 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
         }
     }
     for channel in 0..fixture.plan.sources.len() {
-        for missing in [0..subject.events().len(), 200..400] {
-            let always = missing.len() == subject.events().len();
+        for missing in [0..ticks, ticks / 3..2 * ticks / 3] {
+            let always = missing.len() == ticks;
             let mut table = subject.table.clone();
             for (_, row) in &mut table.events_mut()[missing] {
                 row[channel] = ABSENT;
@@ -41,11 +43,8 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
     let mut late = Table::default();
     for (nth, (event, row)) in subject.events().iter().enumerate() {
         if let Event::Row(now) = event {
-            let gap_s = 7_200 * (nth / 150) as i64;
-            late.push(
-                *now + crate::time::Duration::from_ns(gap_s * 1_000_000_000),
-                row,
-            );
+            let gap_ns = (nth / (ticks / 4)) as i64 * LONG * subject.case.every.as_ns();
+            late.push(*now + crate::time::Duration::from_ns(gap_ns), row);
         }
     }
     finite(
@@ -56,13 +55,16 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
 
 /// Samples of any size for a while; afterwards the node comes back, by itself and in a new segment.
 pub(super) fn infinity(subject: &Subject<'_>) -> Result<(), String> {
-    let fixture = &subject.fixture;
-    let ordinary = samples(subject.kind, &subject.given, 600, Coming::Always);
+    let (fixture, ticks) = (&subject.fixture, subject.ticks());
+    let ordinary = subject.without_gaps(ticks);
     let expected = course(fixture, &mut subject.engine(), ordinary.events());
     let sizes = [f64::INFINITY, f64::MAX, 1e300, f64::MIN_POSITIVE];
     for (nth, size) in sizes.into_iter().enumerate() {
         let mut table = ordinary.clone();
-        for (tick, (_, row)) in table.events_mut()[100..140].iter_mut().enumerate() {
+        for (tick, (_, row)) in table.events_mut()[ticks / 6..ticks / 6 + 40]
+            .iter_mut()
+            .enumerate()
+        {
             for (channel, sample) in row.iter_mut().enumerate() {
                 if (tick + channel + nth) % 3 == 0 {
                     // Twice up and twice down, so that a sum of them overflows and its negative does too.
@@ -78,7 +80,12 @@ pub(super) fn infinity(subject: &Subject<'_>) -> Result<(), String> {
             finite(subject, &course)
                 .map_err(|found| format!("with samples of ±{size:e}, {found}"))?;
             for number in 0..fixture.slots().len() {
-                let answers = |course: &Course| course.values(number).skip(500).any(f64::is_finite);
+                let answers = |course: &Course| {
+                    course
+                        .values(number)
+                        .skip(ticks / 6 * 5)
+                        .any(f64::is_finite)
+                };
                 if answers(&expected) && !answers(&course) {
                     let name = subject.name(number);
                     return Err(format!(

@@ -9,9 +9,6 @@ use super::Subject;
 use super::fitting::text_of;
 use crate::model::Model;
 
-/// How many ticks an edited model is run for.
-const TICKS: usize = 200;
-
 /// What is written in place of a number that counts or points at something.
 const MANY: u64 = 1 << 40;
 
@@ -133,7 +130,7 @@ fn runs(subject: &Subject<'_>, model: &Value) -> Result<(), String> {
     course(
         &subject.fixture,
         &mut engine,
-        &events[..TICKS.min(events.len())],
+        &events[..subject.ticks() / 3],
     );
     Ok(())
 }

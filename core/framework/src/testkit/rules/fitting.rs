@@ -18,6 +18,18 @@ pub(super) fn fits(subject: &Subject<'_>) -> Result<(), String> {
     if !subject.is_fitted() {
         return Ok(());
     }
+    if let Role::Estimator(estimator) = subject.fixture.plan.nodes[0].spec.role()
+        && subject.learns()
+        && estimator.keeps_range()
+        && let mut predictors = subject.fitted.values()
+        && predictors.any(|predictor| predictor.trained_range().is_none())
+    {
+        return Err(
+            "it says that a fit keeps the range of its regressors, and its predictor has no `trained_range`: `learn = { margin = … }` \
+             would be taken and do nothing"
+                .to_owned(),
+        );
+    }
     let one = written(&subject.fitted)?;
     for threads in [1, 3] {
         let again = written(&subject.fit(&subject.table, threads)?)?;
@@ -119,7 +131,7 @@ pub(super) fn models(subject: &Subject<'_>) -> Result<(), String> {
     }
     let fixture = &subject.fixture;
     let read = through_a_model(subject, &subject.fitted)?;
-    let before = course(fixture, &mut subject.engine(), subject.events());
+    let before = subject.usual();
     let after = course(fixture, &mut fixture.engine(&read), subject.events());
     match before.difference(&after, fixture) {
         None => Ok(()),

@@ -1,10 +1,14 @@
 //! Decides what is tried of a node, rule by rule.
 
+use std::sync::OnceLock;
+
 mod absence;
 mod allocation;
+mod answers;
 mod edited;
 mod explained;
 mod fitting;
+mod memory;
 mod names;
 mod parameters;
 mod past;
@@ -12,6 +16,7 @@ mod repeat;
 mod schema;
 mod shapes;
 mod snapshots;
+mod stamps;
 mod traces;
 mod units;
 mod votes;
@@ -20,17 +25,15 @@ pub(super) use explained::explained;
 pub(super) use names::shared;
 
 use super::case::Given;
-use super::compared::course;
+use super::compared::{Course, course};
 use super::fixture::Fixture;
 use super::samples::{Coming, samples};
 use super::{Case, Rule};
+use crate::compile::PlannedRole;
 use crate::engine::{Engine, Fitted};
 use crate::fit::{FitOptions, Outcome, fit};
 use crate::node::{Kind, Role};
 use crate::recording::{Event, Table};
-
-/// How many ticks a run has.
-const TICKS: usize = 600;
 
 /// A kind in one of its cases, ready to be tried.
 #[derive(Debug)]
@@ -42,17 +45,18 @@ pub(super) struct Subject<'a> {
     pub(super) fixture: Fixture,
     pub(super) fitted: Fitted,
     pub(super) table: Table,
+    usual: OnceLock<Course>,
 }
 
 /// What finds a rule broken, and says so. The others are the same kind in its other cases.
 type Check = fn(&Subject<'_>, others: &[Subject<'_>]) -> Result<(), String>;
 
 /// The rules that are tried in every case.
-pub(super) const ALL: [(Rule, Check); 23] = [
+pub(super) const ALL: [(Rule, Check); 25] = [
     (Rule::Names, |subject, _| names::names(subject)),
-    (Rule::Answers, |subject, _| subject.answers()),
+    (Rule::Answers, answers::answers),
     (Rule::ReadsBack, |subject, _| parameters::read_back(subject)),
-    (Rule::Ranges, |subject, _| parameters::ranges(subject)),
+    (Rule::Ranges, parameters::ranges),
     (Rule::Deterministic, |subject, _| {
         repeat::deterministic(subject)
     }),
@@ -62,6 +66,8 @@ pub(super) const ALL: [(Rule, Check); 23] = [
     (Rule::Absence, |subject, _| absence::absence(subject)),
     (Rule::Infinity, |subject, _| absence::infinity(subject)),
     (Rule::Past, |subject, _| past::past(subject)),
+    (Rule::Stamps, |subject, _| stamps::stamps(subject)),
+    (Rule::Memory, |subject, _| memory::memory(subject)),
     (Rule::Segments, |subject, _| repeat::segments(subject)),
     (Rule::Wanted, |subject, _| shapes::wanted(subject)),
     (Rule::Widths, |subject, _| shapes::widths(subject)),
@@ -85,8 +91,8 @@ impl<'a> Subject<'a> {
             .map_err(|error| format!("the parameters of the case are no TOML: {error}"))?;
         let given = case.given(kind);
         let fixture = Fixture::new(kind, &parameters, &given)?;
-        let table = samples(kind, &given, TICKS, Coming::WithGaps);
-        let mut subject = Self {
+        let table = samples(kind, &given, case.ticks, case.every, Coming::WithGaps);
+        let subject = Self {
             kind,
             case,
             parameters,
@@ -94,9 +100,32 @@ impl<'a> Subject<'a> {
             fixture,
             fitted: Fitted::new(),
             table,
+            usual: OnceLock::new(),
         };
-        subject.fitted = subject.fit(&subject.table, 1)?;
-        Ok(subject)
+        subject.fitted()
+    }
+
+    /// The same case with other channels or units, of which other samples come; not fitted yet.
+    pub(super) fn fed(&self, given: Vec<Given>, fixture: Fixture, table: Table) -> Self {
+        Self {
+            kind: self.kind,
+            case: self.case,
+            parameters: self.parameters.clone(),
+            given,
+            fixture,
+            fitted: Fitted::new(),
+            table,
+            usual: OnceLock::new(),
+        }
+    }
+
+    /// The same, fitted on its samples where it is to be fitted.
+    ///
+    /// # Errors
+    /// What the fit says where it gives nothing.
+    pub(super) fn fitted(mut self) -> Result<Self, String> {
+        self.fitted = self.fit(&self.table, 1)?;
+        Ok(self)
     }
 
     /// Fits on a recording.
@@ -129,6 +158,28 @@ impl<'a> Subject<'a> {
         self.fixture.engine(&self.fitted)
     }
 
+    /// How many ticks a run has.
+    pub(super) fn ticks(&self) -> usize {
+        self.case.ticks
+    }
+
+    /// Samples of all channels at every tick, twice as often.
+    pub(super) fn without_gaps(&self, ticks: usize) -> Table {
+        samples(
+            self.kind,
+            &self.given,
+            ticks,
+            self.case.every,
+            Coming::Always,
+        )
+    }
+
+    /// What the node gives where it is fed all of it in one run.
+    pub(super) fn usual(&self) -> &Course {
+        let run = || course(&self.fixture, &mut self.engine(), self.events());
+        self.usual.get_or_init(run)
+    }
+
     /// What is fed.
     pub(super) fn events(&self) -> &[(Event, Vec<f64>)] {
         self.table.events()
@@ -144,6 +195,18 @@ impl<'a> Subject<'a> {
         !self.fitted.is_empty()
     }
 
+    /// Whether it is an estimator that goes on learning while it runs.
+    pub(super) fn learns(&self) -> bool {
+        let role = &self.fixture.plan.nodes[0].role;
+        matches!(
+            role,
+            PlannedRole::Estimator {
+                learning: Some(_),
+                ..
+            }
+        )
+    }
+
     /// Whether the port of a slot may have something to say of nothing.
     fn speaks(&self, slot: usize) -> bool {
         let port = self.fixture.port(slot);
@@ -153,21 +216,5 @@ impl<'a> Subject<'a> {
     /// A channel of the node, as the graph calls it.
     pub(super) fn name(&self, number: usize) -> &str {
         &self.fixture.plan.channels[self.fixture.slots().start + number].name
-    }
-
-    fn answers(&self) -> Result<(), String> {
-        let course = course(&self.fixture, &mut self.engine(), self.events());
-        let answers = |number| course.values(number).any(f64::is_finite);
-        if self.fixture.slots().is_empty() {
-            return Err("the node has no output".to_owned());
-        }
-        if (0..self.fixture.slots().len()).any(answers) {
-            Ok(())
-        } else {
-            Err(format!(
-                "nothing comes out of the node in {TICKS} ticks over about {} min",
-                TICKS / 6
-            ))
-        }
     }
 }

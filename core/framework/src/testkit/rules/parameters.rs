@@ -7,12 +7,9 @@ use super::super::compared::course;
 use super::super::fixture::Fixture;
 use super::super::tried::{PANICS, tried};
 use super::Subject;
-use super::schema::{Bound, Leaf, Sort, leaves};
+use super::schema::{Bound, Leaf, Sort, defaults, leaves};
 use crate::fit::{FitOptions, fit};
 use crate::recording::{Event, Table};
-
-/// How many ticks a node is fitted on and run for at each end of a range.
-const TICKS: usize = 120;
 
 pub(super) fn read_back(subject: &Subject<'_>) -> Result<(), String> {
     reads_back(subject, &subject.fixture)
@@ -36,10 +33,24 @@ fn reads_back(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
     }
 }
 
-pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
+pub(super) fn ranges(subject: &Subject<'_>, all: &[Subject<'_>]) -> Result<(), String> {
     let schema = Json::from((subject.kind.schema)());
     let parameters = subject.fixture.plan.nodes[0].spec.parameters();
-    let mut found = Vec::new();
+    let mut found = left_out(subject, &schema);
+    // What the schema says of itself is told once.
+    if all
+        .first()
+        .is_some_and(|first| std::ptr::eq(first, subject))
+    {
+        let defaults = defaults(&schema).into_iter();
+        found.extend(defaults.filter(|leaf| !leaf.is_allowed()).map(|leaf| {
+            let name = leaf.path.join(".");
+            format!(
+                "`{name}` is {} by default, which the schema does not allow",
+                leaf.value
+            )
+        }));
+    }
     for leaf in leaves(&schema, &parameters) {
         let name = leaf.path.join(".");
         let last = leaf
@@ -84,11 +95,34 @@ pub(super) fn ranges(subject: &Subject<'_>) -> Result<(), String> {
     }
 }
 
+/// Parameters with a default that is refused where they are left out.
+fn left_out(subject: &Subject<'_>, schema: &Json) -> Vec<String> {
+    let mut found = Vec::new();
+    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+        let default = &property["default"];
+        let mut table = in_full(subject, &subject.fixture);
+        if default.is_null() || table.remove(name).is_none() {
+            continue;
+        }
+        // Whether it can learn may hang on the parameter.
+        table.remove("learn");
+        let read = tried(|| Fixture::new(subject.kind, &table, &subject.given));
+        if let Err(told) = read
+            && told.contains(name.as_str())
+        {
+            found.push(format!(
+                "left out, `{name}` is {default}, which is refused: {told}"
+            ));
+        }
+    }
+    found
+}
+
 /// What is taken runs, and is written as it was read.
 fn lives(subject: &Subject<'_>, fixture: &Fixture) -> Result<(), String> {
     reads_back(subject, fixture)?;
     let mut table = Table::default();
-    for (event, values) in subject.events().iter().take(TICKS) {
+    for (event, values) in subject.events().iter().take(subject.ticks() / 5) {
         if let Event::Row(now) = event {
             table.push(*now, values);
         }
@@ -115,7 +149,7 @@ enum Allowed {
 /// Values to try.
 fn probes(leaf: &Leaf) -> Vec<(Value, Allowed)> {
     let text = |text: String, allowed| (Value::String(text), allowed);
-    match leaf.sort {
+    match &leaf.sort {
         Sort::Duration => vec![
             text("-1s".to_owned(), Allowed::No),
             text("0s".to_owned(), Allowed::Maybe),
@@ -131,7 +165,13 @@ fn probes(leaf: &Leaf) -> Vec<(Value, Allowed)> {
                 text(format!("0 {unit}"), Allowed::Maybe),
             ]
         }
-        Sort::Number { integer, low, high } => numbers(integer, low, high),
+        Sort::Number { integer, low, high } => numbers(*integer, *low, *high),
+        // What one of them needs beside it is for a case to say.
+        Sort::Choice(choices) => choices
+            .iter()
+            .filter(|choice| **choice != leaf.value)
+            .filter_map(|choice| Some((crate::node::as_toml(choice)?, Allowed::Maybe)))
+            .collect(),
     }
 }
 

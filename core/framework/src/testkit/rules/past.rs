@@ -2,7 +2,7 @@
 
 use super::super::compared::{Course, course};
 use super::Subject;
-use crate::node::{Feature, Read, Role};
+use crate::node::{Feature, Reach, Read, Role};
 use crate::recording::{Event, Table};
 use crate::time::{Duration, Instant};
 
@@ -10,11 +10,8 @@ use crate::time::{Duration, Instant};
 /// rounding of what has left it.
 const ROUNDING: f64 = 1e-6;
 
-/// How old a value may be that a port holds.
-const HELD: Duration = Duration::from_ns(60_000_000_000);
-
 pub(super) fn past(subject: &Subject<'_>) -> Result<(), String> {
-    let usual = course(&subject.fixture, &mut subject.engine(), subject.events());
+    let usual = subject.usual();
     for number in 0..subject.fixture.slots().len() {
         for (now, given) in usual.given(number) {
             let yet_to_come = |&(value, stamp): &(f64, Instant)| !value.is_nan() && stamp > now;
@@ -27,9 +24,34 @@ pub(super) fn past(subject: &Subject<'_>) -> Result<(), String> {
         }
     }
     match subject.fixture.plan.nodes[0].spec.role() {
-        Role::Feature(feature) => Claims::of(subject, feature, &usual).hold(),
+        Role::Feature(feature) => Claims::of(subject, feature, usual).hold(),
         Role::Estimator(_) | Role::Combiner(_) => Ok(()),
     }
+}
+
+/// For each output channel the measured channels that it is made of by the reach of its port, each with its delay.
+pub(super) fn made_of(
+    subject: &Subject<'_>,
+    reach: impl Fn(&str) -> Reach,
+) -> Vec<Vec<(usize, Duration)>> {
+    let (mut inputs, mut next) = (Vec::new(), 0);
+    for port in (subject.kind.inputs)() {
+        let given = subject.given.iter().find(|given| given.port == port.name);
+        let first = next;
+        next += given.map_or(0, |given| given.channels);
+        if port.read != Read::Truth {
+            inputs.push((first..next).collect());
+        }
+    }
+    let fixture = &subject.fixture;
+    let ports: Vec<&str> = fixture.slots().map(|slot| fixture.port(slot)).collect();
+    let parts = ports.iter().enumerate().map(|(number, port)| {
+        let first = ports.iter().position(|other| other == port);
+        let width = ports.iter().filter(|other| *other == port).count();
+        let nth = number - first.unwrap_or(number);
+        reach(port).parts(&inputs, nth, width)
+    });
+    parts.collect()
 }
 
 /// What a feature says of what its outputs are made of.
@@ -44,28 +66,11 @@ struct Claims<'a> {
 
 impl<'a> Claims<'a> {
     fn of(subject: &'a Subject<'a>, feature: &dyn Feature, usual: &'a Course) -> Self {
-        let (mut inputs, mut next) = (Vec::new(), 0);
-        for port in (subject.kind.inputs)() {
-            let given = subject.given.iter().find(|given| given.port == port.name);
-            let first = next;
-            next += given.map_or(0, |given| given.channels);
-            if port.read != Read::Truth {
-                inputs.push((first..next).collect());
-            }
-        }
-        let fixture = &subject.fixture;
-        let ports: Vec<&str> = fixture.slots().map(|slot| fixture.port(slot)).collect();
-        let parts = ports.iter().enumerate().map(|(number, port)| {
-            let first = ports.iter().position(|other| other == port);
-            let width = ports.iter().filter(|other| *other == port).count();
-            let nth = number - first.unwrap_or(number);
-            feature.reach(port).parts(&inputs, nth, width)
-        });
         Self {
             subject,
             usual,
             endless: feature.is_endless() || feature.closes_loops(),
-            made_of: parts.collect(),
+            made_of: made_of(subject, |port| feature.reach(port)),
         }
     }
 
@@ -98,7 +103,11 @@ impl<'a> Claims<'a> {
         }
         let mut ports = (self.subject.kind.inputs)().iter();
         let held = ports.any(|port| port.read == Read::Held);
-        let held = if held { HELD } else { Duration::ZERO };
+        let held = if held {
+            self.subject.case.held()
+        } else {
+            Duration::ZERO
+        };
         let before = self.course(|now, _| now <= cut);
         self.same(&before, |number, _, stamp| {
             // Whether there is a value may depend on more than what it is.

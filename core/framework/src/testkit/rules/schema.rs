@@ -21,6 +21,8 @@ pub(super) enum Sort {
     },
     Duration,
     Quantity,
+    /// One of these values.
+    Choice(Vec<Json>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +40,49 @@ pub(super) fn leaves(schema: &Json, parameters: &Json) -> Vec<Leaf> {
     };
     walk.enter(schema, parameters, &mut Vec::new());
     walk.leaves
+}
+
+/// What stands for a parameter that is left out, and for each part of it, as the schema has it: also for those of tables within
+/// the parameters.
+pub(super) fn defaults(schema: &Json) -> Vec<Leaf> {
+    let mut walk = Walk {
+        definitions: &schema["$defs"],
+        leaves: Vec::new(),
+    };
+    let definitions = schema["$defs"].as_object().into_iter().flatten();
+    for table in std::iter::once(schema).chain(definitions.map(|(_, table)| table)) {
+        let of = |choice: &str| table[choice].as_array().into_iter().flatten();
+        for table in std::iter::once(table).chain(of("oneOf")).chain(of("anyOf")) {
+            for (name, property) in table["properties"].as_object().into_iter().flatten() {
+                if !property["default"].is_null() {
+                    walk.enter(property, &property["default"], &mut vec![name.clone()]);
+                }
+            }
+        }
+    }
+    walk.leaves
+}
+
+impl Leaf {
+    /// Whether the schema allows the value that it has.
+    pub(super) fn is_allowed(&self) -> bool {
+        match &self.sort {
+            Sort::Number { low, high, .. } => self.value.as_f64().is_none_or(|value| {
+                let above = match *low {
+                    Bound::None => true,
+                    Bound::Inclusive(low) => value >= low,
+                    Bound::Exclusive(low) => value > low,
+                };
+                let below = match *high {
+                    Bound::None => true,
+                    Bound::Inclusive(high) => value <= high,
+                    Bound::Exclusive(high) => value < high,
+                };
+                above && below
+            }),
+            Sort::Duration | Sort::Quantity | Sort::Choice(_) => true,
+        }
+    }
 }
 
 struct Walk<'a> {
@@ -61,6 +106,14 @@ impl<'a> Walk<'a> {
             return;
         }
         let schema = self.resolved(schema);
+        let choices = self.choices(schema);
+        if !choices.is_empty() {
+            self.leaves.push(Leaf {
+                path: path.clone(),
+                sort: Sort::Choice(choices),
+                value: value.clone(),
+            });
+        }
         for choice in ["anyOf", "oneOf"] {
             let mut options = schema[choice].as_array().into_iter().flatten();
             let chosen = if value.is_null() {
@@ -93,6 +146,37 @@ impl<'a> Walk<'a> {
             self.enter(item, element, path);
             path.pop();
         }
+    }
+
+    /// The words that a schema lists, true and false where it is a switch, and the tables that need no more than the tag by which
+    /// they are told apart.
+    fn choices(&self, schema: &'a Json) -> Vec<Json> {
+        if is_of(schema, "boolean") {
+            return [false, true].map(Json::Bool).into();
+        }
+        let options = ["anyOf", "oneOf"].map(|choice| schema[choice].as_array());
+        let options = options.into_iter().flatten().flatten();
+        let mut choices = Vec::new();
+        for option in std::iter::once(schema).chain(options) {
+            let option = self.resolved(option);
+            choices.extend(option["enum"].as_array().into_iter().flatten().cloned());
+            if !option["const"].is_null() {
+                choices.push(option["const"].clone());
+            }
+            let properties = option["properties"].as_object();
+            let tags = properties.into_iter().flatten();
+            let tags = tags.filter(|(_, property)| !property["const"].is_null());
+            let tag: serde_json::Map<String, Json> = tags
+                .map(|(name, property)| (name.clone(), property["const"].clone()))
+                .collect();
+            let mut required = option["required"].as_array().into_iter().flatten();
+            let is_tag = |name: &Json| name.as_str().is_some_and(|name| tag.contains_key(name));
+            if !tag.is_empty() && required.all(is_tag) {
+                choices.push(Json::Object(tag));
+            }
+        }
+        choices.retain(|choice| !choice.is_null());
+        choices
     }
 
     fn resolved(&self, schema: &'a Json) -> &'a Json {
@@ -136,12 +220,17 @@ fn referred(schema: &Json) -> Option<&str> {
     schema["$ref"].as_str()?.rsplit('/').next()
 }
 
-fn number(schema: &Json) -> Option<Sort> {
-    let is = |name: &str| match &schema["type"] {
+/// Whether a schema is of a type, or of that among others.
+fn is_of(schema: &Json, name: &str) -> bool {
+    match &schema["type"] {
         Json::String(sort) => sort == name,
         Json::Array(sorts) => sorts.iter().any(|sort| sort == name),
         _ => false,
-    };
+    }
+}
+
+fn number(schema: &Json) -> Option<Sort> {
+    let is = |name: &str| is_of(schema, name);
     let integer = is("integer");
     (integer || is("number")).then(|| {
         let bound = |inclusive: &str, exclusive: &str| {

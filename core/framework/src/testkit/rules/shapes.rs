@@ -5,21 +5,17 @@ use super::super::compared::course;
 use super::super::fixture::Fixture;
 use super::super::samples::{Coming, samples};
 use super::Subject;
-use crate::engine::Fitted;
 use crate::node::Read;
 
 /// How many channels each port is given, beside those of the case.
 const WIDTHS: [usize; 2] = [1, 8];
-
-/// How many ticks such a run has.
-const TICKS: usize = 300;
 
 /// Ports that somebody reads give the same bits whatever is read beside them.
 pub(super) fn wanted(subject: &Subject<'_>) -> Result<(), String> {
     if !subject.is_feature() {
         return Ok(());
     }
-    let whole = course(&subject.fixture, &mut subject.engine(), subject.events());
+    let whole = subject.usual();
     let ports = subject.fixture.ports();
     let some = std::iter::once(Vec::new()).chain(ports.iter().map(|port| vec![port.clone()]));
     for read in some.filter(|read| read.len() < ports.len()) {
@@ -68,20 +64,17 @@ pub(super) fn widths(subject: &Subject<'_>) -> Result<(), String> {
         let Ok(fixture) = Fixture::new(subject.kind, &subject.parameters, &given) else {
             continue;
         };
-        let mut other = Subject {
-            kind: subject.kind,
-            case: subject.case,
-            parameters: subject.parameters.clone(),
-            table: samples(subject.kind, &given, TICKS, Coming::WithGaps),
-            given,
-            fixture,
-            fitted: Fitted::new(),
-        };
+        let table = samples(
+            subject.kind,
+            &given,
+            subject.ticks() / 2,
+            subject.case.every,
+            Coming::WithGaps,
+        );
         // So many may be more than the rows can tell.
-        let Ok(fitted) = other.fit(&other.table, 1) else {
+        let Ok(other) = subject.fed(given, fixture, table).fitted() else {
             continue;
         };
-        other.fitted = fitted;
         let run = || course(&other.fixture, &mut other.engine(), other.events());
         if let Some(difference) = run().difference(&run(), &other.fixture) {
             return Err(format!(

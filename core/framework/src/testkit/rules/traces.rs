@@ -1,13 +1,13 @@
 //! Decides whether an answer that is asked for changes later ones.
 
-use super::super::compared::{Course, course};
+use super::super::compared::Course;
 use super::Subject;
 use crate::prng::Prng;
 use crate::recording::Event;
 
 pub(super) fn no_trace(subject: &Subject<'_>) -> Result<(), String> {
     let fixture = &subject.fixture;
-    let undisturbed = course(fixture, &mut subject.engine(), subject.events());
+    let undisturbed = subject.usual();
     let (mut engine, mut disturbed) = (subject.engine(), Course::default());
     let mut random = Prng::stream(31, "idle questions");
     for (event, values) in subject.events() {

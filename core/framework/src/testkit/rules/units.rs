@@ -1,7 +1,6 @@
 //! Decides whether a node keeps its answers when what it reads comes in other units.
 
 use super::super::case::Given;
-use super::super::compared::course;
 use super::super::fixture::Fixture;
 use super::Subject;
 use crate::recording::Table;
@@ -37,21 +36,9 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
     let fixture = Fixture::new(subject.kind, &subject.parameters, &given)
         .map_err(|error| format!("with {told} the graph is refused: {error}"))?;
     let table = converted(&subject.table, &subject.given, &given)?;
-    let other = Subject {
-        kind: subject.kind,
-        case: subject.case,
-        parameters: subject.parameters.clone(),
-        given,
-        fixture,
-        fitted: crate::engine::Fitted::new(),
-        table,
-    };
-    let fitted = other
-        .fit(&other.table, 1)
-        .map_err(|found| format!("with {told}, {found}"))?;
-    let other = Subject { fitted, ..other };
-    let one = course(&subject.fixture, &mut subject.engine(), subject.events());
-    let two = course(&other.fixture, &mut other.engine(), other.events());
+    let other = subject.fed(given, fixture, table).fitted();
+    let other = other.map_err(|found| format!("with {told}, {found}"))?;
+    let (one, two) = (subject.usual(), other.usual());
     for (number, slot) in subject.fixture.slots().enumerate() {
         let unit = &subject.fixture.plan.channels[slot].channel.unit;
         let other_unit = &other.fixture.plan.channels[slot].channel.unit;

@@ -100,10 +100,22 @@ pub(super) fn uncertainty(subject: &Subject<'_>) -> Result<(), String> {
         })?;
     }
     if matches!(role, Role::Estimator(_)) {
-        let course = course(&subject.fixture, &mut subject.engine(), subject.events());
+        let course = subject.usual();
         for (number, slot) in subject.fixture.slots().enumerate() {
             if subject.fixture.port(slot) != "deviation" {
                 continue;
+            }
+            // What is predicted in the second half comes after all that is to be learned before.
+            let half = subject.events().len() / 2;
+            let there = |number: usize| course.values(number).skip(half).any(f64::is_finite);
+            let predicts = (0..subject.fixture.slots().len()).find(|&number| {
+                subject.fixture.port(subject.fixture.slots().start + number) == "prediction"
+            });
+            if predicts.is_some_and(there) && !there(number) {
+                return Err(format!(
+                    "`{}` is never there in the second half of the run, though predictions are",
+                    subject.name(number)
+                ));
             }
             let below = |(_, value): &(_, f64)| *value < 0.0;
             if let Some((now, value)) = course.instants().zip(course.values(number)).find(below) {
