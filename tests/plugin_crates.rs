@@ -42,7 +42,7 @@ const ROLES: [(&str, &[&str], &str); 6] = [
         &["tests/live.rs", "examples/run.rs"],
         "--example run",
     ),
-    ("machine", &[], "build --with path:."),
+    ("machine", &["tests/conformance.rs"], "build --with path:."),
 ];
 
 /// Every file under a folder, as paths from there.

@@ -241,6 +241,7 @@ fn texts(role: Role) -> Vec<(&'static str, &'static str)> {
             machine,
             vec![
                 (LIBRARY, text!("machine/lib.rs")),
+                (CONFORMANCE, text!("machine/conformance.rs")),
                 (GRAPH, text!("machine/graph.toml")),
             ],
         ),

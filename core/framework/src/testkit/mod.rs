@@ -40,7 +40,8 @@
 //! ```
 //!
 //! [`conformance!`](crate::conformance) makes a test of it that tries every [`Rule`] on every [`Case`] and tells all that are
-//! broken, each with what to do about it. [`Bench`] is for the tests of what a node computes. Both put the node into a small
+//! broken, each with what to do about it. Simulated machines have rules of their own, which [`assert_every_machine_conforms`] tries.
+//! [`Bench`] is for the tests of what a node computes. Both put the node into a small
 //! graph of its own, compile it and step the real engine.
 
 mod bench;
@@ -48,6 +49,7 @@ mod case;
 mod compared;
 mod derived;
 mod fixture;
+mod machine;
 mod rule;
 mod rules;
 mod samples;
@@ -56,6 +58,7 @@ mod verdict;
 
 pub use bench::Bench;
 pub use case::Case;
+pub use machine::{BrokenMachine, assert_every_machine_conforms, broken_machine};
 pub use rule::Rule;
 pub use verdict::{Broken, assert_conforms, assert_every_kind_conforms, broken};
 

@@ -9,6 +9,7 @@ mod feature;
 mod gaps;
 mod instants;
 mod learning;
+mod machine;
 mod memory;
 mod optional;
 mod pace;

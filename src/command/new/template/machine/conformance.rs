@@ -1,0 +1,9 @@
+//! Every machine of this crate through the rules that every machine keeps.
+
+use athermal_core::testkit::assert_every_machine_conforms;
+use my_node as _;
+
+#[test]
+fn every_machine_of_this_crate_conforms() {
+    assert_every_machine_conforms(env!("CARGO_PKG_NAME"));
+}
