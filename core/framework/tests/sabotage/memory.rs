@@ -37,7 +37,7 @@ impl Feature for Window {
         }
         let mut channels = inputs.port("signal").to_vec();
         for channel in &mut channels {
-            channel.span = channel.span + self.window;
+            channel.span += self.window;
         }
         let name = "mean";
         Ok(vec![OutputPort { name, channels }])
