@@ -96,13 +96,13 @@ impl Case {
     /// are held for six of them, and wander as fast by the tick as they do at 10 s.
     ///
     /// # Panics
-    /// Where that is no time from 10 µs to 10 days.
+    /// Where that is no time from 10 µs to a day.
     #[must_use]
     pub fn every(mut self, every: &str) -> Self {
-        let longest = Duration::from_ns(864_000_000_000_000);
+        let longest = Duration::from_ns(86_400_000_000_000);
         self.every = match every.parse::<Duration>() {
             Ok(every) if every >= Duration::from_ns(SHORTEST_NS) && every <= longest => every,
-            _ => panic!("`{every}` is no time from 10 µs to 10 days, such as \"1s\""),
+            _ => panic!("`{every}` is no time from 10 µs to a day, such as \"1s\""),
         };
         self
     }

@@ -15,6 +15,7 @@ mod optional;
 mod pace;
 mod parameters;
 mod ports;
+mod scale;
 mod words;
 
 use std::collections::BTreeSet;

@@ -118,7 +118,7 @@ fn a_node_for_quick_ticks_is_given_such() {
 }
 
 #[test]
-#[should_panic(expected = "`fast` is no time from 10 µs to 10 days, such as \"1s\"")]
+#[should_panic(expected = "`fast` is no time from 10 µs to a day, such as \"1s\"")]
 fn a_pace_that_is_no_time_is_told() {
     let _ = Case::new("").every("fast");
 }

@@ -5,10 +5,10 @@ use super::Subject;
 use crate::channel::ABSENT;
 use crate::recording::{Event, Table};
 
-/// How many ticks a long gap lasts.
-const LONG: i64 = 720;
+/// How many ticks later than the others each quarter comes: two gaps of hours, and one of days.
+const GAPS: [i64; 4] = [0, 720, 1440, 30_000];
 
-/// Ticks that measure nothing, each channel missing for a while and for all time, and gaps of hours.
+/// Ticks that measure nothing, each channel missing for a while and for all time, and gaps of hours and days.
 pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
     let (fixture, ticks) = (&subject.fixture, subject.ticks());
     let mut nothing = subject.table.clone();
@@ -43,7 +43,8 @@ pub(super) fn absence(subject: &Subject<'_>) -> Result<(), String> {
     let mut late = Table::default();
     for (nth, (event, row)) in subject.events().iter().enumerate() {
         if let Event::Row(now) = event {
-            let gap_ns = (nth / (ticks / 4)) as i64 * LONG * subject.case.every.as_ns();
+            let gap = GAPS[(4 * nth / ticks).min(GAPS.len() - 1)];
+            let gap_ns = gap * subject.case.every.as_ns();
             late.push(*now + crate::time::Duration::from_ns(gap_ns), row);
         }
     }

@@ -73,8 +73,8 @@ pub(super) fn units(subject: &Subject<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// The same input in a unit of the same kind, where there is one. A port with a stated unit that is a point on a scale takes such
-/// alone.
+/// The same input in a unit of the same kind, where there is one. A port with a stated unit takes those
+/// alone that a factor turns into it, which no point on a scale is.
 fn in_another_unit(given: &Given, stated: bool) -> Given {
     let Ok(unit) = Unit::parse(&given.unit) else {
         return given.clone();
@@ -85,7 +85,8 @@ fn in_another_unit(given: &Given, stated: bool) -> Given {
         .chain(OTHERS.map(str::to_owned))
         .filter_map(|text| Some((Unit::parse(&text).ok()?, text)))
         .find(|(other, _)| {
-            let is_taken = !stated || other.is_temperature_point() == unit.is_temperature_point();
+            let is_point = unit.is_temperature_point() || other.is_temperature_point();
+            let is_taken = !stated || !is_point;
             let differs = unit.convert(1.0, other).is_some_and(|one| one != 1.0);
             other.measures_same(&unit) && is_taken && differs
         });
