@@ -152,3 +152,33 @@ fn a_run_that_goes_on_with_nothing_new_says_so() {
     run(&days[0]);
     run(&days[1]).tells(&["no row is after what the run before saw last: nothing was predicted"]);
 }
+
+#[test]
+fn a_run_of_which_nothing_comes_out_says_so_and_where_it_ends() {
+    let scratch = Scratch::new("nothing-comes-out");
+    let graph = scratch.file(
+        "graph.toml",
+        "schema = 1\n[time]\ncolumn = \"time_s\"\n[signals.position]\nunit = \"nm\"\nchannels = [\"Z\"]\nmax_age = \"1min\"\n\
+         [nodes.drift]\ntype = \"slope\"\ninputs.signal = \"position\"\nwindows = [\"5min\"]\nunit = \"nm/min\"\n\
+         [nodes.calm]\ntype = \"moving\"\ninputs.signal = \"drift\"\nwindows = [\"5min\"]\n[outputs]\ncalm = \"calm\"\n",
+    );
+    let rows = |apart: u32| -> String {
+        let rows = (0..200).map(|row| format!("{},{}\n", row * apart, row % 7));
+        std::iter::once("time_s,position.Z\n".to_owned())
+            .chain(rows)
+            .collect()
+    };
+    // In milliseconds, as if they were seconds.
+    let (far, near) = (
+        scratch.file("far.csv", rows(10_000)),
+        scratch.file("near.csv", rows(10)),
+    );
+    let out = scratch.path("out.csv");
+    let run = |log: &std::path::Path| {
+        athermal(&[&"run", &graph, &"--input", &log, &"--output", &out]).ended(0)
+    };
+    run(&far).tells(&[
+        "no output has a value in any of the 200 rows, which are 2.78 h apart: drift gives nothing",
+    ]);
+    assert!(!run(&near).err.contains("no output"));
+}

@@ -15,25 +15,17 @@ mod explain;
 mod faults;
 mod fit;
 mod init;
-mod kept;
 mod model;
 mod new;
 mod nodes;
 mod numbers;
-mod parameters;
-mod ran;
-mod rejected;
 mod report;
 mod run;
 mod schema;
-mod sensors;
 mod show;
 mod simulate;
-mod stop;
-mod swap;
 mod test;
 mod threads;
-mod watched;
 
 use clap::Subcommand;
 

@@ -47,20 +47,39 @@ fn what_is_wrong_with_a_parameter_is_told_though_the_inputs_are_wrong_too() {
     }
 }
 
-#[test]
-fn channels_that_every_node_multiplies_are_stopped() {
+/// A chain of so many nodes, each of which gives 101 channels for every one that it reads.
+fn multiplied(nodes: usize) -> String {
     let lags: Vec<String> = (0..101).map(|lag| format!("\"{lag}s\"")).collect();
     let lags = lags.join(", ");
     let mut text =
         "schema = 1\n[signals.n0]\nunit = \"nm\"\nchannels = [\"X\"]\nmax_age = \"3min\"\n"
             .to_owned();
-    for node in 1..=3 {
+    for node in 1..=nodes {
         let last = node - 1;
         text += &format!(
             "[nodes.n{node}]\ntype = \"lag\"\ninputs.signal = \"n{last}\"\nlags = [{lags}]\n"
         );
     }
-    let told = Read::new(&(text + "[outputs]\nout = \"n3\"\n")).told();
+    text
+}
+
+#[test]
+fn more_regressors_than_a_fit_has_room_for_are_refused() {
+    let text = multiplied(2)
+        + "[nodes.a]\ntype = \"linear\"\ninputs = { features = \"n2\", truth = \"n0.X\" }\nahead = \"5min\"\n\
+           [outputs]\nout = \"a\"\n";
+    let told = Read::new(&text).told();
+    assert!(
+        told.contains(
+            "it would learn from 10201 regressors, more than the 4000 that there is room for"
+        ),
+        "{told}"
+    );
+}
+
+#[test]
+fn channels_that_every_node_multiplies_are_stopped() {
+    let told = Read::new(&(multiplied(3) + "[outputs]\nout = \"n3\"\n")).told();
     assert!(
         told.contains("with its channels the graph has 1040604, more than 1000000"),
         "{told}"

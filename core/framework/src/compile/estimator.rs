@@ -1,4 +1,4 @@
-//! Decides what an estimator's rows are made of, and that none of it sees the future.
+//! Decides what an estimator learns from and what it gives; what its rows are made of is decided by [`row`](super::row).
 
 use std::collections::BTreeSet;
 
@@ -8,11 +8,11 @@ use super::kind_fault::KindFault;
 use super::learning;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
-use super::provenance::{ONE_SAMPLE, Provenance, leaks, persistence_lag};
-use super::resolver::{Resolver, Suspect};
+use super::provenance::Provenance;
+use super::resolver::Resolver;
+use super::row::Row;
 use crate::channel::Channel;
-use crate::diagnostic::Place;
-use crate::node::{Estimator, FREEZE, OutputPort, Regressor, TruthLags};
+use crate::node::{Estimator, FREEZE, OutputPort};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -75,67 +75,23 @@ impl Resolver<'_> {
             self.sound(instance, KindFault::of_regressors(&wanted))?;
         }
 
-        let mut gathers = Vec::new();
-        let mut regressors = Vec::new();
-        let mut behind = Vec::new();
+        let mut row = Row::default();
         let mut whole = sound;
         if let Some(port) = features_port
             && !features.is_empty()
         {
             let mut unit = Self::port_unit(&port);
             if port.name == "voters" {
-                if self.are_predictions(instance, port.name) {
-                    whole &= self.votes_agree(instance, port.name, &features);
-                    whole &= self.votes_fit(instance, port.name, &features, &link);
-                    unit = Some(self.channels[truth].channel.unit.clone());
-                } else {
-                    whole = false;
-                }
+                let are_predictions = self.are_predictions(instance, port.name);
+                whole &= are_predictions && self.may_stack(instance, port.name, &features, &link);
+                unit = are_predictions.then(|| self.channels[truth].channel.unit.clone());
             }
-            for &lag in &wanted.feature_lags {
-                for &slot in &features {
-                    let mut regressor = self.regressor(slot, lag, false);
-                    if let Some(unit) = &unit {
-                        regressor.unit = unit.to_string();
-                    }
-                    regressors.push(regressor);
-                    behind.push((slot, lag));
-                }
-                self.suspects.push(Suspect {
-                    place: instance.input_place(port.name),
-                    context: instance.context(),
-                    features: features.clone(),
-                    lag,
-                    link,
-                });
-                match self.gather(instance, &port, &features, &[lag], unit.as_ref()) {
-                    Some(gather) => gathers.push(gather),
-                    None => whole = false,
-                }
-            }
+            let of = (&port, &*features);
+            whole &=
+                self.features_of_row(instance, of, &wanted.feature_lags, unit, &link, &mut row);
         }
-        let lags = match wanted.truth_lags {
-            TruthLags::None => Vec::new(),
-            TruthLags::At(lags) => lags,
-            TruthLags::SmallestLegal => vec![persistence_lag(link.span, link.ahead)],
-        };
-        for &lag in &lags {
-            if leaks(lag, link.span, link.ahead) {
-                let place = self.lag_place(instance, &lags, lag);
-                let problem = self.leak((truth, lag), lag, &link, Vec::new());
-                self.diagnostics.report(place, problem);
-                whole = false;
-            }
-            regressors.push(self.regressor(truth, lag, true));
-            behind.push((truth, lag));
-        }
-        if !lags.is_empty() {
-            match self.gather(instance, &truth_port, &[truth], &lags, None) {
-                Some(gather) => gathers.push(gather),
-                None => whole = false,
-            }
-        }
-        if regressors.is_empty() && !wanted.every_tick {
+        whole &= self.truths_of_row(instance, &truth_port, wanted.truth_lags, &link, &mut row);
+        if row.regressors.is_empty() && !wanted.every_tick {
             // An optional input that was left out, and nothing in its place.
             let port = features_port.unwrap_or(truth_port);
             self.missing_input(instance, &port);
@@ -147,37 +103,29 @@ impl Resolver<'_> {
             return None;
         }
         let (training, learning) = (training?, learning?);
-        if learning.is_some() {
-            behind.push(link.learned_from());
-        }
-        let behind = Provenance::of(
-            behind
-                .iter()
-                .map(|&(slot, lag)| (&self.provenance[slot], lag)),
-        );
-        let of = &self.channels[truth].channel;
+        let learned_from = learning.as_ref().map(|_| link.learned_from());
+        let behind = row.behind.iter().copied().chain(learned_from);
+        let behind = Provenance::of(behind.map(|(slot, lag)| (&self.provenance[slot], lag)));
         let prediction = Channel {
             ahead: link.ahead,
-            ..of.clone()
+            ..self.channels[truth].channel.clone()
         };
         let mut ports = vec![OutputPort {
             name: "prediction",
             channels: vec![prediction.clone()],
         }];
-        let mut behind = vec![behind];
         if learning.is_some() {
             ports.push(learning::port(&prediction));
-            behind.push(behind[0].clone());
         }
         let mut deviation = None;
         if estimator.deviates() {
             deviation = Some(self.channels.len() + ports.len());
             ports.push(deviation_of(&prediction));
-            behind.push(behind[0].clone());
         }
+        let behind = vec![behind; ports.len()];
         let role = PlannedRole::Estimator {
-            regressors,
-            gathers,
+            regressors: row.regressors,
+            gathers: row.gathers,
             every_tick: wanted.every_tick,
             truth: link,
             training,
@@ -199,6 +147,17 @@ impl Resolver<'_> {
             self.diagnostics.report(instance.node.place, problem);
         }
         ahead
+    }
+
+    /// Whether predictions may be stacked: they agree, and are of the truth that is predicted from them.
+    fn may_stack(
+        &mut self,
+        instance: &Instance<'_>,
+        input: &str,
+        voters: &[usize],
+        link: &TruthLink,
+    ) -> bool {
+        self.votes_agree(instance, input, voters) & self.votes_fit(instance, input, voters, link)
     }
 
     /// Whether predictions are of the truth that is predicted from them, as far ahead.
@@ -298,24 +257,6 @@ impl Resolver<'_> {
         None
     }
 
-    pub(super) fn regressor(&self, slot: usize, lag: Duration, of_truth: bool) -> Regressor {
-        let from = &self.channels[slot];
-        let name = if of_truth && lag == ONE_SAMPLE {
-            format!("{} one sample ago", from.name)
-        } else if of_truth || lag > Duration::ZERO {
-            format!("{} lag {lag}", from.name)
-        } else {
-            from.name.clone()
-        };
-        Regressor {
-            name,
-            unit: from.channel.unit.to_string(),
-            sensors: Vec::new(),
-            lag,
-            of_truth,
-        }
-    }
-
     /// Notes which measured channels each regressor is made from, which is known once loops have been followed.
     pub(super) fn name_sensors(&mut self) {
         for node in &mut self.nodes {
@@ -341,11 +282,6 @@ impl Resolver<'_> {
                 regressor.sensors = sources.map(name).collect();
             }
         }
-    }
-
-    fn lag_place(&self, instance: &Instance<'_>, lags: &[Duration], lag: Duration) -> Place {
-        let nth = lags.iter().position(|&l| l == lag).unwrap_or(0);
-        instance.element_place("lags", nth)
     }
 
     pub(super) fn limits(

@@ -22,6 +22,7 @@ mod problem;
 mod provenance;
 mod reference;
 mod resolver;
+mod row;
 mod scope;
 mod slot_set;
 mod steps;

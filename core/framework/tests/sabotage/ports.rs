@@ -1,7 +1,7 @@
 //! A feature of several ports that is sound, and the same with one fault at a time.
 
 use athermal_core::node::{
-    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, Reach, Tick,
+    Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
 };
 use athermal_core::testkit::{Case, Rule};
 use schemars::JsonSchema;
@@ -37,6 +37,16 @@ const PORTS: [&str; 3] = ["once", "twice", "thrice"];
 impl Feature for Multiples {
     fn inputs() -> &'static [InputPort] {
         const { &[InputPort::fresh("signal", "what is multiplied")] }
+    }
+
+    fn ports() -> &'static [PortSummary] {
+        const {
+            &[
+                PortSummary::new("once", "each channel"),
+                PortSummary::new("twice", "each channel times two"),
+                PortSummary::new("thrice", "each channel times three"),
+            ]
+        }
     }
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
@@ -95,6 +105,36 @@ impl Operator for Multiplying {
 }
 
 athermal_core::register!(Multiples, Feature, "sabotaged_ports");
+
+/// The same, without a word of its ports.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Wordless {}
+
+impl Feature for Wordless {
+    fn inputs() -> &'static [InputPort] {
+        Multiples::inputs()
+    }
+
+    fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
+        Multiples { fault: Fault::None }.outputs(inputs)
+    }
+
+    fn reach(&self, _port: &str) -> Reach {
+        Reach::Own
+    }
+
+    fn build(&self, inputs: &Inputs, wanted: &[bool]) -> Box<dyn Operator> {
+        Multiples { fault: Fault::None }.build(inputs, wanted)
+    }
+}
+
+athermal_core::register!(Wordless, Feature, "sabotaged_wordless_ports");
+
+#[test]
+fn ports_of_several_that_a_user_is_not_told_are_found() {
+    breaks::<Wordless>(Case::new(""), Rule::Names, "`twice` is not among");
+}
 
 fn with(fault: &str) -> Case {
     Case::new(format!("fault = \"{fault}\""))

@@ -28,7 +28,7 @@ pub(in super::super) fn shared(kind: &Kind) -> Vec<String> {
     found
 }
 
-/// Output ports and channels that no reference could name.
+/// Output ports and channels that no reference could name, and ports of several that a user is not told.
 pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
     let node = &subject.fixture.plan.nodes[0];
     let mut found = Vec::new();
@@ -37,6 +37,20 @@ pub(super) fn names(subject: &Subject<'_>) -> Result<(), String> {
         && let Ok(ports) = feature.outputs(inputs)
     {
         found.extend(unfit("the output port", ports.iter().map(|port| port.name)));
+        let told = (subject.kind.ports)();
+        let is_told = |name: &str| {
+            told.iter()
+                .any(|of| of.name == name && !of.summary.is_empty())
+        };
+        // The only port of a node need not be named by who reads it.
+        let untold = ports.iter().filter(|port| !is_told(port.name));
+        let untold = untold.filter(|_| ports.len() > 1 || !told.is_empty());
+        found.extend(untold.map(|port| {
+            let name = port.name;
+            format!(
+                "the output port `{name}` is not among `Feature::ports`, or has no summary there"
+            )
+        }));
         let channels = ports.iter().flat_map(|port| &port.channels);
         let strange = channels.filter(|channel| !is_channel(&channel.name));
         found.extend(strange.map(|channel| {

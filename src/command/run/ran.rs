@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use athermal::Model;
 use athermal::core::engine::EngineState;
 
-use super::aside::whole_aside;
+use crate::command::aside::whole_aside;
 
 /// The graph that runs, in a file beside the state, which is of use with it alone.
 pub struct Ran {

@@ -7,9 +7,9 @@ use athermal::core::live::{Feed, Samples, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
 
-use super::faults::{self, Looks, Purpose, of_standstill, places};
-use super::model::listed;
 use super::rejected::Ranged;
+use crate::command::faults::{self, Looks, Purpose, of_standstill, places};
+use crate::command::model::listed;
 use crate::figures::{count, instant, number, seconds, time};
 use crate::terminal::Terminal;
 

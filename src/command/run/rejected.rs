@@ -8,7 +8,7 @@ use athermal::core::recording::Event;
 
 use athermal::{Duration, Instant};
 
-use super::beyond;
+use crate::command::beyond;
 use crate::figures::number;
 use crate::terminal::Terminal;
 

@@ -11,8 +11,8 @@ use athermal::files::{TimeColumn, TimeForm};
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
-use super::model::{check_fitted, listed, tell_unfitted};
 use super::watched::Watched;
+use crate::command::model::{check_fitted, listed, tell_unfitted};
 use crate::figures::{count, counted, length, number};
 use crate::terminal::{Failure, Terminal};
 

@@ -7,8 +7,8 @@ use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::{Engine, Instant, Model};
 
-use super::aside::{not_written, whole_aside};
 use super::ran::Ran;
+use crate::command::aside::{not_written, whole_aside};
 use crate::figures::{count, length};
 use crate::terminal::{Failure, Terminal, outside};
 

@@ -1,5 +1,14 @@
 //! `athermal run`: rows in, the graph's outputs out.
 
+mod heard;
+mod kept;
+mod ran;
+mod rejected;
+mod sensors;
+mod stop;
+mod swap;
+mod watched;
+
 use std::path::PathBuf;
 
 use athermal::core::compile::{Plan, SourceChannel, Wanted};
@@ -14,18 +23,17 @@ use athermal::files::{
 use athermal::{Engine, Model};
 use clap::Args;
 
-use super::aside::check_apart;
-use super::kept::Kept;
-use super::model::{self, check_fitted, tell_unfitted};
-use super::ran::{self, Ran};
-use super::rejected::Ranged;
-use super::sensors::Sensors;
-use super::stop;
-use super::swap;
-use super::watched::Watched;
-use super::{beyond, data};
+use crate::command::aside::check_apart;
+use crate::command::model::{self, check_fitted, tell_unfitted};
+use crate::command::{beyond, data};
 use crate::figures::{instant, length, seconds};
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
+use heard::Heard;
+use kept::Kept;
+use ran::Ran;
+use rejected::Ranged;
+use sensors::Sensors;
+use watched::Watched;
 
 /// Run a model: rows in, predictions out
 ///
@@ -125,8 +133,10 @@ impl Run {
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
         let mut sensors = Sensors::new(terminal, &mut ranged, &plan, !self.ends());
         let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, &model, sink);
-        live::run_keeping(&mut engine, &mut sensors, &mut writer, &mut keep)?;
-        kept.end(&engine, &model, &mut writer).map_err(outside)?;
+        let mut heard = Heard::of(&mut writer);
+        live::run_keeping(&mut engine, &mut sensors, &mut heard, &mut keep)?;
+        kept.end(&engine, &model, &mut heard).map_err(outside)?;
+        heard.end(terminal, &engine);
         sensors.end();
         self.tell(terminal, &engine, &reader, usual);
         Ok(Answer::Fine)
@@ -185,6 +195,7 @@ impl Run {
         let names = &columns[..columns.len() - 1];
         let mut rest = kept.rest(&mut reader, writer.stood(), !self.ends());
         let mut writer = WithRevision(writer);
+        let mut heard = Heard::of(&mut writer);
         let usual = model.sample_ranges().to_vec();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&read), &usual);
         let mut sensors = Sensors::new(terminal, &mut ranged, &model.plan, !self.ends());
@@ -234,16 +245,17 @@ impl Run {
                 revision: stepped.revision,
                 outputs: &shown,
             };
-            writer.put(&frame).map_err(outside)?;
-            let kept_on = kept.after_tick(stepper.engine(), course.running(), &mut writer);
+            heard.put(&frame).map_err(outside)?;
+            let kept_on = kept.after_tick(stepper.engine(), course.running(), &mut heard);
             kept_on.map_err(outside)?;
         }
-        writer.finish().map_err(outside)?;
-        let ended = kept.end(stepper.engine(), course.running(), &mut writer);
+        heard.finish().map_err(outside)?;
+        let ended = kept.end(stepper.engine(), course.running(), &mut heard);
         ended.map_err(outside)?;
         course.end(&mut control);
         sensors.end();
         let engine = stepper.engine();
+        heard.end(terminal, engine);
         self.tell(terminal, engine, &reader, &usual);
         Ok(Answer::Fine)
     }

@@ -1,5 +1,7 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
+mod parameters;
+
 use athermal::core::diagnostic::nearest;
 use athermal::core::node::{
     FREEZE, Kind, Learns, Read, Role, RoleName, kind, kinds, written_names,
@@ -7,7 +9,6 @@ use athermal::core::node::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::parameters;
 use crate::figures::{page, paragraph};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 

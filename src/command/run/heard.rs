@@ -1,0 +1,70 @@
+//! Decides whether anything came out of a run, and what is said where nothing did.
+
+use athermal::Instant;
+use athermal::core::engine::Engine;
+use athermal::core::live::{Frame, Sink, SinkError};
+use athermal::diagnosis::silent_node;
+
+use crate::figures::{count, time};
+use crate::terminal::Terminal;
+
+/// A sink whose rows are looked at on their way.
+pub struct Heard<'a, S> {
+    sink: &'a mut S,
+    rows: u64,
+    /// Whether an output had a value.
+    any: bool,
+    /// The first row and the last.
+    times: Option<(Instant, Instant)>,
+}
+
+impl<'a, S> Heard<'a, S> {
+    /// Listens to what goes into a sink.
+    pub fn of(sink: &'a mut S) -> Self {
+        Self {
+            sink,
+            rows: 0,
+            any: false,
+            times: None,
+        }
+    }
+
+    /// Tells that nothing came out, with the first node that gives nothing: an output full of empty cells looks like one that works.
+    pub fn end(&self, terminal: &Terminal, engine: &Engine) {
+        let plan = engine.plan();
+        let (Some((first, last)), Some(output)) = (self.times, plan.outputs.first()) else {
+            return;
+        };
+        if self.any {
+            return;
+        }
+        let apart = (last - first).secs() / (self.rows - 1).max(1) as f64;
+        let pace = match apart > 0.0 {
+            true => format!(", which are {} apart", time(apart)),
+            false => String::new(),
+        };
+        terminal.warning(format_args!(
+            "no output has a value in any of the {} rows{pace}: {} gives nothing",
+            count(self.rows),
+            silent_node(plan, engine, output.slot)
+        ));
+    }
+}
+
+impl<S: Sink> Sink for Heard<'_, S> {
+    fn put(&mut self, frame: &Frame<'_>) -> Result<(), SinkError> {
+        self.rows += 1;
+        self.any = self.any || frame.outputs.iter().any(|value| !value.is_nan());
+        let (first, _) = self.times.unwrap_or((frame.time, frame.time));
+        self.times = Some((first, frame.time));
+        self.sink.put(frame)
+    }
+
+    fn flush(&mut self) -> Result<(), SinkError> {
+        self.sink.flush()
+    }
+
+    fn finish(&mut self) -> Result<(), SinkError> {
+        self.sink.finish()
+    }
+}
