@@ -105,35 +105,9 @@ pub fn broken_machine(machine: &dyn Machine) -> Vec<BrokenMachine> {
 
 /// Fails with all that is wrong with the machines that a crate brings, if anything is.
 ///
-/// ```
-/// # mod machine {
-/// #     use athermal_core::machine::{Channel, Machine, Row, SECOND_NS, SetPoint, Setup, SetupError, Simulation, rows_of};
-/// #     struct Plate;
-/// #     impl Machine for Plate {
-/// #         fn name(&self) -> &'static str { "plate" }
-/// #         fn summary(&self) -> &'static str { "A plate that warms steadily: one axis, one temperature." }
-/// #         fn channels(&self) -> &[Channel] { const { &[Channel::temperature("plate"), Channel::position("Z")] } }
-/// #         fn set_points(&self) -> &[SetPoint] { &[] }
-/// #         fn start(&self, setup: &Setup) -> Result<Box<dyn Simulation>, SetupError> {
-/// #             let rows = rows_of(self.name(), self.set_points(), setup, SECOND_NS)?;
-/// #             Ok(Box::new(Warming { row: 0, rows }))
-/// #         }
-/// #     }
-/// #     struct Warming { row: u64, rows: u64 }
-/// #     impl Simulation for Warming {
-/// #         fn next(&mut self, row: &mut Row) -> bool {
-/// #             if self.row == self.rows { return false; }
-/// #             let warmer = 0.001 * self.row as f64;
-/// #             row.time_ns = self.row as i64 * SECOND_NS;
-/// #             row.values.copy_from_slice(&[20.0 + warmer, 1000.0 * warmer]);
-/// #             row.true_drift[0] = if self.row < 300 { f64::NAN } else { 60.0 };
-/// #             self.row += 1;
-/// #             true
-/// #         }
-/// #     }
-/// #     athermal_core::register_machine!(Plate);
-/// # }
-/// // In a test of the crate:
+/// A test of the crate calls it:
+///
+/// ```no_run
 /// athermal_core::testkit::assert_every_machine_conforms(env!("CARGO_PKG_NAME"));
 /// ```
 ///
