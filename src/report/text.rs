@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::published::ARTICLE;
 use super::{Departure, Facts, Hours, Published, Worth, figure, spelled};
 use crate::figures::{paragraph, table, time};
 
@@ -14,6 +15,11 @@ pub fn text(facts: &Facts) -> String {
         text.push_str(&paragraph("", 3, &sentence));
     }
     let ahead = facts.course.axes.first().map_or(0.0, |axis| axis.ahead_s);
+    if !facts.published.is_empty() {
+        text.push('\n');
+        let told = format!("Published are the figures of {ARTICLE}, measured on another machine.");
+        text.push_str(&paragraph("", 2, &told));
+    }
     for table in &facts.published {
         let _ = writeln!(text, "\n{}; here {} ahead", table.source, time(ahead));
         published(&mut text, table);
