@@ -1,5 +1,6 @@
 //! `athermal check`: looks for mistakes in graph files.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
@@ -8,6 +9,8 @@ use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk};
 use athermal::core::trial::{self, Trial};
 use clap::Args;
+use serde::Serialize;
+use serde_json::json;
 
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal, status_of};
@@ -26,6 +29,29 @@ pub struct Check {
     /// Take warnings as a reason to say no (exit status 1)
     #[arg(long)]
     strict: bool,
+}
+
+/// What a graph without mistakes has.
+#[derive(Debug, Serialize)]
+struct Counts {
+    file: String,
+    channels: usize,
+    nodes: usize,
+    instances: usize,
+    outputs: usize,
+}
+
+impl Counts {
+    fn of(path: &Path, plan: &Plan) -> Self {
+        let nodes: BTreeSet<_> = plan.nodes.iter().map(|node| &node.name).collect();
+        Self {
+            file: path.display().to_string(),
+            channels: plan.sources.len(),
+            nodes: nodes.len(),
+            instances: plan.nodes.len(),
+            outputs: plan.outputs.len(),
+        }
+    }
 }
 
 /// The plan of a graph and its tests; `None` after any mistake in either, all of which are told.
@@ -69,19 +95,24 @@ impl Check {
             }
         }
         if terminal.format == Format::Json {
-            println!("{:#}", diagnostics.to_json(&sources));
+            let mut told = diagnostics.to_json(&sources);
+            told["graphs"] = fine
+                .iter()
+                .map(|(path, plan)| Counts::of(path, plan))
+                .map(|of| json!(of))
+                .collect();
+            println!("{told:#}");
         } else {
             terminal.diagnostics(&diagnostics, &sources);
             for (path, plan) in fine {
-                let nodes: std::collections::BTreeSet<_> =
-                    plan.nodes.iter().map(|node| &node.name).collect();
+                let of = Counts::of(path, &plan);
                 terminal.note(format_args!(
                     "{}: {}, {} ({}), {}",
                     path.display(),
-                    counted(plan.sources.len() as u64, "measured channel"),
-                    counted(nodes.len() as u64, "node"),
-                    counted(plan.nodes.len() as u64, "instance"),
-                    counted(plan.outputs.len() as u64, "output"),
+                    counted(of.channels as u64, "measured channel"),
+                    counted(of.nodes as u64, "node"),
+                    counted(of.instances as u64, "instance"),
+                    counted(of.outputs as u64, "output"),
                 ));
             }
         }

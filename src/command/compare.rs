@@ -1,24 +1,26 @@
 //! `athermal compare`: several graphs, fitted and scored on the same data, in one table.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::core::engine::SampleRange;
+use athermal::core::engine::{Engine, SampleRange};
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
-use athermal::core::quantity::Quantity;
-use athermal::core::score::{Lack, Trace, trace};
+use athermal::core::recording::Event;
+use athermal::core::score::{Lack, Mode, ScoreOptions, Trace, trace_as};
 use athermal::diagnosis::comparison::{BLOCKS, Column, Comparison, Contender, Row, compare};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::beyond;
 use super::data::{self, Data, FITS, recording, tell_overlap};
+use super::doubtful::Doubtful;
 use super::faults::{self, FaultWatch, Purpose};
 use super::fit::fit_without_card;
-use super::model::{self, check_limit};
+use super::model;
+use super::scored::Scored;
 use crate::figures::{count, counted, digits, matrix, number, or_dash, seconds, stated};
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
@@ -28,6 +30,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// on the instants at which all of them are valid, beside no model and persistence; one that is valid at less than half of the
 /// instants is scored on its own, and compared with none.
 ///
+/// `--mode` tells how far each model reaches by itself, as in `evaluate`: one step from measured past truths, several, or a free run.
+///
 /// Beside each score stands the standard error of its difference to the best of the column: the instants are cut, in order of
 /// time, into ten blocks of as many each, whose differences tell how much that of all of them would vary (batch means; Law and Kelton). A difference of less than
 /// two standard errors, marked ~, may be chance: of two such graphs choose the simpler one, or score them on more days.
@@ -35,7 +39,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 #[command(after_help = "Examples:
   athermal compare graphs/die-tester.toml mine.toml --data week.csv --on days.csv
   athermal compare graphs/zoo.toml --data week.csv --on days.csv \\
-      --abs-truth-below \"250 nm/min\"")]
+      --abs-truth-below \"250 nm/min\"
+  athermal compare arx.toml oe.toml --data train.csv --on test.csv --mode free-run")]
 pub struct Compare {
     /// The graphs, or models whose graphs are fitted anew
     #[arg(required = true, value_name = "GRAPH")]
@@ -45,9 +50,8 @@ pub struct Compare {
     /// The recording to score on; several files are joined as with --data
     #[arg(long, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     on: Vec<PathBuf>,
-    /// Only truths whose absolute value is below count, such as "250 nm/min"
-    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
-    abs_truth_below: Option<Quantity>,
+    #[command(flatten)]
+    scored: Scored,
 }
 
 /// A difference of fewer standard errors may be chance.
@@ -61,6 +65,9 @@ struct Fitted {
     report: FitReport,
     /// Combiners that went by too few truths where they were scored.
     lacks: Vec<Lack>,
+    /// What is doubtful in the data that it was scored on, and in those that it was fitted on, for programs.
+    doubtful: Map<String, Value>,
+    doubtful_in_fit: Map<String, Value>,
 }
 
 /// What has been told of data: graphs that read the same have the same to tell.
@@ -100,13 +107,21 @@ impl Compare {
     /// # Errors
     /// When a graph has mistakes or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let (contenders, fits) = self.fit_and_run(terminal)?;
-        let comparisons = compare(&contenders, self.abs_truth_below.as_ref());
+        let options = self.scored.options()?;
+        let (contenders, fits) = self.fit_and_run(&options, terminal)?;
+        let comparisons = compare(&contenders, options.abs_truth_below.as_ref());
         if terminal.format == Format::Json {
-            println!("{:#}", facts(&comparisons, &fits));
+            println!("{:#}", self.facts(&comparisons, &fits));
         } else {
+            let asked = self.scored.in_words();
+            for line in &asked {
+                println!("{line}");
+            }
+            if !asked.is_empty() {
+                println!();
+            }
             for comparison in &comparisons {
-                println!("{}", describe(comparison, fits.len() > 1));
+                println!("{}", describe(comparison, options.mode, fits.len() > 1));
             }
             for fit in &fits {
                 println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
@@ -125,9 +140,7 @@ impl Compare {
         let mut models = Vec::new();
         for path in &self.graphs {
             let model = model::load(path, Wanted::default(), terminal)?;
-            if let Some(limit) = &self.abs_truth_below {
-                check_limit(limit, &model)?;
-            }
+            self.scored.check(&model)?;
             models.push((path.display().to_string(), model));
         }
         let graphs = models.iter();
@@ -138,7 +151,21 @@ impl Compare {
             .collect())
     }
 
-    fn fit_and_run(&self, terminal: &Terminal) -> Result<(Vec<Contender>, Vec<Fitted>), Failure> {
+    /// What went wrong with the data, with the graph that was to read them where there are several.
+    fn of_graph(&self, path: &str, failure: Failure) -> Failure {
+        match failure {
+            Failure::Request(told) if self.graphs.len() > 1 => {
+                Failure::Request(format!("for the graph {path}: {told}"))
+            }
+            other => other,
+        }
+    }
+
+    fn fit_and_run(
+        &self,
+        scored: &ScoreOptions,
+        terminal: &Terminal,
+    ) -> Result<(Vec<Contender>, Vec<Fitted>), Failure> {
         let on = self.data.others(self.on.clone());
         if self.graphs.len() > 1 {
             self.data.check_lasting("--data")?;
@@ -153,7 +180,8 @@ impl Compare {
         for (name, path, mut model) in self.models(terminal)? {
             let began = Instant::now();
             let options = FitOptions::default();
-            let fit = fit_without_card(&mut model, &self.data, &options, terminal)?;
+            let fit = fit_without_card(&mut model, &self.data, &options, terminal)
+                .map_err(|failure| self.of_graph(&path, failure))?;
             let seconds = began.elapsed().as_secs_f64();
             once.warn(fit.doubts);
             once.note(data::without_zone(&fit.dataset.reports()));
@@ -162,12 +190,14 @@ impl Compare {
             let mut progress = terminal.progress("scoring");
             let mut ticks = 0;
             let watch = FaultWatch::new(&dataset, Purpose::Scores);
-            let trace = trace(&model.plan, &model.fitted, &watch, &mut |_, _| {
+            let mut look = |_: &Engine, _: Event| {
                 ticks += 1;
                 if ticks % 4096 == 0 {
                     progress.tell(ticks);
                 }
-            })?;
+            };
+            let trace = trace_as(&model.plan, &model.fitted, &watch, scored, &mut look)
+                .map_err(|error| self.of_graph(&path, error.into()))?;
             drop(progress);
             let reports = dataset.reports();
             let rejected = &trace.rejected;
@@ -177,14 +207,27 @@ impl Compare {
             if fits.is_empty() && !report.estimators.is_empty() {
                 self.tell_fitted_on(terminal, &report, &trace);
             }
+            let faults = watch.found();
             once.warn(faults::in_words(&fit.faults));
-            once.warn(faults::in_words(&watch.found()));
+            once.warn(faults::in_words(&faults));
+            let doubtful = Doubtful {
+                faults: &faults,
+                outside_fit: &beyond::beyond(&report.ranges, &trace.ranges),
+                reports: &reports,
+            };
+            let doubtful_in_fit = Doubtful {
+                faults: &fit.faults,
+                outside_fit: &[],
+                reports: &fit.dataset.reports(),
+            };
             fits.push(Fitted {
                 graph: name.clone(),
                 path,
                 seconds,
                 report,
                 lacks: trace.lacks.clone(),
+                doubtful: doubtful.facts(),
+                doubtful_in_fit: doubtful_in_fit.facts(),
             });
             contenders.push(Contender {
                 name,
@@ -193,6 +236,32 @@ impl Compare {
             });
         }
         Ok((contenders, fits))
+    }
+
+    fn facts(&self, comparisons: &[Comparison], fits: &[Fitted]) -> Value {
+        let of = |fit: &Fitted| {
+            let mut told = Map::new();
+            told.insert("graph".to_owned(), json!(fit.graph));
+            told.insert("file".to_owned(), json!(fit.path));
+            told.insert("fit_s".to_owned(), json!(fit.seconds));
+            told.insert("lacks".to_owned(), json!(fit.lacks));
+            told.extend(fit.doubtful.clone());
+            if !fit.doubtful_in_fit.is_empty() {
+                told.insert("in_fit".to_owned(), json!(fit.doubtful_in_fit));
+            }
+            Value::Object(told)
+        };
+        let files = |all: &mut dyn Iterator<Item = &Path>| -> Value {
+            all.map(|path| path.display().to_string()).collect()
+        };
+        let mut told = Map::new();
+        told.insert("data".to_owned(), files(&mut self.data.paths()));
+        let mut on = self.on.iter().map(PathBuf::as_path);
+        told.insert("on".to_owned(), files(&mut on));
+        told.extend(self.scored.facts());
+        told.insert("graphs".to_owned(), fits.iter().map(of).collect());
+        told.insert("comparisons".to_owned(), json!(comparisons));
+        Value::Object(told)
     }
 
     /// Tells where graphs are scored on what they were fitted on.
@@ -237,21 +306,6 @@ fn names<'a>(graphs: impl Iterator<Item = (Option<&'a str>, &'a str)> + Clone) -
         names.extend(free.find(|name| !names.contains(name)));
     }
     names
-}
-
-fn facts(comparisons: &[Comparison], fits: &[Fitted]) -> Value {
-    let graphs: Vec<_> = fits
-        .iter()
-        .map(|fit| {
-            json!({
-                "graph": fit.graph,
-                "file": fit.path,
-                "fit_s": fit.seconds,
-                "lacks": fit.lacks,
-            })
-        })
-        .collect();
-    json!({ "graphs": graphs, "comparisons": comparisons })
 }
 
 /// Tells what makes scores say less than they seem to.
@@ -312,7 +366,7 @@ fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
 }
 
 /// A table, with the names of graphs where there are several.
-fn describe(comparison: &Comparison, several: bool) -> String {
+fn describe(comparison: &Comparison, mode: Mode, several: bool) -> String {
     let columns: Vec<String> = comparison.truths.iter().map(|of| of.name.clone()).collect();
     let plain = |of: fn(&Column) -> Option<f64>| -> Vec<String> {
         let truths = comparison.truths.iter();
@@ -333,10 +387,10 @@ fn describe(comparison: &Comparison, several: bool) -> String {
         let label = format!("{indent}{} ({})", row.label(), row.kind);
         rows.push((label, cells.collect()));
     }
-    heading(comparison) + &matrix("", &columns, &rows)
+    heading(comparison, mode) + &matrix("", &columns, &rows)
 }
 
-fn heading(comparison: &Comparison) -> String {
+fn heading(comparison: &Comparison, mode: Mode) -> String {
     let counts = comparison.truths.iter().map(|truth| truth.count as u64);
     let (fewest, most) = (counts.clone().min(), counts.max());
     let instants = match (fewest, most) {
@@ -361,11 +415,16 @@ fn heading(comparison: &Comparison) -> String {
     } else {
         ""
     };
+    let ahead = stated(comparison.ahead_s);
+    // In other modes it is not how far ahead of measured truths was predicted.
+    let (ahead, then) = match mode {
+        Mode::OneStep => (format!(", {ahead} ahead"), ' '),
+        Mode::Steps(_) | Mode::FreeRun => (format!(" of what looks {ahead} ahead"), '\n'),
+    };
     format!(
-        "RMSE in {}, {} ahead, {instants}; * best, ! worse than no model\n\
+        "RMSE in {}{ahead}, {instants};{then}* best, ! worse than no model\n\
          ± standard error of the difference to the best; ~ that may be chance\n{few}{own}",
-        comparison.unit,
-        stated(comparison.ahead_s)
+        comparison.unit
     )
 }
 
@@ -429,14 +488,14 @@ mod tests {
 
     #[test]
     fn the_best_row_may_be_worse_than_no_model() {
-        assert!(describe(&one_row(100, 8.49), false).contains(" *!8.49"));
-        assert!(describe(&one_row(100, 2.0), false).contains(" *2.00"));
+        assert!(describe(&one_row(100, 8.49), Mode::OneStep, false).contains(" *!8.49"));
+        assert!(describe(&one_row(100, 2.0), Mode::OneStep, false).contains(" *2.00"));
     }
 
     #[test]
     fn with_few_instants_it_is_said_that_the_best_may_be_chance() {
-        assert!(describe(&one_row(19, 2.0), false).contains("best may be chance"));
-        assert!(!describe(&one_row(20, 2.0), false).contains("best may be chance"));
+        assert!(describe(&one_row(19, 2.0), Mode::OneStep, false).contains("best may be chance"));
+        assert!(!describe(&one_row(20, 2.0), Mode::OneStep, false).contains("best may be chance"));
     }
 
     #[test]
@@ -447,14 +506,14 @@ mod tests {
             count: 40,
             no_model: Some(2.6),
         });
-        let told = describe(&seldom, false);
+        let told = describe(&seldom, Mode::OneStep, false);
         assert!(told.contains(" 2.50 @40"), "{told}");
         assert!(told.contains("@ valid at so few instants"), "{told}");
     }
 
     #[test]
     fn of_several_graphs_each_row_stands_below_the_name_of_its_own() {
-        let told = describe(&one_row(100, 2.0), true);
+        let told = describe(&one_row(100, 2.0), Mode::OneStep, true);
         let lines: Vec<&str> = told.lines().map(str::trim_end).collect();
         let at = lines.iter().position(|line| *line == "  a").unwrap();
         assert!(lines[at + 1].starts_with("    vote (mean)"), "{told}");
@@ -462,8 +521,8 @@ mod tests {
 
     #[test]
     fn a_single_instant_is_no_plural() {
-        assert!(describe(&one_row(1, 2.0), false).contains("ahead, 1 instant; *"));
-        assert!(describe(&one_row(2, 2.0), false).contains("ahead, 2 instants; *"));
+        assert!(describe(&one_row(1, 2.0), Mode::OneStep, false).contains("ahead, 1 instant; *"));
+        assert!(describe(&one_row(2, 2.0), Mode::OneStep, false).contains("ahead, 2 instants; *"));
     }
 
     #[test]

@@ -13,7 +13,6 @@ use athermal::core::model::DataCard;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use serde_json::{Value, json};
 
 use crate::figures::{DATES_S, count, counted, instant};
 use crate::invocation::{program, quoted};
@@ -408,18 +407,4 @@ fn of_columns(report: &Report) -> String {
         named.push(format!("others in {} more", columns.len() - NAMED));
     }
     format!(" ({})", named.join(", "))
-}
-
-/// What is told to programs, with the files whose periods overlap, where there are any, under `overlaps`.
-pub fn with_overlaps(mut told: Value, reports: &[(String, Report)]) -> Value {
-    let each = |(file, report): &(String, Report)| {
-        let of =
-            |(other, rows): &(String, u64)| json!({ "file": file, "with": other, "rows": rows });
-        report.overlaps.iter().map(of).collect::<Vec<_>>()
-    };
-    let all: Vec<Value> = reports.iter().flat_map(each).collect();
-    if !all.is_empty() {
-        told["overlaps"] = all.into();
-    }
-    told
 }

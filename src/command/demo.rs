@@ -280,6 +280,7 @@ mod tests {
             truth: String::new(),
             unit: "nm/min".to_owned(),
             ahead_s: 300.0,
+            horizon_s: Some(300.0),
             n: 100,
             rmse: Some(rmse),
             r2_zero: None,

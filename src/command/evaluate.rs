@@ -1,19 +1,18 @@
 //! `athermal evaluate`: scores a model's predictions on recorded data.
 
-use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use athermal::core::compile::Wanted;
-use athermal::core::quantity::Quantity;
-use athermal::core::score::{Lack, Mode, Score, ScoreOptions, Scores, score};
-use clap::{Args, ValueEnum};
-use serde_json::json;
+use athermal::core::score::{Lack, Score, ScoreOptions, Scores, score};
+use clap::Args;
+use serde_json::{Map, Value, json};
 
 use super::beyond;
 use super::data::{self, Data};
+use super::doubtful::Doubtful;
 use super::faults::{self, FaultWatch, Purpose};
-use super::model::{check_limit, load_fitted};
-use super::numbers;
+use super::model::load_fitted;
+use super::scored::Scored;
 use crate::figures::{count, counted, number, or_dash, paragraph, seconds, stated, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -31,6 +30,11 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// R² is against no model, 1 − SSE / Σ y², and tells little of a truth that is never near zero; R²mean is against the truth's
 /// mean, 1 − SSE / Σ (y − ȳ)², the R² of scikit-learn. Fit is the share of the truth's spread that is told,
 /// 1 − √(SSE / Σ (y − ȳ)²), as identification has it.
+///
+/// Ahead is how far ahead of the measured truths that it may go by a prediction was made; with `--mode k-step` that is K − 1 steps
+/// more, where past truths change it, and in a free run without bound. Bias is the mean error, prediction less truth: above zero,
+/// more is predicted than comes. Largest is the largest error in size, and valid the share of the instants at which the truth was
+/// measured that have a prediction.
 ///
 /// Where predictions have intervals (bounds, as of `conformal`, or a standard deviation, of which 1.645 to either side are
 /// to cover nine tenths), a second table tells which share of the truths they cover, how wide they are on average, and
@@ -52,40 +56,11 @@ pub struct Evaluate {
     model: PathBuf,
     #[command(flatten)]
     data: Data,
-    /// Only truths whose absolute value is below count, such as "250 nm/min"
-    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
-    abs_truth_below: Option<Quantity>,
     /// Score each prediction on all instants of its own
     #[arg(long)]
     each_on_its_own: bool,
-    /// Let no estimator learn on the way; otherwise, what learns does so after each truth has been predicted. Votes go by recent
-    /// errors in either case
-    #[arg(long)]
-    frozen: bool,
-    /// From which past truths predictions are made; only what reads or follows past truths differs
-    #[arg(long, value_enum, default_value = "one-step")]
-    mode: Horizon,
-    /// How many steps ahead `--mode k-step` predicts
-    #[arg(
-        long,
-        value_name = "K",
-        allow_negative_numbers = true,
-        value_parser = numbers::read::<NonZeroU32>("a whole number of steps, 1 or more and below 2^32")
-    )]
-    steps: Option<NonZeroU32>,
-}
-
-/// From which past truths predictions are made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Horizon {
-    /// From those measured, as beside a machine: all that the horizon and the embargo allow
-    OneStep,
-    /// From those measured up to K steps before the predicted one; newer ones are replaced by predictions of them, and
-    /// nothing is learned from them. A step is the time from the newest truth that an estimator may read to the predicted one
-    KStep,
-    /// From its own predictions: a measured truth is read only where there is none yet, as at the beginning of a segment, and
-    /// nothing is learned from any; what follows a state is told as many as it takes to know where it is
-    FreeRun,
+    #[command(flatten)]
+    scored: Scored,
 }
 
 impl Evaluate {
@@ -95,16 +70,11 @@ impl Evaluate {
     /// When the model or the data cannot be used.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let model = load_fitted(&self.model, Wanted::SCORES, terminal)?;
-        if let Some(limit) = &self.abs_truth_below {
-            check_limit(limit, &model)?;
-        }
-        let mode = self.mode()?;
+        self.scored.check(&model)?;
         let dataset = self.data.dataset();
         let options = ScoreOptions {
-            abs_truth_below: self.abs_truth_below.clone(),
             each_on_its_own: self.each_on_its_own,
-            frozen: self.frozen,
-            mode,
+            ..self.scored.options()?
         };
         let watch = FaultWatch::new(&dataset, Purpose::Scores);
         let mut progress = terminal.progress("evaluating");
@@ -123,19 +93,23 @@ impl Evaluate {
             let period = scores.period.map(|(from, to)| {
                 json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
             });
-            let mut told = json!({
-                "data": files,
-                "mode": self.mode.name(),
-                "steps": self.steps,
-                "period": period,
-                "scores": scores.scores,
-                "lacks": scores.lacks,
-                "outside_fit": outside_fit,
-            });
-            faults::to_json(&faults, &mut told);
-            println!("{:#}", data::with_overlaps(told, &dataset.reports()));
+            let mut told = Map::from_iter([("data".to_owned(), json!(files))]);
+            told.extend(self.scored.facts());
+            let own = json!(self.each_on_its_own);
+            told.insert("each_on_its_own".to_owned(), own);
+            let mut told = Value::Object(told);
+            told["period"] = json!(period);
+            told["scores"] = json!(scores.scores);
+            told["lacks"] = json!(scores.lacks);
+            let doubtful = Doubtful {
+                faults: &faults,
+                outside_fit: &outside_fit,
+                reports: &dataset.reports(),
+            };
+            doubtful.tell(&mut told);
+            println!("{told:#}");
         } else {
-            print!("{}", describe(&scores, mode));
+            print!("{}", describe(&scores, &self.in_words()));
         }
         data::tell(
             terminal,
@@ -152,7 +126,7 @@ impl Evaluate {
             terminal.warning(told);
         }
         let none = |of: &Score| of.valid.is_some() && of.n == 0;
-        if let Some(steps) = self.steps
+        if let Some(steps) = self.scored.steps()
             && scores.scores.iter().any(none)
         {
             terminal.warning(format_args!(
@@ -170,44 +144,23 @@ impl Evaluate {
         Ok(Answer::Fine)
     }
 
-    fn mode(&self) -> Result<Mode, Failure> {
-        match (self.mode, self.steps) {
-            (Horizon::OneStep, None) => Ok(Mode::OneStep),
-            (Horizon::FreeRun, None) => Ok(Mode::FreeRun),
-            (Horizon::KStep, Some(steps)) => Ok(Mode::Steps(steps)),
-            (Horizon::KStep, None) => Err(Failure::Request(
-                "--mode k-step needs the number of steps: `--steps 3`".to_owned(),
-            )),
-            (other, Some(_)) => Err(Failure::Request(format!(
-                "--steps says how far `--mode k-step` predicts, and the mode is {}",
-                other.name()
-            ))),
+    /// How it is scored, where otherwise than usual.
+    fn in_words(&self) -> Vec<String> {
+        let mut words = self.scored.in_words();
+        if self.each_on_its_own {
+            words.push("each prediction is scored on all instants of its own".to_owned());
         }
+        words
     }
 }
 
-impl Horizon {
-    fn name(self) -> &'static str {
-        match self {
-            Self::OneStep => "one-step",
-            Self::KStep => "k-step",
-            Self::FreeRun => "free-run",
-        }
-    }
-}
-
-fn describe(scores: &Scores, mode: Mode) -> String {
+/// The tables of all truths, below what was asked for.
+fn describe(scores: &Scores, asked: &[String]) -> String {
     use std::fmt::Write as _;
-    let mut text = match mode {
-        Mode::OneStep => String::new(),
-        Mode::Steps(steps) => format!(
-            "{} ahead: no truth newer than that is read, but what was predicted of it\n\n",
-            counted(steps.get(), "step")
-        ),
-        Mode::FreeRun => {
-            "free run: no measured truth is read where there is a prediction of it\n\n".to_owned()
-        }
-    };
+    let mut text: String = asked.iter().map(|line| format!("{line}\n")).collect();
+    if !asked.is_empty() {
+        text.push('\n');
+    }
     let mut truths: Vec<&str> = scores
         .scores
         .iter()
@@ -335,11 +288,11 @@ fn percent(value: f64) -> String {
 
 fn line(score: &Score) -> Vec<String> {
     let ratio = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), share);
-    let ahead =
-        athermal::Duration::from_secs_f64(score.ahead_s).unwrap_or(athermal::Duration::ZERO);
+    // Nothing that is measured bounds how far a free run is ahead.
+    let ahead = score.horizon_s.map_or_else(|| "free".to_owned(), stated);
     let mut cells = vec![
         format!("  {}", score.output),
-        ahead.to_string(),
+        ahead,
         or_dash(score.rmse),
         ratio(score.r2_zero),
         ratio(score.r2_mean),

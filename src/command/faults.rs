@@ -10,8 +10,6 @@ use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
 use athermal::diagnosis::{health_reasons, of_truths};
-use serde::Serialize;
-use serde_json::{Map, Value, json};
 
 use crate::figures::{count, instant, number, seconds};
 use crate::terminal::Terminal;
@@ -31,12 +29,16 @@ pub enum Purpose {
 #[derive(Debug)]
 pub struct Faulty {
     purpose: Purpose,
-    channel: String,
+    /// Its name.
+    pub(super) channel: String,
     /// Whether a truth is made of it, so that its faults look like drift.
-    of_truth: bool,
-    leaps: Option<Leaps>,
-    stuck: Option<Standstill>,
-    silent: Option<Silence>,
+    pub(super) of_truth: bool,
+    /// Where it leaps.
+    pub(super) leaps: Option<Leaps>,
+    /// Where it stands still.
+    pub(super) stuck: Option<Standstill>,
+    /// Where it has no sample.
+    pub(super) silent: Option<Silence>,
 }
 
 impl Faulty {
@@ -356,29 +358,4 @@ pub fn of_standstill(of_truth: bool, purpose: Purpose) -> &'static str {
             "is the sensor stuck? Predictions from that mean little; a `health` node takes such samples out"
         }
     }
-}
-
-/// The same for programs: the channels that leap, are stuck or silent, each where there are any.
-pub fn to_json(all: &[Faulty], told: &mut Value) {
-    let mut put = |key: &str, found: Vec<Value>| {
-        if !found.is_empty() {
-            told[key] = found.into();
-        }
-    };
-    put("leaps", each(all, |of| of.leaps.as_ref()));
-    put("stuck", each(all, |of| of.stuck.as_ref()));
-    put("silent", each(all, |of| of.silent.as_ref()));
-}
-
-fn each<T: Serialize>(all: &[Faulty], fault: impl Fn(&Faulty) -> Option<&T>) -> Vec<Value> {
-    let of = |faulty: &Faulty| {
-        let mut facts = Map::new();
-        facts.insert("channel".to_owned(), json!(faulty.channel));
-        facts.insert("of_truth".to_owned(), json!(faulty.of_truth));
-        if let Value::Object(found) = json!(fault(faulty)?) {
-            facts.extend(found);
-        }
-        Some(Value::Object(facts))
-    };
-    all.iter().filter_map(of).collect()
 }

@@ -16,6 +16,7 @@ use serde_json::json;
 use super::aside::{check_apart, write_aside};
 use super::check::mistakes_in_tests;
 use super::data::{self, Data};
+use super::doubtful::Doubtful;
 use super::faults::{self, FaultWatch, Faulty, Purpose};
 use super::model;
 use super::numbers;
@@ -30,6 +31,8 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// and each fold), the condition number and the error on the rows of the fit, and writes the model: one JSON file that holds all that is
 /// needed to run. What stands in it, `athermal show MODEL --format coefficients` tells. A node that cannot be fitted is told, and gives
 /// nothing; where that is so of all, no model is written, one that is there stays, and the exit status is 1 in both cases.
+///
+/// Where orders are compared, AIC, AICc and BIC count the variance of what is left as one parameter beside the coefficients, and FPE does not.
 ///
 /// What is fed by estimators, such as a `stack`, learns from predictions of rows that those were not fitted on: all below it is
 /// fitted once more for each third of the data: four times with one such level, 13 times with two, 40 times with three.
@@ -176,8 +179,13 @@ impl Fit {
                 })
                 .collect();
             let mut told = json!({ "ticks": report.ticks, "segments": report.segments, "estimators": estimators });
-            faults::to_json(faults, &mut told);
-            println!("{:#}", data::with_overlaps(told, &dataset.reports()));
+            let doubtful = Doubtful {
+                faults,
+                outside_fit: &[],
+                reports: &dataset.reports(),
+            };
+            doubtful.tell(&mut told);
+            println!("{told:#}");
             return;
         }
         for fit in &report.estimators {

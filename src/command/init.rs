@@ -84,10 +84,13 @@ impl Init {
         if people {
             terminal.note(self.next(starter.lenient));
         } else {
-            println!(
-                "{:#}",
-                json!({ "graph": self.output, "remarks": starter.remarks })
-            );
+            let told = json!({
+                "graph": self.output,
+                "columns": starter.columns,
+                "windows": starter.windows,
+                "remarks": starter.remarks,
+            });
+            println!("{told:#}");
         }
         Ok(Answer::Fine)
     }

@@ -4,14 +4,18 @@ use std::path::{Path, PathBuf};
 
 use athermal::chart::Plot;
 use athermal::core::compile::Wanted;
+use athermal::core::engine::SampleRange;
 use athermal::core::fit::FitError;
 use athermal::core::score::Lack;
 use athermal::diagnosis::feedback;
-use athermal::report::{gather, page, plots, text};
+use athermal::report::{SensorFacts, gather, page, plots, text};
 use clap::Args;
 
 use super::aside::{check_apart, write_aside};
+use super::beyond::beyond;
 use super::data::{self, Data};
+use super::doubtful::Doubtful;
+use super::faults::{FaultWatch, Purpose};
 use super::model::load_fitted;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 
@@ -63,7 +67,8 @@ impl Report {
             .iter()
             .map(|path| path.display().to_string())
             .collect();
-        let facts = gather(&model, &dataset, names).map_err(|error| {
+        let watch = FaultWatch::new(&dataset, Purpose::Scores);
+        let facts = gather(&model, &watch, names).map_err(|error| {
             let of_a_pass = error.downcast::<FitError>();
             of_a_pass.map_or_else(outside, |error| Failure::from(*error))
         })?;
@@ -88,9 +93,17 @@ impl Report {
             );
         }
         if terminal.format == Format::Json {
-            let json = serde_json::to_string_pretty(&facts)
+            let mut told = serde_json::to_value(&facts)
                 .map_err(|error| Failure::Outside(error.to_string()))?;
-            println!("{json}");
+            let ranges = facts.course.sensors.iter().filter_map(sample_range);
+            let ranges: Vec<SampleRange> = ranges.collect();
+            let doubtful = Doubtful {
+                faults: &watch.found(),
+                outside_fit: &beyond(model.sample_ranges(), &ranges),
+                reports: &dataset.reports(),
+            };
+            doubtful.tell(&mut told);
+            println!("{told:#}");
         } else if self
             .output
             .as_deref()
@@ -116,6 +129,16 @@ impl Report {
         }
         Ok(Answer::Fine)
     }
+}
+
+/// Between which values the samples of a channel lay; none of one without a sample.
+fn sample_range(of: &SensorFacts) -> Option<SampleRange> {
+    let (lowest, highest) = of.range?;
+    Some(SampleRange {
+        channel: of.name.clone(),
+        lowest,
+        highest,
+    })
 }
 
 /// Writes pictures into a folder.

@@ -99,7 +99,19 @@ impl Simulate {
         let read = self.compensate.iter().chain(&self.schedule);
         check_apart("--output", output, read.map(|path| &**path))?;
         let rows = self.write(known.machine, output, terminal)?;
-        if output.as_os_str() != "-" && terminal.format == Format::Table {
+        if output.as_os_str() == "-" {
+            return Ok(Answer::Fine);
+        }
+        if terminal.format == Format::Json {
+            let told = json!({
+                "output": output,
+                "rows": rows,
+                "machine": name,
+                "days": self.days,
+                "seed": self.seed,
+            });
+            println!("{told:#}");
+        } else {
             terminal.note(format_args!(
                 "wrote {}: {}, {} of `{name}`, seed {}",
                 output.display(),

@@ -77,6 +77,7 @@ pub struct DayScore {
     /// The same of fits on all days but the one predicted, on the same instants: what more days are worth.
     pub all_others: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of no model.
+    #[serde(rename = "no_model")]
     pub zero: Option<f64>,
 }
 

@@ -7,13 +7,13 @@ use std::sync::Arc;
 use athermal_control::Stability;
 use athermal_core::compile::{Plan, PlannedRole};
 use athermal_core::engine::{Engine, EngineError};
-use athermal_core::model::Model;
+use athermal_core::model::{Model, Period};
 use athermal_core::quantity::Quantity;
 use athermal_core::recording::{Event, Recording};
 use athermal_core::score::{PredictionTrace, Trace, TruthTrace};
 use athermal_core::time::{Duration, Instant};
 use athermal_core::unit::Unit;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};
 use super::track::{Track, parameters, places};
@@ -29,6 +29,7 @@ pub struct Course {
     /// Samples rejected as infinite or out of range, by measured channel.
     pub rejected: Vec<(String, u64)>,
     /// First and last instant in s; segments follow each other an hour apart.
+    #[serde(rename = "period", serialize_with = "as_period")]
     pub period_s: Option<(f64, f64)>,
     /// Every predicted truth.
     pub axes: Vec<Axis>,
@@ -84,6 +85,13 @@ pub struct Voter {
     pub kind: &'static str,
     /// Its value for each truth.
     pub value: Vec<f64>,
+}
+
+/// As model cards have it.
+#[allow(clippy::ref_option)] // serde's signature
+fn as_period<S: Serializer>(period_s: &Option<(f64, f64)>, to: S) -> Result<S::Ok, S::Error> {
+    let period = period_s.map(|(from_s, to_s)| Period { from_s, to_s });
+    period.serialize(to)
 }
 
 /// The plan, with the weights of votes and the reasons of watches computed, whether or not the graph reads them.

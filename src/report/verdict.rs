@@ -23,6 +23,7 @@ pub struct Verdict {
     pub on_scale: bool,
     /// Error of the prediction on the instants on which it is scored, or, where these leave many out, wherever there is one; none
     /// where it gave nothing.
+    #[serde(rename = "rmse")]
     pub error: Option<f64>,
     /// The drift itself on the same instants: the error of no model.
     pub no_model: Option<f64>,
@@ -31,6 +32,7 @@ pub struct Verdict {
     /// The share of the instants at which it was measured that have a prediction.
     pub valid: f64,
     /// The standard error of the measured drift, in which scatter and curvature within its windows both count.
+    #[serde(rename = "truth_noise")]
     pub noise: Option<f64>,
     /// Drift over all that is corrected, without the correction.
     pub without_correction: Option<f64>,

@@ -2,6 +2,7 @@
 
 use athermal::core::unit::Unit;
 use athermal::files::Description;
+use serde_json::{Value, json};
 
 use super::Told;
 use super::clock::words;
@@ -123,6 +124,25 @@ impl Column {
             self.why,
             warnings.collect::<String>()
         ))
+    }
+
+    /// What was guessed, for programs.
+    #[must_use]
+    pub fn facts(&self) -> Value {
+        let taken_as = match self.kind {
+            Kind::Temperature => "temperature",
+            Kind::Drifting => "drifting",
+            Kind::Drive => "input",
+            Kind::Unused => "left_out",
+        };
+        let used = self.kind != Kind::Unused;
+        json!({
+            "column": self.name,
+            "taken_as": taken_as,
+            "unit": used.then_some(&self.unit),
+            "unit_known": used.then_some(self.unit_known),
+            "why": self.why,
+        })
     }
 
     /// Tells the user something of it.

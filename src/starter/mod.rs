@@ -22,6 +22,8 @@ use std::path::Path;
 use athermal::core::time::TimeFormat;
 use athermal::files::{Description, FileError, TimeForm};
 
+use column::Column;
+use serde_json::Value;
 use survey::Survey;
 use window::Choice;
 
@@ -43,6 +45,10 @@ pub struct Starter {
     pub text: String,
     /// What was found and guessed, a line each.
     pub remarks: Vec<String>,
+    /// What each column was taken for, for programs.
+    pub columns: Value,
+    /// The signal to noise of each drift against its window, for programs.
+    pub windows: Value,
     /// Whether the log has cells that only a lenient reader passes over.
     pub lenient: bool,
 }
@@ -102,9 +108,12 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
         _ => unfit(why),
     })?;
     remarks.extend(choice.remarks(&clock, &columns));
+    let columns_taken = columns.iter().map(Column::facts).collect();
     Ok(Starter {
         text: text::graph(path, &clock, &columns, &survey, &choice),
         remarks,
+        windows: choice.facts(&columns),
+        columns: columns_taken,
         lenient: survey.needs_lenience(&columns),
     })
 }

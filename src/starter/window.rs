@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 
 use athermal::diagnosis::window::{Drift, FEWEST_SAMPLES, WINDOWS_IN_RECORDING, nice_widths};
 
+use serde_json::{Value, json};
+
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
@@ -166,6 +168,26 @@ impl Choice {
             rare,
             bound,
         })
+    }
+
+    /// What was measured and chosen, for programs: every width that was tried, for each column that drifts.
+    #[must_use]
+    pub fn facts(&self, columns: &[Column]) -> Value {
+        let drifting = columns
+            .iter()
+            .filter(|column| column.kind == Kind::Drifting);
+        let of = |(nth, column): (usize, &Column)| {
+            let widths = self.candidates.iter();
+            let widths = widths.map(
+                |(window_s, ratios)| json!({ "window_s": window_s, "ratio": ratios.get(nth) }),
+            );
+            json!({
+                "column": column.name,
+                "window_s": self.drift_s,
+                "widths": widths.collect::<Vec<_>>(),
+            })
+        };
+        drifting.enumerate().map(of).collect()
     }
 
     /// What was chosen and why, for people.

@@ -98,3 +98,30 @@ fn where_nothing_could_be_scored_the_reason_is_told_and_no_diagnosis() {
         assert!(widest.unwrap() < 120, "{}", scored.out);
     }
 }
+
+#[test]
+fn more_days_are_asked_for_beside_those_of_the_fit_and_not_beside_those_of_the_test() {
+    let scratch = Scratch::new("command-line-more-days");
+    let graph = concat!(env!("CARGO_MANIFEST_DIR"), "/graphs/die-tester.toml");
+    let [train, test] = [("train.csv", "1"), ("test.csv", "2")].map(|(name, seed)| {
+        let data = scratch.path(name);
+        let of = ["simulate", "die-tester", "--days", "1", "--seed", seed];
+        let mut call: Vec<&dyn AsRef<std::ffi::OsStr>> = of.iter().map(|of| of as _).collect();
+        call.extend([&"-o" as &dyn AsRef<std::ffi::OsStr>, &data]);
+        athermal(&call).ended(0);
+        data
+    });
+    let model = scratch.path("model.json");
+    athermal(&[&"fit", &graph, &"--data", &train, &"-o", &model]).ended(0);
+    let call: [&dyn AsRef<std::ffi::OsStr>; 6] =
+        [&"diagnose", &model, &"--data", &test, &"--day", &"8h"];
+    let told = athermal(&call).ended(0).told.replace(" \\\n      ", " ");
+    let fit = format!(
+        "athermal fit {} --data {} MORE.csv -o better.json",
+        model.display(),
+        train.display()
+    );
+    let beside = "More days may still make it better; with another log beside those of the fit:";
+    assert!(told.contains(beside), "{told}");
+    assert!(told.contains(&fit), "`{fit}` is not in:\n{told}");
+}

@@ -1,5 +1,6 @@
 //! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
 
+mod days;
 mod next;
 mod responses;
 mod tables;
@@ -19,6 +20,7 @@ use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
+use super::doubtful::Doubtful;
 use super::faults::{self, FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::report::write_plots;
@@ -99,18 +101,24 @@ impl Diagnose {
         drop(bar);
         let faults = watch.found();
         let tables = Tables::new(&diagnosis, &self.of);
+        let trace = &observation.trace;
+        let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
         if terminal.format == Format::Json {
             let files = dataset.paths().iter();
             let files: Vec<_> = files.map(|path| path.display().to_string()).collect();
             let mut asked = diagnosis.clone();
             asked.keep_only(&self.of);
             let mut told = json!({ "data": files, "diagnosis": asked });
-            faults::to_json(&faults, &mut told);
+            let doubtful = Doubtful {
+                faults: &faults,
+                outside_fit: &outside_fit,
+                reports: &dataset.reports(),
+            };
+            doubtful.tell(&mut told);
             println!("{told:#}");
         } else {
             print!("{}", tables.text());
         }
-        let trace = &observation.trace;
         data::tell(
             terminal,
             &model.plan,
@@ -118,7 +126,6 @@ impl Diagnose {
             trace.refused,
             &trace.rejected,
         );
-        let outside_fit = beyond::beyond(model.sample_ranges(), &trace.ranges);
         beyond::tell(terminal, &outside_fit);
         faults::tell(terminal, &faults);
         for told in Lack::told(&diagnosis.lacks) {

@@ -1,5 +1,7 @@
 //! Decides which commands are worth trying after a diagnosis: only those that what was found asks for, two at most.
 
+use std::path::PathBuf;
+
 use athermal::Model;
 use athermal::diagnosis::lag::FeatureLags;
 use athermal::diagnosis::{Main, is_called};
@@ -14,12 +16,29 @@ impl Diagnose {
     pub(super) fn next(&self, tables: &Tables, model: &Model, drifts: bool) -> Option<String> {
         let left = self.what_is_left(tables, model);
         let left = left.or_else(|| self.wider_windows(tables).filter(|_| drifts));
-        let found: Vec<String> = left.into_iter().chain(self.more_days(tables)).collect();
+        let found: Vec<String> = left
+            .into_iter()
+            .chain(self.more_days(tables, model))
+            .collect();
         (!found.is_empty()).then(|| found.join("\n"))
     }
 
     fn command(&self, name: &str, more: &[&str]) -> String {
         let mut words = self.data.words_with(name, &self.model);
+        words.extend(more.iter().map(|&word| word.to_owned()));
+        command(&words)
+    }
+
+    /// Fits the graph anew on what the model was fitted on, since what is diagnosed is kept for tests; on what is diagnosed where the
+    /// model does not say. More data may follow.
+    fn fit(&self, model: &Model, more: &[&str]) -> String {
+        let cards = model.card.iter().flat_map(|card| &card.data);
+        let seen: Vec<PathBuf> = cards.map(|card| PathBuf::from(&card.path)).collect();
+        let mut words = if seen.is_empty() {
+            self.data.words_with("fit", &self.model)
+        } else {
+            self.data.others(seen).words_with("fit", &self.model)
+        };
         words.extend(more.iter().map(|&word| word.to_owned()));
         command(&words)
     }
@@ -59,7 +78,7 @@ impl Diagnose {
                 look,
             )
         } else {
-            let look = self.command("fit", &["--candidates", "-o again.json"]);
+            let look = self.fit(model, &["--candidates", "-o again.json"]);
             (
                 why + "which it does not use; what a fit tries before it stops:",
                 look,
@@ -68,10 +87,10 @@ impl Diagnose {
         Some(paragraph("", 0, &why) + &look)
     }
 
-    fn more_days(&self, tables: &Tables) -> Option<String> {
-        let fit = self.command("fit", &["MORE.csv", "-o better.json"]);
+    fn more_days(&self, tables: &Tables, model: &Model) -> Option<String> {
+        let fit = self.fit(model, &["MORE.csv", "-o better.json"]);
         let wanted = tables.more_days_may_help();
-        wanted.then(|| format!("More days may still make it better; with another log:\n{fit}"))
+        wanted.then(|| format!("More days may still make it better; with another log beside those of the fit:\n{fit}"))
     }
 
     /// Where what is left is white, a truth over another window may be told better.

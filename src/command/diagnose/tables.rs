@@ -1,12 +1,11 @@
 //! Decides how the facts of a diagnosis look as text, in 80 columns.
 
-use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 use athermal::diagnosis::lag::{Correlogram, FeatureLags, Lags};
 use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::{Residuals, UNLIKELY};
 use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
-use super::responses;
+use super::{days, responses};
 use crate::figures::{count, counted, matrix, number, or_dash, stated, table};
 
 /// Features that are named of each truth.
@@ -117,7 +116,7 @@ impl<'a> Tables<'a> {
         let shown = all.filter(|of| self.shows(&of.prediction));
         let shown: Vec<&str> = shown.map(|of| of.prediction.as_str()).collect();
         let days = self.diagnosis.days.as_ref();
-        days.is_some_and(|days| days.count > 2 && enough(days, &shown).is_none())
+        days.is_some_and(|days| days.count > 2 && days::enough(days, &shown).is_none())
     }
 
     fn lags(&self) -> String {
@@ -306,7 +305,7 @@ impl<'a> Tables<'a> {
         let Some(days) = &self.diagnosis.days else {
             return String::new();
         };
-        self.of_each_unit(|unit, shown| days_in(days, unit, shown))
+        self.of_each_unit(|unit, shown| days::text(days, unit, shown))
     }
 
     fn windows(&self) -> String {
@@ -411,71 +410,6 @@ fn residuals(shown: &[&Residuals]) -> String {
     )
 }
 
-/// On how many days a fit comes near those on all others, of all predictions shown; none where on all of them only.
-fn enough(days: &Days, shown: &[&str]) -> Option<usize> {
-    let near = |point: &CurvePoint| {
-        let scores = point.scores.iter();
-        let mut of_shown = scores.filter(|score| shown.contains(&score.prediction.as_str()));
-        of_shown.all(|score| score.ratio().is_none_or(|ratio| ratio <= ENOUGH))
-    };
-    let last_far = days.curve.iter().rposition(|point| !near(point));
-    let first_near = days.curve.get(last_far.map_or(0, |last| last + 1))?;
-    (first_near.days < days.count - 1).then_some(first_near.days)
-}
-
-fn days_in(days: &Days, unit: &str, shown: &[&str]) -> String {
-    let enough = enough(days, shown);
-    let shown: Vec<String> = shown.iter().map(|&name| name.to_owned()).collect();
-    let cells = |scores: &[DayScore], cell: fn(&DayScore) -> Option<f64>| -> Vec<String> {
-        let of = |name: &String| scores.iter().find(|score| score.prediction == *name);
-        let texts = shown.iter().map(|name| or_dash(of(name).and_then(cell)));
-        texts.collect()
-    };
-    let left_out = days.left_out.iter();
-    let left_out = left_out.map(|of| {
-        let label = format!("day {}", of.day);
-        (label, cells(&of.scores, |score| score.rmse))
-    });
-    let scores = days.curve.iter().flat_map(|point| &point.scores);
-    let mut of_shown = scores.filter(|score| shown.contains(&score.prediction));
-    let compares = of_shown.any(|score| score.ratio().is_some());
-    let curve = days.curve.iter().map(|point| {
-        let (days, fits) = (point.days as u64, point.fits as u64);
-        let label = format!("{} ({})", counted(days, "day"), counted(fits, "fit"));
-        (label, cells(&point.scores, DayScore::ratio))
-    });
-    let (left_out, curve): (Vec<_>, Vec<_>) = (left_out.collect(), curve.collect());
-    let most = days.count - 1;
-    let verdict = match enough {
-        _ if most == 1 => "two are too few to tell",
-        _ if !compares => "nothing to compare",
-        Some(enough) => {
-            let days = counted(enough as u64, "day");
-            let verb = if enough == 1 { "is" } else { "are" };
-            &format!("{days} {verb} enough to come within 5 % of {most}")
-        }
-        None => "more days may still make it better",
-    };
-    let of_day = if days.day_s == 86_400.0 {
-        String::new()
-    } else {
-        format!(" of {}", seconds(days.day_s))
-    };
-    let curve = match most {
-        1 => String::new(),
-        _ => format!(
-            "RMSE of fits on so many days in a row, 1 being that of fits on {most} days, on the\n\
-             same days, which no fit has seen\n{}",
-            matrix("fitted on", &shown, &curve)
-        ),
-    };
-    format!(
-        "RMSE in {unit} of each day{of_day}, predicted by a fit on all others\n{}\
-         how many days are needed: {verdict}\n{curve}",
-        matrix("left out", &shown, &left_out)
-    )
-}
-
 /// Whether a prediction is what an instance puts out: `thermal.Z1` is, of itself and of `thermal`.
 pub(super) fn is_of(prediction: &str, node: &str) -> bool {
     let rest = prediction.strip_prefix(node);
@@ -531,7 +465,7 @@ fn defined(value: f64) -> Option<f64> {
 }
 
 /// A length of time, to the second where it is longer than a minute, and to the minute where it is longer than an hour.
-fn seconds(seconds: f64) -> String {
+pub(super) fn seconds(seconds: f64) -> String {
     let to = match seconds.abs() {
         size if size > 3600.0 => 60.0,
         size if size > 60.0 => 1.0,

@@ -10,7 +10,7 @@ use super::state::NodeState;
 use super::{EngineError, Mode};
 use crate::compile::{Gather, PlannedNode, PlannedRole, TruthLink};
 use crate::node::{FeatureFit, LinearForm, Predictor, Regressor, Restored};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// Where each of the regressors that a fit uses is among those of its node.
 ///
@@ -147,6 +147,13 @@ impl Estimate {
         if let Some(learning) = &mut self.learning {
             learning.predict_in(mode);
         }
+    }
+
+    /// How long a step of it is; none where no past truth changes what it predicts in the mode that it is in.
+    pub(crate) fn step(&self) -> Option<Duration> {
+        let read = self.feedback.as_ref().map(|feedback| feedback.step());
+        let followed = self.learning.as_ref().map(|learning| learning.step());
+        read.max(followed)
     }
 
     /// How many regressors it reads.

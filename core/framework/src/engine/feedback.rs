@@ -93,6 +93,11 @@ impl Feedback {
         })
     }
 
+    /// How long a step is, by the last truths where it was not planned.
+    pub(crate) fn step(&self) -> Duration {
+        self.step.length()
+    }
+
     /// A truth of this tick that the run may read belongs to an earlier run; where there is no horizon, to the one to come.
     pub(crate) fn before_run(&mut self, slots: &Slots, now: Instant) {
         let slot = self.link.slot;

@@ -84,6 +84,11 @@ impl Learning {
         self.mode = mode;
     }
 
+    /// How long a step is, by the last truths where it was not planned.
+    pub(crate) fn step(&self) -> Duration {
+        self.step.length()
+    }
+
     /// The newest arrival that a prediction made at `now` may know of.
     fn newest(&self, now: Instant) -> Instant {
         let newest = self.withheld.newest(now);

@@ -261,6 +261,14 @@ impl Engine {
         self.work = work(&self.plan, &self.nodes);
     }
 
+    /// How long a step of a node is; none where no past truth changes what it predicts in the mode of the engine.
+    pub(crate) fn step_of(&self, node: usize) -> Option<Duration> {
+        match self.nodes.get(node) {
+            Some(Running::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
+            _ => None,
+        }
+    }
+
     /// Whether learning has been frozen on command.
     #[must_use]
     pub fn frozen(&self) -> bool {

@@ -21,7 +21,7 @@ pub enum Mode {
 
 impl Mode {
     /// How much earlier than in one step the newest truth must have arrived that is told at all.
-    pub(super) fn earlier(self, step: Duration) -> Duration {
+    pub(crate) fn earlier(self, step: Duration) -> Duration {
         match self {
             Self::OneStep | Self::FreeRun => Duration::ZERO,
             Self::Steps(steps) => times(step, i64::from(steps.get()) - 1),

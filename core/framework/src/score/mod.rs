@@ -12,7 +12,7 @@ pub use crate::engine::Mode;
 pub use evidence::Lack;
 pub use interval::IntervalScore;
 pub use table::{RESTRICTS, Score, Scores, hide_much};
-pub use trace::{PredictionTrace, Trace, TruthTrace, trace};
+pub use trace::{PredictionTrace, Trace, TruthTrace, trace, trace_as};
 pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;

@@ -9,7 +9,7 @@ use super::{IntervalScore, Lack, Mode, ScoreOptions};
 use crate::channel::Extremes;
 use crate::compile::Plan;
 use crate::engine::{Engine, SampleRange};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// The share of instants below which a prediction does not restrict those on which the others are scored.
 pub const RESTRICTS: f64 = 0.5;
@@ -49,7 +49,11 @@ pub struct Score {
     pub unit: String,
     /// Its horizon in seconds.
     pub ahead_s: f64,
+    /// How far ahead of the measured truths that it may go by it was scored, in seconds: its horizon, and over several steps as many
+    /// steps more as there are beyond the first, where past truths change it; none in a free run, where it goes by its own.
+    pub horizon_s: Option<f64>,
     /// Instants scored.
+    #[serde(rename = "count")]
     pub n: usize,
     /// Root mean square error.
     pub rmse: Option<f64>,
@@ -66,9 +70,11 @@ pub struct Score {
     /// Share of the instants with a truth within the limit at which there is a prediction.
     pub valid: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of predicting zero.
+    #[serde(rename = "no_model")]
     pub baseline_zero: Option<f64>,
     /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so
     /// many steps back, on the same instants; none in a free run, which would repeat the first truth of each segment.
+    #[serde(rename = "persistence")]
     pub baseline_persistence: Option<f64>,
     /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines: both the
     /// scatter of the samples and the curvature of what they follow count, and a prediction may come below it.
@@ -110,6 +116,7 @@ pub(super) fn table(
     ticks: u64,
     options: &ScoreOptions,
 ) -> Scores {
+    let earlier = earlier(plan, engine, options.mode);
     Scores {
         period,
         ticks,
@@ -119,13 +126,34 @@ pub(super) fn table(
         scores: watch
             .truths
             .iter()
-            .flat_map(|truth| scores(plan, truth, options))
+            .flat_map(|truth| scores(plan, truth, options, &earlier))
             .collect(),
         lacks: super::evidence::lacks(&watch.tallies),
     }
 }
 
-fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
+/// For each node how much earlier than in one step the truths lie that it goes by, itself or through what it is made of; none where
+/// it goes by its own predictions of them.
+fn earlier(plan: &Plan, engine: &Engine, mode: Mode) -> Vec<Option<Duration>> {
+    let mut found = vec![Some(Duration::ZERO); plan.nodes.len()];
+    for (nth, node) in plan.nodes.iter().enumerate() {
+        let own = match engine.step_of(nth) {
+            Some(_) if mode == Mode::FreeRun => None,
+            step => Some(mode.earlier(step.unwrap_or(Duration::ZERO))),
+        };
+        let entries = node.role.inputs().flat_map(|of| &plan.gathers[of].entries);
+        let inputs = entries.filter_map(|entry| plan.channels[entry.slot].node);
+        found[nth] = inputs.fold(own, |most, input| Some(most?.max(found[input]?)));
+    }
+    found
+}
+
+fn scores(
+    plan: &Plan,
+    truth: &Truth,
+    options: &ScoreOptions,
+    earlier: &[Option<Duration>],
+) -> Vec<Score> {
     let of = &plan.channels[truth.slot];
     let limit = options
         .abs_truth_below
@@ -193,6 +221,7 @@ fn scores(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<Score> {
                 truth: of.name.clone(),
                 unit: of.channel.unit.difference().to_string(),
                 ahead_s: prediction.ahead.secs(),
+                horizon_s: earlier[prediction.node].map(|more| (prediction.ahead + more).secs()),
                 n,
                 rmse: root_mean_square(errors()),
                 r2_zero: share(about_zero),

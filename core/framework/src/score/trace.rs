@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Lack, Mode, Watch, evidence};
+use super::{Lack, Mode, ScoreOptions, Watch, evidence};
 use crate::compile::Plan;
 use crate::engine::{Engine, Fitted, SampleRange};
 use crate::fit::{FitError, drive};
@@ -40,7 +40,8 @@ pub struct TruthTrace {
     pub errors: Vec<f64>,
     /// What was predicted of it.
     pub predictions: Vec<PredictionTrace>,
-    /// For each horizon the truth at the smallest lag that sees nothing of the answer; NaN where there was none.
+    /// For each horizon the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so many steps
+    /// back; NaN where there was none. Empty in a free run, which would repeat the first truth of each segment.
     pub persistence: BTreeMap<Duration, Vec<f64>>,
 }
 
@@ -68,8 +69,24 @@ pub fn trace(
     recording: &dyn Recording,
     look: &mut dyn FnMut(&Engine, Event),
 ) -> Result<Trace, FitError> {
+    trace_as(plan, fitted, recording, &ScoreOptions::default(), look)
+}
+
+/// The same in another mode, or with nothing learned on the way. What is left out of scores is not left out here.
+///
+/// # Errors
+/// When the recording cannot be read, or the fit does not belong to the plan.
+pub fn trace_as(
+    plan: &Arc<Plan>,
+    fitted: &Fitted,
+    recording: &dyn Recording,
+    options: &ScoreOptions,
+    look: &mut dyn FnMut(&Engine, Event),
+) -> Result<Trace, FitError> {
     let mut engine = Engine::new(Arc::clone(plan), fitted)?;
-    let mut watch = Watch::new(plan, Mode::OneStep);
+    engine.freeze(options.frozen);
+    engine.predict_in(options.mode);
+    let mut watch = Watch::new(plan, options.mode);
     let mut times = vec![Vec::new(); watch.truths.len()];
     let mut segment = 0;
     let passed = drive(&mut engine, recording, |engine, event| {
@@ -106,6 +123,7 @@ pub fn trace(
         persistence: truth
             .persistences
             .into_iter()
+            .filter(|_| options.mode != Mode::FreeRun)
             .map(|(ahead, persistence)| (ahead, persistence.values))
             .collect(),
     });

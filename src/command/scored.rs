@@ -1,0 +1,143 @@
+//! Decides how scoring is asked for on the command line, and how what was asked for is told beside the scores.
+
+use std::num::NonZeroU32;
+
+use athermal::Model;
+use athermal::core::quantity::Quantity;
+use athermal::core::score::{Mode, ScoreOptions};
+use clap::{Args, ValueEnum};
+use serde_json::{Map, Value, json};
+
+use super::model::check_limit;
+use super::numbers;
+use crate::figures::counted;
+use crate::terminal::Failure;
+
+/// How predictions are scored.
+#[derive(Debug, Args)]
+pub struct Scored {
+    /// Only truths whose absolute value is below count, such as "250 nm/min"
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
+    abs_truth_below: Option<Quantity>,
+    /// Let no estimator learn on the way; otherwise, what learns does so after each truth has been predicted. Votes go by recent
+    /// errors in either case
+    #[arg(long)]
+    frozen: bool,
+    /// From which past truths predictions are made; only what reads or follows past truths differs
+    #[arg(long, value_enum, default_value = "one-step")]
+    mode: Horizon,
+    /// How many steps ahead `--mode k-step` predicts
+    #[arg(
+        long,
+        value_name = "K",
+        allow_negative_numbers = true,
+        value_parser = numbers::read::<NonZeroU32>("a whole number of steps, 1 or more and below 2^32")
+    )]
+    steps: Option<NonZeroU32>,
+}
+
+/// From which past truths predictions are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Horizon {
+    /// From those measured, as beside a machine: all that the horizon and the embargo allow
+    OneStep,
+    /// From those measured up to K steps before the predicted one; newer ones are replaced by predictions of them, and
+    /// nothing is learned from them. A step is the time from the newest truth that an estimator may read to the predicted one
+    KStep,
+    /// From its own predictions: a measured truth is read only where there is none yet, as at the beginning of a segment, and
+    /// nothing is learned from any; what follows a state is told as many as it takes to know where it is
+    FreeRun,
+}
+
+impl Scored {
+    /// The same for the program's own functions.
+    ///
+    /// # Errors
+    /// When mode and steps do not go together.
+    pub fn options(&self) -> Result<ScoreOptions, Failure> {
+        Ok(ScoreOptions {
+            abs_truth_below: self.abs_truth_below.clone(),
+            each_on_its_own: false,
+            frozen: self.frozen,
+            mode: self.mode()?,
+        })
+    }
+
+    /// Refuses a limit that truths of a model cannot have.
+    ///
+    /// # Errors
+    /// When there is one.
+    pub fn check(&self, model: &Model) -> Result<(), Failure> {
+        match &self.abs_truth_below {
+            Some(limit) => check_limit(limit, model),
+            None => Ok(()),
+        }
+    }
+
+    /// How many steps ahead is predicted, where that was asked for.
+    pub fn steps(&self) -> Option<NonZeroU32> {
+        self.steps
+    }
+
+    fn mode(&self) -> Result<Mode, Failure> {
+        match (self.mode, self.steps) {
+            (Horizon::OneStep, None) => Ok(Mode::OneStep),
+            (Horizon::FreeRun, None) => Ok(Mode::FreeRun),
+            (Horizon::KStep, Some(steps)) => Ok(Mode::Steps(steps)),
+            (Horizon::KStep, None) => Err(Failure::Request(
+                "--mode k-step needs the number of steps: `--steps 3`".to_owned(),
+            )),
+            (other, Some(_)) => Err(Failure::Request(format!(
+                "--steps says how far `--mode k-step` predicts, and the mode is {}",
+                other.name()
+            ))),
+        }
+    }
+
+    /// For people: a line for each that is in force, none as a rule.
+    pub fn in_words(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        match (self.mode, self.steps) {
+            (Horizon::KStep, Some(steps)) => lines.push(format!(
+                "{} ahead: no truth newer than that is read, but what was predicted of it",
+                counted(steps.get(), "step")
+            )),
+            (Horizon::FreeRun, _) => lines.push(
+                "free run: no measured truth is read where there is a prediction of it".to_owned(),
+            ),
+            _ => {}
+        }
+        if let Some(limit) = &self.abs_truth_below {
+            lines.push(format!(
+                "only truths whose absolute value is below {limit} count"
+            ));
+        }
+        if self.frozen {
+            lines.push("no estimator learns on the way".to_owned());
+        }
+        lines
+    }
+
+    /// For programs.
+    pub fn facts(&self) -> Map<String, Value> {
+        let limit = self.abs_truth_below.as_ref().map(Quantity::to_string);
+        let facts = [
+            ("mode", json!(self.mode.name())),
+            ("steps", json!(self.steps)),
+            ("abs_truth_below", json!(limit)),
+            ("frozen", json!(self.frozen)),
+        ];
+        let facts = facts.into_iter();
+        facts.map(|(key, fact)| (key.to_owned(), fact)).collect()
+    }
+}
+
+impl Horizon {
+    fn name(self) -> &'static str {
+        match self {
+            Self::OneStep => "one-step",
+            Self::KStep => "k-step",
+            Self::FreeRun => "free-run",
+        }
+    }
+}
