@@ -391,10 +391,7 @@ fn scores_say_how_much_they_leave_out_where_one_of_several_predictions_fell_sile
     let alone = rmse(&[&"--each-on-its-own", &"--format", &"json"]);
     assert!(alone > 2.0 * together, "{together} {alone}");
     let facts = athermal_on("report", &model, &data, &[&"--format", &"json"]).ended(0);
-    assert_eq!(
-        facts.json()["verdicts"][0]["error"].as_f64().unwrap(),
-        alone
-    );
+    assert_eq!(facts.json()["verdicts"][0]["rmse"].as_f64().unwrap(), alone);
     athermal_on("compare", &graph, &sound, &[&"--on", &data])
         .ended(0)
         .tells(&[

@@ -240,28 +240,28 @@ impl Compare {
 
     fn facts(&self, comparisons: &[Comparison], fits: &[Fitted]) -> Value {
         let of = |fit: &Fitted| {
-            let mut told = Map::new();
-            told.insert("graph".to_owned(), json!(fit.graph));
-            told.insert("file".to_owned(), json!(fit.path));
-            told.insert("fit_s".to_owned(), json!(fit.seconds));
-            told.insert("lacks".to_owned(), json!(fit.lacks));
-            told.extend(fit.doubtful.clone());
-            if !fit.doubtful_in_fit.is_empty() {
-                told.insert("in_fit".to_owned(), json!(fit.doubtful_in_fit));
+            let mut told = json!({
+                "graph": fit.graph,
+                "file": fit.path,
+                "fit_s": fit.seconds,
+                "lacks": fit.lacks,
+            });
+            for (key, found) in &fit.doubtful {
+                told[key] = found.clone();
             }
-            Value::Object(told)
+            if !fit.doubtful_in_fit.is_empty() {
+                told["in_fit"] = json!(fit.doubtful_in_fit);
+            }
+            told
         };
-        let files = |all: &mut dyn Iterator<Item = &Path>| -> Value {
-            all.map(|path| path.display().to_string()).collect()
-        };
-        let mut told = Map::new();
-        told.insert("data".to_owned(), files(&mut self.data.paths()));
-        let mut on = self.on.iter().map(PathBuf::as_path);
-        told.insert("on".to_owned(), files(&mut on));
-        told.extend(self.scored.facts());
-        told.insert("graphs".to_owned(), fits.iter().map(of).collect());
-        told.insert("comparisons".to_owned(), json!(comparisons));
-        Value::Object(told)
+        let name = |path: &Path| path.display().to_string();
+        let data: Vec<_> = self.data.paths().map(name).collect();
+        let on: Vec<_> = self.on.iter().map(|path| name(path)).collect();
+        let mut told = json!({ "data": data, "on": on });
+        self.scored.tell(&mut told);
+        told["graphs"] = fits.iter().map(of).collect();
+        told["comparisons"] = json!(comparisons);
+        told
     }
 
     /// Tells where graphs are scored on what they were fitted on.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use athermal::core::compile::Wanted;
 use athermal::core::score::{Lack, Score, ScoreOptions, Scores, score};
 use clap::Args;
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use super::beyond;
 use super::data::{self, Data};
@@ -93,11 +93,9 @@ impl Evaluate {
             let period = scores.period.map(|(from, to)| {
                 json!({ "from_s": seconds(from), "to_s": seconds(to), "ticks": scores.ticks })
             });
-            let mut told = Map::from_iter([("data".to_owned(), json!(files))]);
-            told.extend(self.scored.facts());
-            let own = json!(self.each_on_its_own);
-            told.insert("each_on_its_own".to_owned(), own);
-            let mut told = Value::Object(told);
+            let mut told = json!({ "data": files });
+            self.scored.tell(&mut told);
+            told["each_on_its_own"] = self.each_on_its_own.into();
             told["period"] = json!(period);
             told["scores"] = json!(scores.scores);
             told["lacks"] = json!(scores.lacks);

@@ -6,7 +6,7 @@ use athermal::Model;
 use athermal::core::quantity::Quantity;
 use athermal::core::score::{Mode, ScoreOptions};
 use clap::{Args, ValueEnum};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::model::check_limit;
 use super::numbers;
@@ -118,17 +118,13 @@ impl Scored {
         lines
     }
 
-    /// For programs.
-    pub fn facts(&self) -> Map<String, Value> {
+    /// For programs: adds all that could be asked for to an object.
+    pub fn tell(&self, told: &mut Value) {
         let limit = self.abs_truth_below.as_ref().map(Quantity::to_string);
-        let facts = [
-            ("mode", json!(self.mode.name())),
-            ("steps", json!(self.steps)),
-            ("abs_truth_below", json!(limit)),
-            ("frozen", json!(self.frozen)),
-        ];
-        let facts = facts.into_iter();
-        facts.map(|(key, fact)| (key.to_owned(), fact)).collect()
+        told["mode"] = self.mode.name().into();
+        told["steps"] = json!(self.steps);
+        told["abs_truth_below"] = json!(limit);
+        told["frozen"] = self.frozen.into();
     }
 }
 

@@ -400,7 +400,7 @@ pub struct TriedOrder {
     /// The same for programs: each letter with its number.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub letters: BTreeMap<String, usize>,
-    /// How many coefficients it has.
+    /// How many coefficients it has. AIC, AICc and BIC count the variance of what is left beside them, FPE does not.
     pub coefficients: usize,
     /// Akaike's information criterion.
     #[serde(with = "crate::model::number")]
