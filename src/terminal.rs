@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use athermal::ModelError;
 use athermal::core::diagnostic::{Diagnostic, Diagnostics, Severity, Sources};
+use athermal::core::fault::FaultError;
 use athermal::core::fit::FitError;
 use athermal::core::live::RunError;
 use athermal::files::FileError;
@@ -330,6 +331,7 @@ impl From<RunError> for Failure {
 pub fn outside(error: Box<dyn std::error::Error + Send + Sync>) -> Failure {
     match error.downcast::<FileError>() {
         Ok(error) => (*error).into(),
+        Err(error) if error.is::<FaultError>() => Failure::Request(error.to_string()),
         Err(error) => Failure::Outside(error.to_string()),
     }
 }

@@ -157,7 +157,9 @@ expect = [{ of = "slopes.room", at = "5min", equals = "60 mK/min", within = 1e-6
 "#;
     let told = told("late-fault", tests, 2);
     assert!(
-        told.contains("the fault of `temperature.room` begins 1d after the first row, and the data last 9min55s"),
+        told.contains(
+            "the fault of `temperature.room` begins 1d after the first row, and the data last 10min"
+        ),
         "{told}"
     );
 }

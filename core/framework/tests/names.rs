@@ -119,7 +119,7 @@ fn the_kit_says_so_before_anything_else() {
         [
             "names: the name of the state `kept/1` is taken twice, by `athermal-core` and `keepers`\n  to do: take another name, and \
           begin those of states and predictors with that of the kind: all crates of a program share them. Ports and kinds are a \
-          letter, then letters, digits, `_` and `-`"
+          letter, then letters, digits, `_` and `-`; a feature of several output ports tells them by `ports`"
         ]
     );
 }

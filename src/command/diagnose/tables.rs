@@ -142,7 +142,7 @@ impl<'a> Tables<'a> {
                         format!("  {title}: too short a recording to tell")
                     }
                     (true, _) => format!("  {title}: nothing"),
-                    (_, true) => format!("  {title}, and {more} features more"),
+                    (_, true) => format!("  {title}, and {} more", counted(more as u64, "feature")),
                     _ => format!("  {title}"),
                 };
                 rows.push(vec![told]);

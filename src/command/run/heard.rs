@@ -44,7 +44,7 @@ impl<'a, S> Heard<'a, S> {
             false => String::new(),
         };
         terminal.warning(format_args!(
-            "no output has a value in any of the {} rows{pace}: {} gives nothing",
+            "no output has a value in any of the {} rows{pace}; the first to lack one is {}",
             count(self.rows),
             silent_node(plan, engine, output.slot)
         ));
