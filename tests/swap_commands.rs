@@ -165,6 +165,25 @@ fn a_graph_that_looks_back_further_than_the_past_reaches_says_how_far() {
 }
 
 #[test]
+fn what_goes_by_all_of_its_past_is_told_to_know_the_last_of_it() {
+    let scratch = desk("endless");
+    let voting = |shape: &str| {
+        format!(
+            "schema = 1\nextends = \"graph.toml\"\nname = \"voting\"\n\
+             [nodes.vote]\ntype = \"hedge\"\n{shape}inputs = {{ voters = [\"model:same\", \"model:still\"], truth = \"drift.Z\" }}\n\
+             [outputs]\npredicted = \"vote\"\n"
+        )
+    };
+    scratch.file("endless.toml", voting(""));
+    scratch.file("fading.toml", voting("half_life = \"10s\"\n"));
+    let told = "vote: goes by all of its past, of which 90s is known";
+    let endless = run(&scratch, &[&swap(&scratch, "100s", "endless.toml")]).ended(0);
+    endless.tells(&[told]);
+    let fading = run(&scratch, &[&swap(&scratch, "100s", "fading.toml")]).ended(0);
+    assert!(!fading.told.contains("all of its past"), "{}", fading.told);
+}
+
+#[test]
 fn a_graph_of_another_machine_is_told_by_the_outputs_that_it_leaves_empty() {
     let scratch = desk("silent");
     scratch.file("data.csv", format!("time_s,Z\n{}", rows(1000, 400)));

@@ -514,6 +514,15 @@ fn report(path: &Path, staged: &Staged) -> String {
         };
         let _ = write!(text, "\n  {}: {word}, {why}", node.node);
     }
+    let (past, endless) = staged.endless();
+    if !endless.is_empty() {
+        let _ = write!(
+            text,
+            "\n  {}: goes by all of its past, of which {} is known",
+            endless.join(", "),
+            length(past)
+        );
+    }
     if let Some((past, wanted)) = staged.too_short_a_past() {
         let _ = write!(
             text,

@@ -338,7 +338,7 @@ impl<'g> Resolver<'g> {
         }
         let (memory, endless) = match instance.read.spec.role() {
             Role::Feature(feature) => (feature.memory(), feature.is_endless()),
-            Role::Combiner(combiner) => (combiner.memory(), false),
+            Role::Combiner(combiner) => (combiner.memory(), combiner.is_endless()),
             Role::Estimator(_) => (Duration::ZERO, false),
         };
         self.sound(instance, KindFault::of_memory(memory))?;

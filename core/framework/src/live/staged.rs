@@ -50,10 +50,21 @@ impl Staged {
         (self.past, silent.map(|(output, _)| &*output.name).collect())
     }
 
+    /// How much of the past there was to warm it by, and the nodes warmed by it that go by all of theirs, which no past brings back.
+    #[must_use]
+    pub fn endless(&self) -> (Duration, Vec<&str>) {
+        let nodes = self.seated.engine.plan().nodes.iter().zip(&self.carry);
+        let endless = nodes.filter(|(node, carry)| node.endless && is_warmed(carry));
+        (self.past, endless.map(|(_, carry)| &*carry.node).collect())
+    }
+
     fn is_warmed(&self) -> bool {
-        let is_warmed = |node: &NodeCarry| matches!(node.outcome, Carry::Warmed { .. });
         self.carry.iter().any(is_warmed)
     }
+}
+
+fn is_warmed(node: &NodeCarry) -> bool {
+    matches!(node.outcome, Carry::Warmed { .. })
 }
 
 /// What becomes of each node of an engine where nothing is known of what runs.
