@@ -37,11 +37,15 @@ impl Resolver<'_> {
         closes: bool,
     ) -> Option<()> {
         let encoder = feature.encoder();
-        let lags = encoder.map_or_else(|| vec![Duration::ZERO], |encoder| encoder.lags());
-        let sound = self.sound(instance, KindFault::of_encoder(&lags)).is_some();
+        let mut lags = encoder.map_or_else(|| vec![Duration::ZERO], |encoder| encoder.lags());
+        // Lags may follow from parameters that are wrong, which is then the mistake; the rest is looked at without them.
+        let faults: Vec<KindFault> = KindFault::of_encoder(&lags).into_iter().collect();
+        if !faults.is_empty() {
+            lags = vec![Duration::ZERO];
+        }
         let mut ports = Vec::new();
         let mut gathers = Vec::new();
-        let mut whole = sound;
+        let mut whole = true;
         for port in (instance.kind.inputs)() {
             if closes {
                 ports.push((*port, Vec::new()));
@@ -82,7 +86,10 @@ impl Resolver<'_> {
                 return None;
             }
         };
-        self.sound(instance, KindFault::of_outputs(&outputs))?;
+        self.sound(
+            instance,
+            faults.into_iter().chain(KindFault::of_outputs(&outputs)),
+        )?;
         self.doubts(instance, feature.warnings(&inputs));
         let widths = outputs.iter().map(|port| (port.name, port.channels.len()));
         let behind = self.behind(feature, &slots, widths);
