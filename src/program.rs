@@ -3,6 +3,7 @@
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
+use athermal::core::diagnostic::said;
 use clap::Parser;
 
 use crate::terminal::{Answer, Failure};
@@ -69,10 +70,7 @@ fn told_in_a_line() {
 }
 
 fn in_a_line(panic: &PanicHookInfo<'_>) -> String {
-    let payload = panic.payload();
-    let owned = payload.downcast_ref::<String>().map(String::as_str);
-    let said = owned.or_else(|| payload.downcast_ref::<&str>().copied());
-    let said = said.unwrap_or("it does not say why");
+    let said = said(panic.payload());
     match panic.location() {
         Some(place) => format!("panic at {place}: {said}"),
         None => format!("panic: {said}"),

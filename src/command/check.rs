@@ -108,7 +108,7 @@ impl Check {
                 let of = Counts::of(path, &plan);
                 terminal.note(format_args!(
                     "{}: {}, {} ({}), {}",
-                    path.display(),
+                    of.file,
                     counted(of.channels as u64, "measured channel"),
                     counted(of.nodes as u64, "node"),
                     counted(of.instances as u64, "instance"),

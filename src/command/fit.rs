@@ -347,7 +347,9 @@ fn width(steps: &[&SelectionStep], candidates: bool) -> usize {
         .filter(|_| candidates)
         .map(|tried| tried.name.chars().count());
     let taken = steps.iter().map(|step| step.label().chars().count());
-    taken.chain(tried).max().unwrap_or(0)
+    // A width of `format!` ends there, and a name may be longer.
+    let most = usize::from(u16::MAX);
+    taken.chain(tried).max().unwrap_or(0).min(most)
 }
 
 /// What is told of one fitted node.

@@ -106,7 +106,10 @@ pub fn plots(diagnosis: &Diagnosis, asked: &[String]) -> Vec<Plot> {
         .collect();
     let is_main = |name: &str| main.iter().any(|main| main.prediction == name);
     // All that are asked for by name, as in the tables.
-    let shown = |name: &str| is_main(name) || !asked.is_empty() && is_asked(name, asked);
+    let shown = |name: &str| match asked {
+        [] => is_main(name),
+        asked => is_asked(name, asked),
+    };
     let residuals = diagnosis.residuals.iter();
     let residuals: Vec<&Residuals> = residuals.filter(|of| shown(&of.prediction)).collect();
     for of in residuals.iter().filter(|of| !of.bound.is_empty()) {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use athermal_core::compile::{Plan, PlannedRole, SourceChannel};
 use athermal_core::engine::{Engine, SampleRange};
+use athermal_numerics::robust_deviation;
 use serde::Serialize;
 
 use super::figure;
@@ -38,7 +39,7 @@ pub struct SensorFacts {
     pub most_unchanged: u64,
     /// Where it leaps, of a temperature and of what a truth is made of.
     pub leaps: Option<Leaps>,
-    /// The standard deviation of the noise of single samples: the median of the absolute second differences over 0.6745 √6, which
+    /// The standard deviation of the noise of single samples: the robust deviation of second differences over √6, which
     /// a steady change leaves alone, as do steps if they are rare. None where that is below what a sample resolves.
     pub noise: Option<f64>,
     /// Lowest and highest sample.
@@ -72,14 +73,6 @@ struct Looking {
     optional: bool,
     /// The slot in which a `health` node says what is wrong.
     reason: Option<usize>,
-}
-
-/// The median of the sizes of normal numbers, in standard deviations.
-const NORMAL_50: f64 = 0.674_489_750_196_081_7;
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len().checked_sub(1)? / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// One for each measured channel.
@@ -180,9 +173,8 @@ impl SensorFacts {
         let limit = self.max_age_s.unwrap_or(5.0 * self.mean_gap_s);
         self.gaps = lengths.iter().filter(|gap| **gap > limit).count() as u64;
         let mut bends = std::mem::take(&mut self.looking.bends);
-        self.noise = median(&mut bends)
-            .filter(|bend| *bend > 0.0)
-            .map(|bend| bend / (NORMAL_50 * 6.0_f64.sqrt()));
+        let bend = robust_deviation(&mut bends).filter(|bend| *bend > 0.0);
+        self.noise = bend.map(|bend| bend / 6.0_f64.sqrt());
     }
 
     /// What somebody should look at.

@@ -1,5 +1,7 @@
 //! Decides which value of a series stands for none, as -9999 does, and takes it out.
 
+use athermal_numerics::median;
+
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
 use crate::figures::{count, number};
@@ -63,14 +65,9 @@ fn placeholder(values: &[f64]) -> Option<(f64, u64)> {
         return None;
     }
     let changes = others().zip(others().skip(1)).map(|(a, b)| (a - b).abs());
-    let usual = median(changes.filter(|change| *change > 0.0).collect())?;
-    let away = median(others().map(|of| (of - value).abs()).collect())?;
+    let usual = median(&mut changes.filter(|change| *change > 0.0).collect::<Vec<_>>())?;
+    let away = median(&mut others().map(|of| (of - value).abs()).collect::<Vec<_>>())?;
     (away > FAR * usual).then_some((value, count as u64))
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]

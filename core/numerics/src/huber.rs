@@ -2,7 +2,7 @@
 //! outliers.
 
 use crate::checks::{check_columns, check_parameter, check_penalty, check_scale};
-use crate::{Gram, NumericsError, Rows};
+use crate::{Gram, NumericsError, Rows, median, robust_deviation};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
@@ -303,9 +303,9 @@ impl<'a> Descent<'a> {
         let limit = self.how.epsilon * self.sigma;
         let terms = self.columns.iter().zip(&coefficients);
         let sizes = self.residuals.iter().map(|r| r.abs());
-        let deviation = robust_deviation(sizes.clone()).max(self.least_sigma);
+        let deviation = spread(sizes.clone()).max(self.least_sigma);
         let targets = || self.rows.iter().map(|(_, y, _)| y);
-        let middle = median(targets());
+        let middle = median(&mut targets().collect::<Vec<_>>()).unwrap_or(f64::NAN);
         HuberFit {
             intercept: terms.fold(self.weights[self.columns.len()], |rest, (&j, b)| {
                 rest - b * self.means[j]
@@ -314,7 +314,7 @@ impl<'a> Descent<'a> {
             scale: self.sigma,
             beyond: sizes.clone().filter(|size| *size > limit).count() as u64,
             deviation,
-            target_deviation: robust_deviation(targets().map(|y| (y - middle).abs())),
+            target_deviation: spread(targets().map(|y| (y - middle).abs())),
             outliers: sizes.filter(|size| *size > OUTLYING * deviation).count() as u64,
             residual_sum_of_squares: self.residuals.iter().map(|r| r * r).sum(),
             objective: self.objective,
@@ -323,16 +323,9 @@ impl<'a> Descent<'a> {
     }
 }
 
-/// The standard deviation of normal errors of these sizes (Hampel 1974).
-fn robust_deviation(sizes: impl Iterator<Item = f64>) -> f64 {
-    1.4826 * median(sizes)
-}
-
-/// The upper one of the two in the middle where there are two.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// The standard deviation of normal errors of these sizes; NaN of none.
+fn spread(sizes: impl Iterator<Item = f64>) -> f64 {
+    robust_deviation(&mut sizes.collect::<Vec<_>>()).unwrap_or(f64::NAN)
 }
 
 /// What a step takes for the matrix of second derivatives.

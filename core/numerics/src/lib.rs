@@ -46,6 +46,7 @@ mod penalty;
 mod prediction_error;
 mod prediction_variance;
 mod rls;
+mod robust;
 mod scaler;
 mod scratch;
 mod selection;
@@ -81,6 +82,7 @@ pub use prediction_error::{
 };
 pub use prediction_variance::PredictionVariance;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
+pub use robust::{median, robust_deviation};
 pub use scaler::{Standardization, Standardizer};
 pub use selection::{
     CandidateScore, Candidates, Change, Direction, Search, Selection, SelectionScore,

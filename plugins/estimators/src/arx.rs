@@ -7,6 +7,7 @@ use athermal_core::time::Duration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::features::too_many;
 use crate::lag_order::LagOrder;
 use crate::lags::{lag_mistakes, now};
 use crate::order::Order;
@@ -89,6 +90,10 @@ impl Estimator for Arx {
 
     fn deviates(&self) -> bool {
         self.solver.deviates()
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, self.feature_lags.len())
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::conditioning::tell_columns;
-use crate::features::{FEATURES_AND_TRUTH, present_features};
+use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 use crate::folds::Folds;
 use crate::penalty::{best_of, means};
 use crate::regression::{LinearPredictor, told};
@@ -140,6 +140,10 @@ impl Estimator for ElasticNet {
             );
         }
         mistakes
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -1,6 +1,6 @@
 //! What estimators ask for that predict from features as they are now.
 
-use athermal_core::node::{InputPort, Regressors};
+use athermal_core::node::{InputPort, Mistake, Regressors};
 use athermal_core::time::Duration;
 
 /// The features.
@@ -15,6 +15,22 @@ pub(crate) const TRUTH: InputPort =
 
 /// The ports of estimators that do not learn while they run.
 pub(crate) const FEATURES_AND_TRUTH: &[InputPort] = &[FEATURES, TRUTH];
+
+/// The most regressors of features of estimators that keep, or solve for, the products of each with each.
+const MOST_REGRESSORS: usize = 4_000;
+
+/// What is wrong with so many features at so many lags: there is no room for the products of each with each.
+pub(crate) fn too_many(features: usize, lags: usize) -> Vec<Mistake> {
+    let count = features.saturating_mul(lags);
+    if count <= MOST_REGRESSORS {
+        return Vec::new();
+    }
+    let message = format!(
+        "it would learn from {count} regressors, more than the {MOST_REGRESSORS} that there is room for"
+    );
+    let help = "give it fewer features or lags: a `pick` passes on some channels of a node";
+    vec![Mistake::at("inputs.features", message).help(help)]
+}
 
 /// The features as they are now.
 pub(crate) fn present_features() -> Regressors {

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::conditioning::tell_columns;
-use crate::features::{FEATURES_AND_TRUTH, present_features};
+use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 use crate::regression::{LinearPredictor, rows_gone, told};
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.
@@ -64,6 +64,10 @@ impl Estimator for Huber {
             mistakes.push(Mistake::at("alpha", message));
         }
         mistakes
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::elastic_net::{SparsePenalty, SparseTrainer};
-use crate::features::{FEATURES_AND_TRUTH, present_features};
+use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 
 /// Linear regression of the truth on features that leaves out those it can do without.
 ///
@@ -30,6 +30,10 @@ impl Estimator for Lasso {
 
     fn mistakes(&self) -> Vec<Mistake> {
         self.alpha.mistakes()
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

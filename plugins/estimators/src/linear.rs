@@ -6,7 +6,7 @@ use athermal_core::node::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::features::{FEATURES, TRUTH, present_features};
+use crate::features::{FEATURES, TRUTH, present_features, too_many};
 use crate::regression::LinearTrainer;
 use crate::selection::Selection;
 use crate::solver::Solver;
@@ -58,6 +58,10 @@ impl Estimator for Linear {
 
     fn deviates(&self) -> bool {
         self.solver.deviates()
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -9,6 +9,7 @@ use athermal_numerics::{RlsOptions, covariance_of};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::features::too_many;
 use crate::lags::lag_mistakes;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::penalty::Penalty;
@@ -174,6 +175,10 @@ impl Estimator for Rls {
 
     fn deviates(&self) -> bool {
         true
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

@@ -1,10 +1,10 @@
 //! Decides what becomes of a panic in the code of a kind while a graph with it is compiled; where such code is asked is decided
 //! where its answer is needed.
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use super::kind_fault::KindFault;
+use crate::diagnostic::said;
 use crate::node::Kind;
 
 /// What becomes of panics.
@@ -40,11 +40,4 @@ impl Panics {
             KindFault::Panics { said }
         })
     }
-}
-
-/// What a panic says.
-fn said(panic: &(dyn Any + Send)) -> &str {
-    let owned = panic.downcast_ref::<String>().map(String::as_str);
-    let said = owned.or_else(|| panic.downcast_ref::<&str>().copied());
-    said.unwrap_or("it does not say why")
 }

@@ -9,8 +9,9 @@ use crate::node::{InputPort, Mistake, Regressor, TruthLags};
 use crate::time::Duration;
 use crate::unit::Unit;
 
-/// The most regressors of features that an estimator may have: a fit keeps sums of the products of each with each.
-const MOST_REGRESSORS: usize = 4_000;
+/// The most regressors of features that an estimator may have; a few hundred bytes each. What a fit has room for is its kind's to say
+/// ([`Estimator::mistakes_for`](crate::node::Estimator::mistakes_for)).
+const MOST_REGRESSORS: usize = 1_000_000;
 
 /// What a row is made of.
 #[derive(Default)]

@@ -7,6 +7,7 @@ mod digits;
 mod gaps;
 mod names;
 mod nearest;
+mod panicked;
 mod place;
 mod render;
 
@@ -16,6 +17,7 @@ pub use counted::{count, counted};
 pub use digits::digits;
 pub use names::Names;
 pub use nearest::nearest;
+pub use panicked::said;
 pub use place::{Place, SourceId, Sources};
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use athermal_core::node::{Mistake, Regressors, Runs, Trainer, TrainingSetup};
 use athermal_core::time::Duration;
 use athermal_numerics::{InputOrders, Orders};
 
+use crate::features::too_many;
 use crate::order::{LARGEST, Order};
 use follow::MOST_DIFFERENCES;
 pub use per_input::PerInput;
@@ -174,7 +175,7 @@ impl Asked {
 
     /// Lists of orders that are not as long as there are features.
     pub(crate) fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
-        let mut mistakes = Vec::new();
+        let mut mistakes = too_many(features, 1);
         for (name, orders) in self.of_inputs() {
             if let Some(PerInput::Each(list)) = orders
                 && list.len() != features

@@ -15,6 +15,7 @@ mod fit;
 mod follow;
 mod told;
 
+use crate::features::too_many;
 use crate::scaling::Scaling;
 use fit::KalmanTrainer;
 use follow::{Following, deviation};
@@ -145,6 +146,10 @@ impl Estimator for Kalman {
 
     fn deviates(&self) -> bool {
         true
+    }
+
+    fn mistakes_for(&self, features: usize) -> Vec<Mistake> {
+        too_many(features, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {

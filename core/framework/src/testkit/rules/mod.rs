@@ -1,7 +1,5 @@
 //! Decides what is tried of a node, rule by rule.
 
-use std::sync::OnceLock;
-
 mod absence;
 mod allocation;
 mod answers;
@@ -23,6 +21,8 @@ mod votes;
 
 pub(super) use explained::explained;
 pub(super) use names::shared;
+
+use std::sync::OnceLock;
 
 use super::case::Given;
 use super::compared::{Course, course};
