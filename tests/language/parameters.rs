@@ -65,16 +65,26 @@ fn multiplied(nodes: usize) -> String {
 
 #[test]
 fn more_regressors_than_a_fit_has_room_for_are_refused() {
-    let text = multiplied(2)
-        + "[nodes.a]\ntype = \"linear\"\ninputs = { features = \"n2\", truth = \"n0.X\" }\nahead = \"5min\"\n\
-           [outputs]\nout = \"a\"\n";
-    let told = Read::new(&text).told();
-    assert!(
-        told.contains(
-            "it would learn from 10201 regressors, more than the 4000 that there is room for"
-        ),
-        "{told}"
-    );
+    for kind in [
+        "\"linear\"",
+        "\"lasso\"",
+        "\"elastic_net\"",
+        "\"huber\"",
+        "\"rls\"",
+        "\"kalman\"",
+        "\"oe\"",
+        "\"arx\"\nlags = [\"5min\"]",
+    ] {
+        let text = multiplied(2)
+            + &format!(
+                "[nodes.a]\ntype = {kind}\ninputs = {{ features = \"n2\", truth = \"n0.X\" }}\nahead = \"5min\"\n\
+                 [outputs]\nout = \"a\"\n"
+            );
+        let told = Read::new(&text).told();
+        let wanted =
+            "it would learn from 10201 regressors, more than the 4000 that there is room for";
+        assert!(told.contains(wanted), "{kind}: {told}");
+    }
 }
 
 #[test]

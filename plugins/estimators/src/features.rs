@@ -19,9 +19,14 @@ pub(crate) const FEATURES_AND_TRUTH: &[InputPort] = &[FEATURES, TRUTH];
 /// The most regressors of features of estimators that keep, or solve for, the products of each with each.
 const MOST_REGRESSORS: usize = 4_000;
 
-/// What is wrong with so many features at so many lags: there is no room for the products of each with each.
+/// What is wrong with so many features at so many lags.
 pub(crate) fn too_many(features: usize, lags: usize) -> Vec<Mistake> {
-    let count = features.saturating_mul(lags);
+    too_many_at("inputs.features", features, lags)
+}
+
+/// What is wrong with so many channels of an input at so many lags: there is no room for the products of each with each.
+pub(crate) fn too_many_at(input: &str, channels: usize, lags: usize) -> Vec<Mistake> {
+    let count = channels.saturating_mul(lags);
     if count <= MOST_REGRESSORS {
         return Vec::new();
     }
@@ -29,7 +34,7 @@ pub(crate) fn too_many(features: usize, lags: usize) -> Vec<Mistake> {
         "it would learn from {count} regressors, more than the {MOST_REGRESSORS} that there is room for"
     );
     let help = "give it fewer features or lags: a `pick` passes on some channels of a node";
-    vec![Mistake::at("inputs.features", message).help(help)]
+    vec![Mistake::at(input, message).help(help)]
 }
 
 /// The features as they are now.

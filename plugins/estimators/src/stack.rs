@@ -2,14 +2,14 @@
 
 use athermal_core::model::numbers;
 use athermal_core::node::{
-    Coefficients, Estimator, Factor, Figure, InputPort, Of, Predictor, Regressors, Term, Trained,
-    Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Coefficients, Estimator, Factor, Figure, InputPort, Mistake, Of, Predictor, Regressors, Term,
+    Trained, Trainer, TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_numerics::{Gram, GramBlocks, NumericsError, non_negative_least_squares};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::features::present_features;
+use crate::features::{present_features, too_many_at};
 
 /// Stacked regression: the sum of several predictions, by weights that are not negative and found by least squares in the fit.
 ///
@@ -53,6 +53,10 @@ impl Estimator for Stack {
 
     fn needs_constants(&self) -> bool {
         true
+    }
+
+    fn mistakes_for(&self, voters: usize) -> Vec<Mistake> {
+        too_many_at("inputs.voters", voters, 1)
     }
 
     fn trainer(&self, setup: &TrainingSetup) -> Box<dyn Trainer> {
