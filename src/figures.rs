@@ -99,6 +99,17 @@ pub fn stated(seconds: f64) -> String {
     Duration::from_secs_f64(seconds).map_or_else(|| time(seconds), length)
 }
 
+/// A length of time, to the second where it is longer than a minute, and to the minute where it is longer than an hour.
+#[must_use]
+pub fn rounded(seconds: f64) -> String {
+    let to = match seconds.abs() {
+        size if size > 3600.0 => 60.0,
+        size if size > 60.0 => 1.0,
+        _ => return stated(seconds),
+    };
+    stated((seconds / to).round() * to)
+}
+
 /// A length of time, rounded to the millisecond where it is longer than that.
 #[must_use]
 pub fn length(duration: Duration) -> String {
@@ -332,5 +343,16 @@ mod tests {
         let long = "x".repeat(70_000);
         let told = table(&["name", "value"], &[vec!["a".to_owned(), long.clone()]]);
         assert_eq!(told.lines().nth(1), Some(&*format!("a     {long}")));
+    }
+
+    #[test]
+    fn lags_are_told_to_the_second_from_a_minute_on_and_to_the_minute_from_an_hour_on() {
+        assert_eq!(rounded(-150.05), "-150s");
+        assert_eq!(rounded(0.08), "80ms");
+        assert_eq!(rounded(-26.666_666_666), "-26.667s");
+        assert_eq!(
+            (rounded(11_160.0), rounded(15_810.0)),
+            ("3h6min".into(), "4h24min".into())
+        );
     }
 }

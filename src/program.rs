@@ -4,7 +4,7 @@ use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::process::ExitCode;
 
 use athermal::core::diagnostic::said;
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 
 use crate::terminal::{Answer, Failure};
 use crate::{command, terminal};
@@ -12,7 +12,7 @@ use crate::{command, terminal};
 /// Predicts and corrects the thermal drift of precision machines.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true, max_term_width = 80, after_help = EXAMPLES)]
-pub(crate) struct Arguments {
+struct Arguments {
     #[command(subcommand)]
     command: command::Command,
     #[command(flatten)]
@@ -37,7 +37,7 @@ pub fn command_line() -> ExitCode {
     let arguments = Arguments::parse();
     let terminal = terminal::Terminal::new(&arguments.terminal);
     told_in_a_line();
-    match caught(|| arguments.command.run(&terminal)) {
+    match caught(|| arguments.command.run(&terminal, Arguments::command)) {
         Ok(answer) => answer.into(),
         Err(failure) => {
             terminal.error(&failure);

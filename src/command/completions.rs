@@ -1,9 +1,9 @@
 //! `athermal completions`: what a shell needs to complete the commands.
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use crate::terminal::{Answer, Failure, Terminal};
+use crate::terminal::{Answer, Failure};
 
 /// Print a completion script for a shell
 #[derive(Debug, Args)]
@@ -17,14 +17,13 @@ pub struct Completions {
 }
 
 impl Completions {
-    /// Prints the script.
+    /// Prints the script that completes a command line.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn run(&self, _terminal: &Terminal) -> Result<Answer, Failure> {
+    pub fn run(&self, mut whole: Command) -> Result<Answer, Failure> {
         let mut script = Vec::new();
-        let mut command = crate::program::Arguments::command();
-        clap_complete::generate(self.shell, &mut command, "athermal", &mut script);
+        clap_complete::generate(self.shell, &mut whole, "athermal", &mut script);
         crate::terminal::print(&script)?;
         Ok(Answer::Fine)
     }

@@ -58,16 +58,20 @@ pub enum Command {
 }
 
 impl Command {
-    /// Does what was asked for.
+    /// Does what was asked for; `whole` is the command line that it is part of.
     ///
     /// # Errors
     /// When it cannot be done.
-    pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
+    pub fn run(
+        &self,
+        terminal: &Terminal,
+        whole: fn() -> clap::Command,
+    ) -> Result<Answer, Failure> {
         match self {
             Self::Demo(command) => command.run(terminal),
             Self::Show(command) => command.run(terminal),
             Self::Init(command) => command.run(terminal),
-            Self::Completions(command) => command.run(terminal),
+            Self::Completions(command) => command.run(whole()),
             Self::Check(command) => command.run(terminal),
             Self::Explain(command) => command.run(terminal),
             Self::Diff(command) => command.run(terminal),

@@ -3,8 +3,8 @@
 use athermal::core::time::{Duration, TimeColumns, TimeFormat};
 use athermal::files::{Description, TimeForm, is_time_of_day};
 
-use super::column::ends_in_unit;
 use super::dates::{self, Dates};
+use super::name::{ends_in_unit, words};
 use super::texts::Texts;
 use crate::figures::time;
 
@@ -216,13 +216,6 @@ fn by_format(texts: &Texts, format: &TimeFormat) -> Option<Clock> {
 fn words_of_time(name: &str) -> Vec<&str> {
     let words = words(name).into_iter();
     words.flat_map(|word| word.split('/')).collect()
-}
-
-/// The parts of a column's name.
-pub fn words(name: &str) -> Vec<&str> {
-    name.split(|c: char| !(c.is_alphanumeric() || c == '°' || c == '%' || c == '/'))
-        .filter(|word| !word.is_empty())
-        .collect()
 }
 
 /// What texts are as a time.

@@ -5,7 +5,7 @@ use athermal::files::Description;
 use serde_json::{Value, json};
 
 use super::Told;
-use super::clock::words;
+use super::name::{POSITIONS, unit_in, words};
 
 /// What a column is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,60 +50,11 @@ enum Guess {
 
 const SET_POINTS: [&str; 5] = ["target", "setpoint", "set", "sp", "goal"];
 const TEMPERATURES: [&str; 4] = ["t", "temp", "temperature", "tc"];
-const POSITIONS: [&str; 10] = [
-    "pos",
-    "position",
-    "displacement",
-    "x",
-    "y",
-    "z",
-    "gap",
-    "offset",
-    "probe",
-    "deformation",
-];
 const FACTORS: [&str; 6] = ["scale", "gain", "factor", "ratio", "coefficient", "coeff"];
 const DRIVES: [&str; 11] = [
     "drive", "voltage", "heater", "lamp", "power", "current", "duty", "pwm", "input", "speed",
     "rpm",
 ];
-
-/// Whether a name ends in a unit, other than of time: `Z_nm`, `Z [nm]`, `Z/nm`.
-pub fn ends_in_unit(name: &str) -> bool {
-    let words = words(name);
-    let last = words.iter().enumerate().next_back();
-    last.and_then(unit_of_word).is_some() || inches(name).is_some()
-}
-
-/// The last unit in a name.
-fn unit_in(name: &str) -> Option<Unit> {
-    let words = words(name);
-    let unit = words.iter().enumerate().rev().find_map(unit_of_word);
-    unit.or_else(|| inches(name))
-}
-
-/// The unit that a word of a name says which is not the first, or that stands behind its slash.
-fn unit_of_word((place, word): (usize, &&str)) -> Option<Unit> {
-    let whole = (place > 0).then(|| Unit::in_name(word)).flatten();
-    whole.or_else(|| {
-        let (quantity, unit) = word.rsplit_once('/')?;
-        // A unit per another is no quantity in a unit.
-        Unit::in_name(quantity)
-            .is_none()
-            .then(|| Unit::in_name(unit))?
-    })
-}
-
-/// The inch, where `in` can be nothing else: in brackets, or behind the name of a position. `T_in` is that of an inlet.
-fn inches(name: &str) -> Option<Unit> {
-    let lower = name.trim().to_lowercase();
-    let in_brackets = lower.ends_with("[in]") || lower.ends_with("(in)");
-    let words = words(&lower);
-    let (last, rest) = words.split_last()?;
-    let is_position = |word: &&str| POSITIONS.contains(&word.trim_end_matches(char::is_numeric));
-    let is_unit = in_brackets || *last == "in" && rest.iter().any(is_position);
-    is_unit.then(|| Unit::parse("[in_i]").ok())?
-}
 
 impl Column {
     /// What was guessed, for people.

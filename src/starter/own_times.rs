@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use athermal::files::{Description, TimeForm};
 
 use super::clock::{self, Clock};
-use super::column::ends_in_unit;
+use super::name::{ends_in_unit, words};
 use super::texts::Texts;
 
 /// The clock of a server and that of what it serves differ by less than so many steps; the rest is another time.
@@ -40,9 +40,7 @@ pub fn told(described: &Description, clock: &Clock) -> Option<String> {
         let texts = Texts::of(described, index);
         let is_called = || {
             let lower = name.to_lowercase();
-            clock::words(&lower)
-                .iter()
-                .any(|word| CALLED.contains(word))
+            words(&lower).iter().any(|word| CALLED.contains(word))
         };
         let other =
             clock::clock(described, &texts).filter(|other| match (&other.form, &clock.form) {

@@ -12,7 +12,8 @@ use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
 use crate::folds::Folds;
 use crate::penalty::{best_of, means};
-use crate::regression::{LinearPredictor, told};
+use crate::regression::LinearPredictor;
+use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features, many coefficients being exactly zero.
 ///
@@ -267,7 +268,7 @@ impl Trainer for SparseTrainer {
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
-        let predictor = self.solve(&mut report).map_err(told)?;
+        let predictor = self.solve(&mut report).map_err(unsolved)?;
         Ok(Trained {
             predictor: Box::new(predictor),
             report,

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
-use crate::regression::{LinearPredictor, rows_gone, told};
+use crate::regression::{LinearPredictor, rows_gone};
+use crate::unsolved::unsolved;
 
 /// Linear regression of the truth on features in which large errors count by their size, not by their square.
 ///
@@ -113,7 +114,7 @@ impl Trainer for RobustTrainer {
         };
         let all: Vec<usize> = (0..self.regressors.len()).collect();
         let solved = how.solve(rows, &all, &standard.means, &standard.scales);
-        let fit = solved.map_err(told)?;
+        let fit = solved.map_err(unsolved)?;
         let count = rows.count();
         let mut report = TrainingReport {
             in_sample_rmse: Some((fit.residual_sum_of_squares / count as f64).sqrt()),

@@ -5,7 +5,7 @@ use athermal_core::time::Duration;
 use athermal_numerics::{GramBlocks, InformationCriteria, LeastSquares};
 
 use crate::order::{Order, Tried};
-use crate::regression::told;
+use crate::unsolved::unsolved;
 
 /// How many of the first lags are compared.
 #[derive(Debug, Clone)]
@@ -62,7 +62,7 @@ impl LagOrder {
             }
             let fit = LeastSquares::ordinary()
                 .solve(&gram, &columns, scales, blocks.rows())
-                .map_err(told)?;
+                .map_err(unsolved)?;
             let coefficients = columns.len() + 1;
             let figures = InformationCriteria::of(rows, coefficients, fit.residual_sum_of_squares);
             tried.push(Tried {
@@ -80,7 +80,7 @@ impl LagOrder {
                 ),
             });
         }
-        let best = self.order.best(rows, tried, report).map_err(told)?;
+        let best = self.order.best(rows, tried, report).map_err(unsolved)?;
         Ok(all.swap_remove(best))
     }
 

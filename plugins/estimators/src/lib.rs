@@ -33,6 +33,7 @@ mod selection;
 mod solver;
 mod stack;
 mod state_space;
+mod unsolved;
 mod zero;
 
 pub use ar::Ar;

@@ -12,8 +12,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::lags::{lag_mistakes, now};
-use crate::regression::told;
 use crate::scaling::{scale_mistakes, tell_first_rows, term_mistake};
+use crate::unsolved::unsolved;
 
 /// More terms would take the memory of many rows.
 const MOST_TERMS: usize = 500;
@@ -315,7 +315,7 @@ impl Trainer for NarxTrainer {
             most: self.parameters.most,
             least_reduction: self.parameters.tolerance,
         };
-        let found = how.run(&expanding.gram).map_err(told)?;
+        let found = how.run(&expanding.gram).map_err(unsolved)?;
         let squares = expanding
             .gram
             .moments_about(&vec![0.0; self.terms.len() + 1]);

@@ -6,8 +6,8 @@ use athermal_core::node::{
     TrainingError, TrainingReport, TrainingSetup,
 };
 use athermal_numerics::{
-    Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, NumericsError,
-    PredictionVariance, Sgd, SgdOptions, Standardization,
+    Gram, GramBlocks, LearningRate, LeastSquares, LinearFit, Method, PredictionVariance, Sgd,
+    SgdOptions, Standardization,
 };
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +16,7 @@ use crate::lag_order::LagOrder;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::selection::Selection;
 use crate::solver::Solver;
+use crate::unsolved::unsolved;
 
 /// Takes the rows of a linear fit as Gram blocks.
 #[derive(Debug)]
@@ -68,7 +69,9 @@ impl LinearTrainer {
         let penalty = self.solver.penalty();
         let columns = match (&self.selection, &self.order) {
             (Some(by), _) => {
-                let settled = penalty.settle(&self.blocks, &all, scales).map_err(told)?;
+                let settled = penalty
+                    .settle(&self.blocks, &all, scales)
+                    .map_err(unsolved)?;
                 by.run(
                     &self.regressors,
                     &self.blocks,
@@ -76,7 +79,7 @@ impl LinearTrainer {
                     settled.alpha,
                     report,
                 )
-                .map_err(told)?
+                .map_err(unsolved)?
             }
             (None, Some(by)) => {
                 let columns = by.run(&self.regressors, &self.blocks, scales, report)?;
@@ -88,7 +91,7 @@ impl LinearTrainer {
         // What was best for all candidates need not be so for those chosen.
         let settled = penalty
             .settle(&self.blocks, &columns, scales)
-            .map_err(told)?;
+            .map_err(unsolved)?;
         settled.tell(&self.blocks, report);
         Ok((columns, settled.alpha))
     }
@@ -100,7 +103,7 @@ impl LinearTrainer {
         let (chosen, alpha) = self.chosen(&standard.scales, report)?;
         let squares = LeastSquares::ridge(alpha);
         let solved = squares.solve(&gram, &chosen, &standard.scales, self.blocks.rows());
-        let fit = solved.map_err(told)?;
+        let fit = solved.map_err(unsolved)?;
         report.condition = Some(fit.condition);
         report.in_sample_rmse = Some((fit.residual_sum_of_squares / gram.count() as f64).sqrt());
         let of_all = self.selection.as_ref().and_then(|_| {
@@ -201,7 +204,7 @@ impl LinearTrainer {
                 (columns.iter().map(scale).collect(), y - mean)
             })
             .collect();
-        let mut sgd = Sgd::new(columns.len(), options).map_err(told)?;
+        let mut sgd = Sgd::new(columns.len(), options).map_err(unsolved)?;
         sgd.epochs(scaled.iter().map(|(x, y)| (x.as_slice(), *y)), epochs);
         let coefficients: Vec<f64> = sgd
             .weights()
@@ -278,22 +281,6 @@ impl Trainer for LinearTrainer {
             (model, None) => Box::new(model),
         };
         Ok(Trained { predictor, report })
-    }
-}
-
-/// Why the numbers allow no fit, as the framework tells it.
-pub(crate) fn told(error: NumericsError) -> TrainingError {
-    match error {
-        NumericsError::TooFewRows { needed, found } => TrainingError::TooFewRows {
-            rows: usize::try_from(found).unwrap_or(usize::MAX),
-            needed: usize::try_from(needed).unwrap_or(usize::MAX),
-        },
-        error @ NumericsError::FoldsOfBlocks { .. } => TrainingError::Unsolvable {
-            reason: format!("{error}; a larger `--memory` keeps the rows, or take fewer folds"),
-        },
-        error => TrainingError::Unsolvable {
-            reason: error.to_string(),
-        },
     }
 }
 

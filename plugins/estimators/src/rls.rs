@@ -13,9 +13,10 @@ use crate::features::too_many;
 use crate::lags::lag_mistakes;
 use crate::online::{Frame, OnlinePredictor, Recursion};
 use crate::penalty::Penalty;
-use crate::regression::{LinearTrainer, told};
+use crate::regression::LinearTrainer;
 use crate::selection::Selection;
 use crate::solver::Solver;
+use crate::unsolved::unsolved;
 
 /// Recursive least squares: linear regression that goes on learning while it runs, and forgets.
 ///
@@ -222,7 +223,8 @@ impl RlsTrainer {
             .max(f64::MIN_POSITIVE.sqrt());
         let rows = forgetting.memory().min(count);
         let (columns, scales) = (&found.fit.columns, &found.standard.scales);
-        let covariance = covariance_of(&found.gram, columns, scales, alpha, rows).map_err(told)?;
+        let covariance =
+            covariance_of(&found.gram, columns, scales, alpha, rows).map_err(unsolved)?;
         let trace: f64 = covariance.iter().step_by(columns.len() + 2).sum();
         let options = RlsOptions {
             forgetting: match forgetting {
@@ -241,8 +243,8 @@ impl RlsTrainer {
         };
         let frame = Frame::new(found.names.clone(), columns, &found.standard, 0.0);
         let coefficients = frame.scaled(&found.fit.coefficients, found.fit.intercept);
-        let rls =
-            athermal_numerics::Rls::starting_at(coefficients, covariance, options).map_err(told)?;
+        let rls = athermal_numerics::Rls::starting_at(coefficients, covariance, options)
+            .map_err(unsolved)?;
         let range = self.rows.range_of(columns).unwrap_or_default();
         Ok(OnlinePredictor::new(
             frame,

@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::identified::{Found, IdentifiedTrainer, Identify, identified};
-use crate::regression::told;
+use crate::unsolved::unsolved;
 
 /// The horizon, in steps, where it is not stated and rows allow it.
 const USUAL: usize = 10;
@@ -301,7 +301,7 @@ impl Identify for StateSpace {
                          are no states to find; `linear` fits what features do at once"
                     .to_owned(),
             },
-            error => told(error),
+            error => unsolved(error),
         })?;
         report.figure("states", found.model.order());
         report.figure("singular_values", &found.singular_values[..]);

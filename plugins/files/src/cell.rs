@@ -4,28 +4,8 @@ use std::borrow::Cow;
 
 use encoding_rs::WINDOWS_1252;
 
-use crate::ledger::Ledger;
-use crate::{FileError, Place};
-
 /// Longest number with a decimal comma that is looked at; the longest exact double in decimal stays below it.
 const COMMA_CELL: usize = 1100;
-
-/// Cells of the current row, whatever the format.
-pub(crate) trait Cells {
-    /// Goes to the next whole row; false at the end.
-    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError>;
-    /// The cell of the time column.
-    fn time(&self) -> &[u8];
-    /// The cell of a channel of the layout; empty if there is none.
-    fn channel(&self, index: usize) -> &[u8];
-    /// Whether `1,5` is a number.
-    fn decimal_comma(&self) -> bool;
-    fn place(&self) -> Place;
-    /// Takes the columns from here on as the current row names them, if that is what it does.
-    fn take_header(&mut self, _ledger: &mut Ledger) -> Result<bool, FileError> {
-        Ok(false)
-    }
-}
 
 /// The text of a cell: what is not UTF-8 is taken for Windows-1252, which is what Windows programs write in Western countries.
 pub(crate) fn text(cell: &[u8]) -> Cow<'_, str> {

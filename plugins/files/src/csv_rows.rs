@@ -3,7 +3,8 @@
 use athermal_core::time::Civil;
 use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 
-use crate::cell::{self, Cells, is_number, trim};
+use crate::cell::{self, is_number, trim};
+use crate::cells::Cells;
 use crate::columns::{self, Columns};
 use crate::header::{self, Head};
 use crate::ledger::{Ledger, Report};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use crate::cell::Cells;
+use crate::cells::Cells;
 use crate::csv_rows::CsvRows;
 use crate::ledger::Ledger;
 use crate::lines::Lines;

@@ -8,7 +8,8 @@ use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
 use serde_json::Deserializer;
 use serde_json::value::RawValue;
 
-use crate::cell::{Cells, trim};
+use crate::cell::trim;
+use crate::cells::Cells;
 use crate::columns;
 use crate::format::begins_json_array;
 use crate::ledger::Ledger;

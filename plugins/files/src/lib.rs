@@ -26,6 +26,7 @@
 
 mod begun;
 mod cell;
+mod cells;
 mod columns;
 mod csv_rows;
 mod dataset;

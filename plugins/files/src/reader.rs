@@ -5,7 +5,8 @@ use std::path::Path;
 
 use athermal_core::time::Civil;
 
-use crate::cell::{self, Cells};
+use crate::cell;
+use crate::cells::Cells;
 use crate::csv_rows::CsvRows;
 use crate::error::excerpt;
 use crate::joined::{self, Held, Joined};

@@ -2,8 +2,7 @@
 
 use athermal::diagnosis::day::{CurvePoint, DayScore, Days, ENOUGH};
 
-use super::tables::seconds;
-use crate::figures::{counted, matrix, number};
+use crate::figures::{counted, matrix, number, rounded};
 
 /// On how many days a fit comes near those on all others, of all predictions shown; none where on all of them only.
 pub(super) fn enough(days: &Days, shown: &[&str]) -> Option<usize> {
@@ -68,7 +67,7 @@ pub(super) fn text(days: &Days, unit: &str, shown: &[&str]) -> String {
     let of_day = if days.day_s == 86_400.0 {
         String::new()
     } else {
-        format!(" of {}", seconds(days.day_s))
+        format!(" of {}", rounded(days.day_s))
     };
     let curve = match most {
         1 => String::new(),

@@ -1,6 +1,7 @@
 //! `athermal diagnose`: why a model predicts as well as it does, and what would make it better.
 
 mod days;
+mod instances;
 mod next;
 mod responses;
 mod tables;

@@ -7,7 +7,8 @@ use athermal::diagnosis::lag::FeatureLags;
 use athermal::diagnosis::{Main, is_called};
 
 use super::Diagnose;
-use super::tables::{Tables, is_of};
+use super::instances::is_of;
+use super::tables::Tables;
 use crate::figures::paragraph;
 use crate::invocation::{command, program, quoted};
 

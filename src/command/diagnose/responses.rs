@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use athermal::diagnosis::response::{Response, Responses};
 
-use super::tables::{axis_of, grouped, name_of};
+use super::instances::{axis_of, grouped, name_of};
 use crate::figures::{TimeUnit, matrix, number};
 
 /// By how much answers to a step up and down differ at least where it is worth a word.

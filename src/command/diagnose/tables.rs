@@ -5,8 +5,9 @@ use athermal::diagnosis::regressor::Design;
 use athermal::diagnosis::residual::{Residuals, UNLIKELY};
 use athermal::diagnosis::{Diagnosis, Main, is_asked, is_called};
 
+use super::instances::{axis_of, grouped, is_of};
 use super::{days, responses};
-use crate::figures::{count, counted, matrix, number, or_dash, stated, table};
+use crate::figures::{count, counted, matrix, number, or_dash, rounded, table};
 
 /// Features that are named of each truth.
 const FEATURES: usize = 3;
@@ -151,7 +152,7 @@ impl<'a> Tables<'a> {
                     vec![
                         format!("    {}", feature.feature),
                         format!("{:.2}", correlogram.best),
-                        seconds(correlogram.best_lag_s),
+                        rounded(correlogram.best_lag_s),
                         if correlogram.bound < 1.0 {
                             format!("±{:.2}", correlogram.bound)
                         } else {
@@ -332,7 +333,7 @@ impl<'a> Tables<'a> {
                 let own = if of.window_s == width { "*" } else { "" };
                 here.map_or("-".to_owned(), |of| format!("{own}{}", number(of.ratio)))
             };
-            (seconds(width), shown.iter().map(cell).collect())
+            (rounded(width), shown.iter().map(cell).collect())
         });
         let rows: Vec<_> = rows.collect();
         format!(
@@ -362,7 +363,7 @@ fn residuals(shown: &[&Residuals]) -> String {
             });
             let bound = largest.map_or("-".to_owned(), |lag| format!("±{:.2}", of.bound[lag]));
             let largest = largest.map_or("-".to_owned(), |lag| {
-                let after = seconds((lag + 1) as f64 * of.spacing_s);
+                let after = rounded((lag + 1) as f64 * of.spacing_s);
                 format!("{:.2} at {after}", of.autocorrelation[lag])
             });
             let verdict = match of.white {
@@ -404,32 +405,10 @@ fn residuals(shown: &[&Residuals]) -> String {
          what 95 % lie at its lag where there is none from that lag on (Bartlett);\n\
          Q of Ljung and Box over {}: white where p is not below {UNLIKELY}\n{}",
         first.unit,
-        seconds(first.spacing_s),
+        rounded(first.spacing_s),
         counted(first.autocorrelation.len() as u64, "lag"),
         table(&header, &rows)
     )
-}
-
-/// Whether a prediction is what an instance puts out: `thermal.Z1` is, of itself and of `thermal`.
-pub(super) fn is_of(prediction: &str, node: &str) -> bool {
-    let rest = prediction.strip_prefix(node);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-}
-
-/// What is alike in `by` together, in the order in which the first of each comes.
-pub(super) fn grouped<T, K: PartialEq>(
-    all: impl Iterator<Item = T>,
-    by: impl Fn(&T) -> K,
-) -> Vec<Vec<T>> {
-    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
-    for one in all {
-        let key = by(&one);
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, group)) => group.push(one),
-            None => groups.push((key, vec![one])),
-        }
-    }
-    groups.into_iter().map(|(_, group)| group).collect()
 }
 
 fn regressors(of: &Design) -> String {
@@ -449,52 +428,7 @@ fn regressors(of: &Design) -> String {
     table(&[first.as_str(), effect.as_str(), "VIF"], &rows)
 }
 
-/// The node of an instance: `thermal` of `thermal.Z1`.
-pub(super) fn name_of(instance: &str) -> &str {
-    instance.split_once('.').map_or(instance, |(node, _)| node)
-}
-
-pub(super) fn axis_of(channel: &str) -> String {
-    let axis = channel.split_once('.').map_or(channel, |(_, axis)| axis);
-    axis.to_owned()
-}
-
 /// None where there is no number.
 fn defined(value: f64) -> Option<f64> {
     Some(value).filter(|value| !value.is_nan())
-}
-
-/// A length of time, to the second where it is longer than a minute, and to the minute where it is longer than an hour.
-pub(super) fn seconds(seconds: f64) -> String {
-    let to = match seconds.abs() {
-        size if size > 3600.0 => 60.0,
-        size if size > 60.0 => 1.0,
-        _ => return stated(seconds),
-    };
-    stated((seconds / to).round() * to)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_prediction_is_of_its_instance_and_of_its_node_and_of_none_that_begins_alike() {
-        let of = ["thermal", "thermal.Z1", "therm", "thermal.Z"];
-        assert_eq!(
-            of.map(|node| is_of("thermal.Z1", node)),
-            [true, true, false, false]
-        );
-    }
-
-    #[test]
-    fn lags_are_told_to_the_second_from_a_minute_on_and_to_the_minute_from_an_hour_on() {
-        assert_eq!(seconds(-150.05), "-150s");
-        assert_eq!(seconds(0.08), "80ms");
-        assert_eq!(seconds(-26.666_666_666), "-26.667s");
-        assert_eq!(
-            (seconds(11_160.0), seconds(15_810.0)),
-            ("3h6min".into(), "4h24min".into())
-        );
-    }
 }

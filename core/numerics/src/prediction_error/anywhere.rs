@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::residuals::{Counted, Segment};
+use super::segment::{Counted, Segment};
 use super::starts::Start;
 use super::{Polynomials, Samples, Transfer};
 

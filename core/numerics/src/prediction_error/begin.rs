@@ -2,8 +2,9 @@
 
 use super::anywhere::off_rest;
 use super::initial;
-use super::residuals::{Counted, Left};
+use super::residuals::Left;
 use super::search::Judged;
+use super::segment::Counted;
 use super::{Orders, Polynomials, PredictionError, Samples};
 use crate::NumericsError;
 

@@ -5,8 +5,8 @@ use std::ops::Range;
 use serde::Serialize;
 
 use super::Polynomials;
+use super::past::product;
 use super::roots::alike;
-use super::stepper::product;
 use crate::scratch::Scratch;
 
 /// The covariance `P` of the past `z` that a model goes by, in the variance of an innovation: of past values, of what the filter of

@@ -1,7 +1,8 @@
 //! Decides where the search for a model starts: with least squares on long regressions, which need no start.
 
 use super::brought::{Past, through};
-use super::residuals::{Counted, Left};
+use super::residuals::Left;
+use super::segment::Counted;
 use super::{Orders, Polynomials, Samples, Transfer};
 use crate::{GramBlocks, LeastSquares, NumericsError, Standardization};
 

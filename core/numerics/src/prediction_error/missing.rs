@@ -12,9 +12,9 @@ use faer::Mat;
 
 use super::brought::Brought;
 use super::doubt::Doubt;
-use super::residuals::{Counted, Segment};
+use super::past::{product, push};
+use super::segment::{Counted, Segment};
 use super::starts::{OVER, Start, left_of_start};
-use super::stepper::{product, push};
 use super::{Polynomials, Samples};
 
 /// How far a coefficient of the noise is moved to see what changes with it, about where rounding and curvature count the same.

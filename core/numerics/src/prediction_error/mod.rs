@@ -12,8 +12,10 @@ mod begin;
 mod brought;
 mod criteria;
 mod doubt;
+mod fit;
 mod initial;
 mod missing;
+mod past;
 mod polynomials;
 mod precision;
 mod residuals;
@@ -21,6 +23,7 @@ mod ring;
 mod roots;
 mod samples;
 mod search;
+mod segment;
 mod starts;
 mod stepper;
 #[cfg(test)]

@@ -2,14 +2,10 @@
 
 use faer::Mat;
 
-use super::residuals::Counted;
-use super::search::{descend, remembered};
+use super::search::{held, remembered};
+use super::segment::Counted;
 use super::{Polynomials, PredictionError, PredictionErrorFit, Samples};
 use crate::cholesky::inverse_of_factor;
-
-/// The share of a step of the search at which a polynomial that it would make unstable counts as held: a whole one also makes
-/// others so, of which the best lies inside.
-const SHARE: f64 = 1e-3;
 
 impl PredictionError {
     /// The standard errors of all coefficients that this search found in these samples, each in the place of its coefficient:
@@ -48,32 +44,6 @@ impl PredictionError {
         }
         let known = free.iter().all(|&place| errors[place].is_finite());
         known.then(|| without_held(fit.model.with(&errors)))
-    }
-}
-
-/// Which coefficients, in the order of [`flat`](Polynomials::flat), are of a polynomial that would be better outside of the
-/// bound of stability, or that the samples tell so little of that it could as well be there; and those whose damping is beyond all
-/// bounds from the beginning.
-pub(super) fn held(
-    model: &Polynomials,
-    hessian: &Mat<f64>,
-    gradient: &[f64],
-    radius: f64,
-    mut damping: Vec<f64>,
-) -> Option<Vec<bool>> {
-    loop {
-        let change = descend(hessian, gradient, &damping)?;
-        let share: Vec<f64> = change.iter().map(|by| SHARE * by).collect();
-        let moved = model.moved(&share);
-        let held_before = damping.clone();
-        for (of, unstable) in damping.iter_mut().zip(moved.unstable(radius)) {
-            if unstable {
-                *of = f64::INFINITY;
-            }
-        }
-        if damping == held_before {
-            return Some(damping.iter().map(|&of| of > 0.0).collect());
-        }
     }
 }
 

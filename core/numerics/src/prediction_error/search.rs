@@ -3,19 +3,17 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-use super::anywhere::{Beginning, beginnings};
-use super::begin::Begun;
+use super::anywhere::Beginning;
 use super::missing::Weighted;
-use super::precision::held;
-use super::residuals::{Counted, Left, Segment, counted_from};
-use super::{Orders, Polynomials, Samples};
-use crate::checks::{check_parameter, check_penalty};
-use crate::{GramBlocks, NumericsError};
+use super::residuals::Left;
+use super::segment::{Counted, Segment};
+use super::{Polynomials, Samples};
+use crate::GramBlocks;
 
 /// What a step of the polishing promises that is the last, as a share of the sum.
 const SETTLED: f64 = 1e-22;
 /// How much smaller the sum of squares must become for a step to be worth another, as a share of it.
-const TOLERANCE: f64 = 1e-14;
+pub(super) const TOLERANCE: f64 = 1e-14;
 /// A search that ends while it still gains more than this has not converged.
 const SMALL: f64 = 1e-6;
 const MOST_DAMPING: f64 = 1e12;
@@ -23,6 +21,9 @@ const MOST_DAMPING: f64 = 1e12;
 const SAME: f64 = 1e-12;
 /// Steps by the gradient alone at the end.
 const POLISHING: usize = 4;
+/// The share of a step of the search at which a polynomial that it would make unstable counts as held: a whole one also makes
+/// others so, of which the best lies inside.
+const SHARE: f64 = 1e-3;
 
 /// Minimises the sum of squared one-step prediction errors, plus a penalty on the coefficients of `B` and on how far from rest
 /// filters begin, by damped Gauss–Newton
@@ -109,81 +110,6 @@ pub(super) struct Judged {
 }
 
 impl PredictionError {
-    /// Fits a model of these orders. The first `first` samples of each segment are not counted, or those before which the
-    /// model lacks something, whichever are more: models of several orders that are to be compared need the same.
-    ///
-    /// # Errors
-    /// [`NumericsError::Parameter`], [`NumericsError::Width`] where the inputs are not those of the samples,
-    /// [`NumericsError::TooFewRows`], [`NumericsError::NotFinite`].
-    pub fn fit(
-        &self,
-        orders: &Orders,
-        samples: &Samples,
-        first: usize,
-    ) -> Result<PredictionErrorFit, NumericsError> {
-        self.fit_beside(orders, samples, first, &[])
-    }
-
-    /// The same where models that this one contains are known, which it then errs no more than. Others among them are passed over.
-    ///
-    /// # Errors
-    /// As [`fit`](Self::fit).
-    pub fn fit_beside(
-        &self,
-        orders: &Orders,
-        samples: &Samples,
-        first: usize,
-        known: &[Polynomials],
-    ) -> Result<PredictionErrorFit, NumericsError> {
-        check_penalty(self.penalty)?;
-        let spread = self.start_spread;
-        check_parameter("start_spread", spread, spread > 0.0, "above 0")?;
-        if orders.inputs.len() != samples.width() {
-            return Err(NumericsError::Width {
-                expected: orders.inputs.len(),
-                found: samples.width(),
-            });
-        }
-        let first = counted_from(orders, first);
-        let measured = self.measured.max(orders.measured());
-        let rows = samples.counted(first, measured);
-        // Of which nothing is known beforehand, samples must tell.
-        let starts = if self.start_spread.is_infinite() {
-            samples.starts(orders, first, measured)
-        } else {
-            0
-        };
-        let needed = orders.coefficients() + starts + 2;
-        if rows < needed {
-            return Err(NumericsError::TooFewRows {
-                needed: needed as u64,
-                found: rows as u64,
-            });
-        }
-        let radius = remembered(samples);
-        let Begun {
-            counted,
-            start,
-            steps: before,
-        } = self.begun(orders, samples, first, radius, known)?;
-        let (found, steps, converged) = self.search(start, samples, &counted, radius, TOLERANCE);
-        let Judged { model, left, .. } = self.polished(found, samples, &counted, radius);
-        Ok(PredictionErrorFit {
-            residual_sum_of_squares: left.squares,
-            squared_errors: left.squared_errors,
-            variance_ratio: left.mean,
-            beginnings: beginnings(&model, samples, &left.starts),
-            model,
-            rows,
-            first,
-            measured,
-            starts: left.told().round() as usize,
-            start_counts: counted.starts,
-            steps: before + steps,
-            converged,
-        })
-    }
-
     /// The damping, in the order of [`flat`](Polynomials::flat), of a search that takes what is given for given.
     pub(super) fn given(&self, model: &Polynomials) -> Vec<f64> {
         let mut damping = vec![0.0; model.flat().len()];
@@ -260,7 +186,7 @@ impl PredictionError {
 
     /// A few whole steps more, with what is held back from instability at its edge. Where the sum hardly changes it is known less
     /// exactly than its gradient, by which they go.
-    fn polished(
+    pub(super) fn polished(
         &self,
         mut at: Judged,
         samples: &Samples,
@@ -370,7 +296,7 @@ pub(super) fn remembered(samples: &Samples) -> f64 {
 }
 
 /// The step that `(H + diag λ diag H) δ = g` asks for, 0 where the damping `λ` is beyond all bounds; none where it has no solution.
-pub(super) fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<f64>> {
+fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> Option<Vec<f64>> {
     let count = gradient.len();
     let scales: Vec<f64> = (0..count).map(|i| hessian[(i, i)].sqrt()).collect();
     let scales: Vec<f64> = scales
@@ -397,11 +323,36 @@ pub(super) fn descend(hessian: &Mat<f64>, gradient: &[f64], damping: &[f64]) -> 
     step.iter().all(|by| by.is_finite()).then_some(step)
 }
 
+/// Which coefficients, in the order of [`flat`](Polynomials::flat), are of a polynomial that would be better outside of the
+/// bound of stability, or that the samples tell so little of that it could as well be there; and those whose damping is beyond all
+/// bounds from the beginning.
+pub(super) fn held(
+    model: &Polynomials,
+    hessian: &Mat<f64>,
+    gradient: &[f64],
+    radius: f64,
+    mut damping: Vec<f64>,
+) -> Option<Vec<bool>> {
+    loop {
+        let change = descend(hessian, gradient, &damping)?;
+        let share: Vec<f64> = change.iter().map(|by| SHARE * by).collect();
+        let moved = model.moved(&share);
+        let held_before = damping.clone();
+        for (of, unstable) in damping.iter_mut().zip(moved.unstable(radius)) {
+            if unstable {
+                *of = f64::INFINITY;
+            }
+        }
+        if damping == held_before {
+            return Some(damping.iter().map(|&of| of > 0.0).collect());
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::{InputOrders, Orders};
     use super::*;
-    use crate::InputOrders;
-    use crate::draws::uniform;
 
     #[test]
     fn a_search_of_which_no_step_can_be_solved_has_not_converged() {
@@ -429,65 +380,5 @@ mod tests {
             TOLERANCE,
         );
         assert_eq!((model.model, steps, converged), (start, 0, false));
-    }
-
-    #[test]
-    fn samples_that_do_not_tell_every_start_are_enough_where_something_is_known_of_starts() {
-        let (mut samples, mut u) = (Samples::new(1), uniform(7));
-        for _ in 0..4 {
-            samples.segment();
-            (0..2).for_each(|_| samples.push([u()], u()));
-        }
-        let input = InputOrders {
-            nb: 1,
-            nf: 1,
-            nk: 0,
-        };
-        let orders = Orders {
-            inputs: vec![input],
-            ..Orders::default()
-        };
-        let fit = |start_spread| {
-            let search = PredictionError {
-                start_spread,
-                ..PredictionError::default()
-            };
-            search.fit(&orders, &samples, 0)
-        };
-        // Of eight samples three coefficients, four starts and two more.
-        let few = NumericsError::TooFewRows {
-            needed: 9,
-            found: 8,
-        };
-        assert_eq!(fit(f64::INFINITY), Err(few));
-        assert!(fit(1.0).unwrap().variance().is_finite());
-    }
-
-    #[test]
-    fn a_level_that_is_given_is_kept_and_has_no_standard_error() {
-        let (mut samples, mut u, mut value) = (Samples::new(0), uniform(3), 0.0);
-        for _ in 0..400 {
-            value = 0.8 * value + u();
-            samples.push([], 2.0 + value);
-        }
-        let orders = Orders {
-            na: 1,
-            nc: 1,
-            ..Orders::default()
-        };
-        let search = |level| PredictionError {
-            level,
-            ..PredictionError::default()
-        };
-        let free = search(None).fit(&orders, &samples, 0).unwrap();
-        for (level, most) in [(free.model.level, 1.0 + 1e-9), (3.0, 1.2)] {
-            let given = search(Some(level));
-            let fit = given.fit(&orders, &samples, 0).unwrap();
-            assert_eq!(fit.model.level, level);
-            let more = fit.residual_sum_of_squares / free.residual_sum_of_squares;
-            assert!((1.0 - 1e-9..most).contains(&more), "{level}: {more}");
-            let errors = given.standard_errors(&fit, &samples).unwrap();
-            assert!(errors.level.is_nan() && errors.a[0] > 0.0, "{errors:?}");
-        }
     }
 }

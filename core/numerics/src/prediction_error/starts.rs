@@ -5,9 +5,8 @@ use std::collections::BTreeMap;
 
 use faer::Mat;
 
-use super::missing::Gapped;
 use super::polynomials::back;
-use super::residuals::Counted;
+use super::segment::Counted;
 use super::{Polynomials, Samples};
 use crate::state_space::pseudo_inverse_above;
 
@@ -68,14 +67,8 @@ impl FreeResponses {
         Self::of(&responses, rows, counted)
     }
 
-    /// Those of a segment of which values are missing, of so many residuals.
-    pub(super) fn in_gapped(segment: &Gapped, residuals: usize, counted: &Counted) -> Self {
-        let responses = segment.free_responses();
-        Self::of(&responses, std::iter::once(residuals), counted)
-    }
-
     /// Of what becomes of each value in the residuals, in segments of so many.
-    fn of(
+    pub(super) fn of(
         responses: &[Vec<f64>],
         residuals: impl Iterator<Item = usize>,
         counted: &Counted,

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::doubt::Doubt;
+use super::past::{product, push};
 use super::{Polynomials, Transfer};
 use crate::NumericsError;
 use crate::checks::check_length;
@@ -314,19 +315,6 @@ impl Stepper {
             to.values.copy_from_slice(&from.values);
             to.filtered.copy_from_slice(&from.filtered);
         }
-    }
-}
-
-/// `Σ p_j x_j` over the first of both.
-pub(super) fn product(polynomial: &[f64], past: &[f64]) -> f64 {
-    polynomial.iter().zip(past).map(|(p, x)| p * x).sum()
-}
-
-/// Puts a value before those of the past, and forgets the oldest.
-pub(super) fn push(past: &mut [f64], value: f64) {
-    if let Some(last) = past.len().checked_sub(1) {
-        past.copy_within(..last, 1);
-        past[0] = value;
     }
 }
 

@@ -1,7 +1,8 @@
 use faer::Mat;
 
-use super::residuals::{Counted, Left, Segment};
+use super::residuals::Left;
 use super::search::remembered;
+use super::segment::{Counted, Segment};
 use super::*;
 use crate::draws::uniform as noise;
 

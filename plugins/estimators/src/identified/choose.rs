@@ -8,7 +8,7 @@ use athermal_numerics::{
 
 use super::{Asked, Differences};
 use crate::order::{Order, Tried};
-use crate::regression::told;
+use crate::unsolved::unsolved;
 
 /// Steps of the search times coefficients, of which many are never all settled.
 const MOST_WORK: usize = 1000;
@@ -163,6 +163,6 @@ fn unfit(error: NumericsError, samples: &Samples) -> TrainingError {
                 }
             ),
         },
-        error => told(error),
+        error => unsolved(error),
     }
 }

@@ -4,19 +4,14 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use athermal_core::model::numbers;
-use athermal_core::node::{Coefficients, Learner, Mistake, Predictor, Restored, State};
+use athermal_core::node::{Learner, Restored, State};
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Beginning, Polynomials, Stepper};
 use serde::{Deserialize, Serialize};
 
-use crate::order::LARGEST;
+use super::model::Identified;
 use crate::scaling::Scaling;
 
-/// The most interleaved series.
-pub(super) const MOST_SERIES: usize = 16;
-/// How often the noise is integrated at most.
-pub(super) const MOST_DIFFERENCES: usize = 2;
 /// After more steps than that without inputs a model begins anew, unless it reaches further back itself. A mode that hardly
 /// decays would go anywhere with inputs that stay as they last were.
 pub(super) const UNSEEN: usize = 10;
@@ -29,90 +24,6 @@ const MOST_RUNS: f64 = 4_096.0;
 /// How unsure filters are at most where they begin, as a variance in that of an innovation: beyond, rounding would count more than
 /// innovations, and the first truths tell all in any case.
 const MOST_UNSURE: f64 = 1e8;
-
-/// A model as it was identified.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Identified {
-    pub(super) regressors: Vec<String>,
-    pub(super) scaling: Scaling,
-    /// On scaled inputs, in the unit of the truth.
-    pub(super) model: Polynomials,
-    /// The standard error of each coefficient, in its place; of a polynomial that has none, an empty list.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) errors: Option<Polynomials>,
-    /// Whether the level is the mean of the rows of the fit, which do not tell it, so that it has no standard error.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub(super) mean_level: bool,
-    pub(super) step: Duration,
-    /// How many truths come within a step.
-    pub(super) series: usize,
-    /// The standard deviation of a prediction one step after the newest truth, two steps and so on.
-    #[serde(with = "numbers")]
-    pub(super) deviations: Vec<f64>,
-    /// Where the filter of each input begins in a run, on scaled inputs, in the unit of the truth; nothing where at rest.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) beginnings: Vec<Beginning>,
-}
-
-impl Predictor for Identified {
-    fn uses(&self) -> &[String] {
-        &self.regressors
-    }
-
-    fn mistakes(&self) -> Vec<Mistake> {
-        let width = self.regressors.len();
-        let mut mistakes = self.scaling.mistakes(width);
-        let inputs = &self.model.inputs;
-        mistakes.extend(Mistake::of_lengths(width, &[("inputs", inputs.len())]));
-        if !self.beginnings.is_empty() {
-            let beginnings = [("beginnings", self.beginnings.len())];
-            mistakes.extend(Mistake::of_lengths(width, &beginnings));
-        }
-        let delays = inputs
-            .iter()
-            .map(|input| ("delay", input.delay, 0..=LARGEST));
-        let others = [
-            ("differences", self.model.differences, 0..=MOST_DIFFERENCES),
-            ("series", self.series, 1..=MOST_SERIES),
-        ];
-        for (at, found, allowed) in delays.chain(others) {
-            if !allowed.contains(&found) {
-                let (least, most) = allowed.into_inner();
-                let message = format!("`{at}` is {found} and must be {least} to {most}");
-                mistakes.push(Mistake::at(at, message));
-            }
-        }
-        mistakes.extend(Mistake::unless_lasting("step", self.step));
-        mistakes.extend(super::told::mistakes(self));
-        if self.deviations.is_empty() {
-            mistakes.push(Mistake::at("deviations", "`deviations` has no value"));
-        }
-        if let Some(wrong) = self.deviations.iter().find(|of| **of < 0.0) {
-            let message = format!("`deviations` has {wrong} and none may be negative");
-            mistakes.push(Mistake::at("deviations", message));
-        }
-        mistakes
-    }
-
-    fn predict(&self, regressors: &[f64]) -> f64 {
-        self.model.at_rest(self.scaling.of(regressors))
-    }
-
-    fn deviation(&self, _regressors: &[f64]) -> f64 {
-        self.deviations.last().copied().unwrap_or(f64::NAN)
-    }
-
-    fn coefficients(&self) -> Option<Coefficients> {
-        Some(super::told::coefficients(self))
-    }
-
-    fn learner(&self) -> Option<Box<dyn Learner>> {
-        Some(Box::new(Following::new(self)))
-    }
-}
-
-athermal_core::predictor!(Identified, "identified");
 
 /// One of the interleaved series that a model is followed in.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -160,7 +71,7 @@ athermal_core::state!(Before, "identified/2");
 
 /// Follows a model.
 #[derive(Debug)]
-struct Following {
+pub(super) struct Following {
     known: Known,
     deviations: Vec<f64>,
     begins: Begins,
@@ -182,7 +93,7 @@ struct Begins {
 }
 
 impl Following {
-    fn new(of: &Identified) -> Self {
+    pub(super) fn new(of: &Identified) -> Self {
         let stepper = Stepper::new(of.model.clone());
         let followed = Followed {
             stepper: stepper.clone(),

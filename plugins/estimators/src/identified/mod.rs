@@ -2,7 +2,9 @@
 
 mod choose;
 mod follow;
+mod model;
 mod per_input;
+mod predictor;
 mod rehearse;
 mod rows;
 mod told;
@@ -15,7 +17,7 @@ use athermal_numerics::{InputOrders, Orders};
 
 use crate::features::too_many;
 use crate::order::{LARGEST, Order};
-use follow::MOST_DIFFERENCES;
+use model::MOST_DIFFERENCES;
 pub use per_input::PerInput;
 pub(crate) use train::{Found, IdentifiedTrainer, Identify};
 

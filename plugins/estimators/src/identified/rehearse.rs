@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use athermal_core::node::Predictor;
 use athermal_core::time::{Duration, Instant};
 
-use super::follow::Identified;
+use super::model::Identified;
 use super::rows::Rows;
 
 /// What lies between a prediction, its run and the truths that it may know of.

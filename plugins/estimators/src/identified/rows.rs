@@ -5,7 +5,8 @@ use athermal_core::node::TrainingReport;
 use athermal_core::time::{Duration, Instant};
 use athermal_numerics::{Samples, Standardization};
 
-use super::follow::{MOST_SERIES, MOST_STEPS, part, steps};
+use super::follow::{MOST_STEPS, part, steps};
+use super::model::MOST_SERIES;
 
 /// The rows of a fit, in order, and the runs between them.
 #[derive(Debug, Default)]

@@ -1,9 +1,9 @@
 //! Decides how an identified model tells its polynomials, on the scale of the data, and how they come to rest.
 
-use athermal_core::node::{Coefficients, Mistake, Mode, Noise, Of, Predictor, Term};
+use athermal_core::node::{Coefficients, Mistake, Mode, Noise, Of, Term};
 use athermal_numerics::Fading;
 
-use super::follow::Identified;
+use super::model::Identified;
 
 /// Standard errors that do not belong to the coefficients.
 pub(super) fn mistakes(of: &Identified) -> Vec<Mistake> {
@@ -37,7 +37,7 @@ pub(super) fn coefficients(of: &Identified) -> Coefficients {
     };
     // Noise that is integrated leaves no level.
     if model.differences == 0 {
-        let at_rest = of.predict(&vec![0.0; of.regressors.len()]);
+        let at_rest = of.at_rest(&vec![0.0; of.regressors.len()]);
         let error = match &of.errors {
             // Where there are inputs, it is of another constant: that at their means.
             Some(errors) if of.regressors.is_empty() && !of.mean_level => errors.level,

@@ -9,7 +9,8 @@ use athermal_numerics::{
 };
 
 use super::Asked;
-use super::follow::{Identified, UNSEEN, steps};
+use super::follow::{UNSEEN, steps};
+use super::model::Identified;
 use super::rehearse::{self, Reach};
 use super::rows::{Bridges, Pace, Rows};
 use crate::conditioning::tell_rows;

@@ -8,6 +8,7 @@
 //! epoch or an offset. What is done with every row is compiled for the vectors of several processors (`kernel/vectors.rs`).
 
 mod blocks;
+mod lanes;
 mod layout;
 mod parts;
 mod rows;
@@ -26,9 +27,10 @@ use pulp::Simd;
 use serde::{Deserialize, Serialize};
 
 use blocks::Blocks;
+use lanes::{LANES, Lanes};
 use parts::{ABREAST, Least, Line, Weights};
 use rows::Rows;
-use sums::{LANES, Lanes, Values};
+use sums::Values;
 use vectors::Vectors;
 use window::{Kind, Window};
 

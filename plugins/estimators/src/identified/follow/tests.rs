@@ -1,59 +1,8 @@
 //! What a followed model predicts around pauses and gaps, and how sure it says it is of that.
 
+use super::super::model::{MOST_SERIES, identified};
 use super::*;
-use athermal_numerics::Transfer;
-
-/// A model that sums its input up, nearly.
-fn identified(step: Duration) -> Identified {
-    Identified {
-        beginnings: Vec::new(),
-        regressors: vec!["input".to_owned()],
-        scaling: Scaling {
-            means: vec![0.0],
-            scales: vec![1.0],
-            truth: 0.0,
-        },
-        model: Polynomials {
-            a: vec![-0.9995],
-            inputs: vec![Transfer {
-                delay: 0,
-                b: vec![0.1],
-                f: Vec::new(),
-            }],
-            c: Vec::new(),
-            d: Vec::new(),
-            differences: 0,
-            level: 0.0,
-        },
-        errors: None,
-        mean_level: false,
-        step,
-        series: 1,
-        deviations: vec![1.0],
-    }
-}
-
-#[test]
-fn a_polynomial_without_standard_errors_is_no_mistake_and_one_with_too_few_is() {
-    let mut model = identified(Duration::from_ns(1_000_000_000));
-    model.model.a = vec![-0.9, 0.1];
-    for (errors, mistakes) in [(vec![], 0), (vec![0.1], 1), (vec![0.1, 0.2], 0)] {
-        model.errors = Some(Polynomials {
-            a: errors,
-            ..model.model.clone()
-        });
-        assert_eq!(model.mistakes().len(), mistakes);
-    }
-}
-
-#[test]
-fn a_deviation_that_is_negative_is_a_mistake() {
-    let mut model = identified(Duration::from_ns(1_000_000_000));
-    for (deviations, mistakes) in [(vec![], 1), (vec![1.0, -0.5], 1), (vec![0.0], 0)] {
-        model.deviations = deviations;
-        assert_eq!(model.mistakes().len(), mistakes);
-    }
-}
+use athermal_core::node::Predictor;
 
 #[test]
 fn what_the_first_truth_is_off_by_is_shared_by_the_variance_that_filters_and_noise_give() {

@@ -3,8 +3,9 @@
 
 use std::array::from_fn;
 
+use super::lanes::{LANES, Lanes, group_count};
 use super::rows::Rows;
-use super::sums::{Common, Group, LANES, Lanes, Table, group_count};
+use super::sums::{Common, Group, Table};
 
 /// Blocks that restored ones have room for, beside as many again.
 const SPARE_BLOCKS: usize = 16;

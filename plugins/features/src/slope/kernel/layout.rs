@@ -2,8 +2,8 @@
 
 use pulp::Simd;
 
+use super::lanes::{LANES, Lanes};
 use super::parts::ABREAST;
-use super::sums::{LANES, Lanes};
 
 /// Puts results of the channels of a group, of which there are as many as `out` has room for, in all windows.
 #[inline(always)]

@@ -2,7 +2,8 @@
 
 use std::array::from_fn;
 
-use super::sums::{Common, Group, LANES, Lanes, Times, TimesOfLanes, Values};
+use super::lanes::{LANES, Lanes};
+use super::sums::{Common, Group, Times, TimesOfLanes, Values};
 
 const NS_PER_S: f64 = 1e9;
 

@@ -1,7 +1,7 @@
 //! The rows that some window still holds, and how long each channel has been there, silent or awaited.
 //! It does not decide which rows a window holds, nor when there is a value.
 
-use super::sums::{LANES, Lanes, group_count};
+use super::lanes::{LANES, Lanes, group_count};
 
 /// Rows in a ring whose length is a power of two, counted from the last reset.
 #[derive(Clone, Debug)]

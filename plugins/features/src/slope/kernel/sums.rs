@@ -4,24 +4,12 @@
 //! Times are nanoseconds after the run's origin, values lie about an origin that is the same for all runs. Nothing is
 //! ever subtracted from a sum: a sample leaves by not being in the runs that remain.
 //! While no sample is missing, count and times are the same for all channels: sums of them per channel are kept only on demand.
-//! Channels lie in groups of eight, so that the loops over them become vector instructions; the last group is filled up
-//! with channels that are always present.
 
 use std::array::from_fn;
 use std::ops::Range;
 
+use super::lanes::{LANES, Lanes, group_count};
 use super::rows::Rows;
-
-/// Channels in a group.
-pub(super) const LANES: usize = 8;
-
-/// One value for each channel of a group.
-pub(super) type Lanes = [f64; LANES];
-
-/// How many groups there are.
-pub(super) fn group_count(channels: usize) -> usize {
-    channels.div_ceil(LANES)
-}
 
 /// Sums of `L` channels that concern the times of their samples: Σ1, Σt, Σt².
 #[derive(Clone, Copy, Debug)]

@@ -4,8 +4,8 @@ use std::array::from_fn;
 
 use pulp::Scalar;
 
+use super::lanes::{LANES, Lanes};
 use super::parts::{ABREAST, Line};
-use super::sums::{LANES, Lanes};
 use super::window::Kind;
 use super::{RollingSlope, layout};
 

@@ -1,0 +1,21 @@
+//! What a format gives of each row; not what becomes of it.
+
+use crate::ledger::Ledger;
+use crate::{FileError, Place};
+
+/// Cells of the current row, whatever the format.
+pub(crate) trait Cells {
+    /// Goes to the next whole row; false at the end.
+    fn advance(&mut self, ledger: &mut Ledger) -> Result<bool, FileError>;
+    /// The cell of the time column.
+    fn time(&self) -> &[u8];
+    /// The cell of a channel of the layout; empty if there is none.
+    fn channel(&self, index: usize) -> &[u8];
+    /// Whether `1,5` is a number.
+    fn decimal_comma(&self) -> bool;
+    fn place(&self) -> Place;
+    /// Takes the columns from here on as the current row names them, if that is what it does.
+    fn take_header(&mut self, _ledger: &mut Ledger) -> Result<bool, FileError> {
+        Ok(false)
+    }
+}
