@@ -1,4 +1,4 @@
-//! Parameters that do not suit the number of features are told when a graph is checked, not after its data were read.
+//! Numbers of channels that do not suit a node, or its parameters, are told when a graph is checked, and only those.
 
 use crate::mistakes::assert_told;
 use crate::workbench::{Scratch, athermal};
@@ -91,4 +91,35 @@ fn a_scale_of_temperature_that_is_written_as_another_unit_is_named() {
         told.contains("degrees Celsius are \"Cel\"; \"C\" is the coulomb"),
         "{told}"
     );
+}
+
+#[test]
+fn a_state_for_each_rate_is_no_mistake_beside_one_in_a_parameter() {
+    let text = r#"schema = 1
+[signals.position]
+unit = "nm"
+channels = ["X", "Y"]
+max_age = "1min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+[nodes.stability]
+type = "stability"
+inputs.drift = "drift"
+stable_below = "10 nm/min"
+transient_above = "50 nm/min"
+[nodes.correction]
+type = "compensate"
+inputs.rate = "drift"
+inputs.state = "stability"
+range = "2 um"
+max_rate = "60 nm/min"
+max_slew = "1 nm/s"
+stop_in = [0]
+[outputs]
+correction = "correction"
+"#;
+    let expected = "expected the name of a choice for \"stop_in\"";
+    assert_told("state-per-rate", text, &[(22, expected)]);
 }

@@ -7,7 +7,7 @@ use super::keys::Learn;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use crate::document::{InstanceDecl, LeftOut, NodeDecl};
-use crate::node::{InputPort, Kind, Mistake, Read, Role};
+use crate::node::{InputPort, Kind, Mistake, Read, Role, RoleName};
 
 /// What is found whichever choice stands where one could not be read.
 fn agreed(mut readings: impl Iterator<Item = Vec<Mistake>>) -> Vec<Mistake> {
@@ -89,7 +89,8 @@ impl Resolver<'_> {
         let mut whole = true;
         for port in (declared.kind.inputs)() {
             let slots = self.slots(declared, port).unwrap_or_default();
-            let takes_one = port.read == Read::Truth || port.name == "state";
+            let is_gate = port.name == "state" && declared.kind.role == RoleName::Combiner;
+            let takes_one = port.read == Read::Truth || is_gate;
             if takes_one && slots.len() > 1 {
                 self.one_of(declared, port, &slots);
             }
