@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod tests;
+mod usual;
 
 use athermal_core::node::{
     Combine, Combiner, Evidence, InputPort, Mistake, Restored, State, Votes,
@@ -13,6 +14,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::mean::{equal, mean};
+use usual::{Taken, Usual};
 
 /// What both kinds document of their answers.
 macro_rules! reasons {
@@ -31,7 +33,10 @@ macro_rules! reasons {
 /// since the test began. After an alarm it begins anew. The usual error is the root mean
 /// square of all that have been taken, the present one among them; one that is larger than five times that counts as five
 /// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves. Among the `first`
-/// errors, at most 100, 1.4826 times the median of their sizes stands for the usual error in this.
+/// errors, at most 100, 1.4826 times the median of their sizes stands for the usual error in this. All exactly 0, as of a machine
+/// that stands still, they say nothing of those to come and are passed over. Where more than half of the newest, as many as `first`
+/// and at most 100, are larger than five times the usual error, and a quarter of these to either side, what was usual is no more:
+/// they tell anew what is, and the test begins anew. Of sizes that is an alarm.
 ///
 /// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985), and in no fewer with a
 /// `φ` below 1. Those of truths that overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much
@@ -79,7 +84,8 @@ pub struct PageHinkley {
 ///
 /// A window holds the errors, truth minus prediction, since the last change of their mean, in multiples of the usual error: the
 /// root mean square of all that have been taken, of which one larger than five times that counts as five (among the `first`, at
-/// most 100, five times 1.4826 times the median of their sizes). There is an alarm, and the window begins anew, where it has two
+/// most 100, five times 1.4826 times the median of their sizes), and which begins anew where errors are none at first or unusual
+/// for long, as in `page_hinkley`. There is an alarm, and the window begins anew, where it has two
 /// sides with means that are farther apart than chance allows: `ε = √(2/m · σ² · ln(2 ln n / δ)) + 2/(3m) · ln(2 ln n / δ)`, `1/m = 1/(n₁ − s + 1) + 1/(n₂ − s + 1)`
 /// of the sides' lengths with `s` for `shortest` (Bifet and Gavaldà 2007, ADWIN2, where `s` is 1; with the others as river has it). It takes the errors for independent; those of truths that overlap are not, so let it take
 /// one in a while with `every`.
@@ -163,15 +169,6 @@ fn five_minutes() -> Duration {
 fn hour() -> Duration {
     Duration::from_ns(3_600_000_000_000)
 }
-
-/// An error that is more times as large as usual counts as so many times.
-const LARGEST: f64 = 5.0;
-
-/// How many errors tell at most, by the median of their sizes, which are usual.
-const EARLY: u64 = 100;
-
-/// The standard deviation of normal errors in multiples of the median of their sizes (Hampel 1974).
-const OF_MEDIAN: f64 = 1.4826;
 
 /// The largest error that is taken: the squares of so many as there may be have a sum.
 const LARGEST_EVER: f64 = 1e140;
@@ -324,6 +321,8 @@ athermal_core::register!(Adwin, Combiner, "adwin");
 trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeOwned + 'static {
     fn push(&mut self, value: f64) -> Option<MeanChange>;
 
+    fn clear(&mut self);
+
     /// Goes on with the parameters of another.
     fn told_by(self, other: &Self) -> Self;
 }
@@ -331,6 +330,10 @@ trait Detector: Clone + Send + Sync + std::fmt::Debug + Serialize + DeserializeO
 impl Detector for numerics::PageHinkley {
     fn push(&mut self, value: f64) -> Option<MeanChange> {
         self.push(value)
+    }
+
+    fn clear(&mut self) {
+        self.clear();
     }
 
     fn told_by(self, other: &Self) -> Self {
@@ -341,6 +344,10 @@ impl Detector for numerics::PageHinkley {
 impl Detector for numerics::Adwin {
     fn push(&mut self, value: f64) -> Option<MeanChange> {
         self.push(value)
+    }
+
+    fn clear(&mut self) {
+        self.clear();
     }
 
     fn told_by(self, other: &Self) -> Self {
@@ -361,11 +368,7 @@ struct Watching<D> {
 struct Seen<D> {
     watch: Watched,
     detector: D,
-    /// How many errors have been taken, and the mean of their squares.
-    count: u64,
-    mean_square: f64,
-    /// The first errors, while they do not tell yet which are usual.
-    early: Vec<f64>,
+    usual: Usual,
     /// When the last truth was taken.
     taken: Option<Instant>,
     /// The last alarm: when it became known, and whether the mean had gone up.
@@ -376,8 +379,8 @@ struct Seen<D> {
     newest: Option<Instant>,
 }
 
-athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/3");
-athermal_core::state!(Seen<numerics::Adwin>, "adwin/2");
+athermal_core::state!(Seen<numerics::PageHinkley>, "page_hinkley/4");
+athermal_core::state!(Seen<numerics::Adwin>, "adwin/3");
 
 impl<D: Detector> Watching<D> {
     fn new(watch: Watched, first: u64, every: Duration, hold: Duration, detector: D) -> Self {
@@ -388,9 +391,7 @@ impl<D: Detector> Watching<D> {
             seen: Seen {
                 watch,
                 detector,
-                count: 0,
-                mean_square: 0.0,
-                early: Vec::with_capacity(EARLY as usize),
+                usual: Usual::new(),
                 taken: None,
                 alarm: None,
                 found: None,
@@ -401,7 +402,7 @@ impl<D: Detector> Watching<D> {
 
     fn judge(&self) -> f64 {
         let Seen {
-            count,
+            usual,
             alarm,
             newest,
             ..
@@ -414,7 +415,7 @@ impl<D: Detector> Watching<D> {
                     reason::DOWN
                 }
             }
-            _ if *count < self.first => reason::UNKNOWN,
+            _ if usual.count() < self.first => reason::UNKNOWN,
             _ => reason::NONE,
         }
     }
@@ -446,29 +447,23 @@ where
         }
         seen.taken = Some(arrived);
         let error = error.clamp(-LARGEST_EVER, LARGEST_EVER);
-        seen.count += 1;
-        // All that came before are early ones: which are usual is not known yet.
-        if seen.count as usize == seen.early.len() + 1 {
-            seen.early.push(error);
-            if seen.count >= self.first.min(EARLY) {
-                seen.mean_square = usual_square(&mut seen.early);
-                seen.early.clear();
+        match (seen.usual.take(error, self.first, seen.watch), seen.watch) {
+            (Taken::Early, _) => {}
+            (Taken::Counts(relative), watch) => {
+                let value = match watch {
+                    Watched::Error => relative,
+                    Watched::Size => relative.abs(),
+                };
+                if let Some(change) = seen.detector.push(value) {
+                    seen.found = Some(change == MeanChange::Up);
+                }
             }
-            return;
-        }
-        let usual = seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
-        let error = error.clamp(-LARGEST * usual, LARGEST * usual);
-        seen.mean_square += (error * error - seen.mean_square) / seen.count as f64;
-        if seen.count <= self.first {
-            return;
-        }
-        let relative = error / seen.mean_square.sqrt().max(f64::MIN_POSITIVE);
-        let value = match seen.watch {
-            Watched::Error => relative,
-            Watched::Size => relative.abs(),
-        };
-        if let Some(change) = seen.detector.push(value) {
-            seen.found = Some(change == MeanChange::Up);
+            (Taken::Unusual, watch) => {
+                seen.detector.clear();
+                if watch == Watched::Size {
+                    seen.found = Some(true);
+                }
+            }
         }
     }
 
@@ -490,7 +485,7 @@ where
 
     fn evidence(&self) -> Option<Evidence> {
         Some(Evidence {
-            truths: self.seen.count as f64,
+            truths: self.seen.usual.count() as f64,
             // As many again must come before an alarm as tell which errors are usual.
             needed: 2.0 * self.first as f64,
             remedy: "a shorter `every`, or more data,",
@@ -509,27 +504,11 @@ where
             }
             Ok(mut known) => {
                 known.detector = known.detector.told_by(&self.seen.detector);
-                known
-                    .early
-                    .reserve((EARLY as usize).saturating_sub(known.early.len()));
+                known.usual.reserve();
                 self.seen = known;
                 Restored::Accepted
             }
             Err(cold) => cold,
         }
     }
-}
-
-/// The mean square of the first errors, of which one that is larger than [`LARGEST`] times the usual counts as that.
-fn usual_square(errors: &mut [f64]) -> f64 {
-    let middle = errors.len() / 2;
-    let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
-    let (_, median, _) = errors.select_nth_unstable_by(middle, by_size);
-    let largest = match LARGEST * OF_MEDIAN * median.abs() {
-        // Most were exactly as predicted, which says nothing of the others.
-        0.0 => f64::INFINITY,
-        largest => largest,
-    };
-    let squares = errors.iter().map(|error| error.abs().min(largest).powi(2));
-    squares.sum::<f64>() / errors.len() as f64
 }

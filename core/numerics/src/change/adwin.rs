@@ -137,12 +137,13 @@ impl Adwin {
         }
         let change = self.cut();
         if change.is_some() {
-            self.begin();
+            self.clear();
         }
         change
     }
 
-    fn begin(&mut self) {
+    /// Begins anew.
+    pub fn clear(&mut self) {
         self.seen = 0;
         self.window = Part::default();
         self.buckets.iter_mut().for_each(Vec::clear);

@@ -103,9 +103,14 @@ impl PageHinkley {
             None
         };
         if change.is_some() {
-            *self = Self::begin(self.options);
+            self.clear();
         }
         change
+    }
+
+    /// Begins anew.
+    pub fn clear(&mut self) {
+        *self = Self::begin(self.options);
     }
 
     /// Goes on with other options.

@@ -1,4 +1,5 @@
 use super::*;
+use athermal_core::prng::Prng;
 
 fn s(seconds: i64) -> Instant {
     Instant::from_ns(seconds * 1_000_000_000)
@@ -159,10 +160,82 @@ fn a_glitch_among_the_first_errors_leaves_the_tests_as_sensitive_as_they_are_wit
     }
 }
 
+/// How often it is said anew of so many errors, one a minute, that they have gone up or down.
+fn alarms(mut node: Box<dyn Combine>, errors: i64, error: impl Fn(i64) -> f64) -> Vec<i64> {
+    let vote = Votes(&[0.0]);
+    let mut alarms = Vec::new();
+    let mut before = reason::UNKNOWN;
+    for nth in 0..errors {
+        node.observe(vote, error(nth), s(60 * nth));
+        node.advance(s(60 * nth));
+        let said = node.reason(vote);
+        if said != before && (said == reason::UP || said == reason::DOWN) {
+            alarms.push(nth);
+        }
+        before = said;
+    }
+    alarms
+}
+
+/// The series that are watched in these tests, of errors without a mean.
+fn noise(seed: u64, errors: usize) -> Vec<f64> {
+    let mut draw = Prng::stream(seed, "errors");
+    (0..errors).map(|_| draw.normal()).collect()
+}
+
 #[test]
-fn first_errors_of_which_most_are_none_tell_by_the_others_which_are_usual() {
-    assert_eq!(usual_square(&mut [0.0, 0.0, 3.0, 0.0, -1.0]), 2.0);
-    assert_eq!(usual_square(&mut [1.0, -1.0, 1.0, -1.0]), 1.0);
+fn a_start_without_any_error_says_nothing_of_those_that_follow() {
+    for seed in 0..5 {
+        let noise = noise(seed, 3000);
+        // A machine that stands still, by persistence: exactly, and but for rounding.
+        for quiet in [0.0, 1e-15] {
+            let error = |nth: i64| match nth {
+                0..60 => quiet * noise[nth as usize],
+                2000.. => noise[nth as usize] + 3.0,
+                _ => noise[nth as usize],
+            };
+            for node in [page_hinkley().build(1), adwin().build(1)] {
+                let found = alarms(node, 3000, error);
+                let (early, late): (Vec<i64>, Vec<i64>) =
+                    found.iter().partition(|&&nth| nth < 2000);
+                assert!(early.len() <= 1, "{seed}, {quiet}: {found:?}");
+                assert!(
+                    late.first().is_some_and(|&nth| nth < 2050),
+                    "{seed}, {quiet}: {found:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_that_grows_for_good_is_no_bias_and_told_by_its_size() {
+    let size = PageHinkley {
+        watch: Watched::Size,
+        ..page_hinkley()
+    };
+    let size_by_window = Adwin {
+        watch: Watched::Size,
+        ..adwin()
+    };
+    for (quiet, of_later) in [(1000, 0.01), (300, 0.001)] {
+        for seed in 0..5 {
+            let noise = noise(seed, 3000);
+            let error = |nth: i64| match nth {
+                _ if nth < quiet => of_later * noise[nth as usize],
+                _ => noise[nth as usize],
+            };
+            for node in [page_hinkley().build(1), adwin().build(1)] {
+                let found = alarms(node, 3000, error);
+                assert!(found.len() <= 1, "{quiet}, {seed}: {found:?}");
+            }
+            for node in [size.build(1), size_by_window.build(1)] {
+                let found = alarms(node, 3000, error);
+                let told = matches!(found[..], [only] if (quiet..quiet + 30).contains(&only));
+                assert!(told, "{quiet}, {seed}: {found:?}");
+            }
+        }
+    }
 }
 
 #[test]
