@@ -67,7 +67,7 @@ fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another()
         ]);
         alone.ended(0).json()["comparisons"][0].clone()
     };
-    let count = |table: &Value| table["truths"][2]["count"].as_u64().unwrap();
+    let count = |table: &Value| table["truths"][2]["n"].as_u64().unwrap();
     let first = alone(&graph("die-tester"));
     assert_eq!(count(table), count(&alone(&slow)));
     assert!(
@@ -101,7 +101,7 @@ fn graphs_are_fitted_on_one_recording_and_scored_on_common_instants_of_another()
         );
         assert!((rmse / score["rmse"].as_f64().unwrap() - 1.0).abs() < 1e-12);
         let truth = &first["truths"][column];
-        for key in ["no_model", "persistence"] {
+        for key in ["baseline_zero", "baseline_persistence"] {
             let (here, there) = (truth[key].as_f64().unwrap(), score[key].as_f64().unwrap());
             assert!((here / there - 1.0).abs() < 1e-12);
         }
@@ -378,7 +378,7 @@ fn no_shipped_graph_is_worse_than_no_model_on_any_axis_of_any_recording() {
                 .filter(|row| !BASELINES.contains(&row.kind))
             {
                 for (truth, rmse) in table.truths.iter().zip(&row.rmse) {
-                    let (Some(rmse), Some(zero)) = (*rmse, truth.no_model) else {
+                    let (Some(rmse), Some(zero)) = (*rmse, truth.baseline_zero) else {
                         worse.push(format!("{name} {} {}: not scored", row.node, truth.name));
                         continue;
                     };

@@ -131,10 +131,10 @@ fn the_last_truth_is_repeated_from_as_far_back_as_the_mode_says() {
     let repeats = root_mean_square((3..200).map(|t| y[t - 3] - y[t]));
     for of in &three {
         // Features have a prediction of the first three, and nothing to repeat.
-        near(of["persistence"].as_f64().unwrap(), repeats);
+        near(of["baseline_persistence"].as_f64().unwrap(), repeats);
     }
     let free = scores(&model, &data, &["--mode", "free-run", "--each-on-its-own"]);
-    assert!(free.iter().all(|of| of["persistence"].is_null()));
+    assert!(free.iter().all(|of| of["baseline_persistence"].is_null()));
     near(
         figure(&free, "lasting", "rmse"),
         root_mean_square((1..200).map(|t| y[0] - y[t])),
@@ -200,7 +200,7 @@ fn persistence_of_some_steps_repeats_the_last_truth_so_far_back_also_where_rows_
                 Some(rows[last(origin.min(times[run]))?][1] - rows[nth][1])
             });
             near(
-                figure(&scores, "features", "persistence"),
+                figure(&scores, "features", "baseline_persistence"),
                 root_mean_square(errors),
             );
         }
@@ -245,7 +245,7 @@ fn the_error_of_a_fit_of_kalman_is_that_of_evaluating_it_on_the_same_rows() {
             &"json",
         ]);
         let score = of(&score.ended(0).json()["scores"]);
-        assert_eq!(card["rows"], score["count"], "{ahead} {more}");
+        assert_eq!(card["rows"], score["n"], "{ahead} {more}");
         let of_fit = card["in_sample_rmse"].as_f64().unwrap();
         near(of_fit, score["rmse"].as_f64().unwrap());
     }

@@ -48,7 +48,7 @@ fn scored(train: &Path, test: &Path) -> Vec<(f64, f64)> {
         .filter(|score| score["node"].as_str().unwrap().starts_with("vote"))
         .map(|score| {
             let figure = |name: &str| score[name].as_f64().unwrap();
-            (figure("rmse"), figure("no_model"))
+            (figure("rmse"), figure("baseline_zero"))
         })
         .collect()
 }

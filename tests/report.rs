@@ -507,7 +507,7 @@ fn the_verdict_tells_the_errors_of_the_table() {
         let mut of_axis = scores.filter(|of| of["truth"] == format!("drift.{axis}"));
         let score = of_axis.find(|of| of["node"] == *node).unwrap();
         assert_eq!(verdict["rmse"], score["rmse"], "{axis}");
-        assert_eq!(verdict["no_model"], score["no_model"], "{axis}");
+        assert_eq!(verdict["baseline_zero"], score["baseline_zero"], "{axis}");
     }
 }
 

@@ -183,7 +183,7 @@ fn check(name: &str, ahead: f64, graph: &str) {
             let noise: Vec<f64> = common.iter().map(|&i| truths[i].error).collect();
             let there = counted.iter().filter(|&&i| !values[i].is_nan()).count();
             let expected = [
-                ("count", common.len() as f64),
+                ("n", common.len() as f64),
                 ("ahead_s", ahead),
                 ("rmse", root_mean_square(&e)),
                 ("r2_zero", 1.0 - sse / y.iter().map(|y| y * y).sum::<f64>()),
@@ -194,8 +194,8 @@ fn check(name: &str, ahead: f64, graph: &str) {
                 ("bias", e.iter().sum::<f64>() / e.len() as f64),
                 ("max_abs", e.iter().map(|e| e.abs()).fold(0.0, f64::max)),
                 ("valid", there as f64 / counted.len() as f64),
-                ("no_model", root_mean_square(&y)),
-                ("persistence", root_mean_square(&persistence)),
+                ("baseline_zero", root_mean_square(&y)),
+                ("baseline_persistence", root_mean_square(&persistence)),
                 ("truth_noise", root_mean_square(&noise)),
             ];
             assert!(common.len() > 500, "{}", common.len());
@@ -254,7 +254,7 @@ fn a_truth_is_scored_by_the_age_that_its_node_is_given_it_at_and_has_no_spread_w
             scores[0]["r2_mean"].is_null() && scores[0]["fit"].is_null(),
             "{scores}"
         );
-        scores[0]["count"].as_u64().unwrap()
+        scores[0]["n"].as_u64().unwrap()
     };
     let own = "{ from = \"position.Z\", max_age = \"30s\" }";
     let long = "max_age = \"3min\"";

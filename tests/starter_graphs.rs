@@ -124,7 +124,7 @@ fn a_flag_that_is_logged_on_change_does_not_widen_the_drift_window() {
     let thermal = scores.iter().find(|score| score["node"] == "thermal");
     let thermal = thermal.unwrap();
     let figure = |name: &str| thermal[name].as_f64().unwrap();
-    assert!(figure("rmse") < 0.5 * figure("no_model"), "{thermal}");
+    assert!(figure("rmse") < 0.5 * figure("baseline_zero"), "{thermal}");
 }
 
 #[test]

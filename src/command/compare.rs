@@ -373,8 +373,11 @@ fn describe(comparison: &Comparison, mode: Mode, several: bool) -> String {
         truths.map(|truth| or_dash(of(truth))).collect()
     };
     let mut rows = vec![
-        ("no model".to_owned(), plain(|truth| truth.no_model)),
-        ("persistence".to_owned(), plain(|truth| truth.persistence)),
+        ("no model".to_owned(), plain(|truth| truth.baseline_zero)),
+        (
+            "persistence".to_owned(),
+            plain(|truth| truth.baseline_persistence),
+        ),
     ];
     let mut graph = None;
     for (nth, row) in comparison.rows.iter().enumerate() {
@@ -391,7 +394,7 @@ fn describe(comparison: &Comparison, mode: Mode, several: bool) -> String {
 }
 
 fn heading(comparison: &Comparison, mode: Mode) -> String {
-    let counts = comparison.truths.iter().map(|truth| truth.count as u64);
+    let counts = comparison.truths.iter().map(|truth| truth.n as u64);
     let (fewest, most) = (counts.clone().min(), counts.max());
     let instants = match (fewest, most) {
         (Some(fewest), Some(most)) if fewest != most => {
@@ -435,11 +438,11 @@ fn cell(comparison: &Comparison, row: usize, column: usize, truth: &Column) -> S
         return "-".to_owned();
     };
     let own = comparison.rows[row].own[column];
-    let no_model = own.map_or(truth.no_model, |own| own.no_model);
+    let no_model = own.map_or(truth.baseline_zero, |own| own.baseline_zero);
     let worse = no_model.is_some_and(|zero| rmse > zero);
     let worse = if worse { "!" } else { "" };
     if let Some(own) = own {
-        return format!("{worse}{} @{}", number(rmse), count(own.count as u64));
+        return format!("{worse}{} @{}", number(rmse), count(own.n as u64));
     }
     if truth.best == Some(row) {
         return format!("*{worse}{}", number(rmse));
@@ -466,10 +469,10 @@ mod tests {
             truths: vec![Column {
                 truth: "drift.Z".to_owned(),
                 name: "Z".to_owned(),
-                count,
+                n: count,
                 left_out: None,
-                no_model: Some(2.39),
-                persistence: None,
+                baseline_zero: Some(2.39),
+                baseline_persistence: None,
                 best: Some(0),
                 otherwise: Vec::new(),
             }],
@@ -503,8 +506,8 @@ mod tests {
         let mut seldom = one_row(100, 2.5);
         seldom.truths[0].best = None;
         seldom.rows[0].own[0] = Some(athermal::diagnosis::comparison::Own {
-            count: 40,
-            no_model: Some(2.6),
+            n: 40,
+            baseline_zero: Some(2.6),
         });
         let told = describe(&seldom, Mode::OneStep, false);
         assert!(told.contains(" 2.50 @40"), "{told}");

@@ -273,6 +273,10 @@ impl Simulation for Watched {
         self.progress.tell((row.time_ns as f64 / 86_400e6) as u64);
         more
     }
+
+    fn correct(&mut self, asked: &[f64], applied: &mut [f64]) {
+        self.simulation.correct(asked, applied);
+    }
 }
 
 fn list(terminal: &Terminal) {

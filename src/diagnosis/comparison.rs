@@ -53,14 +53,14 @@ pub struct Column {
     /// Its name within its node: `Z1`.
     pub name: String,
     /// Instants scored: those at which every prediction of it that is valid at half of them or more has a value.
-    pub count: usize,
+    pub n: usize,
     /// Instants at which the prediction that is there most often is not scored, since another is not there, and the row that is there
     /// least often of those that count; none where these are few, at most one in twenty.
     pub left_out: Option<(usize, usize)>,
     /// Root mean square of the truth: the error of no model.
-    pub no_model: Option<f64>,
+    pub baseline_zero: Option<f64>,
     /// The error of the truth at the smallest lag that sees nothing of the answer.
-    pub persistence: Option<f64>,
+    pub baseline_persistence: Option<f64>,
     /// The row with the smallest error on these instants.
     pub best: Option<usize>,
     /// Graphs whose own truth of this name is another one than that of the first graph, which all are scored on.
@@ -95,9 +95,9 @@ pub struct Row {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Own {
     /// How many there are.
-    pub count: usize,
+    pub n: usize,
     /// The error of no model on them.
-    pub no_model: Option<f64>,
+    pub baseline_zero: Option<f64>,
 }
 
 /// A prediction of a truth by one of the contenders.
@@ -283,8 +283,8 @@ fn column(
             let there = || counted.iter().filter(|at| !value(entry, at).is_nan());
             rows[row].rmse[nth] = rms(there().map(|at| value(entry, at) - truth(at)));
             rows[row].own[nth] = Some(Own {
-                count: there().count(),
-                no_model: rms(there().map(|at| truth(at))),
+                n: there().count(),
+                baseline_zero: rms(there().map(|at| truth(at))),
             });
             continue;
         }
@@ -330,10 +330,10 @@ fn column(
     Column {
         truth: first.truth_name().to_owned(),
         name: channel.name.clone(),
-        count: common.len(),
+        n: common.len(),
         left_out,
-        no_model: rms(common.iter().map(|at| truth(at))),
-        persistence: rms(common.iter().map(|at| lasting(at) - truth(at))),
+        baseline_zero: rms(common.iter().map(|at| truth(at))),
+        baseline_persistence: rms(common.iter().map(|at| lasting(at) - truth(at))),
         best: best.filter(|&best| rows[best].rmse[nth].is_some()),
         otherwise,
     }

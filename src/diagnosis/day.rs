@@ -71,13 +71,13 @@ pub struct DayScore {
     /// The prediction: `vote.Z1`.
     pub prediction: String,
     /// Instants at which both this fit and that on all days but the one predicted had a prediction.
-    pub count: usize,
+    pub n: usize,
     /// Root mean square error on these; none without an instant.
     pub rmse: Option<f64>,
     /// The same of fits on all days but the one predicted, on the same instants: what more days are worth.
     pub all_others: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of no model.
-    #[serde(rename = "no_model")]
+    #[serde(rename = "baseline_zero")]
     pub zero: Option<f64>,
 }
 
@@ -351,7 +351,7 @@ fn scores(plan: &Plan, trace: &Trace, sums: &[Sums]) -> Vec<DayScore> {
         let rms = |squares: f64| (sums.count > 0).then(|| (squares / sums.count as f64).sqrt());
         DayScore {
             prediction: plan.channels[of.slot].name.clone(),
-            count: sums.count,
+            n: sums.count,
             rmse: rms(sums.own),
             all_others: rms(sums.others),
             zero: rms(sums.zero),

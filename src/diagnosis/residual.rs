@@ -30,7 +30,7 @@ pub struct Residuals {
     /// The unit of the truth.
     pub unit: String,
     /// Residuals over all truths for which this prediction was valid; a score takes those for which all of the truth were.
-    pub count: usize,
+    pub n: usize,
     /// Their root mean square.
     pub rms: f64,
     /// Their mean.
@@ -94,7 +94,7 @@ fn of_prediction(
         prediction: plan.channels[of.slot].name.clone(),
         truth: truth.name.clone(),
         unit: truth.channel.unit.difference().to_string(),
-        count,
+        n: count,
         rms: (present.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt(),
         mean: present.iter().sum::<f64>() / count as f64,
         spacing_s: spacing.secs(),

@@ -26,7 +26,7 @@ pub struct Verdict {
     #[serde(rename = "rmse")]
     pub error: Option<f64>,
     /// The drift itself on the same instants: the error of no model.
-    pub no_model: Option<f64>,
+    pub baseline_zero: Option<f64>,
     /// Whether the drift was measured at any instant.
     pub measured: bool,
     /// The share of the instants at which it was measured that have a prediction.
@@ -75,7 +75,7 @@ impl Verdict {
             unit: axis.error_unit.clone(),
             on_scale: axis.error_unit != axis.unit,
             error: figures.map(|of| of.0),
-            no_model: figures.map(|of| of.1),
+            baseline_zero: figures.map(|of| of.1),
             measured: measured > 0,
             valid: both().count() as f64 / measured.max(1) as f64,
             noise: score.and_then(|score| score.truth_noise),
@@ -91,7 +91,7 @@ impl Verdict {
             with.zip(without)
                 .is_some_and(|(with, without)| with < without)
         };
-        better(self.error, self.no_model)
+        better(self.error, self.baseline_zero)
             && (self.with_correction.is_none()
                 || better(self.with_correction, self.without_correction))
     }
@@ -99,7 +99,7 @@ impl Verdict {
     /// The sentence, after the name of the axis.
     #[must_use]
     pub fn sentence(&self) -> String {
-        let (Some(error), Some(no_model)) = (self.error, self.no_model) else {
+        let (Some(error), Some(no_model)) = (self.error, self.baseline_zero) else {
             return if self.measured {
                 format!("{} gave no prediction on these data.", self.node)
             } else {
@@ -173,7 +173,7 @@ mod tests {
             unit: "nm/min".into(),
             on_scale: false,
             error: Some(20.0),
-            no_model: Some(50.0),
+            baseline_zero: Some(50.0),
             measured: true,
             valid: 0.97,
             noise: Some(3.85),

@@ -6,10 +6,12 @@ mod looped;
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+use std::path::Path;
+
 use athermal::core::machine::{Row, Schedule, Setup, Simulated, Simulation};
 use athermal::core::prng::Prng;
 use looped::{Looped, output};
-use workbench::{Scratch, graph};
+use workbench::{Scratch, athermal, graph, simulated};
 
 fn die_tester() -> Looped {
     Looped::new("die-tester", &graph("die-tester-control"), 200_000.0, 50.0)
@@ -203,4 +205,52 @@ fn a_correction_that_the_axis_clips_fools_nobody() {
         clipped > 100 && left_the_end,
         "{clipped} ticks at the end of the axis"
     );
+}
+
+/// The numbers of a column of a table, NaN where a cell is empty.
+fn column(table: &Path, name: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(table).unwrap();
+    let mut rows = text.lines().map(|line| line.split(','));
+    let place = rows.next().unwrap().position(|column| column == name);
+    let cells = rows.map(|mut row| row.nth(place.unwrap()).unwrap());
+    cells.map(|cell| cell.parse().unwrap_or(f64::NAN)).collect()
+}
+
+#[test]
+fn what_simulate_is_told_to_correct_moves_the_axes_that_it_writes() {
+    let scratch = Scratch::new("simulate-compensates");
+    let week = simulated(&scratch, "week.csv", "die-tester", 3.0, 1);
+    let alone = simulated(&scratch, "alone.csv", "die-tester", 1.0, 2);
+    let [model, corrected] = ["model.json", "corrected.csv"].map(|name| scratch.path(name));
+    let graph = graph("die-tester-control");
+    athermal(&[&"fit", &graph, &"--data", &week, &"-o", &model]).ended(0);
+    athermal(&[
+        &"simulate",
+        &"die-tester",
+        &"--days",
+        &"1",
+        &"--seed",
+        &"2",
+        &"--compensate",
+        &model,
+        &"-o",
+        &corrected,
+    ])
+    .ended(0);
+    let applied = column(&corrected, "Z1_applied_nm");
+    let measured = [&corrected, &alone].map(|table| column(table, "Z1_nm"));
+    let moved = measured[0]
+        .iter()
+        .zip(&measured[1])
+        .map(|(with, without)| with - without);
+    let off = moved.zip(&applied).map(|(moved, applied)| moved - applied);
+    let off: Vec<f64> = off.filter(|off| !off.is_nan()).collect();
+    let far = off.iter().filter(|off| off.abs() > 1.0).count();
+    assert!(
+        off.len() > 1000 && far * 100 < off.len(),
+        "{far} of {}",
+        off.len()
+    );
+    let largest = applied.iter().fold(0.0, |most: f64, of| most.max(of.abs()));
+    assert!(largest > 1000.0, "the largest correction is {largest} nm");
 }

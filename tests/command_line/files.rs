@@ -254,7 +254,7 @@ fn date_and_time_in_two_columns_give_what_both_in_one_give() {
 
     let (graph, model, log) = dated_desk(&scratch, "{Date} {Time}");
     let in_two = athermal_on("evaluate", &model, &log, &[&"--format", &"json"]).json();
-    assert_eq!(in_two["scores"][0]["count"], 700);
+    assert_eq!(in_two["scores"][0]["n"], 700);
     assert_eq!(in_two["scores"], scores["scores"]);
     let page = scratch.path("page.html");
     athermal_on("report", &model, &log, &[&"-o", &page]).ended(0);

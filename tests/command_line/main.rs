@@ -222,15 +222,15 @@ fn scores_are_printed_as_json_with_all_their_keys() {
     for key in [
         "ahead_s",
         "horizon_s",
-        "count",
+        "n",
         "rmse",
         "r2_zero",
         "r2_mean",
         "bias",
         "max_abs",
         "valid",
-        "no_model",
-        "persistence",
+        "baseline_zero",
+        "baseline_persistence",
     ] {
         assert!(score[key].is_number(), "{key} in {score}");
     }
@@ -238,7 +238,7 @@ fn scores_are_printed_as_json_with_all_their_keys() {
         score.as_object().unwrap().contains_key("truth_noise"),
         "a plain sample has none, and the key is there"
     );
-    assert_eq!(score["count"], 60);
+    assert_eq!(score["n"], 60);
     assert_eq!(json["data"][0], data.display().to_string());
     assert_eq!(
         (
@@ -517,7 +517,7 @@ fn data_without_rows_are_told_and_never_a_panic() {
     .ended(0)
     .json();
     assert_eq!(
-        (&json["scores"][0]["count"], &json["scores"][0]["rmse"]),
+        (&json["scores"][0]["n"], &json["scores"][0]["rmse"]),
         (&0.into(), &serde_json::Value::Null)
     );
     let fit = athermal(&[

@@ -106,7 +106,7 @@ fn persistence_of_several_horizons_is_told_for_each() {
     let heading = scores.out.lines().nth(1).unwrap();
     assert!(heading.contains(" at 30s and "), "{heading}");
     assert!(heading.contains(" at 2min"), "{heading}");
-    let of = |row: usize| scored["scores"][row]["persistence"].as_f64();
+    let of = |row: usize| scored["scores"][row]["baseline_persistence"].as_f64();
     assert_ne!(of(0), of(1));
 }
 

@@ -289,7 +289,7 @@ fn a_single_truth_long_after_the_first_row_is_one_residual() {
     table.push(secs(36_000.0), &[1.0, f64::NAN]);
     let observation = observe(&model, &table).unwrap();
     let found = residual::residuals(&model.plan, &observation);
-    assert_eq!((found[0].count, found[0].spaced), (1, 1));
+    assert_eq!((found[0].n, found[0].spaced), (1, 1));
     assert_eq!(found[0].white, None);
 }
 
@@ -560,5 +560,5 @@ fn a_recording_without_a_truth_is_no_reason_to_stop() {
         empty.push(secs(10.0 * f64::from(row)), &[20.0, f64::NAN, f64::NAN]);
     }
     let (found, _) = diagnose(&model, &empty, &options, &mut |_, _| {}).unwrap();
-    assert!(found.residuals[0].count == 0 && found.days.is_none());
+    assert!(found.residuals[0].n == 0 && found.days.is_none());
 }

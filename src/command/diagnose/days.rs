@@ -95,7 +95,7 @@ mod tests {
     fn a_day_that_is_predicted_worse_than_by_no_model_is_marked_and_no_model_stands_below() {
         let score = |rmse: f64| DayScore {
             prediction: "vote.Z".to_owned(),
-            count: 100,
+            n: 100,
             rmse: Some(rmse),
             all_others: Some(rmse),
             zero: Some(4.0),

@@ -241,7 +241,7 @@ fn tell_empty(terminal: &Terminal, plan: &Plan, diagnosis: &Diagnosis, observati
     for main in &diagnosis.main {
         let residuals = diagnosis.residuals.iter();
         let mut of_main = residuals.filter(|of| of.prediction == main.prediction);
-        if of_main.all(|of| of.count > 0) {
+        if of_main.all(|of| of.n > 0) {
             continue;
         }
         let mut truths = observation.trace.truths.iter();

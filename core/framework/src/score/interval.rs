@@ -61,7 +61,6 @@ pub struct IntervalScore {
     /// The share of truths that they are to cover.
     pub stated: f64,
     /// Instants with an interval, of those on which the prediction is scored.
-    #[serde(rename = "count")]
     pub n: usize,
     /// The share of truths that they cover.
     pub covered: f64,

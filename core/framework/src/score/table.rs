@@ -53,7 +53,6 @@ pub struct Score {
     /// steps more as there are beyond the first, where past truths change it; none in a free run, where it goes by its own.
     pub horizon_s: Option<f64>,
     /// Instants scored.
-    #[serde(rename = "count")]
     pub n: usize,
     /// Root mean square error.
     pub rmse: Option<f64>,
@@ -70,11 +69,9 @@ pub struct Score {
     /// Share of the instants with a truth within the limit at which there is a prediction.
     pub valid: Option<f64>,
     /// Root mean square of the truth on the same instants: the error of predicting zero.
-    #[serde(rename = "no_model")]
     pub baseline_zero: Option<f64>,
     /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so
     /// many steps back, on the same instants; none in a free run, which would repeat the first truth of each segment.
-    #[serde(rename = "persistence")]
     pub baseline_persistence: Option<f64>,
     /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines: both the
     /// scatter of the samples and the curvature of what they follow count, and a prediction may come below it.
