@@ -1,5 +1,9 @@
 //! Requests that cannot be met as they stand, told before anything is done; and what is told once for all that was asked.
 
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
 use super::workbench::{Scratch, athermal, athermal_on};
 use super::{csv, desk, rows};
 
@@ -110,12 +114,45 @@ fn persistence_of_several_horizons_is_told_for_each() {
     assert_ne!(of(0), of(1));
 }
 
+/// What the page of a node says of its output ports, by name.
+fn ports(kind: &str) -> BTreeMap<String, String> {
+    let told = athermal(&[&"nodes", &kind, &"--format", &"json"]).ended(0);
+    let told = told.json();
+    let text = |port: &Value, key: &str| port[key].as_str().unwrap().to_owned();
+    let ports = told["outputs"].as_array().unwrap().iter();
+    ports
+        .map(|port| (text(port, "name"), text(port, "summary")))
+        .collect()
+}
+
 #[test]
-fn the_page_of_a_node_names_its_output_ports() {
-    let page = |kind: &str| athermal(&[&"nodes", &kind]).ended(0).out;
-    assert!(page("rls").contains("learning"));
-    assert!(page("linear").contains("deviation"));
-    assert!(page("auto_weighted").contains("weights"));
+fn the_page_of_a_node_names_the_output_ports_that_it_has() {
+    for (kind, expected) in [
+        ("rls", &["deviation", "learning", "prediction"][..]),
+        ("auto_weighted", &["deviation", "prediction", "weights"]),
+        ("guard", &["deviation", "prediction", "reason", "weights"]),
+        ("conformal", &["lower", "prediction", "upper"]),
+        ("narx", &["prediction"]),
+    ] {
+        let ports = ports(kind);
+        assert_eq!(ports.keys().collect::<Vec<_>>(), expected, "{kind}");
+        let always = |what: &String| !what.contains("not with all parameters");
+        assert!(ports.values().all(always), "{kind}");
+    }
+    // With stochastic gradients it goes on learning, and does not tell how sure it is.
+    let ports = ports("linear");
+    for port in ["learning", "deviation"] {
+        assert!(
+            ports[port].ends_with(" (not with all parameters)"),
+            "{port}"
+        );
+    }
+}
+
+#[test]
+fn the_choices_of_a_list_are_told_too() {
+    let page = athermal(&[&"nodes", &"compensate"]).ended(0).out;
+    assert!(page.contains("\"quasi_stable\""), "{page}");
 }
 
 #[test]

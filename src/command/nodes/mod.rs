@@ -1,6 +1,7 @@
 //! `athermal nodes`: lists the node types of this program, or explains one.
 
 mod parameters;
+mod settings;
 
 use athermal::core::diagnostic::nearest;
 use athermal::core::node::{
@@ -11,6 +12,7 @@ use serde_json::{Value, json};
 
 use crate::figures::{page, paragraph};
 use crate::terminal::{Answer, Failure, Format, Terminal};
+use settings::settings;
 
 /// List the node types, or explain one
 #[derive(Debug, Args)]
@@ -104,7 +106,7 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
     for (port, what) in outputs {
         let name = format!("  {port:<17} ");
-        print!("{}", paragraph(&name, 6, what));
+        print!("{}", paragraph(&name, 6, &what));
     }
     let schema = Value::from((kind.schema)());
     println!("\nParameters:");
@@ -135,67 +137,70 @@ fn explain(terminal: &Terminal, kind: &Kind) {
     }
 }
 
-/// The output ports that nodes of a kind may have, and when.
-fn outputs(kind: &Kind) -> Vec<(&'static str, &'static str)> {
-    const PREDICTION: (&str, &str) = ("prediction", "what the truth will be, in its unit");
-    const DEVIATION: (&str, &str) = (
-        "deviation",
-        "the standard deviation of the truth about the prediction",
+/// The output ports that nodes of a kind may have, and what each says.
+fn outputs(kind: &Kind) -> Vec<(&'static str, String)> {
+    let settings = settings(kind);
+    let specs: Vec<Role<'_>> = settings.iter().map(|spec| spec.role()).collect();
+    let port = |name, what: &str, has: fn(&Role<'_>) -> bool| {
+        let with = specs.iter().filter(|spec| has(spec)).count();
+        // Where no setting can be made up, they may be there.
+        let (any, all) = (with > 0 || specs.is_empty(), with == specs.len());
+        let when = if all && !specs.is_empty() {
+            ""
+        } else {
+            " (not with all parameters)"
+        };
+        any.then(|| (name, format!("{what}{when}")))
+    };
+    let prediction = (
+        "prediction",
+        "what the truth will be, in its unit".to_owned(),
     );
-    // Where only parameters tell, they may be there.
-    let by_default = kind.by_default();
-    let role = by_default.as_ref().map(|spec| spec.role());
     match kind.role {
         RoleName::Feature => {
             let ports = (kind.ports)().iter();
-            ports.map(|port| (port.name, port.summary)).collect()
+            ports
+                .map(|port| (port.name, port.summary.to_owned()))
+                .collect()
         }
         RoleName::Estimator => {
-            let (learns, deviates) = match role {
-                Some(Role::Estimator(of)) => {
-                    (!matches!(of.learns(), Learns::Never { .. }), of.deviates())
-                }
-                _ => (true, true),
-            };
-            let learning = (
-                "learning",
-                "with `learn`: what became of the newest truth. 0 learned, 1 frozen on command, 2 frozen by a channel, 3 an outlier, \
-                 4 outside the range of the fit, 5 outside `train.abs_truth`, 6 a regressor was missing",
-            );
-            let more = [(learns, learning), (deviates, DEVIATION)];
-            let more = more.into_iter().filter(|(there, _)| *there);
-            std::iter::once(PREDICTION)
-                .chain(more.map(|(_, port)| port))
-                .collect()
-        }
-        RoleName::Combiner => {
-            let (weighs, reasons, covers) = match role {
-                Some(Role::Combiner(of)) => (of.weighs(), of.reasons(), of.covers().is_some()),
-                _ => (true, true, true),
-            };
-            let more = [
-                (weighs, ("weights", "the weight of each voter, by its name")),
-                (
-                    reasons,
-                    (
-                        "reason",
-                        "the number of why it does what it does, as told above",
-                    ),
+            let ports = [
+                Some(prediction),
+                port(
+                    "learning",
+                    "with `learn`: what became of the newest truth. 0 learned, 1 frozen on command, 2 frozen by a channel, 3 an \
+                     outlier, 4 outside the range of the fit, 5 outside `train.abs_truth`, 6 a regressor was missing",
+                    |spec| matches!(spec, Role::Estimator(of) if !matches!(of.learns(), Learns::Never { .. })),
                 ),
-                (covers, ("lower", "where the interval begins")),
-                (covers, ("upper", "where it ends")),
-                (
-                    weighs,
-                    (
-                        DEVIATION.0,
-                        "where all voters have one: that of the truth about the prediction",
-                    ),
+                port(
+                    "deviation",
+                    "the standard deviation of the truth about the prediction",
+                    |spec| matches!(spec, Role::Estimator(of) if of.deviates()),
                 ),
             ];
-            let more = more.into_iter().filter(|(there, _)| *there);
-            std::iter::once(PREDICTION)
-                .chain(more.map(|(_, port)| port))
-                .collect()
+            ports.into_iter().flatten().collect()
+        }
+        RoleName::Combiner => {
+            let weighs = |spec: &Role<'_>| matches!(spec, Role::Combiner(of) if of.weighs());
+            let covers =
+                |spec: &Role<'_>| matches!(spec, Role::Combiner(of) if of.covers().is_some());
+            let ports = [
+                Some(prediction),
+                port("weights", "the weight of each voter, by its name", weighs),
+                port(
+                    "reason",
+                    "the number of why it does what it does, as told above",
+                    |spec| matches!(spec, Role::Combiner(of) if of.reasons()),
+                ),
+                port("lower", "where the interval begins", covers),
+                port("upper", "where it ends", covers),
+                port(
+                    "deviation",
+                    "where all voters have one: that of the truth about the prediction",
+                    weighs,
+                ),
+            ];
+            ports.into_iter().flatten().collect()
         }
     }
 }

@@ -74,6 +74,9 @@ impl<'a> Page<'a> {
         for choice in choices.flatten().filter(|choice| choice["type"] != "null") {
             self.choice(choice, depth);
         }
+        if value["items"].is_object() {
+            self.forms(&value["items"], depth);
+        }
         if value["type"] == "object" && value["properties"].is_object() {
             self.properties(value, None, depth);
         }

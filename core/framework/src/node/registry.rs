@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Combiner, Estimator, Feature, InputPort, PortSummary, Read};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
-use crate::document::{Data, Decoded, Table, Value, Wanted, decode_rest};
+use crate::document::{Decoded, Value, Wanted, decode_rest};
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -89,14 +89,11 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// A specification with all defaults; none of a kind that has parameters without.
+    /// The specification that parameters as a table give, with defaults for the others; none where they cannot be read.
     #[must_use]
-    pub fn by_default(&self) -> Option<Box<dyn NodeSpec>> {
-        let nothing = Value {
-            place: Place::new(SourceId(0), 0, 0),
-            data: Data::Table(Table::default()),
-        };
-        (self.read)(&nothing, &[], &mut Diagnostics::new())?.whole()
+    pub fn given(&self, parameters: &serde_json::Value) -> Option<Box<dyn NodeSpec>> {
+        let parameters = Value::from_json(parameters, Place::new(SourceId(0), 0, 0)).ok()?;
+        (self.read)(&parameters, &[], &mut Diagnostics::new())?.whole()
     }
 
     /// The keys of a node's table that the framework reads itself.
