@@ -268,6 +268,44 @@ fn whoever_reads_a_log_is_told_of_a_sensor_that_froze_or_fell_silent_in_it() {
 }
 
 #[test]
+fn a_sensor_without_any_sample_and_positions_that_stop_are_told_by_whoever_scores_or_runs() {
+    let scratch = Scratch::new("faulty-from-the-start");
+    let graph = scratch.file("graph.toml", GRAPH);
+    let (sound, model) = (
+        scratch.file("sound.csv", log(|_, _| ())),
+        scratch.path("model.json"),
+    );
+    athermal_on("fit", &graph, &sound, &[&"-o", &model]).ended(0);
+    let never = |_: usize, values: &mut [f64; 3]| values[1] = f64::NAN;
+    let stops = |row: usize, values: &mut [f64; 3]| {
+        if row > 960 {
+            values[2] = f64::NAN;
+        }
+    };
+    let told_of = |log: String, expected: &str| {
+        let data = scratch.file("log.csv", log);
+        let scored = athermal_on("evaluate", &model, &data, &[]);
+        let ran = athermal(&[&"run", &model, &"-i", &data]);
+        for told in [scored.told, ran.told] {
+            assert!(in_one_line(&told).contains(expected), "{told}");
+        }
+    };
+    told_of(
+        log(never),
+        "temperature.room has no sample in any of 2,880 rows: is the sensor connected, and its column the right one?",
+    );
+    told_of(
+        log(stops),
+        "position.Z has no sample in 1,919 of 2,880 rows, from 57660 s to 172740 s: is it not measured any more?",
+    );
+    // Where positions are measured for the fit alone, that is as it should be.
+    let unmeasured = log(|_, values| values[2] = f64::NAN);
+    let data = scratch.file("unmeasured.csv", unmeasured);
+    let ran = athermal(&[&"run", &model, &"-i", &data]).ended(0);
+    assert!(!ran.told.contains("no sample"), "{}", ran.told);
+}
+
+#[test]
 fn a_coarse_sensor_that_freezes_looks_stuck_though_it_often_repeats_its_value() {
     let scratch = Scratch::new("faulty-coarse");
     let coarse = |frozen: bool| {

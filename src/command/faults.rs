@@ -136,8 +136,7 @@ impl Looks {
                 of_truth,
                 leaps,
                 stuck: (!rests && !watched).then(Default::default),
-                // A position that is only measured now and then is none that fails.
-                silent: (!rests && !of_truth).then(Default::default),
+                silent: (!rests).then(Default::default),
             }
         });
         let channels: Vec<Looked> = looked.collect();
@@ -206,7 +205,14 @@ impl Looks {
                 of_truth: of.of_truth,
                 leaps: leaps.filter(|leaps| !stuck.is_some_and(|stuck| ends(leaps, &stuck))),
                 stuck,
-                silent: of.silent.and_then(silence::Finder::found),
+                // A position that is only measured now and then, or in the fit alone, is none that fails.
+                silent: of.silent.and_then(|finder| {
+                    if of.of_truth {
+                        finder.lasting()
+                    } else {
+                        finder.found()
+                    }
+                }),
             }
         });
         all.filter(|of| !of.is_sound()).collect()
@@ -304,19 +310,42 @@ pub fn in_words(all: &[Faulty]) -> Vec<String> {
         }
         if let Some(silent) = &faulty.silent {
             words.push(format!(
-                "{channel} has no sample in {} of {} rows, from {} to {}: did the sensor fail? What needs it {} there",
-                count(silent.rows),
-                count(silent.of_rows),
-                instant(silent.from_s),
-                instant(silent.to_s),
-                match faulty.purpose {
-                    Purpose::Fit => "learns nothing",
-                    Purpose::Scores | Purpose::Run => "predicts nothing",
-                }
+                "{channel} has no sample in {}",
+                of_silence(faulty, silent)
             ));
         }
     }
     words
+}
+
+fn of_silence(faulty: &Faulty, silent: &Silence) -> String {
+    let never = silent.rows == silent.of_rows;
+    let rows = if never {
+        format!("any of {} rows", count(silent.rows))
+    } else {
+        format!(
+            "{} of {} rows, from {} to {}",
+            count(silent.rows),
+            count(silent.of_rows),
+            instant(silent.from_s),
+            instant(silent.to_s)
+        )
+    };
+    let asked = match (faulty.of_truth, never) {
+        (true, _) => "is it not measured any more?",
+        (false, true) => "is the sensor connected, and its column the right one?",
+        (false, false) => "did the sensor fail?",
+    };
+    let then = match (faulty.of_truth, faulty.purpose) {
+        (true, Purpose::Fit) => "Nothing is learned of it there",
+        (true, Purpose::Scores) => {
+            "Nothing is scored there, and what goes by it or by errors has none"
+        }
+        (true, Purpose::Run) => "What goes by it or by errors has none there",
+        (false, Purpose::Fit) => "What needs it learns nothing there",
+        (false, Purpose::Scores | Purpose::Run) => "What needs it predicts nothing there",
+    };
+    format!("{rows}: {asked} {then}")
 }
 
 fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {

@@ -77,18 +77,34 @@ impl Finder {
         self.rows -= std::mem::take(&mut self.now).rows;
     }
 
-    /// The silence; none where there is none that is longer than usual. A channel without any sample is none that fell silent.
+    /// The silence; none where there is none that is longer than usual. A channel without any sample was silent from the first row
+    /// to the last.
     #[must_use]
-    pub fn found(mut self) -> Option<Silence> {
-        self.interrupt();
-        let rows = self.longest.rows;
-        let is_long = rows as f64 >= LEAST_SHARE * self.rows as f64
-            && self.samples > 0
-            && rows * self.samples > TIMES * (self.rows - rows);
-        is_long.then_some(Silence {
+    pub fn found(self) -> Option<Silence> {
+        let mut longest = self.longest;
+        if self.now.rows > longest.rows {
+            longest = self.now;
+        }
+        self.is_long(longest.rows).then_some(Silence {
             of_rows: self.rows,
-            ..self.longest
+            ..longest
         })
+    }
+
+    /// The silence that lasts to the last row, where it is long, of a channel that had samples: of what is measured only now and then,
+    /// or not at all, others say nothing.
+    #[must_use]
+    pub fn lasting(self) -> Option<Silence> {
+        (self.had_samples() && self.is_long(self.now.rows)).then_some(Silence {
+            of_rows: self.rows,
+            ..self.now
+        })
+    }
+
+    fn is_long(&self, rows: u64) -> bool {
+        rows > 0
+            && rows as f64 >= LEAST_SHARE * self.rows as f64
+            && rows * self.samples.max(1) > TIMES * (self.rows - rows)
     }
 }
 
@@ -135,6 +151,26 @@ mod tests {
         assert_eq!(of((0..200).map(|nth| nth % 50 == 0)), None);
         assert_eq!(of((0..2000).map(|nth| nth % 8 == 0)), None);
         assert!(of((0..2000).map(|nth| nth % 8 == 0 && nth > 300)).is_some());
-        assert_eq!(of([false; 100]), None);
+    }
+
+    #[test]
+    fn without_any_sample_it_is_silent_from_the_first_row_on() {
+        let found = of([false; 100]).unwrap();
+        assert_eq!((found.rows, found.of_rows), (100, 100));
+        assert_eq!((found.from_s, found.to_s), (0.0, 99.0));
+        assert_eq!(of([]), None);
+    }
+
+    #[test]
+    fn only_a_silence_to_the_end_is_lasting() {
+        let lasting = |is_there: fn(u32) -> bool| {
+            let mut finder = Finder::default();
+            (0..300).for_each(|nth| finder.push(f64::from(nth), is_there(nth)));
+            finder.lasting()
+        };
+        assert_eq!(lasting(|nth| !(100..200).contains(&nth)), None);
+        let found = lasting(|nth| nth < 200).unwrap();
+        assert_eq!((found.rows, found.from_s), (100, 200.0));
+        assert_eq!(lasting(|_| false), None);
     }
 }
