@@ -37,10 +37,12 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
 /// two standard errors, marked ~, may be chance: of two such graphs choose the simpler one, or score them on more days.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  athermal compare graphs/die-tester.toml mine.toml --data week.csv --on days.csv
+  athermal compare graphs/die-tester.toml mine.toml --data week.csv \\
+      --on days.csv
   athermal compare graphs/zoo.toml --data week.csv --on days.csv \\
       --abs-truth-below \"250 nm/min\"
-  athermal compare arx.toml oe.toml --data train.csv --on test.csv --mode free-run")]
+  athermal compare arx.toml oe.toml --data train.csv --on test.csv \\
+      --mode free-run")]
 pub struct Compare {
     /// The graphs, or models whose graphs are fitted anew
     #[arg(required = true, value_name = "GRAPH")]

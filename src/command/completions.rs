@@ -8,8 +8,9 @@ use crate::terminal::{Answer, Failure};
 /// Print a completion script for a shell
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  athermal completions bash > ~/.local/share/bash-completion/completions/athermal
-  athermal completions zsh > ~/.zfunc/_athermal       # with fpath+=~/.zfunc in ~/.zshrc
+  athermal completions bash \\
+      > ~/.local/share/bash-completion/completions/athermal
+  athermal completions zsh > ~/.zfunc/_athermal # fpath+=~/.zfunc in ~/.zshrc
   athermal completions fish > ~/.config/fish/completions/athermal.fish")]
 pub struct Completions {
     /// The shell

@@ -30,6 +30,13 @@ fn help_has_examples_and_fits_80_columns() {
         assert_fits(help.lines());
         let taught = help.contains("Example") || help.contains("\nCommands:");
         assert!(taught, "{command} has no example:\n{help}");
+        let examples = help.lines().skip_while(|line| !line.starts_with("Example"));
+        let mut goes_on = false;
+        for line in examples.filter(|line| line.starts_with("  ")) {
+            let whole = goes_on || line.contains("athermal");
+            assert!(whole, "{command}: an example is broken off before `{line}`");
+            goes_on = line.ends_with('\\');
+        }
     }
 }
 

@@ -203,7 +203,10 @@ impl Weigher {
             Weighting::AsPrinted | Weighting::AsPrintedRaw if roots > 0.0 => {
                 mean_square / (roots * roots)
             }
-            Weighting::AsPrinted | Weighting::AsPrintedRaw => 1.0,
+            // As it is where all errors are the same, however small.
+            Weighting::AsPrinted | Weighting::AsPrintedRaw => {
+                (known(errors, votes).count() as f64).powi(-2)
+            }
         };
         let (mut total, mut count, mut present) = (0.0, 0.0, 0.0);
         for (voter, _) in votes.present() {

@@ -201,6 +201,16 @@ fn errors_of_nothing_and_of_ten_to_the_hundred_leave_finite_weights() {
 }
 
 #[test]
+fn as_printed_voters_without_an_error_count_like_voters_with_the_same() {
+    for errors in [[0.0, 0.0], [3.0, 3.0]] {
+        let running = learned(&vote(900, 2.0, Weighting::AsPrintedRaw), &errors);
+        // (1/2)² each.
+        let found = running.combine(Votes(&[10.0, 20.0]));
+        assert!((found - 7.5).abs() < 1e-12, "{errors:?}: {found}");
+    }
+}
+
+#[test]
 fn a_great_error_leaves_no_trace_once_it_is_forgotten() {
     let parameters = vote(10, 2.0, Weighting::InversePower);
     let (mut plain, mut shocked) = (parameters.build(2), parameters.build(2));

@@ -18,7 +18,8 @@ use crate::features::{present_features, too_many_at};
 /// thousand times as large as it varies, such as a position that is counted from far away, do they add up to one, which they nearly do
 /// there anyway. Predictions of the rows that an estimator was itself fitted on would flatter the one that fits them closest, so that
 /// weights are found on out-of-fold predictions: each third of the data, with as many instants at which there is a truth, is predicted
-/// by voters fitted on the rest. So voters are fitted four times, and those of a voter that is a stack itself 13 times.
+/// by voters fitted on the rest; nothing is left out between the two, so that thirds should be long against windows and horizons.
+/// So voters are fitted four times, and those of a voter that is a stack itself 13 times.
 ///
 /// Unlike a vote it needs a fit and learns nothing while it runs. A voter without a prediction drops out, and the others go by the
 /// weights that are the best without it: where two say nearly the same, one may have all their weight, and the other takes it over.
