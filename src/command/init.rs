@@ -67,7 +67,14 @@ impl Init {
         }
         check_apart("--output", &self.output, [&*self.data])?;
         let starter = starter(&self.data, &told).map_err(|error| match error {
-            NoStarter::File(error) => error.into(),
+            NoStarter::File(error) => {
+                // There is no `--lenient` here that it could advise.
+                let told = error.taken().to_string();
+                match error.into() {
+                    Failure::Request(_) => Failure::Request(told),
+                    other => other,
+                }
+            }
             NoStarter::Unfit(why) => Failure::Request(format!("{}: {why}", self.data.display())),
         })?;
         let people = terminal.format == Format::Table;

@@ -78,6 +78,9 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
     if let Some(long) = described.long_format() {
         return Err(NoStarter::Unfit(long.to_string()));
     }
+    if let Some(why) = too_few(&described) {
+        return Err(NoStarter::Unfit(why));
+    }
     let mut remarks = Vec::new();
     let clock = clock::find(&described, told.time.as_deref(), told.format.as_ref())
         .map_err(NoStarter::Unfit)?;
@@ -117,4 +120,18 @@ pub fn starter(path: &Path, told: &Told) -> Result<Starter, NoStarter> {
         columns: columns_taken,
         lenient: survey.needs_lenience(&columns),
     })
+}
+
+/// Why a log of which there is hardly anything tells nothing.
+fn too_few(described: &Description) -> Option<String> {
+    let rows = match described.rows.len() {
+        0 => "no row",
+        1 => "a single row",
+        _ => return None,
+    };
+    Some(format!(
+        "it has {rows} that can be read below the names of its columns ({}); a starter graph is made by what many rows, of hours or \
+         days, have in common",
+        described.columns.join(", ")
+    ))
 }

@@ -10,6 +10,8 @@ use athermal::diagnosis::window::{Drift, FEWEST_SAMPLES, WINDOWS_IN_RECORDING, n
 
 use serde_json::{Value, json};
 
+use crate::figures::time;
+
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::survey::{Series, Survey};
@@ -98,8 +100,9 @@ impl Choice {
             .collect();
         if widths.is_empty() {
             return Err(format!(
-                "it is too short: a drift over {narrowest:.0} s, the least at the rate of its samples, would fit \
-                 only {:.0} times into it, and {WINDOWS_IN_RECORDING} times are needed",
+                "it is too short: a drift over {}, the least at the rate of its samples, would fit only {:.0} times into it, \
+                 and {WINDOWS_IN_RECORDING} times are needed",
+                time(narrowest),
                 survey.duration_s / narrowest.max(f64::MIN_POSITIVE)
             ));
         }

@@ -92,6 +92,18 @@ pub enum FileError {
         /// The longest row that is read, in bytes.
         limit: usize,
     },
+    /// A row beyond that, with no names of columns above it.
+    HeaderTooLong {
+        /// Where it starts.
+        place: Place,
+        /// The longest row that is read, in bytes.
+        limit: usize,
+    },
+    /// Lines that end in carriage returns alone, so that all of them are one.
+    CarriageReturns {
+        /// The line that is all of them.
+        place: Place,
+    },
     /// A quoted cell that does not end, in its line or soon after.
     UnclosedQuote {
         /// The row in which the cell starts.
@@ -273,6 +285,41 @@ impl FileError {
         Self::Open {
             file: path.display().to_string().into(),
             source: Arc::new(source),
+        }
+    }
+
+    /// The line that it is about, where it is about one.
+    #[must_use]
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Open { .. }
+            | Self::Write { .. }
+            | Self::StandardInputInList
+            | Self::Empty { .. }
+            | Self::NotBegun { .. }
+            | Self::ValueCount { .. } => None,
+            Self::Read { place, .. }
+            | Self::NotText { place }
+            | Self::TooLong { place, .. }
+            | Self::HeaderTooLong { place, .. }
+            | Self::CarriageReturns { place }
+            | Self::UnclosedQuote { place }
+            | Self::DuplicateColumn { place, .. }
+            | Self::MissingColumns { place, .. }
+            | Self::BadCell { place, .. }
+            | Self::MixedMarks { place, .. }
+            | Self::TimeBeyond { place, .. }
+            | Self::BadTime { place, .. }
+            | Self::TimeSkipped { place, .. }
+            | Self::TimeAgain { place, .. }
+            | Self::TimeNotAfter { place, .. }
+            | Self::TimeLeaps { place, .. }
+            | Self::TimeStaysBehind { place, .. }
+            | Self::HeaderAgain { place, .. }
+            | Self::LongFormat { place, .. }
+            | Self::CellCount { place, .. }
+            | Self::BadObject { place, .. }
+            | Self::JsonArray { place } => Some(place),
         }
     }
 

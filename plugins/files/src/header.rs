@@ -31,7 +31,12 @@ pub(crate) fn seek(
     let mut above = Vec::new();
     let mut seen: Vec<Line> = Vec::new();
     let mut found = None;
-    while found.is_none() && seen.len() < LOOKED_AT && lines.advance()? {
+    while found.is_none() && seen.len() < LOOKED_AT && lines.advance().map_err(unheaded)? {
+        if lines.place().line == 1 && has_bare_returns(lines.text()) {
+            return Err(FileError::CarriageReturns {
+                place: lines.place(),
+            });
+        }
         let named = delimiter_named(lines.text()).filter(|_| seen.is_empty());
         if let Some(named) = named {
             delimiter = delimiter.or(Some(named));
@@ -72,6 +77,23 @@ pub(crate) fn seek(
             .collect(),
     );
     Ok(Head { delimiter, above })
+}
+
+/// A row that is too long, where no header was found before it: none can be left out then.
+fn unheaded(error: FileError) -> FileError {
+    match error {
+        FileError::TooLong { place, limit } => FileError::HeaderTooLong { place, limit },
+        other => other,
+    }
+}
+
+/// Whether a line goes on after a carriage return that stands in no quoted cell.
+pub(crate) fn has_bare_returns(line: &[u8]) -> bool {
+    let mut unquoted = line.split(|byte| *byte == b'"').step_by(2);
+    unquoted.any(|piece| {
+        let mut pairs = piece.windows(2);
+        pairs.any(|pair| pair[0] == b'\r' && !matches!(pair[1], b'\r' | b'\n'))
+    })
 }
 
 /// With this a first line names the delimiter, for spreadsheets.

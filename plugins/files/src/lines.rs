@@ -9,6 +9,7 @@ use std::sync::Arc;
 use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use crate::format::begins_json_array;
+use crate::header::has_bare_returns;
 use crate::{FileError, Format, Place};
 
 /// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
@@ -113,6 +114,9 @@ impl Lines {
         let place = self.place();
         Err(match begins_json_array(&self.line) {
             true => FileError::JsonArray { place },
+            false if self.number == 1 && has_bare_returns(&self.line) => {
+                FileError::CarriageReturns { place }
+            }
             false => FileError::TooLong {
                 place,
                 limit: LONGEST_ROW,

@@ -100,6 +100,16 @@ impl FileError {
                 )?;
                 or_leniently(f, strict, "leave it out")
             }
+            Self::HeaderTooLong { place, limit } => write!(
+                f,
+                "{place}: a row longer than {limit} bytes starts here, and no names of columns stand above it; look for missing line \
+                 ends, or give the columns shorter names"
+            ),
+            Self::CarriageReturns { place } => write!(
+                f,
+                "{place}: the lines end in carriage returns alone, as on old Macs, so that all of them are one; save the recording with \
+                 line feeds, as `tr '\\r' '\\n' < OLD > NEW` does"
+            ),
             Self::UnclosedQuote { place } => {
                 write!(
                     f,
