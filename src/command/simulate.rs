@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use athermal::core::compile::Wanted;
+use athermal::core::document::{NO_FILE, lasts};
 use athermal::core::fault::FaultSpec;
 use athermal::core::machine::{
     ClosedLoop, KnownMachine, Machine, MachineError, Row, Schedule, Setup, Simulated, Simulation,
@@ -170,6 +171,12 @@ impl Simulate {
         let Some(path) = &self.schedule else {
             return Ok(None);
         };
+        // What a shell has opened for this command, as `<(…)`, comes to an end.
+        let is_open = path.starts_with("/dev/fd");
+        if !(is_open || lasts(path)) {
+            let told = format!("--schedule {}: {NO_FILE}", path.display());
+            return Err(Failure::Request(told));
+        }
         let text = std::fs::read_to_string(path).map_err(|error| {
             Failure::Outside(format!("cannot read {}: {error}", path.display()))
         })?;

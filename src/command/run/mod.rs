@@ -12,6 +12,7 @@ mod watched;
 use std::path::PathBuf;
 
 use athermal::core::compile::{Plan, SourceChannel, Wanted};
+use athermal::core::document::{NO_FILE, lasts};
 use athermal::core::engine::SampleRange;
 use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
@@ -99,6 +100,10 @@ impl Run {
             if state.as_os_str() == "-" {
                 let told = "--state -: what a run knows is kept in a file, from one run to the next; name a file";
                 return Err(Failure::Request(told.to_owned()));
+            }
+            if !lasts(state) {
+                let told = format!("--state {}: {NO_FILE}", state.display());
+                return Err(Failure::Request(told));
             }
             // Where the output is a stream, the state is none.
             let output = Some(&*self.output).filter(|path| path.as_os_str() != "-");

@@ -85,6 +85,11 @@ impl FileReader for Noting {
         Disk.read(path)
     }
 
+    fn read_named(&self, path: &Path) -> Result<String, io::Error> {
+        self.note(path);
+        Disk.read_named(path)
+    }
+
     fn beside(&self, path: &Path) -> Vec<String> {
         Disk.beside(path)
     }

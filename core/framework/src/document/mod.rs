@@ -30,7 +30,7 @@ pub use json::JsonError;
 pub use lacks::Lacks;
 pub use problem::DocumentProblem;
 pub(crate) use read::unreadable;
-pub use read::{Disk, Document, FileReader, Memory, load, load_text};
+pub use read::{Disk, Document, FileReader, Memory, NO_FILE, lasts, load, load_text};
 pub use slip::Slip;
 pub use tree::{Data, Entry, Table, Value};
 

@@ -26,8 +26,25 @@ pub trait FileReader {
     /// What the operating system says, also for a text that is not UTF-8.
     fn read(&self, path: &Path) -> Result<String, io::Error>;
 
+    /// The same of a file that another names, which must be one that can be read again: no pipe and no device.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    fn read_named(&self, path: &Path) -> Result<String, io::Error> {
+        self.read(path)
+    }
+
     /// The names of the graph files in the folder of `path`, in order: one of them may be meant where that is not there.
     fn beside(&self, path: &Path) -> Vec<String>;
+}
+
+/// What is said of something that is read again, or must end, and does not.
+pub const NO_FILE: &str = "it is a pipe or a device, and must be a file";
+
+/// Whether what stands at a path, if anything, is read to an end without waiting, and again: a pipe or a device may not be.
+#[must_use]
+pub fn lasts(path: &Path) -> bool {
+    std::fs::metadata(path).map_or(true, |of| of.is_file() || of.is_dir())
 }
 
 /// The names of the graph files of these, in order.
@@ -51,6 +68,13 @@ impl FileReader for Disk {
             .take(LARGEST as u64 + 1)
             .read_to_string(&mut text)?;
         Ok(text)
+    }
+
+    fn read_named(&self, path: &Path) -> Result<String, io::Error> {
+        match lasts(path) {
+            true => self.read(path),
+            false => Err(io::Error::other(NO_FILE)),
+        }
     }
 
     fn beside(&self, path: &Path) -> Vec<String> {
@@ -357,7 +381,7 @@ impl Chain<'_> {
             );
             return None;
         }
-        match self.reader.read(&path) {
+        match self.reader.read_named(&path) {
             Ok(text) => self.read(&path, text),
             Err(error) => {
                 self.fail(place, not_read(&path, &error, self.reader, &self.paths));

@@ -353,7 +353,7 @@ impl Declaring<'_> {
             return read.clone();
         }
         let shown = path.display().to_string();
-        let text: Arc<str> = match self.reader.read(&path) {
+        let text: Arc<str> = match self.reader.read_named(&path) {
             Ok(text) => text.into(),
             Err(error) => {
                 let reason = unreadable(&error);
