@@ -32,6 +32,7 @@ mod drawing;
 mod figures;
 mod invocation;
 mod markup;
+mod message;
 mod program;
 pub mod report;
 mod starter;

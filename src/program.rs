@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use athermal::core::diagnostic::said;
 use clap::{CommandFactory, Parser};
 
-use crate::terminal::{Answer, Failure};
+use crate::terminal::{Answer, Failure, Format};
 use crate::{command, terminal};
 
 /// Predicts and corrects the thermal drift of precision machines.
@@ -35,7 +35,8 @@ outside failed, such as reading a file.";
 #[must_use]
 pub fn command_line() -> ExitCode {
     let arguments = Arguments::parse();
-    let terminal = terminal::Terminal::new(&arguments.terminal);
+    let mut terminal = terminal::Terminal::new(&arguments.terminal);
+    terminal.events = terminal.format == Format::Json && arguments.command.tells_programs();
     told_in_a_line();
     match caught(|| arguments.command.run(&terminal, Arguments::command)) {
         Ok(answer) => answer.into(),

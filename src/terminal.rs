@@ -13,8 +13,10 @@ use athermal::core::live::RunError;
 use athermal::files::FileError;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use serde_json::Value;
 
 use crate::figures::{count, counted};
+use crate::message::Message;
 
 /// Options that every command takes.
 #[derive(Debug, Args)]
@@ -51,11 +53,13 @@ pub struct Terminal {
     pub format: Format,
     /// Whether to be brief.
     pub quiet: bool,
+    /// Whether what is told beside the result is told to programs: a JSON object a line.
+    pub events: bool,
     colour: bool,
 }
 
 impl Terminal {
-    /// The terminal as it is and as the user wants it.
+    /// The terminal as it is and as the user wants it, of words alone beside the result.
     #[must_use]
     pub fn new(options: &Options) -> Self {
         let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
@@ -67,20 +71,21 @@ impl Terminal {
                 Format::Table
             },
             quiet: options.quiet,
+            events: false,
             colour,
         }
     }
 
     /// Says something that the user should know beside the result.
-    pub fn note(&self, text: impl fmt::Display) {
+    pub fn note(&self, told: impl Into<Message>) {
         if !self.quiet {
-            self.say(format_args!("{text}"));
+            self.tell("note", None, &told.into());
         }
     }
 
     /// Says what is not as it should be, but did not stop the work.
-    pub fn warning(&self, text: impl fmt::Display) {
-        self.labelled("warning", "\x1b[1;33m", &text);
+    pub fn warning(&self, told: impl Into<Message>) {
+        self.tell("warning", Some("\x1b[1;33m"), &told.into());
     }
 
     /// Says why the program gives up.
@@ -90,9 +95,25 @@ impl Terminal {
                 diagnostics,
                 sources,
             } => self.diagnostics(diagnostics, sources),
+            other => self.setback(other),
+        }
+    }
+
+    /// Says why something is not done, while the result goes on.
+    pub fn setback(&self, failure: &Failure) {
+        match failure {
+            Failure::Graph {
+                diagnostics,
+                sources,
+            } if self.events => self.doubts(diagnostics, sources),
+            Failure::Graph {
+                diagnostics,
+                sources,
+            } => self.diagnostics(diagnostics, sources),
             Failure::Told(_) => {}
             Failure::Request(text) | Failure::Outside(text) => {
-                self.labelled("error", "\x1b[1;31m", text)
+                let told = Message::new("error", Value::Null, text);
+                self.tell("error", Some("\x1b[1;31m"), &told);
             }
         }
     }
@@ -105,7 +126,7 @@ impl Terminal {
         if self.format == Format::Json {
             println!("{:#}", diagnostics.to_json(sources));
         } else {
-            self.say(diagnostics.render(sources, self.colour, 100).trim_end());
+            self.doubts(diagnostics, sources);
             let (errors, warnings) = (diagnostics.error_count(), diagnostics.warning_count());
             let kinds = [(errors, "error"), (warnings, "warning")];
             let kinds = kinds.iter().filter(|(count, _)| *count > 0);
@@ -116,9 +137,16 @@ impl Terminal {
         }
     }
 
-    /// Shows what is doubtful in a file that is used nevertheless.
+    /// Shows what is doubtful or wrong in a file, beside a result that there is nevertheless.
     pub fn doubts(&self, diagnostics: &Diagnostics, sources: &Sources) {
-        if !diagnostics.is_empty() {
+        if self.events {
+            let told = diagnostics.to_json(sources);
+            for of in told["diagnostics"].as_array().into_iter().flatten() {
+                let text = |key: &str| of[key].as_str().unwrap_or_default();
+                let told = Message::new("diagnostic", of.clone(), text("message"));
+                self.say(told.line(text("severity")));
+            }
+        } else if !diagnostics.is_empty() {
             self.say(diagnostics.render(sources, self.colour, 100).trim_end());
         }
     }
@@ -147,11 +175,15 @@ impl Terminal {
         }
     }
 
-    fn labelled(&self, label: &str, colour: &str, text: &dyn fmt::Display) {
-        if self.colour {
-            self.say(format_args!("{colour}{label}\x1b[0m\x1b[1m:\x1b[0m {text}"));
-        } else {
-            self.say(format_args!("{label}: {text}"));
+    /// Tells programs or people; these know what is graver than a note by a label of this colour.
+    fn tell(&self, level: &str, colour: Option<&str>, told: &Message) {
+        match colour {
+            _ if self.events => self.say(told.line(level)),
+            Some(colour) if self.colour => {
+                self.say(format_args!("{colour}{level}\x1b[0m\x1b[1m:\x1b[0m {told}"));
+            }
+            Some(_) => self.say(format_args!("{level}: {told}")),
+            None => self.say(told),
         }
     }
 

@@ -2,12 +2,17 @@
 
 use athermal::core::engine::SampleRange;
 use serde::Serialize;
+use serde_json::json;
 
 use crate::figures::number;
+use crate::message::Message;
 use crate::terminal::Terminal;
 
 /// So many widths beyond, another unit is more likely than another day.
 const ANOTHER_UNIT: f64 = 10.0;
+
+/// What programs are told by: samples outside of those of the fit.
+const OUTSIDE: &str = "outside_fit";
 
 /// A channel whose samples lie far outside of what a fit saw.
 #[derive(Debug, Serialize)]
@@ -40,7 +45,7 @@ pub fn beyond<'a>(fit: &[SampleRange], seen: &'a [SampleRange]) -> Vec<Beyond<'a
 /// Tells of them.
 pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
     for of in all {
-        terminal.warning(format_args!(
+        let words = format!(
             "{} is between {} and {}, and was between {} and {} in the data of the fit: {}",
             of.channel,
             number(of.lowest),
@@ -48,7 +53,8 @@ pub fn tell(terminal: &Terminal, all: &[Beyond<'_>]) {
             number(of.lowest_in_fit),
             number(of.highest_in_fit),
             of.doubt
-        ));
+        );
+        terminal.warning(Message::new(OUTSIDE, json!(of), words));
     }
 }
 
@@ -60,13 +66,21 @@ pub fn is_beyond(usual: &SampleRange, sample: f64) -> bool {
 /// Tells of the first such sample of a channel.
 pub fn tell_first(terminal: &Terminal, usual: &SampleRange, time: &str, sample: f64) {
     if let Some(doubt) = doubt(usual, sample, sample) {
-        terminal.warning(format_args!(
+        let words = format!(
             "{} at {time}: {}, and was between {} and {} in the data of the fit: {doubt}",
             usual.channel,
             number(sample),
             number(usual.lowest),
             number(usual.highest),
-        ));
+        );
+        let facts = json!({
+            "channel": usual.channel,
+            "time": time,
+            "value": sample,
+            "lowest_in_fit": usual.lowest,
+            "highest_in_fit": usual.highest,
+        });
+        terminal.warning(Message::new(OUTSIDE, facts, words));
     }
 }
 

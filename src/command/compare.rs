@@ -22,6 +22,7 @@ use super::fit::fit_without_card;
 use super::model;
 use super::scored::Scored;
 use crate::figures::{count, counted, digits, matrix, number, or_dash, seconds, stated};
+use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit several graphs on the same data and score them on others, in one table
@@ -81,10 +82,10 @@ struct Once<'a> {
 }
 
 impl Once<'_> {
-    fn warn(&mut self, told: impl IntoIterator<Item = String>) {
-        for words in told {
-            if self.told.insert(words.clone()) {
-                self.terminal.warning(words);
+    fn warn(&mut self, all: impl IntoIterator<Item = Message>) {
+        for told in all {
+            if self.told.insert(told.to_string()) {
+                self.terminal.warning(told);
             }
         }
     }
@@ -210,8 +211,8 @@ impl Compare {
                 self.tell_fitted_on(terminal, &report, &trace);
             }
             let faults = watch.found();
-            once.warn(faults::in_words(&fit.faults));
-            once.warn(faults::in_words(&faults));
+            once.warn(faults::told(&fit.faults));
+            once.warn(faults::told(&faults));
             let doubtful = Doubtful {
                 faults: &faults,
                 outside_fit: &beyond::beyond(&report.ranges, &trace.ranges),

@@ -13,9 +13,12 @@ use athermal::core::model::DataCard;
 use athermal::files::{Dataset, FileError, Format, Options, Report};
 use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
+use serde_json::json;
 
+use super::refused;
 use crate::figures::{DATES_S, count, counted, instant};
 use crate::invocation::{program, quoted};
+use crate::message::Message;
 use crate::starter::WITHOUT_ZONE;
 use crate::terminal::{Failure, Terminal};
 
@@ -266,11 +269,11 @@ pub fn tell(
     refused: u64,
     rejected: &[(String, u64)],
 ) {
-    tell_doubts(terminal, &doubts(plan, reports, refused, rejected), reports);
+    tell_doubts(terminal, doubts(plan, reports, refused, rejected), reports);
 }
 
 /// The same of doubts that are known already.
-pub fn tell_doubts(terminal: &Terminal, doubts: &[String], reports: &[(String, Report)]) {
+pub fn tell_doubts(terminal: &Terminal, doubts: Vec<Message>, reports: &[(String, Report)]) {
     for told in doubts {
         terminal.warning(told);
     }
@@ -279,6 +282,9 @@ pub fn tell_doubts(terminal: &Terminal, doubts: &[String], reports: &[(String, R
     }
 }
 
+/// What programs are told by: samples that do not count.
+pub const REJECTED: &str = "rejected_samples";
+
 /// What is told of data but for dates without a zone.
 #[must_use]
 pub fn doubts(
@@ -286,27 +292,31 @@ pub fn doubts(
     reports: &[(String, Report)],
     refused: u64,
     rejected: &[(String, u64)],
-) -> Vec<String> {
+) -> Vec<Message> {
     let mut told = of_files(reports);
-    told.extend(other_units(plan, reports));
+    told.extend(other_units(plan, reports).into_iter().map(Message::from));
     if refused > 0 {
         let were = if refused == 1 { "was" } else { "were" };
-        told.push(format!(
+        let words = format!(
             "{} {were} refused for a time that is not after the one before",
             counted(refused, "row")
-        ));
+        );
+        let facts = json!({ "reason": "time_before", "count": refused });
+        told.push(Message::new(refused::ROWS, facts, words));
     }
     let rows: u64 = reports.iter().map(|(_, report)| report.rows).sum();
     told.extend(rejected.iter().map(|(channel, n)| {
         let samples = counted(*n, "sample");
-        match *n {
+        let words = match *n {
             most if 2 * most > rows && most > 1 => format!(
                 "{channel}: {}{samples} are infinite or out of range, taken as missing; is its unit that of the log?",
                 if most == rows { "all " } else { "" }
             ),
             1 => format!("{channel}: {samples} is infinite or out of range, taken as missing"),
             _ => format!("{channel}: {samples} are infinite or out of range, taken as missing"),
-        }
+        };
+        let facts = json!({ "channel": channel, "samples": n });
+        Message::new(REJECTED, facts, words)
     }));
     told
 }
@@ -334,8 +344,9 @@ fn other_units(plan: &Plan, reports: &[(String, Report)]) -> Vec<String> {
 
 /// What is told of files after reading: rows and cells that were not taken, and files that count more than once.
 #[must_use]
-pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
-    let mut told = repeated(reports.iter().map(|(file, _)| file));
+pub fn of_files(reports: &[(String, Report)]) -> Vec<Message> {
+    let repeated = repeated(reports.iter().map(|(file, _)| file));
+    let mut told: Vec<Message> = repeated.into_iter().map(Message::from).collect();
     for (file, report) in reports {
         for (other, rows) in &report.overlaps {
             let all = counted(report.rows, "row");
@@ -344,9 +355,10 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
                 rows => count(rows),
             };
             let lie = if *rows == 1 { "lies" } else { "lie" };
-            told.push(format!(
+            let words = format!(
                 "{file}: {some} of its {all} {lie} in the period of {other}; files are not merged, so windows begin afresh in it and what both have counts twice"
-            ));
+            );
+            told.push(Message::from(words));
         }
         let unreadable = format!("unreadable cell{}", of_columns(report));
         let counted = [
@@ -364,22 +376,31 @@ pub fn of_files(reports: &[(String, Report)]) -> Vec<String> {
             ),
         ];
         for headers in [&report.headers_moved, &report.headers] {
-            match (headers.count, &headers.first) {
-                (more @ 2.., Some(first)) => told.push(format!("{first}; {} in all", count(more))),
-                (_, first) => told.extend(first.iter().map(ToString::to_string)),
+            if let Some(first) = &headers.first {
+                let in_all = match headers.count {
+                    more @ 2.. => format!("; {} in all", count(more)),
+                    _ => String::new(),
+                };
+                told.push(refused::message(
+                    first,
+                    Some(headers.count),
+                    format_args!("{first}{in_all}"),
+                ));
             }
         }
         for (found, what, then) in counted {
             if let Some(first) = &found.first {
-                let n = count(found.count);
-                let first = first.taken();
-                told.push(format!("{file}: {n} × {what}, {then}; the first: {first}"));
+                let (n, taken) = (count(found.count), first.taken());
+                let words = format!("{file}: {n} × {what}, {then}; the first: {taken}");
+                told.push(refused::message(first, Some(found.count), words));
             }
         }
         if let Some(place) = &report.truncated {
-            told.push(format!(
+            let words = format!(
                 "{place}: the last line has no end and was left out, since it was cut off or is still being written"
-            ));
+            );
+            let facts = json!({ "reason": "cut_off", "count": 1, "file": &*place.file, "line": place.line });
+            told.push(Message::new(refused::ROWS, facts, words));
         }
     }
     told

@@ -49,15 +49,7 @@ impl Doubtful<'_> {
 }
 
 fn each<T: Serialize>(all: &[Faulty], fault: impl Fn(&Faulty) -> Option<&T>) -> Vec<Value> {
-    let of = |faulty: &Faulty| {
-        let mut facts = Map::new();
-        facts.insert("channel".to_owned(), json!(faulty.channel));
-        facts.insert("of_truth".to_owned(), json!(faulty.of_truth));
-        if let Value::Object(found) = json!(fault(faulty)?) {
-            facts.extend(found);
-        }
-        Some(Value::Object(facts))
-    };
+    let of = |faulty: &Faulty| Some(faulty.facts(fault(faulty)?));
     all.iter().filter_map(of).collect()
 }
 

@@ -11,7 +11,11 @@ use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
 use athermal::diagnosis::{health_reasons, of_truths};
 
+use serde::Serialize;
+use serde_json::{Value, json};
+
 use crate::figures::{count, instant, number, seconds};
+use crate::message::Message;
 use crate::terminal::Terminal;
 
 /// What a recording is read for.
@@ -46,10 +50,24 @@ impl Faulty {
         self.leaps.is_none() && self.stuck.is_none() && self.silent.is_none()
     }
 
+    /// What programs are told of one of its faults.
+    pub(super) fn facts(&self, fault: &impl Serialize) -> Value {
+        facts(&self.channel, self.of_truth, fault)
+    }
+
     fn signal(&self) -> &str {
         let name = self.channel.split_once('.');
         name.map_or(&self.channel, |(signal, _)| signal)
     }
+}
+
+/// What programs are told of a fault of a channel.
+pub fn facts(channel: &str, of_truth: bool, fault: &impl Serialize) -> Value {
+    let mut facts = json!({ "channel": channel, "of_truth": of_truth });
+    if let (Value::Object(all), Value::Object(found)) = (&mut facts, json!(fault)) {
+        all.extend(found);
+    }
+    facts
 }
 
 /// A recording whose channels are looked at when it is first read.
@@ -284,38 +302,39 @@ impl Rows for Looking<'_> {
 
 /// Tells of them.
 pub fn tell(terminal: &Terminal, all: &[Faulty]) {
-    for words in in_words(all) {
-        terminal.warning(words);
+    for told in told(all) {
+        terminal.warning(told);
     }
 }
 
 /// What is told of them, a sentence for each fault.
-pub fn in_words(all: &[Faulty]) -> Vec<String> {
-    let mut words = Vec::new();
+pub fn told(all: &[Faulty]) -> Vec<Message> {
+    let mut told = Vec::new();
     for faulty in all {
         let channel = &faulty.channel;
+        let mut tell = |name, facts: Value, words| told.push(Message::new(name, facts, words));
         if let Some(leaps) = &faulty.leaps {
             let (at, then) = (instant(leaps.first.at_s), of_leaps(faulty, leaps));
-            words.push(format!("{channel} {leaps}, at {at}: {then}"));
+            let words = format!("{channel} {leaps}, at {at}: {then}");
+            tell("leaps", faulty.facts(leaps), words);
         }
         if let Some(stuck) = &faulty.stuck {
-            words.push(format!(
+            let words = format!(
                 "{channel} is {} in {} samples one after the other, from {} to {}: {}",
                 number(stuck.value),
                 count(stuck.samples),
                 instant(stuck.from_s),
                 instant(stuck.to_s),
                 of_standstill(faulty.of_truth, faulty.purpose)
-            ));
+            );
+            tell("stuck", faulty.facts(stuck), words);
         }
         if let Some(silent) = &faulty.silent {
-            words.push(format!(
-                "{channel} has no sample in {}",
-                of_silence(faulty, silent)
-            ));
+            let words = format!("{channel} has no sample in {}", of_silence(faulty, silent));
+            tell("silent", faulty.facts(silent), words);
         }
     }
-    words
+    told
 }
 
 fn of_silence(faulty: &Faulty, silent: &Silence) -> String {

@@ -23,6 +23,7 @@ use super::numbers;
 use super::threads::Threads;
 use crate::figures::{count, counted, number, paragraph, seconds, table};
 use crate::invocation::{next, program, quoted};
+use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal};
 
 /// Fit a graph on recorded data
@@ -211,7 +212,7 @@ pub struct Told {
     /// What is wrong with channels.
     pub faults: Vec<Faulty>,
     /// What was left out of the data, and what may be wrong in them.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Message>,
 }
 
 /// Fits a model on data, fills in its card, and tells what was left out of the data, or may be wrong in them.
@@ -224,9 +225,10 @@ pub fn fit_on(
     options: &FitOptions,
     terminal: &Terminal,
 ) -> Result<Told, Failure> {
-    let told = fit_without_card(model, data, options, terminal)?;
+    let mut told = fit_without_card(model, data, options, terminal)?;
+    let doubts = std::mem::take(&mut told.doubts);
     let (dataset, report) = (&told.dataset, &told.report);
-    data::tell_doubts(terminal, &told.doubts, &dataset.reports());
+    data::tell_doubts(terminal, doubts, &dataset.reports());
     faults::tell(terminal, &told.faults);
     model.card = Some(Card {
         athermal: env!("CARGO_PKG_VERSION").to_owned(),

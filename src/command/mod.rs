@@ -20,6 +20,7 @@ mod model;
 mod new;
 mod nodes;
 mod numbers;
+mod refused;
 mod report;
 mod run;
 mod schema;
@@ -58,6 +59,12 @@ pub enum Command {
 }
 
 impl Command {
+    /// Whether programs are told as much as people beside the result, which is rows.
+    #[must_use]
+    pub fn tells_programs(&self) -> bool {
+        matches!(self, Self::Run(_))
+    }
+
     /// Does what was asked for; `whole` is the command line that it is part of.
     ///
     /// # Errors

@@ -27,7 +27,7 @@ pub(crate) use plot::{
     Picture, autocorrelation as autocorrelation_picture, responses as response_pictures,
     with_truth as truth_picture,
 };
-pub use rest::{Untold, silent_node};
+pub use rest::Untold;
 
 use std::collections::BTreeMap;
 

@@ -50,25 +50,8 @@ pub struct Untold {
 
 /// The first node on which a slot rests, itself included, that gives nothing.
 pub(super) fn silent(plan: &Plan, engine: &Engine, slot: usize) -> String {
-    first_silent(plan, engine, slot, |_| true)
-}
-
-/// The same of the nodes alone: a measured channel need not have a sample at every tick.
-#[must_use]
-pub fn silent_node(plan: &Plan, engine: &Engine, slot: usize) -> String {
-    first_silent(plan, engine, slot, |slot| {
-        plan.channels[slot].node.is_some()
-    })
-}
-
-fn first_silent(
-    plan: &Plan,
-    engine: &Engine,
-    slot: usize,
-    counts: impl Fn(usize) -> bool,
-) -> String {
     let of_slot = upstream(plan, vec![slot], |node| inputs(plan, node));
-    let mut all = (0..of_slot.len()).filter(|&slot| of_slot[slot] && counts(slot));
+    let mut all = (0..of_slot.len()).filter(|&slot| of_slot[slot]);
     let first = all.find(|&slot| engine.value(slot).is_nan());
     name(plan, first.unwrap_or(slot))
 }

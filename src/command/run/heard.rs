@@ -3,9 +3,10 @@
 use athermal::Instant;
 use athermal::core::engine::Engine;
 use athermal::core::live::{Frame, Sink, SinkError};
-use athermal::diagnosis::silent_node;
+use serde_json::json;
 
 use crate::figures::{count, time};
+use crate::message::Message;
 use crate::terminal::Terminal;
 
 /// A sink whose rows are looked at on their way.
@@ -38,16 +39,23 @@ impl<'a, S> Heard<'a, S> {
         if self.any {
             return;
         }
+        let silent = engine.first_silent(output.slot);
         let apart = (last - first).secs() / (self.rows - 1).max(1) as f64;
         let pace = match apart > 0.0 {
             true => format!(", which are {} apart", time(apart)),
             false => String::new(),
         };
-        terminal.warning(format_args!(
-            "no output has a value in any of the {} rows{pace}; the first to lack one is {}",
-            count(self.rows),
-            silent_node(plan, engine, output.slot)
-        ));
+        let words = format!(
+            "no output has a value in any of the {} rows{pace}; the first to lack one is {silent}",
+            count(self.rows)
+        );
+        let facts = json!({ "ticks": self.rows, "first_silent": silent });
+        terminal.warning(Message::new("no_output", facts, words));
+    }
+
+    /// How many rows went into it.
+    pub fn rows(&self) -> u64 {
+        self.rows
     }
 }
 

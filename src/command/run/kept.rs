@@ -6,10 +6,12 @@ use std::time::{Duration, Instant as Clock};
 use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::{Engine, Instant, Model};
+use serde_json::json;
 
 use super::ran::Ran;
 use crate::command::aside::{not_written, whole_aside};
 use crate::figures::{count, length};
+use crate::message::Message;
 use crate::terminal::{Failure, Terminal, outside};
 
 /// How long a run that is killed may have learned in vain.
@@ -190,22 +192,29 @@ impl Rest<'_> {
         self.passed_over += 1;
         self.before = before;
         if self.passed_over == 1 && self.seen.is_some() {
-            self.terminal.note(format_args!(
+            let words = format!(
                 "the row of {} was seen by the run before: it and all like it are passed over",
                 samples.time_text
-            ));
+            );
+            self.terminal.note(self.passed(samples, words));
         }
         // 10, 100, 1,000 and so on: where the clock has been set back, it goes on for as long as that.
         let rows = self.passed_over;
         if self.at_once && rows >= 10 && 10_u64.pow(rows.ilog10()) == rows {
-            self.terminal.warning(format_args!(
+            let words = format!(
                 "{} rows so far, up to that of {}, which is {} before the last of the run before: nothing is put out until rows come \
                  after that; this is right where a log is read again, and not where a clock was ahead then: {BEGIN_COLD}",
                 count(rows),
                 samples.time_text,
                 length(before)
-            ));
+            );
+            self.terminal.warning(self.passed(samples, words));
         }
+    }
+
+    fn passed(&self, newest: &Samples, words: String) -> Message {
+        let facts = json!({ "count": self.passed_over, "time": newest.time_text });
+        Message::new("passed_over", facts, words)
     }
 
     /// Tells of an input that has come to its end while all of it was passed over: a clock may once have been ahead.

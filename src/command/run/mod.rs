@@ -23,11 +23,13 @@ use athermal::files::{
 };
 use athermal::{Engine, Model};
 use clap::Args;
+use serde_json::json;
 
 use crate::command::aside::check_apart;
 use crate::command::model::{self, check_fitted, tell_unfitted};
-use crate::command::{beyond, data};
-use crate::figures::{instant, length, seconds};
+use crate::command::{beyond, data, refused};
+use crate::figures::{counted, instant, length, seconds};
+use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 use heard::Heard;
 use kept::Kept;
@@ -143,7 +145,7 @@ impl Run {
         kept.end(&engine, &model, &mut heard).map_err(outside)?;
         heard.end(terminal, &engine);
         sensors.end();
-        self.tell(terminal, &engine, &reader, usual);
+        self.tell(terminal, &engine, heard.rows(), &reader, usual);
         Ok(Answer::Fine)
     }
 
@@ -261,7 +263,7 @@ impl Run {
         sensors.end();
         let engine = stepper.engine();
         heard.end(terminal, engine);
-        self.tell(terminal, engine, &reader, &usual);
+        self.tell(terminal, engine, heard.rows(), &reader, &usual);
         Ok(Answer::Fine)
     }
 
@@ -308,17 +310,21 @@ impl Run {
             opened => opened?,
         };
         let terminal = *terminal;
-        reader.tell_first(move |first| match first {
-            FileError::MissingColumns { .. } => {
-                terminal.warning(format_args!("{first} (missing until a line has it)"));
-            }
-            FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { moved: true, .. } => {
-                terminal.warning(format_args!("{first}"));
-            }
-            _ => terminal.warning(format_args!(
-                "{}; others like it are counted",
-                first.taken()
-            )),
+        reader.tell_first(move |first| {
+            let told = match first {
+                FileError::MissingColumns { .. } => {
+                    let words = format_args!("{first} (missing until a line has it)");
+                    refused::message(first, None, words)
+                }
+                FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { moved: true, .. } => {
+                    refused::message(first, None, first)
+                }
+                _ => {
+                    let words = format_args!("{}; others like it are counted", first.taken());
+                    refused::message(first, None, words)
+                }
+            };
+            terminal.warning(told);
         });
         Ok(reader)
     }
@@ -401,7 +407,14 @@ impl Run {
         }
     }
 
-    fn tell(&self, terminal: &Terminal, engine: &Engine, reader: &Reader, usual: &[SampleRange]) {
+    fn tell(
+        &self,
+        terminal: &Terminal,
+        engine: &Engine,
+        ticks: u64,
+        reader: &Reader,
+        usual: &[SampleRange],
+    ) {
         if stop::is_told() {
             terminal.note("told to stop: what had been read until then has been put out");
         }
@@ -421,6 +434,21 @@ impl Run {
         );
         if self.ends() {
             beyond::tell(terminal, &beyond::beyond(usual, &engine.sample_ranges()));
+        }
+        // People are told of what is not in order alone.
+        if terminal.events {
+            let report = reader.report();
+            let by_time = report.refused_time.count + report.repeated_time.count;
+            let refused = by_time + engine.refused();
+            let facts = json!({
+                "ticks": ticks,
+                "refused": refused,
+                "unreadable_rows": report.refused_rows.count,
+                "unreadable_cells": report.bad_cells.count,
+                "rejected": rejected,
+            });
+            let rows = counted(ticks, "row");
+            terminal.note(Message::new("ended", facts, format_args!("{rows} stepped")));
         }
     }
 }

@@ -7,9 +7,12 @@ use athermal::core::live::{Feed, Samples, Source, SourceError};
 use athermal::core::recording::Event;
 
 use athermal::{Duration, Instant};
+use serde_json::json;
 
 use crate::command::beyond;
+use crate::command::data::REJECTED;
 use crate::figures::number;
+use crate::message::Message;
 use crate::terminal::Terminal;
 
 /// A channel that has been in order for so long is told of when it is not again.
@@ -93,11 +96,13 @@ impl Channel {
         let Self { source, usual, .. } = self;
         if !source.admits(value) {
             if is_news(&mut self.rejected, now) {
-                terminal.warning(format_args!(
+                let words = format!(
                     "{} at {time}: {}, taken as missing; others like it are counted",
                     source.name,
                     why(value, source.range)
-                ));
+                );
+                let facts = json!({ "channel": source.name, "time": time, "value": value });
+                terminal.warning(Message::new(REJECTED, facts, words));
             }
         } else if let Some(usual) = usual
             && beyond::is_beyond(usual, value)

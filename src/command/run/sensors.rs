@@ -7,10 +7,13 @@ use athermal::core::live::{Feed, Samples, Source, SourceError};
 use athermal::core::recording::Event;
 use athermal::diagnosis::{health_reasons, of_truths, silence, standstill};
 
+use serde_json::json;
+
 use super::rejected::Ranged;
 use crate::command::faults::{self, Looks, Purpose, of_standstill, places};
 use crate::command::model::listed;
 use crate::figures::{count, instant, number, seconds, time};
+use crate::message::Message;
 use crate::terminal::Terminal;
 
 /// So long, in s, a sensor is silent before that is told.
@@ -226,6 +229,16 @@ impl Sensor {
         }
     }
 
+    /// What happened to it, from when to when.
+    fn event(&self, name: &'static str, from_s: f64, to_s: f64, words: String) -> Message {
+        let times = json!({ "from_s": from_s, "to_s": to_s });
+        Message::new(
+            name,
+            faults::facts(&self.source.name, self.of_truth, &times),
+            words,
+        )
+    }
+
     /// What follows is not set against what was.
     fn interrupt(&mut self) {
         self.silent.interrupt();
@@ -238,55 +251,62 @@ impl Sensor {
     }
 }
 
-/// Tells what there is to tell at a row; of many that fail or come back together in one sentence, as when a logger is unplugged.
+/// Tells what there is to tell at a row; people are told of many that fail or come back together in one sentence, as when a logger is
+/// unplugged.
 fn tell<'a>(terminal: &Terminal, sensors: impl Iterator<Item = &'a Sensor>, at_s: f64) {
-    let (mut silent, mut since_s) = (Vec::new(), f64::INFINITY);
-    let (mut back, mut fault_s) = (Vec::new(), f64::INFINITY);
+    let (mut silent, mut back) = (Vec::new(), Vec::new());
     for sensor in sensors {
         let name = &sensor.source.name;
         match sensor.news {
-            Some(News::Fails(Fault::Silent { from_s })) => {
-                silent.push(name.clone());
-                since_s = since_s.min(from_s);
+            Some(News::Fails(Fault::Silent { from_s })) => silent.push((sensor, from_s)),
+            Some(News::Fails(Fault::Stuck(stuck))) => {
+                let words = format!(
+                    "{name} is {} in all of its last {} samples, since {}: {}",
+                    number(stuck.value),
+                    count(stuck.samples),
+                    instant(stuck.from_s),
+                    of_standstill(sensor.of_truth, Purpose::Run)
+                );
+                let facts = faults::facts(name, sensor.of_truth, &stuck);
+                terminal.warning(Message::new("stuck", facts, words));
             }
-            Some(News::Fails(Fault::Stuck(stuck))) => terminal.warning(format_args!(
-                "{name} is {} in all of its last {} samples, since {}: {}",
-                number(stuck.value),
-                count(stuck.samples),
-                instant(stuck.from_s),
-                of_standstill(sensor.of_truth, Purpose::Run)
-            )),
-            Some(News::IsBack(Fault::Silent { from_s })) => {
-                back.push(name.clone());
-                fault_s = fault_s.min(from_s);
+            Some(News::IsBack(Fault::Silent { from_s })) => back.push((sensor, from_s)),
+            Some(News::IsBack(Fault::Stuck(stuck))) => {
+                let after = time(at_s - stuck.from_s);
+                let words = format!("{name} changes again, after {after}");
+                terminal.note(sensor.event("changes_again", stuck.from_s, at_s, words));
             }
-            Some(News::IsBack(Fault::Stuck(stuck))) => terminal.note(format_args!(
-                "{name} changes again, after {}",
-                time(at_s - stuck.from_s)
-            )),
             None => {}
         }
     }
-    let one = |names: &[String], one: &'static str, many: &'static str| match names.len() {
-        1 => one,
-        _ => many,
-    };
-    if !silent.is_empty() {
-        terminal.warning(format_args!(
-            "{} {} no sample since {}: did {} fail? What needs {} predicts nothing",
-            listed(&silent),
-            one(&silent, "has", "have"),
-            instant(since_s),
-            one(&silent, "the sensor", "the sensors"),
-            one(&silent, "it", "them"),
-        ));
+    // Programs are told of each.
+    let at_once = if terminal.events { 1 } else { usize::MAX };
+    for silent in silent.chunks(at_once) {
+        let (names, since_s) = together(silent);
+        let (has, the_sensor, it) = match silent.len() {
+            1 => ("has", "the sensor", "it"),
+            _ => ("have", "the sensors", "them"),
+        };
+        let words = format!(
+            "{names} {has} no sample since {}: did {the_sensor} fail? What needs {it} predicts nothing",
+            instant(since_s)
+        );
+        terminal.warning(silent[0].0.event("silent", since_s, at_s, words));
     }
-    if !back.is_empty() {
-        terminal.note(format_args!(
-            "{} {} samples again, after {}",
-            listed(&back),
-            one(&back, "has", "have"),
-            time(at_s - fault_s)
-        ));
+    for back in back.chunks(at_once) {
+        let (names, since_s) = together(back);
+        let has = if back.len() == 1 { "has" } else { "have" };
+        let words = format!(
+            "{names} {has} samples again, after {}",
+            time(at_s - since_s)
+        );
+        terminal.note(back[0].0.event("has_samples_again", since_s, at_s, words));
     }
+}
+
+/// The names of sensors, and since when the first of them has failed.
+fn together(all: &[(&Sensor, f64)]) -> (String, f64) {
+    let names: Vec<String> = all.iter().map(|(of, _)| of.source.name.clone()).collect();
+    let since_s = all.iter().map(|(_, from_s)| *from_s);
+    (listed(&names), since_s.fold(f64::INFINITY, f64::min))
 }

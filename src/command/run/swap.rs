@@ -1,11 +1,12 @@
-//! Decides when a graph is replaced while recorded data run through it, and tells what becomes of it.
+//! Decides when a graph is replaced while recorded data run through it.
+
+mod told;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use athermal::core::document::TimeBase;
-use athermal::core::engine::Carry;
-use athermal::core::live::{Control, Feed, Notice, StageError, Staged, Verdict};
+use athermal::core::live::{Control, Feed, StageError};
 use athermal::core::time::Civil;
 use athermal::files::{TimeColumn, TimeForm};
 use athermal::{Duration, Instant, Model};
@@ -13,7 +14,7 @@ use clap::Args;
 
 use super::watched::Watched;
 use crate::command::model::{check_fitted, listed, tell_unfitted};
-use crate::figures::{count, counted, length, number};
+use crate::figures::length;
 use crate::terminal::{Failure, Terminal};
 
 /// When and how the graph is replaced.
@@ -270,7 +271,7 @@ impl<'a> Course<'a> {
         if !(due || look || self.staged.is_some() || self.rows.is_multiple_of(1024)) {
             return Ok(());
         }
-        self.tell(control.pump());
+        told::notices(self.terminal, control.pump());
         // One at a time: what is committed takes over with this row, and only then may the next be staged.
         if self.staged.is_some() {
             return self.judge(control);
@@ -303,11 +304,10 @@ impl<'a> Course<'a> {
         let model = match load(&path, std::iter::once(&self.running), self.terminal) {
             Ok(model) => model,
             Err(failure) => {
-                self.terminal.error(&failure);
-                self.terminal.warning(format_args!(
-                    "{} is not taken over; what runs goes on",
-                    path.display()
-                ));
+                self.terminal.setback(&failure);
+                let words = "is not taken over; what runs goes on";
+                self.terminal
+                    .warning(told::not_taken_over(&path, "refused", words));
                 return;
             }
         };
@@ -316,13 +316,14 @@ impl<'a> Course<'a> {
             .iter()
             .find(|output| !self.columns.contains(&output.name))
         {
-            self.terminal.warning(format_args!(
-                "{} has the output `{}`, for which there is no column; what runs goes on",
-                path.display(),
+            let words = format_args!(
+                "has the output `{}`, for which there is no column; what runs goes on",
                 new.name
-            ));
+            );
+            self.terminal
+                .warning(told::not_taken_over(&path, "no_column", words));
         } else if let Err(failure) = self.stage(control, model, path, now) {
-            self.terminal.error(&failure);
+            self.terminal.setback(&failure);
         }
     }
 
@@ -335,7 +336,7 @@ impl<'a> Course<'a> {
     ) -> Result<(), Failure> {
         let staged = control.stage(&model, false).map_err(refused)?;
         self.tell_lacking(&model, &path);
-        self.terminal.note(report(&path, staged));
+        self.terminal.note(told::staged(&path, staged));
         let (past, mut silent) = staged.silent();
         // What runs seldom gives any either, as a settle time, which there is when the set point has changed.
         silent.retain(|name| !self.gives_seldom(name, now, past));
@@ -393,18 +394,18 @@ impl<'a> Course<'a> {
         let Some(verdict) = control.verdict().filter(|verdict| verdict.over) else {
             return Ok(());
         };
-        self.terminal.note(figures(&verdict));
+        self.terminal.note(told::shadow(&verdict));
         if verdict.passes == Some(true) {
             return self.commit(control);
         }
-        let why = if verdict.passes.is_none() {
-            "there was nothing to compare"
-        } else {
-            "its error is larger"
+        let (reason, why) = match verdict.passes {
+            None => ("nothing_to_compare", "there was nothing to compare"),
+            Some(_) => ("larger_error", "its error is larger"),
         };
         if let Some((_, path)) = self.staged.take() {
+            let words = format_args!("does not take over: {why}");
             self.terminal
-                .warning(format_args!("{} does not take over: {why}", path.display()));
+                .warning(told::not_taken_over(&path, reason, words));
         }
         control.discard();
         Ok(())
@@ -420,36 +421,13 @@ impl<'a> Course<'a> {
 
     /// Tells, once the data have ended, what has happened since and what has not.
     pub fn end(&self, control: &mut Control) {
-        self.tell(control.pump());
+        told::notices(self.terminal, control.pump());
         let shadowed = self.staged.iter().map(|(_, path)| path);
         let waiting = self.waiting.iter().rev().map(|swap| &swap.path);
         for path in shadowed.chain(waiting) {
-            self.terminal.warning(format_args!(
-                "{} did not take over: the data ended before",
-                path.display()
-            ));
-        }
-    }
-
-    /// Tells what has happened.
-    fn tell(&self, notices: Vec<Notice>) {
-        for notice in notices {
-            match notice {
-                Notice::TookOver { revision, tick, .. } => {
-                    self.terminal.note(format_args!(
-                        "revision {revision} took over before tick {}",
-                        count(tick)
-                    ));
-                }
-                Notice::SentBack => self
-                    .terminal
-                    .warning("the new graph came too late and was sent back"),
-                Notice::Missed { ticks } => {
-                    let were = if ticks == 1 { "was" } else { "were" };
-                    let ticks = counted(ticks, "tick");
-                    self.terminal.warning(format_args!("{ticks} {were} missed"));
-                }
-            }
+            let words = "did not take over: the data ended before";
+            self.terminal
+                .warning(told::not_taken_over(path, "data_ended", words));
         }
     }
 }
@@ -489,67 +467,4 @@ pub fn reading(running: &Model, swaps: &[Swap], feed: &[Feed]) -> athermal::core
 
 fn refused(error: StageError) -> Failure {
     Failure::Request(error.to_string())
-}
-
-fn report(path: &Path, staged: &Staged) -> String {
-    use std::fmt::Write as _;
-    let all = staged.carry();
-    let carried = all
-        .iter()
-        .filter(|node| node.outcome == Carry::Carried)
-        .count();
-    let mut text = format!(
-        "{} (revision {}): {carried} of {} nodes go on as they were",
-        path.display(),
-        staged.revision(),
-        all.len()
-    );
-    for node in all {
-        let (word, why) = match &node.outcome {
-            Carry::Carried => continue,
-            Carry::Adopted { reason } => ("goes on from the old state", reason.clone()),
-            Carry::Migrated { from } => ("goes on", format!("from a state of the form {from}")),
-            Carry::Warmed { reason } => ("warmed by the past", reason.clone()),
-            Carry::Cold { reason } => ("cold", reason.clone()),
-        };
-        let _ = write!(text, "\n  {}: {word}, {why}", node.node);
-    }
-    let (past, endless) = staged.endless();
-    if !endless.is_empty() {
-        let _ = write!(
-            text,
-            "\n  {}: goes by all of its past, of which {} is known",
-            endless.join(", "),
-            length(past)
-        );
-    }
-    if let Some((past, wanted)) = staged.too_short_a_past() {
-        let _ = write!(
-            text,
-            "\n  the past to warm it by is {}, and it looks back as far as {}: until then it may give less than it will",
-            length(past),
-            length(wanted)
-        );
-    }
-    text
-}
-
-fn figures(verdict: &Verdict) -> String {
-    use std::fmt::Write as _;
-    let mut text = "in the shadow:".to_owned();
-    for output in &verdict.outputs {
-        let _ = write!(
-            text,
-            "\n  {}: RMSE {} running, {} new, in {}, over {}",
-            output.output,
-            number(output.running_rmse),
-            number(output.candidate_rmse),
-            output.unit,
-            counted(output.n as u64, "instant")
-        );
-    }
-    if let Some(ratio) = verdict.ratio {
-        let _ = write!(text, "\n  new to running: {ratio:.3}");
-    }
-    text
 }

@@ -186,7 +186,10 @@ impl Opened {
     /// What is wrong with the files, once they have been read.
     fn warnings(&self) -> Vec<String> {
         match self {
-            Self::Files(dataset) => of_files(&dataset.reports()),
+            Self::Files(dataset) => {
+                let told = of_files(&dataset.reports());
+                told.iter().map(ToString::to_string).collect()
+            }
             Self::Simulated(_) => Vec::new(),
         }
     }

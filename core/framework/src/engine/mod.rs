@@ -30,7 +30,7 @@ mod turn;
 mod vote;
 mod withheld;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 pub use carry::{Carry, NodeCarry};
@@ -371,6 +371,36 @@ impl Engine {
     #[must_use]
     pub fn stamp(&self, slot: usize) -> Instant {
         self.slots.given[slot].stamp
+    }
+
+    /// The first of all that a slot is made of, itself included, that lacks a value: a measured channel without a sample in this
+    /// segment, or a node that never ran in it or gave nothing when it last did.
+    ///
+    /// # Panics
+    /// Where the plan has no such slot.
+    #[must_use]
+    pub fn first_silent(&self, slot: usize) -> String {
+        let Plan {
+            channels,
+            gathers,
+            nodes,
+            sources,
+            ..
+        } = &*self.plan;
+        let (mut waiting, mut found) = (vec![slot], BTreeSet::new());
+        while let Some(slot) = waiting.pop() {
+            if let (true, Some(node)) = (found.insert(slot), channels[slot].node) {
+                let inputs = nodes[node].role.inputs();
+                waiting.extend(inputs.flat_map(|of| gathers[of].entries.iter().map(|of| of.slot)));
+            }
+        }
+        let may_rest = |slot: usize| sources.get(slot).is_some_and(|source| source.optional);
+        let mut silent = found.into_iter();
+        let first = silent.find(|&slot| self.slots.values[slot].is_nan() && !may_rest(slot));
+        let first = &channels[first.unwrap_or(slot)];
+        first
+            .node
+            .map_or_else(|| first.name.clone(), |node| nodes[node].instance())
     }
 
     /// What a gather read at the present tick, and whether anything in it was fresh.

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../workbench/mod.rs"]
 mod workbench;
+
+mod told;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
@@ -280,7 +283,9 @@ side = "side"
         arguments.extend(more.iter().map(|of| of as &dyn AsRef<OsStr>));
         json(&arguments)
     };
-    vec![
+    let told = told::by_runs(scratch, &model, [&one, &two]);
+    let told = told.into_iter().map(|told| ("what-a-run-tells", told));
+    let printed = vec![
         ("evaluate", with("evaluate", &[])),
         ("evaluate", json(&[&"evaluate", &of_few, &"--data", &few])),
         ("diagnose", with("diagnose", &["--window", "--day", "4h"])),
@@ -307,7 +312,8 @@ side = "side"
             json(&[&"simulate", &"die-tester", &"--days", &"0.01", &"-o", &made]),
         ),
         ("simulate", json(&[&"simulate"])),
-    ]
+    ];
+    printed.into_iter().chain(told).collect()
 }
 
 #[test]

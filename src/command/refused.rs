@@ -1,0 +1,54 @@
+//! Decides what programs are told of rows and cells that a reader does not take; in what words people are told, its errors say.
+
+use athermal::files::FileError;
+use serde_json::{Value, json};
+
+use crate::message::Message;
+
+/// What is not taken as it stands: one that has just been read, or the first of so many.
+#[must_use]
+pub fn message(error: &FileError, count: Option<u64>, words: impl std::fmt::Display) -> Message {
+    let (name, mut facts) = facts(error);
+    if let Some(place) = error.place() {
+        facts["file"] = json!(&*place.file);
+        facts["line"] = json!(place.line);
+    }
+    if let Some(count) = count {
+        facts["count"] = json!(count);
+    }
+    Message::new(name, facts, words)
+}
+
+/// Rows that are left out.
+pub const ROWS: &str = "refused_rows";
+/// Cells that are taken as missing.
+const CELLS: &str = "unreadable_cells";
+
+fn facts(error: &FileError) -> (&'static str, Value) {
+    match error {
+        FileError::TimeNotAfter { time, .. } | FileError::TimeStaysBehind { time, .. } => {
+            (ROWS, json!({ "reason": "time_before", "time": time }))
+        }
+        FileError::TimeAgain { time, .. } => {
+            (ROWS, json!({ "reason": "time_again", "time": time }))
+        }
+        FileError::TimeLeaps { time, .. } => {
+            (ROWS, json!({ "reason": "time_leaps", "time": time }))
+        }
+        FileError::BadTime { column, found, .. }
+        | FileError::TimeBeyond { column, found, .. }
+        | FileError::TimeSkipped { column, found, .. } => (
+            ROWS,
+            json!({ "reason": "time_unreadable", "column": column, "found": found }),
+        ),
+        FileError::BadCell { column, found, .. } | FileError::MixedMarks { column, found, .. } => {
+            (CELLS, json!({ "column": column, "found": found }))
+        }
+        FileError::HeaderAgain { .. } => ("header_again", json!({})),
+        FileError::MissingColumns { missing, .. } => {
+            let columns: Vec<_> = missing.iter().map(|of| &of.name).collect();
+            ("missing_columns", json!({ "columns": columns }))
+        }
+        _ => (ROWS, json!({ "reason": "unreadable" })),
+    }
+}
