@@ -13,6 +13,7 @@ use super::doubtful::Doubtful;
 use super::faults::{self, FaultWatch, Purpose};
 use super::model::load_fitted;
 use super::scored::Scored;
+use super::unscored;
 use crate::figures::{count, counted, number, or_dash, paragraph, seconds, stated, table};
 use crate::invocation::next;
 use crate::terminal::{Answer, Failure, Format, Terminal};
@@ -98,6 +99,7 @@ impl Evaluate {
             told["each_on_its_own"] = self.each_on_its_own.into();
             told["period"] = json!(period);
             told["scores"] = json!(scores.scores);
+            told["unscored"] = json!(scores.unscored);
             told["lacks"] = json!(scores.lacks);
             let doubtful = Doubtful {
                 faults: &faults,
@@ -120,6 +122,7 @@ impl Evaluate {
         faults::tell(terminal, &faults);
         let period = scores.period.map(|(from, to)| (seconds(from), seconds(to)));
         self.data.tell_fitted_on(terminal, &model, period);
+        unscored::tell(terminal, &scores.unscored);
         for told in Lack::told(&scores.lacks) {
             terminal.warning(told);
         }

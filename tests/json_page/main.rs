@@ -287,6 +287,10 @@ side = "side"
     let told = told.into_iter().map(|told| ("what-a-run-tells", told));
     let printed = vec![
         ("evaluate", with("evaluate", &[])),
+        (
+            "evaluate",
+            with("evaluate", &["--abs-truth-below", "1e-9 nm/min"]),
+        ),
         ("evaluate", json(&[&"evaluate", &of_few, &"--data", &few])),
         ("diagnose", with("diagnose", &["--window", "--day", "4h"])),
         ("report", with("report", &[])),

@@ -4,6 +4,7 @@ mod evidence;
 mod interval;
 mod table;
 mod trace;
+mod unscored;
 mod watch;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ pub use evidence::Lack;
 pub use interval::IntervalScore;
 pub use table::{RESTRICTS, Score, Scores, hide_much};
 pub use trace::{PredictionTrace, Trace, TruthTrace, trace, trace_as};
+pub use unscored::Unscored;
 pub(crate) use watch::{Prediction, Watch};
 
 use crate::compile::Plan;

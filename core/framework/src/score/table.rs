@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::watch::{Truth, Watch};
-use super::{IntervalScore, Lack, Mode, ScoreOptions};
+use super::{IntervalScore, Lack, Mode, ScoreOptions, Unscored};
 use crate::channel::Extremes;
 use crate::compile::Plan;
 use crate::engine::{Engine, SampleRange};
@@ -29,6 +29,8 @@ pub struct Scores {
     pub ranges: Vec<SampleRange>,
     /// A row for each prediction, those of one truth together, in the order of the plan.
     pub scores: Vec<Score>,
+    /// Predictions of a truth of which nothing is scored.
+    pub unscored: Vec<Unscored>,
     /// Combiners that went by fewer truths than they take.
     pub lacks: Vec<Lack>,
 }
@@ -114,17 +116,26 @@ pub(super) fn table(
     options: &ScoreOptions,
 ) -> Scores {
     let earlier = earlier(plan, engine, options.mode);
+    let (mut rows, mut unscored) = (Vec::new(), Vec::new());
+    for truth in &watch.truths {
+        let within = within_limit(plan, truth, options);
+        let of = scores(plan, truth, &within, options, &earlier);
+        for (score, prediction) in of.iter().zip(&truth.predictions) {
+            if score.n == 0 {
+                let there = (within.len(), score.left_out);
+                unscored.push(Unscored::of(plan, engine, ticks, truth, prediction, there));
+            }
+        }
+        rows.extend(of);
+    }
     Scores {
         period,
         ticks,
         refused: engine.refused(),
         rejected: engine.rejected_channels(),
         ranges: engine.sample_ranges(),
-        scores: watch
-            .truths
-            .iter()
-            .flat_map(|truth| scores(plan, truth, options, &earlier))
-            .collect(),
+        scores: rows,
+        unscored,
         lacks: super::evidence::lacks(&watch.tallies),
     }
 }
@@ -145,20 +156,24 @@ fn earlier(plan: &Plan, engine: &Engine, mode: Mode) -> Vec<Option<Duration>> {
     found
 }
 
+/// The truths that count.
+fn within_limit(plan: &Plan, truth: &Truth, options: &ScoreOptions) -> Vec<usize> {
+    let unit = &plan.channels[truth.slot].channel.unit;
+    let limit = options.abs_truth_below.as_ref();
+    let limit = limit.and_then(|limit| limit.as_difference(unit));
+    (0..truth.values.len())
+        .filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit))
+        .collect()
+}
+
 fn scores(
     plan: &Plan,
     truth: &Truth,
+    counted: &[usize],
     options: &ScoreOptions,
     earlier: &[Option<Duration>],
 ) -> Vec<Score> {
     let of = &plan.channels[truth.slot];
-    let limit = options
-        .abs_truth_below
-        .as_ref()
-        .and_then(|limit| limit.as_difference(&of.channel.unit));
-    let counted: Vec<usize> = (0..truth.values.len())
-        .filter(|&i| limit.is_none_or(|limit| truth.values[i].abs() < limit))
-        .collect();
     let there: Vec<usize> = truth
         .predictions
         .iter()

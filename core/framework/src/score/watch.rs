@@ -37,6 +37,8 @@ pub(crate) struct Prediction {
     pub(crate) ahead: Duration,
     pairing: Pairing,
     pub(crate) values: Vec<f64>,
+    /// At how many ticks it was there.
+    pub(super) given: u64,
     /// Where its intervals come from, if it has any.
     pub(crate) intervals: Option<Intervals>,
     /// Both ends of each.
@@ -86,6 +88,7 @@ impl Watch {
                 ahead,
                 pairing,
                 values: Vec::new(),
+                given: 0,
                 intervals,
                 ends: Vec::new(),
             });
@@ -136,6 +139,7 @@ impl Truth {
         for prediction in &mut self.predictions {
             if engine.ran(prediction.slot) {
                 let value = engine.value(prediction.slot);
+                prediction.given += u64::from(!value.is_nan());
                 let intervals = prediction.intervals.as_ref();
                 let ends = intervals.map(|intervals| intervals.read(engine, value));
                 let ends = ends.as_ref().map_or(&[][..], |ends| &ends[..]);

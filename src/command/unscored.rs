@@ -1,0 +1,47 @@
+//! Decides in what words people are told why nothing of a prediction is scored.
+
+use athermal::core::score::Unscored;
+
+use super::model::listed;
+use crate::figures::{counted, stated};
+use crate::terminal::Terminal;
+
+/// Tells of them, of those together of which the same is to be told.
+pub fn tell(terminal: &Terminal, unscored: &[Unscored]) {
+    let mut told: Vec<(Vec<String>, String)> = Vec::new();
+    for of in unscored {
+        let (output, why) = (of.output.clone(), why(of));
+        match told.iter_mut().find(|(_, told)| *told == why) {
+            Some((outputs, _)) => outputs.push(output),
+            None => told.push((vec![output], why)),
+        }
+    }
+    for (outputs, why) in told {
+        let outputs = listed(&outputs);
+        terminal.warning(format_args!("{outputs}: nothing is scored: {why}"));
+    }
+}
+
+/// Why nothing is scored, whichever prediction it is.
+fn why(of: &Unscored) -> String {
+    let there = [
+        counted(of.ticks, "row"),
+        counted(of.truths as u64, "truth"),
+        counted(of.predictions, "prediction"),
+        counted(of.pairs as u64, "pair"),
+    ];
+    let why = match &of.first_silent {
+        Some(silent) if *silent == of.truth => format!("{silent} never has a value"),
+        Some(silent) => format!("the first to lack a value is {silent}"),
+        None if of.within_limit == 0 => "no truth is within `--abs-truth-below`".to_owned(),
+        None if of.pairs == 0 => format!(
+            "no truth is there {} after a prediction; are the data longer than that, without a gap?",
+            stated(of.ahead_s)
+        ),
+        None => {
+            "where one is, other predictions of the truth are not there; `--each-on-its-own` scores each wherever it is"
+                .to_owned()
+        }
+    };
+    format!("{}: {why}", there.join(", "))
+}
