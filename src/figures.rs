@@ -122,7 +122,8 @@ pub fn length(duration: Duration) -> String {
     Duration::from_ns(rounded.saturating_mul(MILLISECOND_NS)).to_string()
 }
 
-/// A table with the first column to the left and the others to the right, each as wide as it must be.
+/// A table with the first column to the left and the others to the right, each as wide as it must be. A cell beyond those of the
+/// header is a remark, which stands below its row where it does not fit into [`WIDTH`].
 #[must_use]
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     let width = |column: usize| {
@@ -149,6 +150,9 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
                         0 => write!(line, "{cell}{room}"),
                         _ => write!(line, "  {room}{cell}"),
                     };
+                }
+                None if line.chars().count() + 2 + cell.chars().count() > WIDTH => {
+                    let _ = write!(line, "\n    {cell}");
                 }
                 None => {
                     let _ = write!(line, "  {cell}");
@@ -336,6 +340,20 @@ mod tests {
         assert_eq!(told(300_000_000_000), "5min");
         assert_eq!(told(12_345), "12.345us");
         assert_eq!(told(0), "0s");
+    }
+
+    #[test]
+    fn a_remark_that_does_not_fit_beside_its_row_stands_below() {
+        let row = |cell: &str, remark: String| vec![cell.to_owned(), "1".to_owned(), remark];
+        let rows = [
+            row("a", "worse".to_owned()),
+            row("b", "x".repeat(70)),
+            row("c", "worse".to_owned()),
+        ];
+        let told = table(&["name", "value"], &rows);
+        let below = format!("b         1\n    {}", "x".repeat(70));
+        let expected = format!("name  value\na         1  worse\n{below}\nc         1  worse\n");
+        assert_eq!(told, expected);
     }
 
     #[test]

@@ -65,7 +65,13 @@ fn what_fit_and_evaluate_tell_fits_80_columns() {
         &"--candidates",
     ]);
     let evaluated = athermal(&[&"evaluate", &model, &"--data", &data]);
-    for (told, holds) in [(fit.ended(0), "R²"), (evaluated.ended(0), "persistence")] {
+    let alone = athermal(&[&"evaluate", &model, &"--data", &data, &"--each-on-its-own"]);
+    let expected = [
+        (fit, "R²"),
+        (evaluated, "persistence"),
+        (alone, "on its own "),
+    ];
+    for (told, holds) in expected.map(|(told, holds)| (told.ended(0), holds)) {
         assert!(told.out.contains(holds), "{}", told.out);
         assert_fits(told.out.lines());
     }
