@@ -250,6 +250,9 @@ struct Watching {
     sensors: Vec<Sensor>,
 }
 
+/// Where the sum of all squares stands.
+const ALL: usize = 1;
+
 /// What is known of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Sensor {
@@ -268,6 +271,11 @@ struct Sensor {
     squares: Vec<f64>,
     next: usize,
     full: bool,
+    /// Their sums, as a tree: the `i`th is that of the two at `2 i` and `2 i + 1`, the squares standing behind the sums. So a
+    /// square is put in by as many additions as the tree is deep, and none is ever subtracted: the sum of all, the first,
+    /// follows from the ring alone, and of what has left it nothing remains.
+    #[serde(skip)]
+    sums: Vec<f64>,
 }
 
 impl Sensor {
@@ -282,6 +290,7 @@ impl Sensor {
             squares: vec![0.0; kept],
             next: 0,
             full: false,
+            sums: vec![0.0; kept],
         }
     }
 
@@ -293,8 +302,23 @@ impl Sensor {
 
     /// The noise of single samples, once there are enough of them.
     fn noise(&self) -> Option<f64> {
-        let mean = || self.squares.iter().sum::<f64>() / self.squares.len() as f64;
+        let mean = || self.sums[ALL] / self.squares.len() as f64;
         self.full.then(|| (0.5 * mean()).sqrt())
+    }
+
+    /// The sums of a ring that comes without them.
+    fn sum_up(&mut self) {
+        self.sums.clear();
+        self.sums.resize(self.squares.len(), 0.0);
+        (ALL..self.sums.len()).rev().for_each(|at| self.sum(at));
+    }
+
+    fn sum(&mut self, at: usize) {
+        let part = |at: usize| match self.sums.get(at) {
+            Some(&sum) => sum,
+            None => self.squares[at - self.sums.len()],
+        };
+        self.sums[at] = part(2 * at) + part(2 * at + 1);
     }
 
     fn note(&mut self, difference: f64) {
@@ -302,6 +326,11 @@ impl Sensor {
             return;
         }
         self.squares[self.next] = difference * difference;
+        let mut at = (self.next + self.squares.len()) / 2;
+        while at >= ALL {
+            self.sum(at);
+            at /= 2;
+        }
         self.next += 1;
         if self.next == self.squares.len() {
             (self.next, self.full) = (0, true);
@@ -413,6 +442,7 @@ impl Operator for Watching {
             return Restored::cold("the number of samples over which noise is judged differs");
         }
         self.sensors = state.sensors;
+        self.sensors.iter_mut().for_each(Sensor::sum_up);
         Restored::Accepted
     }
 }

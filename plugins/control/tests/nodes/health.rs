@@ -112,6 +112,25 @@ fn noise_is_judged_by_successive_differences() {
 }
 
 #[test]
+fn of_a_jump_no_noise_remains_once_its_samples_are_past() {
+    let long = GRAPH
+        .replace("range = [\"0 Cel\", \"100 Cel\"]", "noise_samples = 500")
+        .replace("max_rate = \"1 K/s\"", "noise_below = \"5 mK\"");
+    let mut machine = Machine::new(&long);
+    // The jump and the way back are two differences of 499; their squares leave no digits for those of the others.
+    let reasons: Vec<f64> = (0..1100)
+        .map(|i| {
+            let jump = if i == 550 { 1e9 } else { 0.0 };
+            at(&mut machine, f64::from(i), alive(f64::from(i)) + jump).0
+        })
+        .collect();
+    assert!(reasons[..550].iter().all(|&reason| reason == 0.0));
+    assert!(reasons[550..1050].iter().all(|&reason| reason == 5.0));
+    assert!(reasons[1050..1070].iter().all(|&reason| reason == 7.0));
+    assert!(reasons[1070..].iter().all(|&reason| reason == 0.0));
+}
+
+#[test]
 fn a_watch_without_a_check_is_warned_of_and_one_that_contradicts_itself_refused() {
     let nothing = r#"
 [signals.t]
