@@ -130,7 +130,7 @@ fn ordered(items: &[Item]) -> Vec<Vec<usize>> {
                 mean(beside.iter().map(|&other| rank[other])).unwrap_or(rank[item])
             };
             columns[layer].sort_by(|a, b| key(a).total_cmp(&key(b)));
-            remember(&columns, &mut rank);
+            remember(&columns[layer..=layer], &mut rank);
         }
     }
     columns

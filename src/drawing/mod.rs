@@ -111,14 +111,8 @@ impl Drawn<'_> {
     }
 
     fn signals(&mut self) {
-        let mut signals: Vec<(&str, Vec<usize>)> = Vec::new();
-        for (slot, source) in self.plan.sources.iter().enumerate() {
-            let signal = source.name.split('.').next().unwrap_or(&source.name);
-            match signals.iter_mut().find(|(name, _)| *name == signal) {
-                Some((_, slots)) => slots.push(slot),
-                None => signals.push((signal, vec![slot])),
-            }
-        }
+        let sources = self.plan.sources.iter().enumerate();
+        let signals = grouped(sources.map(|(slot, source)| (&*source.name, slot)));
         for (signal, slots) in signals {
             let unit = &self.plan.channels[slots[0]].channel.unit;
             let lines = vec![format!(
@@ -133,17 +127,20 @@ impl Drawn<'_> {
     }
 
     fn nodes(&mut self, expand: bool) {
+        let mut instances: BTreeMap<&str, usize> = BTreeMap::new();
+        for node in &self.plan.nodes {
+            *instances.entry(&node.name).or_default() += 1;
+        }
         let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
         for node in &self.plan.nodes {
             let number = match numbers.get(node.name.as_str()) {
                 Some(&number) if !expand => number,
                 _ => {
-                    let title = if expand {
-                        node.instance()
+                    let number = if expand {
+                        self.node(&node.instance(), node, 1)
                     } else {
-                        node.name.clone()
+                        self.node(&node.name, node, instances[&*node.name])
                     };
-                    let number = self.node(&title, node, expand);
                     numbers.insert(&node.name, number);
                     number
                 }
@@ -162,17 +159,7 @@ impl Drawn<'_> {
         }
     }
 
-    fn node(&mut self, title: &str, node: &PlannedNode, expand: bool) -> usize {
-        let instances = if expand {
-            1
-        } else {
-            let same = self
-                .plan
-                .nodes
-                .iter()
-                .filter(|other| other.name == node.name);
-            same.count()
-        };
+    fn node(&mut self, title: &str, node: &PlannedNode, instances: usize) -> usize {
         let mut lines = vec![if instances > 1 {
             format!("{} × {instances}", node.kind.name)
         } else {
@@ -250,14 +237,8 @@ impl Drawn<'_> {
     }
 
     fn outputs(&mut self) {
-        let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
-        for output in &self.plan.outputs {
-            let name = output.name.split('.').next().unwrap_or(&output.name);
-            match groups.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, slots)) => slots.push(output.slot),
-                None => groups.push((name, vec![output.slot])),
-            }
-        }
+        let outputs = self.plan.outputs.iter();
+        let groups = grouped(outputs.map(|output| (&*output.name, output.slot)));
         for (name, slots) in groups {
             let unit = &self.plan.channels[slots[0]].channel.unit;
             let lines = vec![format!(
@@ -270,6 +251,21 @@ impl Drawn<'_> {
             }
         }
     }
+}
+
+/// The slots of channels by what stands before the dot of their names, each in the order in which it first comes.
+fn grouped<'a>(channels: impl Iterator<Item = (&'a str, usize)>) -> Vec<(&'a str, Vec<usize>)> {
+    let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    for (channel, slot) in channels {
+        let name = channel.split('.').next().unwrap_or(channel);
+        let place = *places.entry(name).or_insert(groups.len());
+        if place == groups.len() {
+            groups.push((name, Vec::new()));
+        }
+        groups[place].1.push(slot);
+    }
+    groups
 }
 
 #[cfg(test)]
