@@ -166,7 +166,7 @@ impl Terminal {
         total: Option<u64>,
     ) -> Progress {
         Progress {
-            what,
+            what: what.to_owned(),
             unit,
             total,
             shown: std::io::stderr().is_terminal() && !self.quiet,
@@ -210,7 +210,7 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
 /// A line that says how far the work has come.
 #[derive(Debug)]
 pub struct Progress {
-    what: &'static str,
+    what: String,
     unit: &'static str,
     total: Option<u64>,
     shown: bool,
@@ -221,22 +221,36 @@ pub struct Progress {
 impl Progress {
     /// Tells how many have been done so far.
     pub fn tell(&mut self, done: u64) {
-        if !self.shown || self.began.elapsed() < Duration::from_secs(1) {
-            return;
+        let rested = |last: Instant| last.elapsed() > Duration::from_millis(100);
+        if self.takes_long() && self.last.is_none_or(rested) {
+            self.show(&line(self, done, self.began.elapsed().as_secs_f64()));
         }
-        if self
-            .last
-            .is_none_or(|last| last.elapsed() > Duration::from_millis(100))
-        {
-            self.last = Some(Instant::now());
-            let line = line(self, done, self.began.elapsed().as_secs_f64());
-            let _ = write!(std::io::stderr(), "\r{line}\x1b[K");
+    }
+
+    /// Tells what is done next, which may take long and is not counted together with the rest.
+    pub fn say(&mut self, text: impl fmt::Display) {
+        if self.takes_long() {
+            self.show(&text);
         }
+    }
+
+    /// From here on the work is called so.
+    pub fn doing(&mut self, what: String) {
+        self.what = what;
+    }
+
+    fn takes_long(&self) -> bool {
+        self.shown && self.began.elapsed() >= Duration::from_secs(1)
+    }
+
+    fn show(&mut self, text: &dyn fmt::Display) {
+        self.last = Some(Instant::now());
+        let _ = write!(std::io::stderr(), "\r{text}\x1b[K");
     }
 }
 
 fn line(progress: &Progress, done: u64, elapsed_s: f64) -> String {
-    let (what, unit) = (progress.what, progress.unit);
+    let (what, unit) = (&progress.what, progress.unit);
     let Some(total) = progress.total.filter(|total| (1..=*total).contains(&done)) else {
         let rate = done as f64 / elapsed_s;
         return format!("{what}: {} {unit}, {rate:.0} per second", count(done));
@@ -384,7 +398,7 @@ mod tests {
 
     fn progress(total: Option<u64>) -> Progress {
         Progress {
-            what: "fitting",
+            what: "fitting".to_owned(),
             unit: "ticks",
             total,
             shown: true,

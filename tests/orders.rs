@@ -6,8 +6,11 @@ mod workbench;
 
 use std::ffi::OsStr;
 
+use athermal::Instant;
+use athermal::core::fit::{FitOptions, FitProgress, fit};
+use athermal::core::recording::Table;
 use serde_json::Value;
-use workbench::{Scratch, athermal, athermal_on, own_oracle};
+use workbench::{Scratch, athermal, athermal_on, numbers, own_oracle, plan};
 
 /// A graph that leaves open of how many steps back it reads, up to `most`.
 fn graph_up_to(most: usize, by: &str, node: &str) -> String {
@@ -63,6 +66,25 @@ fn fitted_card(name: &str, graph: &str) -> (Value, String) {
     let text = std::fs::read_to_string(&model).unwrap();
     let model: Value = serde_json::from_str(&text).unwrap();
     (model["card"]["estimators"][0].clone(), told.out)
+}
+
+#[test]
+fn each_order_is_told_as_it_is_gone_to() {
+    let plan = plan(&graph("aic", "type = \"arma\"\nnc = 1"));
+    let mut table = Table::default();
+    let text = std::fs::read_to_string(own_oracle("orders/series.csv")).unwrap();
+    for row in numbers(&text) {
+        table.push(Instant::from_ns((row[0] * 1e9) as i64), &row[1..]);
+    }
+    let mut orders = Vec::new();
+    fit(&plan, &table, &FitOptions::default(), &mut |progress| {
+        if let FitProgress::Order { node, nth, of } = progress {
+            orders.push((node.to_owned(), nth, of));
+        }
+    })
+    .unwrap();
+    let expected: Vec<_> = (1..=6).map(|nth| ("model".to_owned(), nth, 6)).collect();
+    assert_eq!(orders, expected);
 }
 
 #[test]

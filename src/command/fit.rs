@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use athermal::Model;
 use athermal::core::compile::{PlannedChannel, Wanted};
 use athermal::core::diagnostic::Sources;
-use athermal::core::fit::{EstimatorFit, FitOptions, FitReport, Outcome, fit};
+use athermal::core::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
 use athermal::core::node::{OrderTable, SelectionStep, TrainingError};
 use athermal::files::Dataset;
@@ -258,8 +258,18 @@ pub fn fit_without_card(
     let dataset = data.dataset();
     let watch = FaultWatch::new(&dataset, Purpose::Fit);
     let mut progress = terminal.progress("fitting");
-    let (fitted, report) = fit(&model.plan, &watch, options, &mut |ticks| {
-        progress.tell(ticks);
+    let (fitted, report) = fit(&model.plan, &watch, options, &mut |told| match told {
+        FitProgress::Ticks { stepped, fit, of } => {
+            progress.doing(if of > 1 {
+                format!("fitting {fit} of {of}")
+            } else {
+                "fitting".to_owned()
+            });
+            progress.tell(stepped);
+        }
+        FitProgress::Order { node, nth, of } => {
+            progress.say(format_args!("fitting `{node}`: order {nth} of {of}"));
+        }
     })?;
     drop(progress);
     let faults = watch.found();

@@ -7,7 +7,7 @@ use athermal::core::compile::Plan;
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{Memory, declare, load_text};
 use athermal::core::engine::Fitted;
-use athermal::core::fit::{FitOptions, FitReport, fit};
+use athermal::core::fit::{FitOptions, FitProgress, FitReport, fit};
 use athermal::core::model::Model;
 use athermal::core::node::{
     Encoder, Estimator, Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs,
@@ -228,7 +228,19 @@ fn with_output(text: &str, output: &str) -> String {
 }
 
 fn fitted(plan: &Arc<Plan>) -> (Fitted, FitReport) {
-    fit(plan, &recording(), &FitOptions::default(), &mut |_| {}).unwrap()
+    let mut told = (0, 0);
+    let made = fit(
+        plan,
+        &recording(),
+        &FitOptions::default(),
+        &mut |progress| {
+            if let FitProgress::Ticks { fit, of, .. } = progress {
+                told = (fit, of);
+            }
+        },
+    );
+    assert_eq!(told.0, told.1, "as many fits as were told to come");
+    made.unwrap()
 }
 
 fn samples() -> Vec<(Instant, Vec<f64>)> {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use athermal::core::fit::{FitOptions, Outcome, fit};
+use athermal::core::fit::{FitOptions, FitProgress, Outcome, fit};
 use athermal::core::node::Figure;
 use athermal::core::recording::{Event, Table};
 use athermal::{Engine, Instant};
@@ -84,16 +84,22 @@ fn what_two_levels_learn_from_is_fitted_once() {
             &values,
         );
     }
-    let mut stepped = 0;
+    let mut told = (0, 0, 0);
     let plan = plan(&graph);
-    let (_, report) = fit(&plan, &table, &FitOptions::default(), &mut |ticks| {
-        stepped = ticks
+    let (_, report) = fit(&plan, &table, &FitOptions::default(), &mut |progress| {
+        if let FitProgress::Ticks { stepped, fit, of } = progress {
+            told = (stepped, fit, of);
+        }
     })
     .unwrap();
     assert_eq!(report.estimators.len(), 5);
     // A level takes a pass, and one above others a pass for each of three folds. What lies below the third level is fitted
     // once on all ticks and once without each fold, and so on: 1, 1 + 3 + 3 · 1, 1 + 3 + 3 + 3 · 7 and 1 + 3 + 3 + 3 + 3 · 28.
-    assert_eq!(stepped, 94 * u64::try_from(rows).unwrap());
+    let stepped = 94 * u64::try_from(rows).unwrap();
+    // The lowest is fitted once for all ticks, and each above with all that it asks for: once, and three times what the one
+    // below it takes.
+    let fits = 1 + 4 + 13 + 40;
+    assert_eq!(told, (stepped, fits, fits));
 }
 
 #[test]

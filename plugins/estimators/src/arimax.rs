@@ -127,7 +127,9 @@ mod tests {
             ..Asked::default()
         };
         let mut report = TrainingReport::default();
-        let found = asked.identify(&samples, 1, &mut report).unwrap();
+        let found = asked
+            .identify(&samples, 1, &mut report, &mut |_, _| {})
+            .unwrap();
         let tried = report.orders.unwrap().tried.into_iter();
         (
             found.model.differences,
@@ -157,7 +159,7 @@ mod tests {
         };
         let fit = |differences| {
             let mut report = TrainingReport::default();
-            let found = asked(differences).identify(&samples, 1, &mut report);
+            let found = asked(differences).identify(&samples, 1, &mut report, &mut |_, _| {});
             found.unwrap()
         };
         let (told, given) = (fit(Differences::Told), fit(Differences::Given(0)));

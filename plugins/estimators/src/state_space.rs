@@ -253,6 +253,7 @@ impl Identify for StateSpace {
         samples: &Samples,
         series: usize,
         report: &mut TrainingReport,
+        _order: &mut dyn FnMut(usize, usize),
     ) -> Result<Found, TrainingError> {
         let outputs = || samples.records().flat_map(|record| record.outputs);
         let count = samples.count().max(1) as f64;
@@ -418,7 +419,7 @@ mod tests {
         }
         let asked = asking(States::default(), horizon);
         let mut report = TrainingReport::default();
-        asked.identify(&samples, 1, &mut report)?;
+        asked.identify(&samples, 1, &mut report, &mut |_, _| {})?;
         Ok(report.notes)
     }
 
@@ -453,7 +454,7 @@ mod tests {
                 samples.push(inputs, truth(inputs));
             }
             let asked = asking(States::default(), None);
-            let found = asked.identify(&samples, 1, &mut TrainingReport::default());
+            let found = asked.identify(&samples, 1, &mut TrainingReport::default(), &mut |_, _| {});
             found.unwrap_err().to_string()
         };
         assert_eq!(

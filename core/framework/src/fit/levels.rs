@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::collect::{Collector, Share, Trainee};
 use super::drive::{Passed, drive};
+use super::progress::{FitProgress, Listener};
 use super::train::{Made, Making, begin, end, train_kept};
 use super::{FitError, FitOptions, FitReport};
 use crate::compile::{Plan, PlannedRole};
@@ -17,7 +18,7 @@ pub(super) struct Fitting<'a> {
     plan: &'a Arc<Plan>,
     recording: &'a dyn Recording,
     options: &'a FitOptions,
-    progress: &'a mut dyn FnMut(u64),
+    progress: Listener<'a>,
     /// What is to be fitted, by level: nodes of a level are fed by levels below only.
     levels: Vec<Level>,
     /// The truths that estimators learn from which are fed by others.
@@ -25,6 +26,9 @@ pub(super) struct Fitting<'a> {
     /// The ticks with one of them, as the last pass met them: by those folds are cut.
     counted: Counted,
     stepped: u64,
+    /// How many fits of a level have begun, and how many there will be.
+    begun: u64,
+    fits: u64,
     report: FitReport,
 }
 
@@ -117,14 +121,18 @@ impl<'a> Fitting<'a> {
         plan: &'a Arc<Plan>,
         recording: &'a dyn Recording,
         options: &'a FitOptions,
-        progress: &'a mut dyn FnMut(u64),
+        progress: Listener<'a>,
     ) -> Self {
         let levels = levels(plan);
         let above = levels.iter().filter(|level| level.of_predictions);
         let rows = above.flat_map(|level| &level.nodes);
         let rows = rows.filter_map(|&node| plan.nodes[node].rows());
         let truths = rows.map(|rows| rows.truth.slot).collect();
+        let top = levels.len().saturating_sub(1);
+        let whole = &mut Planned::default();
         Self {
+            fits: whole.fits_up_to(top, plan, &levels, options.folds()),
+            begun: 0,
             truths,
             counted: Counted::default(),
             plan,
@@ -195,8 +203,7 @@ impl<'a> Fitting<'a> {
             }]);
         }
         if course.folds.is_empty() {
-            let folds = self.options.folds.max(2);
-            course.folds = course.without_folds(&self.counted.ticks, folds);
+            course.folds = course.without_folds(&self.counted.ticks, self.options.folds());
         }
         let mut parts = Vec::new();
         for (fold, without) in &mut course.folds {
@@ -221,10 +228,16 @@ impl<'a> Fitting<'a> {
     }
 
     fn fit_level(&mut self, nodes: &[usize], parts: &[Part]) -> Result<Vec<Made>, FitError> {
+        self.begun += 1;
         let mut collector = Collector::new(self.plan, nodes, self.options.memory);
         self.pass(&mut collector, parts, None)?;
         if !collector.overflowed {
-            return Ok(train_kept(self.plan, &collector, self.options));
+            return Ok(train_kept(
+                self.plan,
+                &collector,
+                self.options,
+                &self.progress,
+            ));
         }
         let all = collector.trainees.iter();
         let mut makings =
@@ -249,7 +262,7 @@ impl<'a> Fitting<'a> {
         Ok(ended
             .map(|(trainee, making)| {
                 let _at_hand = AtHand::in_fit(self.plan, trainee.node);
-                end(self.plan, &collector, trainee, making, true)
+                end(self.plan, &collector, trainee, making, true, &self.progress)
             })
             .collect())
     }
@@ -284,7 +297,10 @@ impl<'a> Fitting<'a> {
                 collector.rewind();
             }
             let mut engine = Engine::new(Arc::clone(self.plan), &part.fitted)?;
-            let (stepped, progress) = (&mut self.stepped, &mut self.progress);
+            let (stepped, progress) = (&mut self.stepped, &self.progress);
+            let (fit, of) = (self.begun, self.fits);
+            let tell = |stepped| progress.tell(FitProgress::Ticks { stepped, fit, of });
+            tell(*stepped);
             let (truths, counted) = (&self.truths, &mut self.counted);
             *counted = Counted::default();
             let passed = drive(&mut engine, self.recording, |engine, event| {
@@ -299,7 +315,7 @@ impl<'a> Fitting<'a> {
                     counted.tick(truths.iter().any(came));
                     *stepped += 1;
                     if stepped.is_multiple_of(4096) {
-                        progress(*stepped);
+                        tell(*stepped);
                     }
                 }
             })?;
@@ -315,6 +331,36 @@ impl<'a> Fitting<'a> {
         self.report.refused = engine.refused();
         self.report.rejected = engine.rejected_channels();
         self.report.ranges = engine.sample_ranges();
+    }
+}
+
+/// A [`Course`] of which only the number of fits is asked; all of its folds have the same.
+#[derive(Default)]
+struct Planned {
+    levels: usize,
+    fold: Option<Box<Planned>>,
+    is_fold: bool,
+}
+
+impl Planned {
+    fn fits_up_to(&mut self, top: usize, plan: &Plan, levels: &[Level], folds: usize) -> u64 {
+        let mut fits = 0_u64;
+        while self.levels <= top && self.levels < levels.len() {
+            let level = &levels[self.levels];
+            let is_open =
+                |&node: &usize| matches!(plan.nodes[node].role, PlannedRole::Estimator { .. });
+            if !self.is_fold || level.feeding.iter().any(is_open) {
+                fits = fits.saturating_add(1);
+                if level.of_predictions {
+                    let fold = self.fold.get_or_insert_default();
+                    fold.is_fold = true;
+                    let of_fold = fold.fits_up_to(self.levels - 1, plan, levels, folds);
+                    fits = of_fold.saturating_mul(folds as u64).saturating_add(fits);
+                }
+            }
+            self.levels += 1;
+        }
+        fits
     }
 }
 

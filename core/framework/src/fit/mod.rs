@@ -7,11 +7,13 @@ mod collect;
 mod doubt;
 mod drive;
 mod levels;
+mod progress;
 mod report;
 mod train;
 
 use std::sync::Arc;
 
+pub use progress::FitProgress;
 pub use report::{Dropped, EstimatorFit, FitError, FitReport, Outcome};
 
 pub(crate) use drive::drive;
@@ -42,10 +44,16 @@ impl Default for FitOptions {
     }
 }
 
+impl FitOptions {
+    fn folds(&self) -> usize {
+        self.folds.max(2)
+    }
+}
+
 /// Trains every estimator of a plan that needs it.
 ///
 /// The plan is stepped over the recording; at every new truth each estimator's row is the one that it saw at its last run
-/// at or before `τ − ahead`. `progress` is told the number of ticks stepped so far, over all passes.
+/// at or before `τ − ahead`. `progress` is told from time to time how far it has come.
 ///
 /// # Errors
 /// When the recording cannot be read. An estimator that cannot be fitted is told of in the report.
@@ -53,7 +61,7 @@ pub fn fit(
     plan: &Arc<Plan>,
     recording: &dyn Recording,
     options: &FitOptions,
-    progress: &mut dyn FnMut(u64),
+    progress: &mut (dyn FnMut(FitProgress<'_>) + Send),
 ) -> Result<(Fitted, FitReport), FitError> {
-    levels::Fitting::new(plan, recording, options, progress).run()
+    levels::Fitting::new(plan, recording, options, progress::Listener::new(progress)).run()
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::FitOptions;
 use super::collect::{Collector, Sink, Trainee};
 use super::doubt::{Lacking, Truths, tell_constant};
+use super::progress::{FitProgress, Listener};
 use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedRole};
@@ -169,6 +170,7 @@ pub(super) fn end(
     trainee: &Trainee,
     making: Making,
     streamed: bool,
+    progress: &Listener<'_>,
 ) -> Made {
     let node = &plan.nodes[trainee.node];
     let truth = &plan.channels[trainee.link.slot];
@@ -209,7 +211,11 @@ pub(super) fn end(
         // Some trainers would make a model of sums that overflowed.
         match too_large {
             Some(error) => Err(error),
-            None => making.trainer.finish(),
+            None => {
+                let node = &node.instance();
+                let mut order = |nth, of| progress.tell(FitProgress::Order { node, nth, of });
+                making.trainer.finish_telling(&mut order)
+            }
         }
     };
     let trained = trained.and_then(|trained| {
@@ -282,7 +288,12 @@ fn no_truth(plan: &Plan, collector: &Collector, trainee: &Trainee) -> TrainingEr
 }
 
 /// Fits all estimators from the examples kept, on several threads; the result does not depend on how many.
-pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOptions) -> Vec<Made> {
+pub(super) fn train_kept(
+    plan: &Plan,
+    collector: &Collector,
+    options: &FitOptions,
+    progress: &Listener<'_>,
+) -> Vec<Made> {
     let count = collector.trainees.len();
     let threads = options.threads.clamp(1, count.max(1));
     let next = AtomicUsize::new(0);
@@ -305,7 +316,10 @@ pub(super) fn train_kept(plan: &Plan, collector: &Collector, options: &FitOption
                 making = begin(plan, trainee, options.memory, constant);
                 collector.replay(index, &mut making);
             }
-            made.push((index, end(plan, collector, trainee, making, false)));
+            made.push((
+                index,
+                end(plan, collector, trainee, making, false, progress),
+            ));
         }
     };
     let mut made = if threads == 1 {

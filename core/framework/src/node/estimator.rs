@@ -242,6 +242,17 @@ pub trait Trainer: Send {
     /// # Errors
     /// When the rows do not allow one.
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError>;
+
+    /// The same for a trainer that compares many orders, and tells before each which of how many it is.
+    ///
+    /// # Errors
+    /// As [`Trainer::finish`].
+    fn finish_telling(
+        self: Box<Self>,
+        _order: &mut dyn FnMut(usize, usize),
+    ) -> Result<Trained, TrainingError> {
+        self.finish()
+    }
 }
 
 /// What a fit gave.

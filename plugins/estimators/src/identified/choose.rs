@@ -14,12 +14,13 @@ use crate::unsolved::unsolved;
 const MOST_WORK: usize = 1000;
 
 impl Asked {
-    /// The model of the orders that are asked for, or of the best of them.
+    /// The model of the orders that are asked for, or of the best of them; told is which of how many is gone to.
     pub(super) fn fit(
         &self,
         samples: &Samples,
         spread: f64,
         report: &mut TrainingReport,
+        tell: &mut dyn FnMut(usize, usize),
     ) -> Result<PredictionErrorFit, TrainingError> {
         // By default no order is open.
         let order = self.order.unwrap_or_default();
@@ -48,7 +49,8 @@ impl Asked {
         in_order.sort_by_key(|&nth| candidates[nth].1.coefficients());
         let mut found: Vec<Option<Result<PredictionErrorFit, NumericsError>>> =
             candidates.iter().map(|_| None).collect();
-        for nth in in_order {
+        for (place, nth) in in_order.into_iter().enumerate() {
+            tell(place + 1, candidates.len());
             let orders = &candidates[nth].1;
             let known = best_contained(orders, &candidates, &found);
             // The criteria are made for fits without a penalty: with one, another coefficient could enlarge the residuals.

@@ -33,7 +33,8 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
         None
     }
 
-    /// The model, from samples of so many interleaved series; what there is to tell goes into the report.
+    /// The model, from samples of so many interleaved series; what there is to tell goes into the report. Where orders are
+    /// compared, which of how many is told as each is gone to.
     ///
     /// # Errors
     /// When the samples do not allow one.
@@ -42,6 +43,7 @@ pub(crate) trait Identify: std::fmt::Debug + Send {
         samples: &Samples,
         series: usize,
         report: &mut TrainingReport,
+        order: &mut dyn FnMut(usize, usize),
     ) -> Result<Found, TrainingError>;
 }
 
@@ -119,7 +121,11 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         }
     }
 
-    fn solve(&self, report: &mut TrainingReport) -> Result<Identified, TrainingError> {
+    fn solve(
+        &self,
+        report: &mut TrainingReport,
+        order: &mut dyn FnMut(usize, usize),
+    ) -> Result<Identified, TrainingError> {
         let unsolvable = |reason: String| TrainingError::Unsolvable { reason };
         if !self.fits() {
             let bytes = (self.count * self.bytes_per_row()) as f64;
@@ -151,7 +157,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
             missing: self.memory / self.bytes_per_row(),
         });
         let samples = self.rows.samples(pace, &standard, bridges);
-        let found = self.asked.identify(&samples, pace.series, report)?;
+        let found = self.asked.identify(&samples, pace.series, report, order)?;
         tell_rows(
             &self.names,
             self.rows.regressors(),
@@ -236,11 +242,12 @@ impl Identify for Asked {
         samples: &Samples,
         _series: usize,
         report: &mut TrainingReport,
+        order: &mut dyn FnMut(usize, usize),
     ) -> Result<Found, TrainingError> {
         // In units of their spread, or the search would depend on the unit of the truth.
         let spread = samples.spread();
         let divided = samples.divided(spread);
-        let mut fit = self.fit(&divided, spread, report)?;
+        let mut fit = self.fit(&divided, spread, report, order)?;
         let mut search = PredictionError {
             penalty: self.penalty,
             ..PredictionError::default()
@@ -416,8 +423,15 @@ impl<Kind: Identify> Trainer for IdentifiedTrainer<Kind> {
     }
 
     fn finish(self: Box<Self>) -> Result<Trained, TrainingError> {
+        self.finish_telling(&mut |_, _| {})
+    }
+
+    fn finish_telling(
+        self: Box<Self>,
+        order: &mut dyn FnMut(usize, usize),
+    ) -> Result<Trained, TrainingError> {
         let mut report = TrainingReport::default();
-        let predictor = self.solve(&mut report)?;
+        let predictor = self.solve(&mut report, order)?;
         Ok(Trained {
             predictor: Box::new(predictor),
             report,
@@ -495,7 +509,9 @@ mod tests {
             ..Asked::default()
         };
         let mut report = TrainingReport::default();
-        let found = asked.identify(&samples, 1, &mut report).unwrap();
+        let found = asked
+            .identify(&samples, 1, &mut report, &mut |_, _| {})
+            .unwrap();
         let off = (found.model.level - samples.mean()).abs();
         assert!(!found.mean_level || off < 1e-9, "{off}");
         (found, report.notes)
