@@ -3,7 +3,7 @@
 
 use crate::cell::is_number;
 use crate::columns::{Columns, DELIMITERS, choose_delimiter, names_in};
-use crate::lines::{Lines, is_content};
+use crate::lines::{Lines, has_bare_returns, is_content};
 use crate::units::are_units;
 use crate::{FileError, Layout};
 
@@ -85,15 +85,6 @@ fn unheaded(error: FileError) -> FileError {
         FileError::TooLong { place, limit } => FileError::HeaderTooLong { place, limit },
         other => other,
     }
-}
-
-/// Whether a line goes on after a carriage return that stands in no quoted cell.
-pub(crate) fn has_bare_returns(line: &[u8]) -> bool {
-    let mut unquoted = line.split(|byte| *byte == b'"').step_by(2);
-    unquoted.any(|piece| {
-        let mut pairs = piece.windows(2);
-        pairs.any(|pair| pair[0] == b'\r' && !matches!(pair[1], b'\r' | b'\n'))
-    })
 }
 
 /// With this a first line names the delimiter, for spreadsheets.

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use crate::format::begins_json_array;
-use crate::header::has_bare_returns;
 use crate::{FileError, Format, Place};
 
 /// The longest row, in bytes, so that a stray quote or a binary file cannot fill the memory.
@@ -218,6 +217,15 @@ impl Lines {
 /// Whether a line is neither blank nor a comment.
 pub(crate) fn is_content(line: &[u8]) -> bool {
     !matches!(line.trim_ascii_start().first(), None | Some(b'#'))
+}
+
+/// Whether a line goes on after a carriage return that stands in no quoted cell.
+pub(crate) fn has_bare_returns(line: &[u8]) -> bool {
+    let mut unquoted = line.split(|byte| *byte == b'"').step_by(2);
+    unquoted.any(|piece| {
+        let mut pairs = piece.windows(2);
+        pairs.any(|pair| pair[0] == b'\r' && !matches!(pair[1], b'\r' | b'\n'))
+    })
 }
 
 #[cfg(test)]
