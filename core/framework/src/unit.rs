@@ -7,8 +7,6 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use crate::diagnostic::nearest;
-
 mod in_names;
 mod ratio;
 mod spelling;
@@ -17,6 +15,10 @@ use ratio::Ratio;
 
 /// Longest text that is tried as a unit; the longest sensible ones have about 20 characters.
 const LONGEST: usize = 64;
+
+/// What to write for a level above 1 mW.
+const LEVEL: &str =
+    "a level above 1 W is \"dB[W]\", in which 0 dBm are -30; a difference of levels is in \"dB\"";
 
 /// 0 °C in K (BIPM, SI brochure, 9th edition, 2.3.1).
 const CELSIUS_ZERO_K: f64 = 273.15;
@@ -358,6 +360,13 @@ pub enum UnitError {
         /// A known unit that is spelt alike.
         suggestion: Option<String>,
     },
+    /// A level above a power for which UCUM has no code.
+    Level {
+        /// The unit as written.
+        text: String,
+        /// The level in it.
+        symbol: String,
+    },
     /// The text is not built like a unit.
     Syntax {
         /// The unit as written.
@@ -380,8 +389,17 @@ impl UnitError {
         match self {
             Self::Unknown { suggestion, .. } => suggestion.as_deref(),
             Self::PointInCompound { advice, .. } => Some(advice),
-            Self::Empty | Self::TooLong { .. } | Self::Syntax { .. } => None,
+            Self::Empty | Self::TooLong { .. } | Self::Level { .. } | Self::Syntax { .. } => None,
         }
+    }
+
+    /// The same in a sentence.
+    pub fn help(&self) -> Option<String> {
+        if let Self::Level { .. } = self {
+            return Some(LEVEL.to_owned());
+        }
+        let advice = self.advice()?;
+        Some(format!("write the unit as \"{advice}\""))
     }
 
     /// What is wrong, without the advice.
@@ -389,8 +407,8 @@ impl UnitError {
         match self {
             Self::Empty => "a unit is a UCUM code like \"nm/min\" (\"1\" if there is none), found an empty text".to_owned(),
             Self::TooLong { length } => format!("a unit has at most {LONGEST} characters, found {length}"),
-            Self::Unknown { text, symbol, .. } if symbol == text => format!("\"{text}\" is not a unit that UCUM knows"),
-            Self::Unknown { text, symbol, .. } => format!("\"{symbol}\" in \"{text}\" is not a unit that UCUM knows"),
+            Self::Unknown { text, symbol, .. } | Self::Level { text, symbol } if symbol == text => format!("\"{text}\" is not a unit that UCUM knows"),
+            Self::Unknown { text, symbol, .. } | Self::Level { text, symbol } => format!("\"{symbol}\" in \"{text}\" is not a unit that UCUM knows"),
             Self::Syntax { text, at: 0 } => format!("\"{text}\" is not built like a unit, e.g. \"nm/min\""),
             Self::Syntax { text, at } => {
                 format!("\"{text}\" is not built like a unit, e.g. \"nm/min\": reading stopped at byte {at}")
@@ -410,18 +428,16 @@ fn of_words(text: &str) -> Option<String> {
 
 fn unknown(text: &str, error: &ucum::UcumError) -> UnitError {
     match error {
+        ucum::UcumError::UnknownAtom { code } if spelling::is_level(code) => UnitError::Level {
+            text: text.to_owned(),
+            symbol: code.clone(),
+        },
         ucum::UcumError::UnknownAtom { code } => UnitError::Unknown {
             text: text.to_owned(),
             symbol: code.clone(),
             suggestion: of_words(text)
-                .or_else(|| {
-                    let near = nearest(text, spelling::COMMON.iter().copied());
-                    near.map(str::to_owned)
-                })
-                .or_else(|| {
-                    let symbol = nearest(code, spelling::COMMON.iter().copied())?;
-                    Some(text.replace(code.as_str(), symbol))
-                }),
+                .or_else(|| spelling::near(text).map(str::to_owned))
+                .or_else(|| Some(text.replace(code.as_str(), spelling::near(code)?))),
         },
         ucum::UcumError::Parse { pos, .. } => UnitError::Syntax {
             text: text.to_owned(),
@@ -443,6 +459,7 @@ impl fmt::Display for UnitError {
                 ..
             } => write!(f, "; did you mean \"{suggestion}\"?"),
             Self::PointInCompound { advice, .. } => write!(f, "; write \"{advice}\""),
+            Self::Level { .. } => write!(f, "; {LEVEL}"),
             _ => Ok(()),
         }
     }

@@ -3,8 +3,8 @@
 use super::Unit;
 use super::spelling::MICROINCH;
 
-/// Words, and the UCUM codes that they mean; the case counts for single letters.
-const WORDS: [(&str, &str); 42] = [
+/// Words, and the UCUM codes that they mean; the case counts for single letters, and where words differ in nothing else.
+const WORDS: [(&str, &str); 53] = [
     ("degC", "Cel"),
     ("°C", "Cel"),
     ("celsius", "Cel"),
@@ -47,6 +47,17 @@ const WORDS: [(&str, &str); 42] = [
     ("%", "%"),
     ("pct", "%"),
     ("percent", "%"),
+    ("%RH", "%"),
+    ("rpm", "/min"),
+    ("Hz", "Hz"),
+    ("kHz", "kHz"),
+    ("Nm", "N.m"),
+    ("kWh", "kW.h"),
+    ("dB", "dB"),
+    ("ppm", "[ppm]"),
+    ("hPa", "hPa"),
+    ("kPa", "kPa"),
+    ("mbar", "mbar"),
 ];
 
 impl Unit {
@@ -54,10 +65,11 @@ impl Unit {
     /// that are as usual, such as `min`.
     #[must_use]
     pub fn in_name(word: &str) -> Option<Self> {
-        let same = |known: &str| {
-            known == word || known.len() > 1 && known.eq_ignore_ascii_case(word) && word != "MK"
+        let in_any_case = |known: &str| {
+            known.len() > 1 && known.eq_ignore_ascii_case(word) && !["MK", "NM"].contains(&word)
         };
-        let (_, code) = WORDS.iter().find(|(known, _)| same(known))?;
+        let exact = WORDS.iter().find(|(known, _)| *known == word);
+        let (_, code) = exact.or_else(|| WORDS.iter().find(|(known, _)| in_any_case(known)))?;
         Self::parse(code).ok()
     }
 

@@ -1,7 +1,9 @@
 //! How units are spelt: common spellings to UCUM codes, a code taken apart into symbols; it knows no factors but prefixes.
 
+use crate::diagnostic::nearest;
+
 /// Spellings of whole symbols, and the UCUM symbols they stand for.
-const SPELLINGS: [(&str, &str); 34] = [
+const SPELLINGS: [(&str, &str); 65] = [
     ("degC", "Cel"),
     ("\u{b0}C", "Cel"),
     ("\u{2103}", "Cel"),
@@ -36,14 +38,75 @@ const SPELLINGS: [(&str, &str); 34] = [
     ("ppm", "[ppm]"),
     ("arcsec", "''"),
     ("arcmin", "'"),
+    ("rpm", "/min"),
+    ("RPM", "/min"),
+    ("rps", "/s"),
+    ("rev", "{rev}"),
+    ("Nm", "N.m"),
+    ("uNm", "uN.m"),
+    ("mNm", "mN.m"),
+    ("cNm", "cN.m"),
+    ("kNm", "kN.m"),
+    ("Ncm", "N.cm"),
+    ("Nmm", "N.mm"),
+    ("Wh", "W.h"),
+    ("mWh", "mW.h"),
+    ("kWh", "kW.h"),
+    ("MWh", "MW.h"),
+    ("Ah", "A.h"),
+    ("mAh", "mA.h"),
+    ("VA", "V.A"),
+    ("kVA", "kV.A"),
+    ("%RH", "%"),
+    ("%rH", "%"),
+    ("%rh", "%"),
+    ("u\u{3b5}", "um/m"),
+    ("ustrain", "um/m"),
+    ("microstrain", "um/m"),
+    ("mps", "m/s"),
+    ("Pas", "Pa.s"),
+    ("mPas", "mPa.s"),
+    ("lpm", "L/min"),
+    ("LPM", "L/min"),
+    ("mmHg", "mm[Hg]"),
 ];
 
+/// Whether a symbol is a level above a power, of which UCUM has none: `dBm` is that above 1 mW.
+pub(super) fn is_level(symbol: &str) -> bool {
+    ["dBm", "dBmW", "dB[mW]"].contains(&symbol)
+}
+
+/// The unit that a text may be a slip of the finger for. Short names lie near to many: one of a single letter, or that begins with
+/// another, is none of them, and one that differs in its capitals alone is none where these tell units of different kinds apart (`mPa`, `NM`).
+pub(super) fn near(text: &str) -> Option<&'static str> {
+    let spelt = SPELLINGS.iter().map(|(spelling, _)| *spelling);
+    let known = COMMON.iter().copied().chain(spelt);
+    let same: Vec<_> = known
+        .filter(|known| known.eq_ignore_ascii_case(text))
+        .collect();
+    let differing = |known: &&&str| {
+        known
+            .bytes()
+            .zip(text.bytes())
+            .filter(|(a, b)| a != b)
+            .count()
+    };
+    if let Some(first) = same.iter().min_by_key(differing) {
+        let unit = |text: &str| super::Unit::parse(text).ok();
+        let of_first = unit(first)?;
+        let is_alike = |other: &&str| unit(other).is_some_and(|unit| unit.measures_same(&of_first));
+        return same.iter().all(is_alike).then_some(first);
+    }
+    let begins = |known: &&str| known.len() > 1 && known.chars().next() == text.chars().next();
+    nearest(text, COMMON.iter().copied().filter(begins))
+}
+
 /// Units that are suggested for one that is not known.
-pub(super) const COMMON: [&str; 60] = [
+pub(super) const COMMON: [&str; 61] = [
     "nm", "um", "mm", "cm", "m", "km", "pm", "K", "mK", "uK", "Cel", "degC", "degF", "s", "ms",
-    "us", "ns", "min", "h", "d", "Pa", "kPa", "mPa", "bar", "mbar", "V", "mV", "uV", "A", "mA",
-    "W", "mW", "Hz", "kHz", "dB", "%", "rad", "urad", "mrad", "deg", "N", "mN", "J", "g", "kg",
-    "mg", "1", "nm/min", "nm/s", "um/s", "mm/s", "mK/min", "K/min", "K/s", "nm/K", "um/K",
+    "us", "ns", "min", "h", "d", "Pa", "kPa", "mPa", "MPa", "bar", "mbar", "V", "mV", "uV", "A",
+    "mA", "W", "mW", "Hz", "kHz", "dB", "%", "rad", "urad", "mrad", "deg", "N", "mN", "J", "g",
+    "kg", "mg", "1", "nm/min", "nm/s", "um/s", "mm/s", "mK/min", "K/min", "K/s", "nm/K", "um/K",
     "um/min", "L", "L/min", "Ohm",
 ];
 
@@ -167,11 +230,27 @@ const PREFIXES: [(&str, i32); 20] = [
 
 /// `text` with every common spelling replaced by its UCUM code; what is not known stays as it is.
 pub(super) fn ucum_code(text: &str) -> String {
+    // Revolutions, in the language of many a drive, and no enzyme units.
+    if text == "U/min" {
+        return "/min".to_owned();
+    }
     let mut code = String::new();
     let mut symbol = String::new();
     let mut brackets = 0usize;
     let flush = |symbol: &mut String, code: &mut String| {
-        code.push_str(&one_symbol(symbol));
+        let of_symbol = one_symbol(symbol);
+        // What stands for one symbol stays one operand.
+        let one = if of_symbol.starts_with('/') && !code.is_empty() {
+            "1"
+        } else {
+            ""
+        };
+        if code.ends_with('/') && of_symbol.contains(['.', '/']) {
+            code.push_str(&format!("({one}{of_symbol})"));
+        } else {
+            code.push_str(one);
+            code.push_str(&of_symbol);
+        }
         symbol.clear();
     };
     for c in text.chars() {

@@ -231,3 +231,73 @@ fn a_name_may_say_inches_and_their_parts() {
 fn unit_of_nm() -> Unit {
     unit("nm")
 }
+
+#[test]
+fn spellings_of_machine_logs_are_taken_for_what_they_mean() {
+    for (spelling, code) in [
+        ("Nm", "N.m"),
+        ("N\u{b7}m", "N.m"),
+        ("mNm", "mN.m"),
+        ("Nm/A", "N.m/A"),
+        ("A/Nm", "A/(N.m)"),
+        ("rpm", "/min"),
+        ("U/min", "/min"),
+        ("min-1", "/min"),
+        ("rev/min", "/min"),
+        ("rpm/s", "/min/s"),
+        ("V/rpm", "V.min"),
+        ("N.rpm", "N/min"),
+        ("kWh", "kW.h"),
+        ("mAh", "mA.h"),
+        ("kVA", "kV.A"),
+        ("%RH", "%"),
+        ("\u{b5}\u{3b5}", "um/m"),
+        ("\u{3bc}\u{3b5}", "um/m"),
+        ("l/min", "L/min"),
+        ("lpm", "L/min"),
+        ("mPas", "mPa.s"),
+        ("mmHg", "mm[Hg]"),
+        ("mbar", "hPa"),
+        ("ppm", "[ppm]"),
+    ] {
+        assert_eq!(unit(spelling), unit(code), "{spelling}");
+    }
+    assert_eq!(unit("rpm").text(), "/min");
+    assert_eq!(unit("Nm").text(), "N.m");
+}
+
+#[test]
+fn no_unit_of_another_kind_is_suggested() {
+    for text in ["NM", "gpm", "r/min", "rH", "gn", "fpm/s"] {
+        let error = Unit::parse(text).unwrap_err();
+        assert_eq!(error.advice(), None, "{error}");
+    }
+    for (text, code) in [
+        ("mk/min", "mK/min"),
+        ("bars", "bar"),
+        ("pa", "Pa"),
+        ("Mpa", "MPa"),
+        ("nn", "nm"),
+    ] {
+        let error = Unit::parse(text).unwrap_err();
+        assert_eq!(error.advice(), Some(code), "{error}");
+    }
+    let level = "\"dBm\" is not a unit that UCUM knows; a level above 1 W is \"dB[W]\", in which 0 dBm are -30; \
+                 a difference of levels is in \"dB\"";
+    assert_eq!(Unit::parse("dBm").unwrap_err().to_string(), level);
+    assert!(Unit::parse("dB[W]").is_ok());
+}
+
+#[test]
+fn a_name_may_say_torque_and_revolutions() {
+    for (word, code) in [
+        ("rpm", "/min"),
+        ("RPM", "/min"),
+        ("Nm", "N.m"),
+        ("nm", "nm"),
+        ("%RH", "%"),
+    ] {
+        assert_eq!(Unit::in_name(word), Some(unit(code)), "{word}");
+    }
+    assert!(Unit::in_name("NM").is_none(), "a torque or a length");
+}

@@ -338,9 +338,7 @@ impl Problem for DocumentProblem {
                         .to_owned(),
                 )
             }
-            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error
-                .advice()
-                .map(|advice| format!("write the unit as \"{advice}\"")),
+            Self::Unit(error) | Self::Quantity(QuantityError::Unit(error)) => error.help(),
             Self::NothingToRemove {
                 role,
                 name,
