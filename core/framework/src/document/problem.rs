@@ -31,6 +31,8 @@ pub enum DocumentProblem {
         reason: String,
         /// The graph files in its folder, where it is not there.
         beside: Vec<String>,
+        /// Whether another file names it.
+        named: bool,
     },
     /// A file is too large.
     TooLarge {
@@ -40,6 +42,11 @@ pub enum DocumentProblem {
     /// Tables or lists are nested too deeply.
     TooDeep {
         /// The greatest depth.
+        limit: usize,
+    },
+    /// A list has too many values.
+    LongList {
+        /// The greatest number of values.
         limit: usize,
     },
     /// Too many files extend one another.

@@ -412,6 +412,7 @@ fn not_read(
         path: path.display().to_string(),
         reason: unreadable(error),
         beside,
+        named: error.kind() == io::ErrorKind::NotFound && !being_read.is_empty(),
     }
 }
 

@@ -12,6 +12,10 @@ use crate::diagnostic::{Diagnostics, Place, SourceId};
 /// How deep keys may nest; the stack of a thread bears several times as much.
 const DEEPEST: usize = 64;
 
+/// The most values of one list: as many as a graph may have instances. A tree of the millions that a file has room for would take
+/// a hundred bytes for each before anybody could refuse them.
+const LONGEST_LIST: usize = 200_000;
+
 /// What could be read of a text.
 pub(super) struct Parsed {
     pub(super) table: Table,
@@ -21,9 +25,8 @@ pub(super) struct Parsed {
 
 /// Reads `text`. After a syntax error the tree holds what the error does not touch; `None` where that cannot be told.
 pub(super) fn parse(source: SourceId, text: &str, diagnostics: &mut Diagnostics) -> Option<Parsed> {
-    if let Some(place) = too_deep(source, text) {
-        // The parser does not limit dotted keys, and everything behind it is recursive.
-        diagnostics.report(place, DocumentProblem::TooDeep { limit: DEEPEST });
+    if let Some((byte, problem)) = too_much(text) {
+        diagnostics.report(at(source, &(byte..byte + 1)), problem);
         return None;
     }
     let (root, errors) = DeTable::parse_recoverable(text);
@@ -149,10 +152,12 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The first key with more parts than may be nested.
-fn too_deep(source: SourceId, text: &str) -> Option<Place> {
+/// The first byte of what is too much to be parsed: a key with more parts than may be nested, since the parser does not limit them
+/// and everything behind it is recursive; or a list with more values than any may have.
+fn too_much(text: &str) -> Option<(usize, DocumentProblem)> {
     let bytes = text.as_bytes();
     let mut dots = 0;
+    let (mut list, mut values) = (0, 0);
     let mut at_byte = 0;
     while let Some(&byte) = bytes.get(at_byte) {
         match byte {
@@ -170,8 +175,17 @@ fn too_deep(source: SourceId, text: &str) -> Option<Place> {
             b'\n' | b'=' | b',' | b'{' | b'[' => dots = 0,
             _ => {}
         }
+        match byte {
+            b'=' => (list, values) = (at_byte, 0),
+            b',' => values += 1,
+            _ => {}
+        }
         if dots >= DEEPEST {
-            return Some(at(source, &(at_byte..at_byte + 1)));
+            return Some((at_byte, DocumentProblem::TooDeep { limit: DEEPEST }));
+        }
+        if values > LONGEST_LIST {
+            let limit = LONGEST_LIST;
+            return Some((list, DocumentProblem::LongList { limit }));
         }
         at_byte += 1;
     }

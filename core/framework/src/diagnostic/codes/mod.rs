@@ -45,7 +45,7 @@ pub const CODES: &[Code] = &[
     code!(
         "A003",
         "too large",
-        "Files have at most 16 MB, tables nest at most 64 deep, and `extends` chains have at most 16 files."
+        "Files have at most 16 MB, lists 200,000 values, tables nest at most 64 deep, and `extends` chains have at most 16 files."
     ),
     code!(
         "A004",

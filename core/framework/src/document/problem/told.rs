@@ -68,7 +68,10 @@ impl Problem for DocumentProblem {
         match self {
             Self::Syntax { .. } => "A001",
             Self::Unreadable { .. } => "A002",
-            Self::TooLarge { .. } | Self::TooDeep { .. } | Self::LongChain { .. } => "A003",
+            Self::TooLarge { .. }
+            | Self::TooDeep { .. }
+            | Self::LongList { .. }
+            | Self::LongChain { .. } => "A003",
             Self::SchemaMissing | Self::SchemaUnknown { .. } => "A004",
             Self::ExtendsLoop { .. } => "A005",
             Self::UnknownKey { .. } | Self::InputAsKey { .. } => "A006",
@@ -106,6 +109,7 @@ impl Problem for DocumentProblem {
             Self::Unreadable { path, reason, .. } => format!("cannot read \"{path}\": {reason}"),
             Self::TooLarge { limit } => format!("the file is larger than {} MB", limit / 1_000_000),
             Self::TooDeep { limit } => format!("keys are nested more than {limit} deep"),
+            Self::LongList { limit } => format!("the list has more than {limit} values"),
             Self::LongChain { limit } => format!("more than {limit} files extend one another"),
             Self::ExtendsLoop { chain } => format!(
                 "`extends` comes back to its own file: {}",
@@ -220,6 +224,7 @@ impl Problem for DocumentProblem {
         match self {
             Self::Syntax { .. } => "here".to_owned(),
             Self::Unreadable { .. } => "named here".to_owned(),
+            Self::LongList { .. } => "of this list".to_owned(),
             Self::ExtendsLoop { .. } | Self::LongChain { .. } => "extends this file".to_owned(),
             Self::SchemaMissing => "`schema = 1` is missing".to_owned(),
             Self::SchemaUnknown { .. } => "not 1".to_owned(),
@@ -266,14 +271,30 @@ impl Problem for DocumentProblem {
                         _ => format!("a text stands in quotes: \"{bare}\""),
                     })
             }
-            Self::Unreadable { path, beside, .. } => match graph_meant(path, beside) {
+            Self::Unreadable {
+                path,
+                beside,
+                named,
+                ..
+            } => match graph_meant(path, beside) {
                 Some(meant) => Some(format!("did you mean \"{meant}\"?")),
-                None if beside.is_empty() => None,
+                None if beside.is_empty() => named.then(|| {
+                    let folder = Path::new(path).parent().map(Path::to_string_lossy);
+                    let folder = folder.filter(|folder| !folder.is_empty());
+                    format!(
+                        "a relative path starts at the file in which it stands, and no other graph is in {}",
+                        folder.as_deref().unwrap_or("its folder")
+                    )
+                }),
                 None => {
                     let graphs = listed(beside.iter().map(String::as_str));
                     Some(format!("in that folder there is {graphs}"))
                 }
             },
+            Self::LongList { .. } => Some(
+                "a graph has no room for so many members; samples stand in a file of data"
+                    .to_owned(),
+            ),
             Self::UnknownKey { key, known, .. } => suggestion(key, known, "the keys are"),
             Self::InputAsKey { input, .. } => {
                 Some(format!("`{input}` is an input: write `inputs.{input} = …`"))
@@ -407,6 +428,7 @@ impl Problem for DocumentProblem {
             | Self::Unreadable { .. }
             | Self::TooLarge { .. }
             | Self::TooDeep { .. }
+            | Self::LongList { .. }
             | Self::LongChain { .. }
             | Self::ExtendsLoop { .. }
             | Self::SchemaMissing

@@ -121,6 +121,8 @@ error[A002]: cannot read "m/b.toml": there is no such file
   |
 2 | extends = "b.toml"
   |           ^^^^^^^^ named here
+  |
+  = help: a relative path starts at the file in which it stands, and no other graph is in m
 "#
     );
 }
@@ -183,6 +185,27 @@ error[A003]: keys are nested more than 64 deep
   |
 2 | ....a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.x = 1
   |                                                          ^
+"#
+    );
+}
+
+#[test]
+fn a_list_of_more_values_than_there_is_room_for_is_refused_before_it_is_kept() {
+    let members = "\"m\",\n".repeat(200_002);
+    let files = [(
+        "a.toml",
+        &*format!("schema = 1\n[sets]\na = [\n{members}]\n"),
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A003]: the list has more than 200000 values
+ --> a.toml:3:3
+  |
+3 | a = [
+  |   ^ of this list
+  |
+  = help: a graph has no room for so many members; samples stand in a file of data
 "#
     );
 }
