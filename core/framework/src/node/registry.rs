@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use super::{Combiner, Estimator, Feature, InputPort, PortSummary, Read};
 use crate::diagnostic::{Diagnostics, Place, SourceId};
 use crate::document::{Decoded, Value, Wanted, decode_rest};
+use crate::quantity::Quantity;
 
 /// The specification of a node: the parameters of some kind, read from a graph.
 #[diagnostic::on_unimplemented(
@@ -153,10 +154,43 @@ pub fn read<T: NodeSpec + DeserializeOwned + JsonSchema + 'static>(
                 let default = &schema["properties"][key]["default"];
                 default.is_object().then(|| inline_toml(default))
             }
+            Wanted::Quantity(way) => example(&schema, way),
         }
     };
     let read = decode_rest::<T>(value, "the node", elsewhere, &advice, diagnostics)?;
     Some(read.map(|spec| Box::new(spec) as Box<dyn NodeSpec>))
+}
+
+/// The first quantity that the documentation of a parameter gives as an example: `"20 um"`.
+fn example(schema: &serde_json::Value, way: &[&str]) -> Option<String> {
+    let mut parameter = schema;
+    for key in way {
+        parameter = forms(schema, parameter)
+            .into_iter()
+            .find_map(|form| form["properties"].get(key))?;
+    }
+    let documentation = parameter["description"].as_str()?;
+    let mut quoted = documentation.split('"').skip(1).step_by(2);
+    let example = quoted.find(|quoted| quoted.parse::<Quantity>().is_ok())?;
+    Some(example.to_owned())
+}
+
+/// The schemas of the forms that a parameter may have.
+fn forms<'a>(
+    schema: &'a serde_json::Value,
+    parameter: &'a serde_json::Value,
+) -> Vec<&'a serde_json::Value> {
+    if let Some(path) = parameter["$ref"].as_str() {
+        let name = path.strip_prefix("#/$defs/").unwrap_or(path);
+        return forms(schema, &schema["$defs"][name]);
+    }
+    let several = ["anyOf", "oneOf"].map(|key| parameter[key].as_array());
+    let several: Vec<_> = several.into_iter().flatten().flatten().collect();
+    if several.is_empty() {
+        return vec![parameter];
+    }
+    let inner = several.into_iter().flat_map(|form| forms(schema, form));
+    inner.collect()
 }
 
 /// A value as a graph file has it.

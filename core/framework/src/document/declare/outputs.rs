@@ -23,8 +23,10 @@ fn output(name: &str, entry: &Entry, diagnostics: &mut Diagnostics) -> Option<Ou
         Data::Table(keys) => {
             let known = ["from", "blend"];
             known_keys(keys, &known, &what, diagnostics);
-            let blend = meant(keys, "blend", &known)
-                .and_then(|value| Some((quantity(value, "blend", diagnostics)?, value.place)));
+            let blend = meant(keys, "blend", &known).and_then(|value| {
+                let rate = quantity(value, "blend", ("nm/s", false), diagnostics)?;
+                Some((rate, value.place))
+            });
             match meant(keys, "from", &known) {
                 Some(from) => (from, blend),
                 None => {

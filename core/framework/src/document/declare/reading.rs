@@ -4,7 +4,7 @@ use crate::diagnostic::{Diagnostics, Place, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Table, Value};
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, QuantityError};
 use crate::time::Duration;
 
 /// Reports every key of `table` that is not `known`.
@@ -171,19 +171,28 @@ pub(super) fn length(
     None
 }
 
+/// A quantity in such a unit as this, or where it is known, in this one or one that converts.
 pub(super) fn quantity(
     value: &Value,
     key: &str,
+    (unit, is_known): (&str, bool),
     diagnostics: &mut Diagnostics,
 ) -> Option<Quantity> {
-    let Some(text) = value.as_text() else {
-        let lacks = Lacks::for_quantity(&value.data);
-        lacking(value, key, "a quantity like \"5 nm/s\"", lacks, diagnostics);
-        return None;
-    };
-    text.parse()
-        .map_err(|error| diagnostics.report(value.place, DocumentProblem::Quantity(error)))
-        .ok()
+    let read = value.as_text().map(str::parse);
+    match read {
+        Some(Ok(quantity)) => return Some(quantity),
+        Some(Err(QuantityError::NoUnit { .. })) | None => {
+            let lacks = Lacks::for_quantity(&value.data, unit, is_known);
+            let expected = if is_known {
+                format!("a quantity in {unit}")
+            } else {
+                format!("a quantity like \"5 {unit}\"")
+            };
+            lacking(value, key, &expected, lacks, diagnostics);
+        }
+        Some(Err(error)) => diagnostics.report(value.place, DocumentProblem::Quantity(error)),
+    }
+    None
 }
 
 /// The number in `"2 samples"` or `"1 sample"`; `None` for any other text.

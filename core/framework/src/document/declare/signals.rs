@@ -222,10 +222,11 @@ fn range(value: &Value, unit: Option<&Unit>, diagnostics: &mut Diagnostics) -> O
         );
         return None;
     };
+    let of = (unit.map_or("Cel", Unit::text), unit.is_some());
     // Both are read before either is given up, so that mistakes in both are told.
     let ends = (
-        quantity(low, "range", diagnostics).map(|of| (of, low.place)),
-        quantity(high, "range", diagnostics).map(|of| (of, high.place)),
+        quantity(low, "range", of, diagnostics).map(|of| (of, low.place)),
+        quantity(high, "range", of, diagnostics).map(|of| (of, high.place)),
     );
     let unit = unit?;
     let foreign = [&ends.0, &ends.1].into_iter().flatten();

@@ -9,7 +9,7 @@ use crate::diagnostic::{Diagnostics, Place, Problem, counted, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Value};
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, QuantityError};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -26,6 +26,30 @@ pub(super) enum Step {
 impl Step {
     pub(super) fn is_key(&self, key: &str) -> bool {
         matches!(self, Step::Key(name) if name == key)
+    }
+}
+
+/// The keys among steps.
+fn keys_of(steps: &[Step]) -> Vec<&str> {
+    let keys = steps.iter().filter_map(|step| match step {
+        Step::Key(key) => Some(key.as_str()),
+        Step::Index(_) => None,
+    });
+    keys.collect()
+}
+
+/// The number that stands where a quantity is needed, and how it was found.
+fn bare_number(problem: &DocumentProblem) -> Option<(String, String)> {
+    match problem {
+        DocumentProblem::WrongType {
+            found,
+            lacks: Some(Lacks::Unit { number, .. }),
+            ..
+        } => Some((number.clone(), found.clone())),
+        DocumentProblem::Quantity(QuantityError::NoUnit { number }) => {
+            Some((number.clone(), format!("the text \"{number}\"")))
+        }
+        _ => None,
     }
 }
 
@@ -103,7 +127,18 @@ impl Mistake {
             ) if expected == A_TABLE => {
                 *lacks = of(Wanted::TableOf(key)).map(|example| Lacks::Table { example });
             }
-            _ => {}
+            (path, problem) => {
+                if let Some((number, found)) = bare_number(problem)
+                    && let Some(example) = of(Wanted::Quantity(&keys_of(path)))
+                {
+                    *problem = DocumentProblem::WrongType {
+                        key: None,
+                        expected: format!("a quantity like \"{example}\""),
+                        found,
+                        lacks: Some(Lacks::unit_of(number, &example)),
+                    };
+                }
+            }
         }
         self
     }
@@ -124,16 +159,7 @@ impl Mistake {
             DocumentProblem::UnknownKey { .. } => &self.path[..self.path.len().saturating_sub(1)],
             _ => &self.path[..],
         };
-        let keys: Vec<&str> = steps
-            .iter()
-            .filter_map(|step| {
-                if let Step::Key(key) = step {
-                    Some(key.as_str())
-                } else {
-                    None
-                }
-            })
-            .collect();
+        let keys = keys_of(steps);
         let owner = if keys.is_empty() {
             what.to_owned()
         } else {
@@ -381,7 +407,9 @@ fn lacks(found: &Data, words: &str) -> Option<Lacks> {
         "a sequence" => Lacks::for_texts(found),
         list if list.starts_with("a list of ") => Lacks::for_texts(found),
         duration if duration.starts_with("a duration ") => Lacks::for_duration(found),
-        quantity if quantity.starts_with("a quantity ") => Lacks::for_quantity(found),
+        quantity if quantity.starts_with("a quantity ") => {
+            Lacks::for_quantity(found, "nm/min", false)
+        }
         _ => None,
     }
 }

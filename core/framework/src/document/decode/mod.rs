@@ -50,6 +50,8 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
     what: &str,
     elsewhere: &[&str],
     advice: Advice<'_>,
+    /// The keys to a number that lacks a unit.
+    Quantity(&'a [&'a str]),
     diagnostics: &mut Diagnostics,
 ) -> Option<Decoded<T>> {
     let last = RefCell::new(None);

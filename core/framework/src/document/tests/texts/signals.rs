@@ -64,21 +64,21 @@ range = [0, 5.5]
     assert_eq!(
         rendered(&files),
         r#"
-error[A008]: expected a quantity like "5 nm/s" for "range", found the number 0
+error[A008]: expected a quantity in nm for "range", found the number 0
  --> a.toml:5:10
   |
 5 | range = [0, 5.5]
-  |          ^ expected a quantity like "5 nm/s"
+  |          ^ expected a quantity in nm
   |
-  = help: a quantity needs a unit, e.g. "150 nm/min"
+  = help: write "0 nm"
 
-error[A008]: expected a quantity like "5 nm/s" for "range", found the number 5.5
+error[A008]: expected a quantity in nm for "range", found the number 5.5
  --> a.toml:5:13
   |
 5 | range = [0, 5.5]
-  |             ^^^ expected a quantity like "5 nm/s"
+  |             ^^^ expected a quantity in nm
   |
-  = help: a quantity needs a unit, e.g. "150 nm/min"
+  = help: write "5.5 nm"
 "#
     );
 }
@@ -318,11 +318,13 @@ range = ["0", "5 nn"]
     assert_eq!(
         rendered(&files),
         r#"
-error[A018]: the number 0 needs a unit, e.g. "0 nm/min" ("0 1" if it has none)
+error[A008]: expected a quantity in nm for "range", found the text "0"
  --> a.toml:5:10
   |
 5 | range = ["0", "5 nn"]
-  |          ^^^ not a quantity
+  |          ^^^ expected a quantity in nm
+  |
+  = help: write "0 nm"
 
 error[A018]: "nn" is not a unit that UCUM knows
  --> a.toml:5:15
