@@ -465,6 +465,23 @@ fn lengths_in_inches_and_mils_are_taken_for_what_they_are() {
 }
 
 #[test]
+fn revolutions_and_torque_are_inputs_in_their_units() {
+    let folder = Folder::new("tells-rpm");
+    let mut text = "time_s,plate_degC,spindle_rpm,torque_Nm,Z_um\n".to_owned();
+    for (time, plate, z) in machine(3000) {
+        let (rpm, torque) = (3000.0 + 100.0 * plate, 0.1 * plate);
+        let _ = writeln!(text, "{time},{plate:.4},{rpm:.1},{torque:.4},{z:.4}");
+    }
+    let (fine, told, graph) = init(&folder, "spindle.csv", &text);
+    assert!(fine, "{told}");
+    assert!(told.contains("spindle_rpm: input, in /min;"), "{told}");
+    assert!(told.contains("torque_Nm: input, in N.m;"), "{told}");
+    assert!(graph.contains("unit = \"/min\""), "{graph}");
+    let (fine, told) = said(&folder, &["check", "--strict", "spindle.csv.toml"]);
+    assert!(fine, "{told}");
+}
+
+#[test]
 fn a_number_that_stands_for_no_value_is_no_position() {
     let folder = Folder::new("tells-placeholder");
     let log = |nothing: &str, every: usize| {
