@@ -37,6 +37,24 @@ expect = [{ of = "thermal", rmse_below = "-1 nm" },
 }
 
 #[test]
+fn rivals_that_are_no_nodes_are_known_and_so_are_the_forms_of_a_sample() {
+    let test = r#"[[tests]]
+name = "a"
+inputs = { "temperature.a" = { every = "1s", samples = [["0s", "1 Cel"]] } }
+expect = [{ of = "drift", equals = "1 nm/min", within = [1], beats = ["zeros", "persistance"] }]
+"#;
+    let scratch = Scratch::new("command-line-rivals");
+    let graph = scratch.file("graph.toml", SOUND.to_owned() + test);
+    athermal(&[&"check", &graph]).ended(2).tells(&[
+        "expected a quantity like \"20 nm\", or nan for no value",
+        "found a list",
+        "expected a number, or a quantity like \"5 nm\"",
+        "did you mean `zero`?",
+        "did you mean `persistence`?",
+    ]);
+}
+
+#[test]
 fn a_fit_does_without_the_tests_of_a_graph_and_says_so() {
     let scratch = Scratch::new("command-line-fit-tests");
     let text = SOUND.to_owned()

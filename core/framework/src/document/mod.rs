@@ -22,7 +22,7 @@ pub use declare::declare;
 pub(crate) use declare::is_name;
 pub(crate) use declare::{TIME_UNITS, is_misspelt, known_keys};
 pub use decode::{Decoded, decode};
-pub(crate) use decode::{LeftOut, Wanted, decode_rest};
+pub(crate) use decode::{LeftOut, Wanted, decode_part, decode_rest};
 pub use graph_file::{
     GraphFile, InputDecl, InstanceDecl, NodeDecl, OutputDecl, SignalDecl, TimeBase, TimeForm,
 };

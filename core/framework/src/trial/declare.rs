@@ -1,6 +1,6 @@
 //! Decides what `[[tests]]` mean for a graph: channels looked up, units checked, mistakes told where they stand.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use super::table::SimulationTable;
 use crate::compile::{CompileProblem, Part, Plan, PlannedRole, Reference, SourceChannel};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{
-    Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode, is_misspelt,
+    Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode_part, is_misspelt,
     known_keys, unreadable,
 };
 use crate::fault::{FaultSpec, Faults};
@@ -87,6 +87,7 @@ fn read(
     let mut trials: Vec<Trial> = Vec::new();
     let mut names: Vec<(&str, Place)> = Vec::new();
     let mut schedules = Schedules::new();
+    let mut compared = BTreeSet::new();
     let channels = Channels::of(plan);
     for test in tests {
         let Some(table) = test.as_table() else {
@@ -119,6 +120,7 @@ fn read(
                 reader,
                 sources,
                 schedules: &mut schedules,
+                compared: &mut compared,
                 diagnostics,
             }
             .trial(test, table)
@@ -165,6 +167,8 @@ pub(super) struct Declaring<'a> {
     reader: &'a dyn FileReader,
     sources: &'a mut Sources,
     schedules: &'a mut Schedules,
+    /// The machines of which it is known what they measure of what the graph does.
+    compared: &'a mut BTreeSet<&'static str>,
     pub(super) diagnostics: &'a mut Diagnostics,
 }
 
@@ -281,11 +285,15 @@ impl Declaring<'_> {
 
     fn simulation(&mut self, key: &'static str, value: &Value) -> Option<DataSet> {
         let what = format!("\"{key}\"");
-        let table = decode::<SimulationTable>(value, &what, self.diagnostics)?;
+        let read = decode_part::<SimulationTable>(value, &what, self.diagnostics)?;
+        let (table, is_sure) = read.sure();
         let place = value.place_of("simulate");
-        if !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
+        if is_sure("days") && !(table.days > 0.0 && table.days <= LONGEST_DAYS) {
             let found = table.days.to_string();
             self.range(value, "days", found, "above 0 and at most 3653");
+        }
+        if !is_sure("simulate") {
+            return None;
         }
         let known = match machine(&table.simulate) {
             Ok(known) => known,
@@ -294,11 +302,17 @@ impl Declaring<'_> {
                 return None;
             }
         };
-        self.measured_by(known.machine, place);
+        // What one lacks is lacking in every test that simulates it, and told once.
+        if self.compared.insert(known.machine.name()) {
+            let test = self.diagnostics.scope(None);
+            self.measured_by(known.machine, place);
+            self.diagnostics.scope(test);
+        }
         let schedule = match &table.schedule {
             Some(path) => Some(self.schedule(path, value.place_of("schedule"), known.machine)?),
             None => None,
         };
+        read.as_whole()?;
         Some(DataSet::Simulated(Simulation {
             machine: known.machine.name(),
             days: table.days,
@@ -328,6 +342,7 @@ impl Declaring<'_> {
                 machine: machine.name(),
                 channels: missing,
                 has: channels.iter().map(|channel| channel.reference()).collect(),
+                inherited_by: self.inherited_by.clone(),
             };
             self.diagnostics.report(place, problem);
         }
@@ -418,14 +433,15 @@ impl Declaring<'_> {
     }
 
     fn fault(&mut self, value: &Value) -> Option<Vec<FaultSpec>> {
-        let spec = decode::<FaultSpec>(value, "the fault", self.diagnostics)?;
+        let read = decode_part::<FaultSpec>(value, "the fault", self.diagnostics)?;
+        let (spec, is_sure) = read.sure();
         if spec.from < Duration::ZERO {
             self.range(value, "from", spec.from.to_string(), "0 or later");
         }
         if let Some(lasting) = spec.lasting.filter(|lasting| *lasting <= Duration::ZERO) {
             self.range(value, "for", lasting.to_string(), "longer than 0");
         }
-        if spec.size.is_some() && !spec.kind.has_size() {
+        if is_sure("kind") && spec.size.is_some() && !spec.kind.has_size() {
             let problem = TrialProblem::Keys {
                 key: "size",
                 with: "kind",
@@ -434,7 +450,11 @@ impl Declaring<'_> {
             self.diagnostics.report(value.place_of("size"), problem);
         }
         let plan = self.plan;
+        if !is_sure("channel") {
+            return None;
+        }
         let slots = self.measured(&spec.channel, value.place_of("channel"))?;
+        let spec = read.as_whole()?;
         let one = |slot: usize| {
             let name = plan.sources[slot].name.as_str();
             let unit = &plan.channels[slot].channel.unit;
@@ -468,6 +488,21 @@ impl Declaring<'_> {
             .look_up(reference)
             .map_err(|problem| self.not_found(reference, place, problem))
             .ok()
+    }
+
+    /// The channels of what is to be beaten, which may be no node as well.
+    pub(super) fn rival(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {
+        let problem = match self.channels.look_up(reference) {
+            Ok(slots) => return Some(slots),
+            Err(CompileProblem::UnknownNode { node, known }) => {
+                let names = ["zero", "persistence"].into_iter().chain(known.iter());
+                let known = Arc::new(names.map(str::to_owned).collect());
+                CompileProblem::UnknownNode { node, known }
+            }
+            Err(problem) => problem,
+        };
+        self.not_found(reference, place, problem);
+        None
     }
 
     fn measured(&mut self, reference: &str, place: Place) -> Option<Vec<usize>> {

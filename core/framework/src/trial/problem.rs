@@ -37,6 +37,8 @@ pub enum TrialProblem {
         machine: &'static str,
         channels: Vec<String>,
         has: Vec<String>,
+        /// The file that inherits the test, where it stands in another.
+        inherited_by: Option<String>,
     },
     /// A quantity of another kind than the channel.
     Units {
@@ -89,6 +91,13 @@ fn listed<T: AsRef<str>>(names: &[T]) -> String {
         n if n > MOST => format!("{} and {} more", shown.join(", "), n - MOST),
         _ => shown.join(", "),
     }
+}
+
+/// How a file does without the tests that it inherits.
+fn without_inherited(file: &str) -> String {
+    format!(
+        "`tests = []` in {file}, or tests of its own there, take the place of those that it inherits"
+    )
 }
 
 impl Problem for TrialProblem {
@@ -265,10 +274,15 @@ impl Problem for TrialProblem {
             Self::ScheduleUnreadable { .. } => {
                 "give the path of a schedule, which starts at the file in which it stands".to_owned()
             }
-            Self::MachineLacks { has, .. } => format!(
-                "it measures {}; a signal may call channels `optional`",
-                listed(has)
-            ),
+            Self::MachineLacks {
+                has, inherited_by, ..
+            } => {
+                let way_out = "a signal may call channels `optional`";
+                match inherited_by {
+                    Some(file) => format!("{way_out}; {}", without_inherited(file)),
+                    None => format!("it measures {}; {way_out}", listed(has)),
+                }
+            }
             Self::Units { expected, .. } => format!("write it in {expected}"),
             Self::NotAPrediction { .. } => {
                 "`equals`, `between`, `absent`, `max_step_below`, `valid_above` and `given_above` work for every channel"
@@ -332,9 +346,7 @@ impl Problem for NotFound {
         let Some(file) = &self.inherited_by else {
             return help;
         };
-        let way_out = format!(
-            "`tests = []` in {file}, or tests of its own there, take the place of those that it inherits"
-        );
+        let way_out = without_inherited(file);
         Some(match help {
             Some(help) => format!("{help}; {way_out}"),
             None => way_out,

@@ -4,7 +4,7 @@ use super::problem::TrialProblem;
 use super::series::{Curve, Series, Shape};
 use super::table::{InputTable, Sample};
 use crate::diagnostic::Diagnostics;
-use crate::document::{DocumentProblem, Value, decode};
+use crate::document::{DocumentProblem, Value, decode_part};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 use crate::unit::Unit;
@@ -20,7 +20,8 @@ pub(super) fn read(
     diagnostics: &mut Diagnostics,
 ) -> Option<Series> {
     let before = diagnostics.error_count();
-    let table = decode::<InputTable>(value, "the input", diagnostics)?;
+    let read = decode_part::<InputTable>(value, "the input", diagnostics)?;
+    let (table, is_sure) = read.sure();
     let mut shaping = Shaping {
         value,
         channel,
@@ -28,11 +29,14 @@ pub(super) fn read(
         diagnostics,
     };
     let noise = shaping.difference("noise", table.noise.as_ref(), &unit.difference());
-    let shape = shaping.shape(&table);
+    let shape = match read.as_whole() {
+        Some(table) => shaping.shape(table),
+        None => Shape::Curve(shaping.curve(table)),
+    };
     if noise < 0.0 || noise.is_nan() {
         shaping.range("noise", noise.to_string(), "0 or more");
     }
-    if table.every <= Duration::ZERO {
+    if is_sure("every") && table.every <= Duration::ZERO {
         shaping.range("every", table.every.to_string(), "longer than 0");
     }
     (diagnostics.error_count() == before).then_some(Series {
@@ -95,7 +99,9 @@ impl Shaping<'_> {
         if table.sine.is_some() && table.period.is_none() {
             self.keys("sine", "period", false);
         }
-        Shape::Curve(self.curve(table))
+        let curve = self.curve(table);
+        self.lengths(table, &curve);
+        Shape::Curve(curve)
     }
 
     fn curve(&mut self, table: &InputTable) -> Curve {
@@ -105,7 +111,7 @@ impl Shaping<'_> {
             Some(constant) => (Some(constant), "constant"),
             None => (table.start.as_ref(), "start"),
         };
-        let curve = Curve {
+        Curve {
             length: table.length.unwrap_or_default(),
             start: self.point(key, start),
             delay: table.delay,
@@ -113,7 +119,10 @@ impl Shaping<'_> {
             ramp: self.difference("ramp", table.ramp.as_ref(), &rate),
             amplitude: self.difference("sine", table.sine.as_ref(), &difference),
             period: table.period.unwrap_or(Duration::MAX),
-        };
+        }
+    }
+
+    fn lengths(&mut self, table: &InputTable, curve: &Curve) {
         match table.length {
             None => self.diagnostics.report(
                 self.value.place,
@@ -141,7 +150,6 @@ impl Shaping<'_> {
         if curve.period <= Duration::ZERO {
             self.range("period", curve.period.to_string(), "longer than 0");
         }
-        curve
     }
 
     fn sample(&mut self, nth: usize, sample: &Sample) -> f64 {

@@ -2,9 +2,10 @@
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use crate::fault::FaultSpec;
+use crate::node::Forms;
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -103,14 +104,22 @@ pub(super) struct InputTable {
 }
 
 /// One sample.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(untagged)]
-#[schemars(rename = "TestSample")]
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged, rename = "TestSample")]
 pub(super) enum Sample {
     /// A value with its unit.
     Value(Quantity),
     /// `nan`: no value.
     Absent(f64),
+}
+
+impl<'de> Deserialize<'de> for Sample {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Forms::new("a quantity like \"20 nm\", or nan for no value")
+            .text(Self::Value)
+            .number(Self::Absent)
+            .read(deserializer)
+    }
 }
 
 /// What must come out. Times count from the first row of each segment.
@@ -155,12 +164,20 @@ pub(super) struct ExpectTable {
 }
 
 /// How far a value may be off.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(untagged)]
-#[schemars(rename = "TestTolerance")]
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged, rename = "TestTolerance")]
 pub(super) enum Within {
     /// In the unit of `equals`.
     Number(f64),
     /// With a unit of its own.
     Quantity(Quantity),
+}
+
+impl<'de> Deserialize<'de> for Within {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Forms::new("a number, or a quantity like \"5 nm\"")
+            .number(Self::Number)
+            .text(Self::Quantity)
+            .read(deserializer)
+    }
 }

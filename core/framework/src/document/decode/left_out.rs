@@ -36,6 +36,11 @@ impl<T> Decoded<T> {
         std::iter::once(&self.value).chain(&self.others)
     }
 
+    /// The first of these, and whether what it has under a key is what stands there.
+    pub(crate) fn sure(&self) -> (&T, impl Fn(&str) -> bool) {
+        (&self.value, |key: &str| !self.left_out.explains(key))
+    }
+
     /// What was left out.
     pub(crate) fn left_out(&self) -> &LeftOut {
         &self.left_out

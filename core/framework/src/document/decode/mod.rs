@@ -28,7 +28,16 @@ pub fn decode<T: DeserializeOwned>(
     what: &str,
     diagnostics: &mut Diagnostics,
 ) -> Option<T> {
-    decode_rest(value, what, &[], &|_| None, diagnostics)?.whole()
+    decode_part(value, what, diagnostics)?.whole()
+}
+
+/// As [`decode`], with what could be read beside mistakes.
+pub(crate) fn decode_part<T: DeserializeOwned>(
+    value: &Value,
+    what: &str,
+    diagnostics: &mut Diagnostics,
+) -> Option<Decoded<T>> {
+    decode_rest(value, what, &[], &|_| None, diagnostics)
 }
 
 /// What to write under a key of the table that is decoded, where the table's owner knows it.
@@ -41,6 +50,8 @@ pub(crate) enum Wanted<'a> {
     Key(&'a str),
     /// A key under which something else stands in the place of a table.
     TableOf(&'a str),
+    /// The keys to a number that lacks a unit.
+    Quantity(&'a [&'a str]),
 }
 
 /// As [`decode`], with keys of the table that are read elsewhere and may be meant by an unknown one, with what to write where one of
@@ -50,8 +61,6 @@ pub(crate) fn decode_rest<T: DeserializeOwned>(
     what: &str,
     elsewhere: &[&str],
     advice: Advice<'_>,
-    /// The keys to a number that lacks a unit.
-    Quantity(&'a [&'a str]),
     diagnostics: &mut Diagnostics,
 ) -> Option<Decoded<T>> {
     let last = RefCell::new(None);
@@ -93,7 +102,8 @@ fn mend(
             let repair = repair.get_or_insert_with(|| Repair::of(value));
             for mistake in unknown {
                 repair.take_out(&mistake.path);
-                mistake.clone().beside(elsewhere).report(what, diagnostics);
+                let mistake = mistake.beside(elsewhere);
+                mistake.clone().report(what, diagnostics);
                 strange.push(mistake);
             }
         }
