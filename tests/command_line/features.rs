@@ -93,6 +93,103 @@ fn a_scale_of_temperature_that_is_written_as_another_unit_is_named() {
     );
 }
 
+/// The help for each of these lines in the place of a sound one.
+fn helped(name: &str, text: &str, wrong: &[(&str, &str, &str)]) {
+    for (nth, (line, instead, help)) in wrong.iter().enumerate() {
+        assert!(text.contains(line), "{line}");
+        let told = checked(&format!("{name}-{nth}"), &text.replace(line, instead));
+        assert!(told.contains(help), "{instead}: {told}");
+    }
+}
+
+#[test]
+fn a_number_without_its_unit_is_told_with_one_that_suits_it() {
+    let text = r#"schema = 1
+[signals.rate]
+unit = "nm/min"
+channels = ["X"]
+max_age = "1min"
+range = ["-200 nm/min", "200 nm/min"]
+[nodes.move]
+type = "compensate"
+inputs.rate = "rate"
+range = "20 um"
+max_rate = "1000 nm/min"
+max_slew = "50 nm/s"
+stop = { below = "3 nm/min", above = "6 nm/min" }
+[nodes.radius]
+type = "optical_loss"
+inputs.drift = "rate"
+radii = ["2 um"]
+[outputs]
+move = { from = "move", blend = "5 nm/s" }
+loss = "radius"
+"#;
+    let wrong = [
+        (
+            "range = [\"-200 nm/min\"",
+            "range = [-20",
+            "write \"-20 nm/min\"",
+        ),
+        (
+            "range = \"20 um\"",
+            "range = 200",
+            "needs a unit, e.g. \"200 um\"",
+        ),
+        (
+            "range = \"20 um\"",
+            "range = \"200\"",
+            "needs a unit, e.g. \"200 um\"",
+        ),
+        (
+            "below = \"3 nm/min\"",
+            "below = 0.5",
+            "needs a unit, e.g. \"0.5 nm/min\"",
+        ),
+        (
+            "radii = [\"2 um\"]",
+            "radii = [2]",
+            "needs a unit, e.g. \"2 um\"",
+        ),
+        (
+            "blend = \"5 nm/s\"",
+            "blend = 5",
+            "needs a unit, e.g. \"5 nm/s\"",
+        ),
+    ];
+    helped("command-line-bare", text, &wrong);
+}
+
+#[test]
+fn channels_of_one_name_are_told_apart_by_their_nodes() {
+    let text = r#"schema = 1
+[signals.p]
+unit = "nm"
+channels = ["q"]
+[nodes.s]
+type = "slope"
+inputs.signal = "p"
+windows = ["5min"]
+unit = "nm/s"
+[nodes.s2]
+type = "slope"
+inputs.signal = "p"
+windows = ["5min"]
+unit = "um/min"
+[nodes.both]
+type = "sum"
+inputs.signal = ["s", "s2"]
+weights = [1]
+[outputs]
+both = "both"
+"#;
+    let expected = [
+        (17, "`s.q` is in nm/s and `s2.q` in um/min"),
+        (18, "`weights` has 1 numbers for 2 channels"),
+    ];
+    assert_told("command-line-one-name", text, &expected);
+}
+
 #[test]
 fn a_state_for_each_rate_is_no_mistake_beside_one_in_a_parameter() {
     let text = r#"schema = 1

@@ -6,6 +6,7 @@
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+mod beside;
 mod beyond;
 mod columns;
 mod features;

@@ -61,9 +61,9 @@ pub struct Compensate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stop {
-    /// Stops when the absolute rate falls below.
+    /// Stops when the absolute rate falls below: `"3 nm/min"`.
     pub below: Quantity,
-    /// Goes on when the absolute rate exceeds this; not less than `below`.
+    /// Goes on when the absolute rate exceeds this: `"6 nm/min"`; not less than `below`.
     pub above: Quantity,
 }
 
@@ -108,18 +108,24 @@ struct Limits {
 impl Compensate {
     fn limits(&self, rate: &Channel) -> Result<Limits, Vec<Mistake>> {
         let unit = &self.range.unit;
-        let speed = limit::per_second(unit);
-        let Some(factor) = rate.unit.factor_to(&speed) else {
+        let mut speed = limit::per_second(unit);
+        let mut mistakes = Vec::new();
+        let factor = rate.unit.factor_to(&speed);
+        if factor.is_none() {
             let message = format!(
                 "`{}` is in {}, and its integral cannot be in {unit}",
                 rate.name, rate.unit
             );
             let natural = rate.unit.per(&Unit::one());
-            return Err(vec![Mistake::at("range", message).help(format!(
+            mistakes.push(Mistake::at("range", message).help(format!(
                 "the rate is a change per time ({natural}); give `range` in what changes"
-            ))]);
-        };
-        let mut mistakes = Vec::new();
+            )));
+            // Where another limit fits the rate, it is the range that does not belong here.
+            let mut limits = [&self.max_rate, &self.max_slew].into_iter();
+            if limits.any(|limit| limit.unit.measures_same(&rate.unit)) {
+                speed = rate.unit.clone();
+            }
+        }
         let mut read = |quantity: Option<&Quantity>, unit: &Unit, at: &str| {
             limit::size_or_none(quantity, unit, at, &mut mistakes)
         };
@@ -153,15 +159,17 @@ impl Compensate {
             let message = "`stop.above` lies under `stop.below`";
             mistakes.push(Mistake::at("stop.above", message).rests_on("stop.below"));
         }
-        match (range, max_rate, slew) {
-            (Some(range), Some(rate), Some(slew)) if mistakes.is_empty() => Ok(Limits {
-                factor,
-                range,
-                rate,
-                slew,
-                deadband,
-                stop: below.zip(above),
-            }),
+        match (factor, range, max_rate, slew) {
+            (Some(factor), Some(range), Some(rate), Some(slew)) if mistakes.is_empty() => {
+                Ok(Limits {
+                    factor,
+                    range,
+                    rate,
+                    slew,
+                    deadband,
+                    stop: below.zip(above),
+                })
+            }
             _ => Err(mistakes),
         }
     }
@@ -214,11 +222,14 @@ impl Feature for Compensate {
             mistakes.extend(self.limits(first).err().into_iter().flatten());
             if let Some(other) = rate
                 .iter()
-                .find(|channel| !channel.unit.measures_same(&first.unit))
+                .position(|channel| !channel.unit.measures_same(&first.unit))
             {
                 let message = format!(
                     "`{}` is in {} and `{}` in {}",
-                    first.name, first.unit, other.name, other.unit
+                    inputs.reference("rate", 0),
+                    first.unit,
+                    inputs.reference("rate", other),
+                    rate[other].unit
                 );
                 mistakes.push(Mistake::at("inputs.rate", message));
             }

@@ -33,10 +33,10 @@ pub struct Health {
     /// For how long the very same value may come again and again. A silence longer than this, or than `max_gap`, ends the count.
     #[serde(default)]
     pub stuck_after: Option<Duration>,
-    /// The least noise of a living sensor.
+    /// The least noise of a living sensor, such as `"0.1 mK"`.
     #[serde(default)]
     pub noise_above: Option<Quantity>,
-    /// The most noise of a sound one.
+    /// The most noise of a sound one, such as `"20 mK"`.
     #[serde(default)]
     pub noise_below: Option<Quantity>,
     /// Over how many samples noise is judged, 3 to 100,000.

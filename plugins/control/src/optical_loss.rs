@@ -100,7 +100,8 @@ impl OpticalLoss {
         }
         let mut coefficients = Vec::with_capacity(drift.len());
         for (nth, channel) in drift.iter().enumerate() {
-            let Some(factor) = channel.unit.factor_to(&um_per_min) else {
+            let factor = channel.unit.factor_to(&um_per_min);
+            if factor.is_none() {
                 let message = format!(
                     "`{}` is in {}, which is no drift",
                     channel.name, channel.unit
@@ -108,8 +109,7 @@ impl OpticalLoss {
                 mistakes.push(
                     Mistake::at("inputs.drift", message).help("a length per time, such as nm/min"),
                 );
-                continue;
-            };
+            }
             if channel.span != drift[0].span || channel.ahead != drift[0].ahead {
                 let message = format!(
                     "`{}` and `{}` are drifts over different times",
@@ -127,19 +127,24 @@ impl OpticalLoss {
                         }
                     })
                 }),
-                (None, Some(preset)) => Some(preset.radius_um(&channel.name).ok_or_else(|| {
-                    let message = format!(
-                        "the preset has no radius for an axis named `{}`",
-                        channel.name
-                    );
-                    Mistake::at("preset", message)
-                        .help("it knows names that begin with X, Y or Z; give `radii`")
-                })),
-                (None, None) => None,
+                (None, Some(preset)) if factor.is_some() => {
+                    Some(preset.radius_um(&channel.name).ok_or_else(|| {
+                        let message = format!(
+                            "the preset has no radius for an axis named `{}`",
+                            channel.name
+                        );
+                        Mistake::at("preset", message)
+                            .help("it knows names that begin with X, Y or Z; give `radii`")
+                    }))
+                }
+                (None, _) => None,
             };
             match radius {
-                Some(Ok(radius)) => coefficients
-                    .push(coefficient(self.over.secs() / 60.0, radius) * factor * factor),
+                Some(Ok(radius)) => {
+                    coefficients.extend(factor.map(|factor| {
+                        coefficient(self.over.secs() / 60.0, radius) * factor * factor
+                    }))
+                }
                 Some(Err(mistake)) => mistakes.push(mistake),
                 None => {}
             }

@@ -25,7 +25,7 @@ use crate::limit;
 pub struct SafeState {
     /// What is safe.
     pub refuge: Refuge,
-    /// The stated value, with `refuge = "value"`.
+    /// The stated value, such as `"0 nm"`, with `refuge = "value"`.
     #[serde(default)]
     pub value: Option<Quantity>,
     /// The number of ticks without trust that are bridged with the last value.

@@ -58,15 +58,17 @@ impl Settled {
             }
         };
         let (loss, set_point) = (one("loss"), one("set_point"));
-        if let (Some(loss), Some(set_point)) = (loss, set_point) {
-            let below = limit::size(&self.below, &loss.unit, "below");
-            let change = limit::size(&self.change, &set_point.unit.difference(), "change");
-            match (below, change) {
-                (Ok(below), Ok(change)) if mistakes.is_empty() => return Ok((below, change)),
-                (below, change) => mistakes.extend(below.err().into_iter().chain(change.err())),
-            }
+        let below = loss.and_then(|loss| {
+            limit::size_or_none(Some(&self.below), &loss.unit, "below", &mut mistakes)
+        });
+        let change = set_point.and_then(|set_point| {
+            let unit = set_point.unit.difference();
+            limit::size_or_none(Some(&self.change), &unit, "change", &mut mistakes)
+        });
+        match (below, change) {
+            (Some(below), Some(change)) if mistakes.is_empty() => Ok((below, change)),
+            _ => Err(mistakes),
         }
-        Err(mistakes)
     }
 }
 

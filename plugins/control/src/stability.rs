@@ -26,7 +26,7 @@ pub struct Stability {
     pub stable_below: Quantity,
     /// From this absolute drift on an axis is transient: `"80 nm/min"`.
     pub transient_above: Quantity,
-    /// How far below a limit the drift must fall for the calmer state; none by default.
+    /// How far below a limit the drift must fall for the calmer state, such as `"5 nm/min"`; none by default.
     #[serde(default)]
     pub hysteresis: Option<Quantity>,
     /// How long another state must have lasted before it is given; no time by default.
@@ -66,30 +66,36 @@ impl Stability {
         let mut read = |limit, at| limit::size_or_none(limit, unit, at, &mut mistakes);
         let stable = read(Some(&self.stable_below), "stable_below");
         let transient = read(Some(&self.transient_above), "transient_above");
-        let hysteresis = read(self.hysteresis.as_ref(), "hysteresis").unwrap_or(0.0);
-        if let (Some(stable), Some(transient)) = (stable, transient) {
-            if stable > transient {
-                let message = format!(
-                    "`transient_above` ({}) lies below `stable_below` ({})",
-                    self.transient_above, self.stable_below
-                );
-                mistakes.push(Mistake::at("transient_above", message).rests_on("stable_below"));
-            } else if hysteresis >= stable && hysteresis > 0.0 {
-                let message = "with such a `hysteresis` an axis can never become stable again";
-                mistakes.push(
-                    Mistake::at("hysteresis", message)
-                        .help("it must be below `stable_below`")
-                        .rests_on("stable_below"),
-                );
-            } else if mistakes.is_empty() {
-                return Ok(Limits {
-                    stable,
-                    transient,
-                    hysteresis,
-                });
-            }
+        let hysteresis = read(self.hysteresis.as_ref(), "hysteresis");
+        if let (Some(stable), Some(transient)) = (stable, transient)
+            && stable > transient
+        {
+            let message = format!(
+                "`transient_above` ({}) lies below `stable_below` ({})",
+                self.transient_above, self.stable_below
+            );
+            mistakes.push(Mistake::at("transient_above", message).rests_on("stable_below"));
         }
-        Err(mistakes)
+        let hysteresis = hysteresis.unwrap_or(0.0);
+        if let Some(stable) = stable
+            && hysteresis >= stable
+            && hysteresis > 0.0
+        {
+            let message = "with such a `hysteresis` an axis can never become stable again";
+            mistakes.push(
+                Mistake::at("hysteresis", message)
+                    .help("it must be below `stable_below`")
+                    .rests_on("stable_below"),
+            );
+        }
+        match (stable, transient) {
+            (Some(stable), Some(transient)) if mistakes.is_empty() => Ok(Limits {
+                stable,
+                transient,
+                hysteresis,
+            }),
+            _ => Err(mistakes),
+        }
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Scale {
     /// The factor.
     #[serde(default = "one")]
     pub factor: f64,
-    /// The offset, in the unit of the result.
+    /// The offset, in the unit of the result: `"0.2 K"`.
     #[serde(default)]
     pub offset: Option<Quantity>,
     /// The unit of the result; without it, that of the input.
@@ -57,18 +57,25 @@ fn one() -> f64 {
 
 const TERMS: InputPort = InputPort::held("signal", "the channels that are put together");
 
-fn same_units(channels: &[Channel]) -> Result<&Channel, Vec<Mistake>> {
+fn same_units(inputs: &Inputs) -> Result<&Channel, Vec<Mistake>> {
+    let channels = inputs.port("signal");
     let Some(first) = channels.first() else {
         return Err(vec![Mistake::at(
             "inputs.signal",
             "there is nothing to put together",
         )]);
     };
-    match channels.iter().find(|channel| channel.unit != first.unit) {
+    match channels
+        .iter()
+        .position(|channel| channel.unit != first.unit)
+    {
         Some(other) => {
             let message = format!(
                 "`{}` is in {} and `{}` in {}",
-                first.name, first.unit, other.name, other.unit
+                inputs.reference("signal", 0),
+                first.unit,
+                inputs.reference("signal", other),
+                channels[other].unit
             );
             let help = "give all in the same unit, with a `scale` node where it is another";
             Err(vec![Mistake::at("inputs.signal", message).help(help)])
@@ -112,19 +119,24 @@ impl Feature for Sum {
 
     fn outputs(&self, inputs: &Inputs) -> Result<Vec<OutputPort>, Vec<Mistake>> {
         let channels = inputs.port("signal");
-        let first = same_units(channels)?;
-        let mut total = channels.len() as f64;
-        if let Some(weights) = &self.weights {
-            if weights.len() != channels.len() {
-                let message = format!(
-                    "`weights` has {} numbers for {} channels",
-                    weights.len(),
-                    channels.len()
-                );
-                return Err(vec![Mistake::at("weights", message)]);
+        let weights = self.weights.as_deref();
+        let miscounted = weights.filter(|weights| weights.len() != channels.len());
+        let miscounted = miscounted.map(|weights| {
+            let message = format!(
+                "`weights` has {} numbers for {} channels",
+                weights.len(),
+                channels.len()
+            );
+            Mistake::at("weights", message)
+        });
+        let first = match (same_units(inputs), miscounted) {
+            (Ok(first), None) => first,
+            (units, miscounted) => {
+                let mistakes = units.err().into_iter().flatten().chain(miscounted);
+                return Err(mistakes.collect());
             }
-            total = weights.iter().sum();
-        }
+        };
+        let total = weights.map_or(channels.len() as f64, |weights| weights.iter().sum());
         let adds_up_to = |sum: f64| (total - sum).abs() < 1e-9;
         let is_scale = first.unit.is_temperature_point();
         if is_scale && !adds_up_to(0.0) && !adds_up_to(1.0) {

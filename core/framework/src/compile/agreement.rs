@@ -1,7 +1,7 @@
 //! Decides which channels are predictions, and which may stand for the same quantity.
 
 use super::conversion::{factor, mismatch};
-use super::instance::Instance;
+use super::instance::Declared;
 use super::plan::PlannedRole;
 use super::problem::CompileProblem;
 use super::reference::Reference;
@@ -11,7 +11,7 @@ use super::scope::Found;
 impl Resolver<'_> {
     /// Whether no voter is what an estimator or combiner gives beside its prediction. What else there is may vote: a feature of
     /// a prediction, such as its `scale`, is one for all that is known.
-    pub(super) fn are_predictions(&mut self, instance: &Instance<'_>, input: &str) -> bool {
+    pub(super) fn are_predictions(&mut self, instance: &Declared<'_>, input: &str) -> bool {
         let mut all = true;
         for (text, place) in instance
             .input(input)
@@ -49,7 +49,7 @@ impl Resolver<'_> {
     /// Whether predictions may be put together.
     pub(super) fn votes_agree(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         input: &str,
         voters: &[usize],
     ) -> bool {
@@ -71,7 +71,7 @@ impl Resolver<'_> {
     /// vote, or the truth.
     pub(super) fn agree(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         input: &str,
         first: usize,
         second: usize,

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::instance::Instance;
-use super::keys::Limits;
+use super::instance::{Declared, Instance};
+use super::keys::{EstimatorKeys, Limits};
 use super::kind_fault::KindFault;
 use super::learning;
 use super::plan::{PlannedRole, TrainingLimits, TruthLink};
@@ -61,11 +61,14 @@ impl Resolver<'_> {
         }
         let sound = sound && beside.is_empty();
         self.mistakes(instance, beside);
-        let (Some((truth_port, truth)), Some(link), Some((features_port, features))) =
-            (truth, link, features)
+        let (Some((truth_port, truth)), Some(link), Some(&(features_port, ref features))) =
+            (truth, link, features.as_ref())
         else {
             if let Some((_, truth)) = truth {
-                self.limits(instance, truth);
+                self.limits(instance, &instance.read.estimator, truth);
+            }
+            if let Some((Some(port), features)) = &features {
+                self.max_ages(instance, port.name, features);
             }
             self.learning(instance, estimator);
             return None;
@@ -86,7 +89,7 @@ impl Resolver<'_> {
                 whole &= are_predictions && self.may_stack(instance, port.name, &features, &link);
                 unit = are_predictions.then(|| self.channels[truth].channel.unit.clone());
             }
-            let of = (&port, &*features);
+            let of = (&port, features.as_slice());
             whole &=
                 self.features_of_row(instance, of, &wanted.feature_lags, unit, &link, &mut row);
         }
@@ -97,7 +100,7 @@ impl Resolver<'_> {
             self.missing_input(instance, &port);
             whole = false;
         }
-        let training = self.limits(instance, link.slot);
+        let training = self.limits(instance, &instance.read.estimator, link.slot);
         let learning = self.learning(instance, estimator);
         if !whole {
             return None;
@@ -189,7 +192,7 @@ impl Resolver<'_> {
     /// A truth as predictions `ahead` of it are paired with it.
     pub(super) fn link(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         truth: usize,
         ahead: Duration,
     ) -> Option<TruthLink> {
@@ -224,7 +227,8 @@ impl Resolver<'_> {
         let limit = if span > Duration::ZERO {
             Some(span)
         } else {
-            self.max_age(instance, "truth", truth)
+            let ages = self.max_ages(instance, "truth", &[truth]);
+            ages.and_then(|ages| ages.first().copied())
         };
         Some(TruthLink {
             slot: truth,
@@ -286,10 +290,11 @@ impl Resolver<'_> {
 
     pub(super) fn limits(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
+        keys: &EstimatorKeys,
         truth: usize,
     ) -> Option<TrainingLimits> {
-        let Limits { below, above } = instance.read.estimator.train.abs_truth.clone();
+        let Limits { below, above } = keys.train.abs_truth.clone();
         let unit = self.channels[truth].channel.unit.clone();
         let mut whole = true;
         let mut size = |limit: Option<Quantity>, default: f64, key: &str| match limit {

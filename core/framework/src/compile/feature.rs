@@ -78,7 +78,7 @@ impl Resolver<'_> {
         };
         let data = ports.iter().filter(|(port, _)| port.read != Read::Truth);
         let slots: Vec<Vec<usize>> = data.map(|(_, slots)| slots.clone()).collect();
-        let inputs = self.inputs(instance, ports);
+        let mut inputs = self.inputs(instance, ports);
         let outputs = match outputs_of(feature, Some(&inputs)) {
             Ok(outputs) => outputs,
             Err(mistakes) => {
@@ -91,6 +91,7 @@ impl Resolver<'_> {
             faults.into_iter().chain(KindFault::of_outputs(&outputs)),
         )?;
         self.doubts(instance, feature.warnings(&inputs));
+        inputs.names = Vec::new();
         let widths = outputs.iter().map(|port| (port.name, port.channels.len()));
         let behind = self.behind(feature, &slots, widths);
         let role = PlannedRole::Feature {
@@ -114,7 +115,7 @@ impl Resolver<'_> {
     ) -> Option<PlannedFit> {
         let ahead = self.horizon(instance)?;
         let truth = self.link(instance, truth, ahead)?;
-        let training = self.limits(instance, truth.slot)?;
+        let training = self.limits(instance, &instance.read.estimator, truth.slot)?;
         let mut regressors = Vec::new();
         for (port, slots) in ports.iter().filter(|(port, _)| port.read != Read::Truth) {
             let unit = Self::port_unit(port);

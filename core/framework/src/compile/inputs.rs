@@ -1,9 +1,12 @@
 //! Decides which slots the inputs of a node name, how old a held value may be, and what is converted on the way.
 
+use std::collections::HashSet;
+
 use super::conversion;
 use super::instance::{Declared, Instance};
 use super::plan::{Conversion, Entry, Gather};
 use super::problem::CompileProblem;
+use super::reference::Reference;
 use super::resolver::Resolver;
 use super::scope::Found;
 use crate::channel::Channel;
@@ -13,7 +16,7 @@ use crate::time::Duration;
 use crate::unit::Unit;
 
 /// The inputs of which every channel counts once; a product may well have one twice.
-const COUNTS_ONCE: [&str; 2] = ["features", "voters"];
+pub(super) const COUNTS_ONCE: [&str; 2] = ["features", "voters"];
 
 /// Which input of its kind one is meant to be that the kind does not have: the nearest, or where none is near, the only one that
 /// is missing.
@@ -170,27 +173,34 @@ impl Resolver<'_> {
         }
     }
 
-    /// How long a held value of each slot counts at an input.
-    pub(crate) fn max_age(
+    /// How long a held value of each slot counts at an input; `None` where nothing says it of one, which is told once for each signal
+    /// and node.
+    pub(super) fn max_ages(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         port: &str,
-        slot: usize,
-    ) -> Option<Duration> {
+        slots: &[usize],
+    ) -> Option<Vec<Duration>> {
         let stated = instance
             .input(port)
             .and_then(|input| input.max_age)
             .map(|(age, _)| age);
-        let age = stated.or_else(|| self.channels[slot].channel.default_max_age());
-        if age.is_none() {
+        let age = |slot: &usize| stated.or_else(|| self.channels[*slot].channel.default_max_age());
+        let ages: Vec<Option<Duration>> = slots.iter().map(age).collect();
+        let mut told = HashSet::new();
+        for (&slot, _) in slots.iter().zip(&ages).filter(|(_, age)| age.is_none()) {
             let channel = self.channels[slot].name.clone();
+            let of = Reference::parse(&channel).whole_node().into_owned();
+            if !told.insert(of) {
+                continue;
+            }
             let problem = CompileProblem::NoMaxAge {
                 channel,
                 input: port.to_owned(),
             };
             self.diagnostics.report(instance.input_place(port), problem);
         }
-        age
+        ages.into_iter().collect()
     }
 
     /// The gather that reads these slots at one lag.
@@ -202,19 +212,16 @@ impl Resolver<'_> {
         lags: &[Duration],
         unit: Option<&Unit>,
     ) -> Option<usize> {
-        let conversions = self.conversions(instance, port, slots, lags.len(), unit)?;
+        let conversions = self.conversions(instance, port, slots, lags.len(), unit);
+        let ages = match port.read {
+            Read::Fresh => Some(vec![Duration::ZERO; slots.len()]),
+            Read::Held | Read::Truth => self.max_ages(instance, port.name, slots),
+        };
+        let (conversions, ages) = (conversions?, ages?);
         let mut entries = Vec::with_capacity(slots.len() * lags.len());
         for &lag in lags {
-            for &slot in slots {
-                let max_age = match port.read {
-                    Read::Fresh => Some(Duration::ZERO),
-                    Read::Held | Read::Truth => self.max_age(instance, port.name, slot),
-                };
-                entries.push(Entry {
-                    slot,
-                    lag,
-                    max_age: max_age?,
-                });
+            for (&slot, &max_age) in slots.iter().zip(&ages) {
+                entries.push(Entry { slot, lag, max_age });
                 if lag > Duration::ZERO {
                     let history = &mut self.channels[slot].history;
                     *history = Some(history.map_or(lag, |deepest| deepest.max(lag)));
@@ -235,9 +242,9 @@ impl Resolver<'_> {
     }
 
     /// What it takes to give slots, at so many lags, in a unit; `None` when one does not convert, which has been told.
-    fn conversions(
+    pub(super) fn conversions(
         &mut self,
-        instance: &Instance<'_>,
+        instance: &Declared<'_>,
         port: &InputPort,
         slots: &[usize],
         lags: usize,
@@ -281,6 +288,11 @@ impl Resolver<'_> {
         instance: &Declared<'_>,
         ports: Vec<(InputPort, Vec<usize>)>,
     ) -> Inputs {
+        let name = |&slot: &usize| self.channels[slot].name.clone();
+        let names = ports
+            .iter()
+            .map(|(_, slots)| slots.iter().map(name).collect());
+        let names = names.collect();
         let channels = |port: InputPort, slots: Vec<usize>| {
             let unit = Self::port_unit(&port);
             let channels = slots.into_iter().map(|slot| {
@@ -297,6 +309,7 @@ impl Resolver<'_> {
                 .collect(),
             member: instance.decl.member.clone(),
             fit: None,
+            names,
         }
     }
 }

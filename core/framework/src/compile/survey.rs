@@ -1,7 +1,7 @@
 //! Decides what is told of an instance that cannot be resolved, since mistakes in it have been told: all that is wrong with the rest.
 
 use super::feature::outputs_of;
-use super::inputs::meant_input;
+use super::inputs::{COUNTS_ONCE, meant_input};
 use super::instance::{Declared, ReadParts};
 use super::keys::Learn;
 use super::problem::CompileProblem;
@@ -36,6 +36,7 @@ impl Resolver<'_> {
         let declared = Declared { node, decl, kind };
         self.known_inputs(&declared);
         let ports = self.wired(&declared);
+        self.surely_read(&declared, parts, &ports);
         if let Some(keys) = &parts.estimator {
             let spec = parts.spec.as_ref().and_then(|spec| spec.as_whole());
             let ranged = spec.is_none_or(|spec| match spec.role() {
@@ -51,13 +52,30 @@ impl Resolver<'_> {
         let Some(spec) = &parts.spec else {
             return;
         };
-        let inputs = ports.map(|ports| self.inputs(&declared, ports));
+        let truth = self.only_truth(&ports);
+        let truth = truth.map(|slot| self.channels[slot].channel.unit.clone());
+        let features = ports
+            .iter()
+            .find(|(port, _)| COUNTS_ONCE.contains(&port.name));
+        let features = features.and_then(|(_, slots)| Some(slots.as_ref()?.len()));
+        let whole = ports.into_iter().map(|(port, slots)| Some((port, slots?)));
+        let inputs = whole.collect::<Option<_>>();
+        let inputs = inputs.map(|ports| self.inputs(&declared, ports));
         let mistakes = agreed(spec.readings().map(|spec| match spec.role() {
             Role::Feature(feature) => {
                 let inputs = inputs.as_ref().filter(|_| !feature.closes_loops());
                 outputs_of(feature, inputs).err().unwrap_or_default()
             }
-            Role::Estimator(estimator) => estimator.mistakes(),
+            Role::Estimator(estimator) => {
+                let mut mistakes = estimator.mistakes();
+                mistakes.extend(
+                    truth
+                        .iter()
+                        .flat_map(|unit| estimator.mistakes_beside(unit)),
+                );
+                mistakes.extend(features.iter().flat_map(|&of| estimator.mistakes_for(of)));
+                mistakes
+            }
             Role::Combiner(combiner) => combiner.mistakes(),
         }));
         self.own_mistakes(&declared, mistakes, spec.left_out());
@@ -79,25 +97,87 @@ impl Resolver<'_> {
         self.mistakes(declared, mistakes);
     }
 
-    /// What each input port reads, where all of it is known; whatever is wrong with it is told.
-    fn wired(&mut self, declared: &Declared<'_>) -> Option<Vec<(InputPort, Vec<usize>)>> {
+    /// What each input port reads, where all of that is known; whatever is wrong with it is told.
+    fn wired(&mut self, declared: &Declared<'_>) -> Vec<(InputPort, Option<Vec<usize>>)> {
         // Inputs that cannot be read at all are not missing.
-        if declared.node.faulty.is_some() && declared.decl.inputs.is_empty() {
-            return None;
-        }
-        let mut ports = Vec::new();
-        let mut whole = true;
-        for port in (declared.kind.inputs)() {
-            let slots = self.slots(declared, port).unwrap_or_default();
+        let unread = declared.node.faulty.is_some() && declared.decl.inputs.is_empty();
+        let ports = (declared.kind.inputs)().iter().map(|port| {
+            let slots = (!unread).then(|| self.slots(declared, port)).flatten();
             let is_gate = port.name == "state" && declared.kind.role == RoleName::Combiner;
             let takes_one = port.read == Read::Truth || is_gate;
-            if takes_one && slots.len() > 1 {
-                self.one_of(declared, port, &slots);
+            if let Some(slots) = slots
+                .as_deref()
+                .filter(|slots| takes_one && slots.len() > 1)
+            {
+                self.one_of(declared, port, slots);
             }
-            whole &= !slots.is_empty() || port.optional && declared.input(port.name).is_none();
-            ports.push((*port, slots));
+            let left_out = port.optional && declared.input(port.name).is_none();
+            (*port, slots.filter(|slots| left_out || !slots.is_empty()))
+        });
+        ports.collect()
+    }
+
+    /// The truth, where it is known and one channel.
+    fn only_truth(&self, ports: &[(InputPort, Option<Vec<usize>>)]) -> Option<usize> {
+        let (_, slots) = ports.iter().find(|(port, _)| port.read == Read::Truth)?;
+        match slots.as_deref()? {
+            [slot] => Some(*slot),
+            _ => None,
         }
-        whole.then_some(ports)
+    }
+
+    /// Tells what is wrong with what is read, whatever the parameters are that could not be.
+    fn surely_read(
+        &mut self,
+        declared: &Declared<'_>,
+        parts: &ReadParts,
+        ports: &[(InputPort, Option<Vec<usize>>)],
+    ) {
+        // An age that could not be read is not missing.
+        if declared.node.faulty.is_some() || self.diagnostics.is_open(declared.node.place) {
+            return;
+        }
+        for (port, slots) in ports {
+            let Some(slots) = slots else { continue };
+            if port.read != Read::Truth {
+                let unit = Self::port_unit(port);
+                self.conversions(declared, port, slots, 1, unit.as_ref());
+            }
+            if port.read == Read::Held {
+                self.max_ages(declared, port.name, slots);
+            }
+            if port.name == "voters" && self.are_predictions(declared, port.name) {
+                self.votes_agree(declared, port.name, slots);
+            }
+        }
+        let Some(truth) = self.only_truth(ports) else {
+            return;
+        };
+        let voters = ports.iter().find(|(port, _)| port.name == "voters");
+        let first = voters.and_then(|(_, slots)| slots.as_ref()?.first().copied());
+        if declared.kind.role == RoleName::Combiner
+            && let Some(first) = first
+        {
+            self.agree(declared, "voters", first, truth, false);
+            self.link(declared, truth, self.channels[first].channel.ahead);
+        }
+        let (Some(spec), Some(keys)) = (&parts.spec, &parts.estimator) else {
+            return;
+        };
+        if declared.kind.role != RoleName::Estimator {
+            return;
+        }
+        let (read, is_read) = keys.sure();
+        let is_sure = |way| is_read(way) && !spec.left_out().explains(way);
+        self.link(declared, truth, read.ahead.unwrap_or_default());
+        if is_sure("train") {
+            self.limits(declared, read, truth);
+        }
+        if read.ahead.is_none() && is_sure("ahead") {
+            let kind = declared.kind.name;
+            let problem = CompileProblem::NoHorizon { kind };
+            self.diagnostics.report(declared.node.place, problem);
+        }
     }
 
     /// Tells of inputs that the kind does not have.

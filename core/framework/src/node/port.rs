@@ -132,9 +132,20 @@ pub struct Inputs {
     /// The member of `each` that this instance stands for.
     pub member: Option<String>,
     pub(crate) fit: Option<FeatureFit>,
+    /// What the graph calls the channels of each port; nothing once it is compiled.
+    pub(crate) names: Vec<Vec<String>>,
 }
 
 impl Inputs {
+    /// What the graph calls a channel of a port while it is compiled, such as `drift.Z1`: channels of two nodes may have one name.
+    #[must_use]
+    pub fn reference(&self, port: &str, nth: usize) -> &str {
+        let place = self.ports.iter().position(|(own, _)| own.name == port);
+        let name = place.and_then(|place| self.names.get(place)?.get(nth));
+        let own = || self.port(port).get(nth).map_or("", |own| &own.name);
+        name.map_or_else(own, String::as_str)
+    }
+
     /// The channels of a port; none where the port has been left out, or the kind declares no such port.
     ///
     /// # Panics

@@ -156,3 +156,19 @@ fn settling_goes_on_from_a_snapshot() {
         .collect();
     goes_on_alike(SETTLED, &rows);
 }
+
+#[test]
+fn an_input_that_does_not_fit_hides_no_mistake_of_a_limit() {
+    let text = LOSS
+        .replace("nm/min", "K")
+        .replace("preset = \"mandelli\"", "radii = [\"-2 um\"]");
+    let told = compiled(&text).0.unwrap_err();
+    assert!(told.contains("in K, which is no drift"), "{told}");
+    assert!(told.contains("must not be negative"), "{told}");
+    let text = SETTLED
+        .replace("[\"loss\"]", "[\"loss\", \"more\"]")
+        .replace("5 K", "5 nm");
+    let told = compiled(&text).0.unwrap_err();
+    assert!(told.contains("takes one channel and is given 2"), "{told}");
+    assert!(told.contains("`change` is in nm"), "{told}");
+}

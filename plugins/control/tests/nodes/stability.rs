@@ -86,3 +86,13 @@ fn it_goes_on_from_a_snapshot_and_refuses_limits_out_of_order() {
         .unwrap_err();
     assert!(told.contains("K/min, which cannot be in nm/min"), "{told}");
 }
+
+#[test]
+fn a_limit_that_cannot_be_read_hides_no_other_mistake() {
+    let text = GRAPH
+        .replace("80 nm/min", "80 K/min")
+        .replace("\"5 nm/min\"", "\"9 um/min\"");
+    let told = compiled(&text).0.unwrap_err();
+    assert!(told.contains("`transient_above` is in K/min"), "{told}");
+    assert!(told.contains("never become stable again"), "{told}");
+}

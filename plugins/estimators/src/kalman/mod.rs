@@ -76,9 +76,9 @@ pub struct Kalman {
 pub struct Noises {
     /// Of one truth, such as "3.85 nm/min"; above 0.
     pub observation: Quantity,
-    /// What the level wanders in the time `per`, 0 or more.
+    /// What the level wanders in the time `per`, such as "10 nm/min"; 0 or more.
     pub level: Quantity,
-    /// By what the change of the level within `per` wanders in the time `per`, 0 or more; for a level with a trend.
+    /// By what the change of the level within `per` wanders in the time `per`, such as "1 nm/min"; 0 or more, for a level with a trend.
     #[serde(default)]
     pub trend: Option<Quantity>,
     /// The time in which they do, such as "1h".
