@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use athermal::Model;
 use athermal::core::compile::{Plan, Wanted, compile_part};
 use athermal::core::diagnostic::{Diagnostics, Sources};
-use athermal::core::document::{self, Disk};
+use athermal::core::document::{self, Disk, GraphFile};
 use athermal::core::trial::{self, Trial};
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
+use super::unread;
 use crate::figures::counted;
 use crate::terminal::{Answer, Failure, Format, Terminal, status_of};
 
@@ -54,12 +55,12 @@ impl Counts {
     }
 }
 
-/// The plan of a graph and its tests; `None` after any mistake in either, all of which are told.
+/// A graph, its plan and its tests; `None` after any mistake in either, all of which are told.
 pub(super) fn plan_and_tests(
     path: &Path,
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
-) -> Option<(Plan, Vec<Trial>)> {
+) -> Option<(GraphFile, Plan, Vec<Trial>)> {
     let graph = document::load(path, &Disk, sources, diagnostics)
         .and_then(|read| document::declare(read, diagnostics))?;
     let compiled = compile_part(&graph, Wanted::default(), diagnostics);
@@ -67,7 +68,7 @@ pub(super) fn plan_and_tests(
         .map_err(|part| trial::mistakes(&graph, &part, &Disk, sources, diagnostics))
         .ok()?;
     let trials = trial::declare(&graph, &plan, &Disk, sources, diagnostics)?;
-    Some((plan, trials))
+    Some((graph, plan, trials))
 }
 
 /// The number of mistakes in the tests of a graph that has no others, read from `sources`.
@@ -90,7 +91,9 @@ impl Check {
             let mut of_file = Diagnostics::new();
             let planned = plan_and_tests(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
-            if let Some((plan, _)) = planned.filter(|_| diagnostics.error_count() == before) {
+            if let Some((graph, plan, _)) = planned.filter(|_| diagnostics.error_count() == before)
+            {
+                unread::tell(terminal, path, &graph);
                 fine.push((path, plan));
             }
         }

@@ -29,6 +29,7 @@ mod show;
 mod simulate;
 mod test;
 mod threads;
+mod unread;
 mod unscored;
 
 use clap::Subcommand;

@@ -38,6 +38,43 @@ fn run_tells_that_it_does_not_read_model_before_it_asks_for_a_fit() {
 }
 
 #[test]
+fn check_tells_that_a_model_is_not_read_as_run_does() {
+    let scratch = Scratch::new("command-line-check-model");
+    scratch.file("plain.toml", PLAIN);
+    let text = "extends = \"plain.toml\"\nschema = 1\nmodel = \"nosuch.json\"\n";
+    let machine = scratch.file("machine.toml", text);
+    athermal(&[&"check", &machine]).ended(0).tells(&[
+        "machine.toml: `athermal run` does not yet read `model`: name the fitted model in place of the graph",
+    ]);
+}
+
+#[test]
+fn a_sensor_that_the_simulated_machine_of_inherited_tests_lacks_is_one_mistake() {
+    let scratch = Scratch::new("command-line-more-sensors");
+    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/graphs/die-tester.toml");
+    let machine = |more: &str| {
+        let text = format!(
+            "schema = 1\nextends = {shipped:?}\n{more}[signals.temperature]\n\
+             channels = [\"plate1\", \"holder1\", \"plate2\", \"holder2\", \"room\", \"chuck\", \"spindle\"]\n"
+        );
+        scratch.file("machine.toml", text)
+    };
+    let checked = athermal(&[&"check", &machine("")]).ended(2);
+    let path = scratch.path("machine.toml");
+    let way_out = format!(
+        "help: a signal may call channels `optional`; `tests = []` in {}, or tests of its own there",
+        path.display()
+    );
+    checked.tells(&[
+        "error[A074]: the machine `die-tester` does not measure `temperature.spindle`",
+        &way_out,
+        "1 error",
+    ]);
+    assert_eq!(checked.told.matches("A074").count(), 1, "{}", checked.told);
+    athermal(&[&"check", &machine("tests = []\n")]).ended(0);
+}
+
+#[test]
 fn what_refers_to_a_node_that_is_removed_is_told_so_and_how_to_remove_it_too() {
     let scratch = Scratch::new("command-line-removed");
     scratch.file("base.toml", PLAIN);

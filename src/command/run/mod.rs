@@ -27,7 +27,7 @@ use serde_json::json;
 
 use crate::command::aside::check_apart;
 use crate::command::model::{self, check_fitted, tell_unfitted};
-use crate::command::{beyond, data, refused};
+use crate::command::{beyond, data, refused, unread};
 use crate::figures::{counted, instant, length, seconds};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
@@ -71,22 +71,6 @@ pub struct Run {
     #[command(flatten)]
     swap: swap::Options,
 }
-
-/// What a machine file may say and is not read here: its key, how it is written, and what to do instead.
-const UNREAD: [(&str, &str, &str); 4] = [
-    ("source", "`[source]`", "give the input with `--input`"),
-    ("sinks", "`[sinks]`", "give the output with `--output`"),
-    (
-        "runtime",
-        "`[runtime]`",
-        "do without heartbeats, since every tick is a row",
-    ),
-    (
-        "model",
-        "`model`",
-        "name the fitted model in place of the graph",
-    ),
-];
 
 impl Run {
     /// Runs until the input ends.
@@ -161,7 +145,7 @@ impl Run {
         let last = ran.and_then(|(ran, state)| ran.of_state(state));
         let given = model::load(&self.model, Wanted::default(), terminal);
         if let Ok(given) = &given {
-            self.tell_unread(terminal, given);
+            unread::tell(terminal, &self.model, &given.graph);
         }
         let Some(last) = last else {
             let given = given?;
@@ -265,23 +249,6 @@ impl Run {
         heard.end(terminal, engine);
         self.tell(terminal, engine, heard.rows(), &reader, &usual);
         Ok(Answer::Fine)
-    }
-
-    /// Tells which sections of a machine file are not read, since whoever wrote them expects them to work.
-    fn tell_unread(&self, terminal: &Terminal, model: &Model) {
-        let written = |(key, ..): &&(&str, &str, &str)| model.graph.deployment.contains_key(*key);
-        let unread: Vec<_> = UNREAD.iter().filter(written).collect();
-        if unread.is_empty() {
-            return;
-        }
-        let sections: Vec<_> = unread.iter().map(|(_, section, _)| *section).collect();
-        let instead: Vec<_> = unread.iter().map(|(.., instead)| *instead).collect();
-        terminal.warning(format_args!(
-            "{}: `athermal run` does not yet read {}: {}",
-            self.model.display(),
-            sections.join(", "),
-            instead.join("; ")
-        ));
     }
 
     /// What was recorded is read as it is for fitting; of what is still being written no row waits for the next.
