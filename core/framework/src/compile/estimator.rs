@@ -86,7 +86,7 @@ impl Resolver<'_> {
             let mut unit = Self::port_unit(&port);
             if port.name == "voters" {
                 let are_predictions = self.are_predictions(instance, port.name);
-                whole &= are_predictions && self.may_stack(instance, port.name, &features, &link);
+                whole &= are_predictions && self.may_stack(instance, port.name, features, &link);
                 unit = are_predictions.then(|| self.channels[truth].channel.unit.clone());
             }
             let of = (&port, features.as_slice());

@@ -92,9 +92,8 @@ pub(super) fn near(text: &str) -> Option<&'static str> {
             .count()
     };
     if let Some(first) = same.iter().min_by_key(differing) {
-        let unit = |text: &str| super::Unit::parse(text).ok();
-        let of_first = unit(first)?;
-        let is_alike = |other: &&str| unit(other).is_some_and(|unit| unit.measures_same(&of_first));
+        let dimension = |text: &str| ucum::analyze(&ucum_code(text)).ok().map(|of| of.dimension);
+        let is_alike = |other: &&str| dimension(other) == dimension(first);
         return same.iter().all(is_alike).then_some(first);
     }
     let begins = |known: &&str| known.len() > 1 && known.chars().next() == text.chars().next();
