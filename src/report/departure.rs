@@ -30,6 +30,14 @@ pub struct Departure {
 const MANY: f64 = 0.01;
 
 impl Departure {
+    /// Whether the correction leaves the positions farther off than they are without: drift may be less all the same, where a small
+    /// bias of the rate adds up.
+    #[must_use]
+    pub fn is_worse(&self) -> bool {
+        let both = self.rms_with.zip(self.rms_without);
+        both.is_some_and(|(with, without)| with > without)
+    }
+
     /// What kept the correction from following the prediction though there was one, for people.
     #[must_use]
     pub fn limited(&self) -> Option<String> {
@@ -112,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn only_limits_that_often_hold_a_correction_back_are_told() {
+    fn limits_that_often_hold_a_correction_back_are_told_and_whether_it_is_of_harm() {
         let mut departure = Departure {
             axis: "Z".into(),
             unit: "nm".into(),
@@ -128,5 +136,8 @@ mod tests {
             departure.limited().as_deref(),
             Some("at the end of its range 36 % of the time")
         );
+        assert!(!departure.is_worse());
+        (departure.rms_without, departure.rms_with) = (Some(233.0), Some(399.0));
+        assert!(departure.is_worse());
     }
 }

@@ -94,6 +94,13 @@ fn departures(text: &mut String, departures: &[Departure]) {
         text.push_str(&table(&header, &rows));
     }
     for of in departures {
+        if of.is_worse() {
+            let told = format!(
+                "Corrected, {} is farther from its start than without, though its drift may be less.",
+                of.axis
+            );
+            text.push_str(&paragraph("", 2, &told));
+        }
         if let Some(limited) = of.limited() {
             let told = format!("The correction of {} is {limited}.", of.axis);
             text.push_str(&paragraph("", 2, &told));

@@ -151,9 +151,10 @@ pub(super) fn departures(departures: &[Departure]) -> String {
             .map(|(by, share)| format!("{by} {:.1} %", 100.0 * share));
         let _ = write!(
             rows,
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"left{}\">{}</td></tr>",
+            "<tr><td>{}</td><td>{}</td><td{}>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"left{}\">{}</td></tr>",
             escaped(&of.axis),
             figure(of.rms_without),
+            if of.is_worse() { " class=\"bad\"" } else { "" },
             figure(of.rms_with),
             figure(Some(of.largest_without)),
             figure(Some(of.largest_with)),
