@@ -35,7 +35,6 @@ pub struct Compared {
     /// The unit of errors: that of the truth, or K where that is a temperature.
     pub unit: String,
     /// Instants with a truth and both predictions.
-    #[serde(rename = "count")]
     pub n: usize,
     /// Root mean square error of what runs.
     pub running_rmse: f64,
