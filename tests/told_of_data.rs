@@ -178,7 +178,7 @@ fn a_run_of_which_nothing_comes_out_says_so_and_where_it_ends() {
         athermal(&[&"run", &graph, &"--input", &log, &"--output", &out]).ended(0)
     };
     run(&far).tells(&[
-        "no output has a value in any of the 200 rows, which are 2.78 h apart; the first to lack one is drift",
+        "no output has a value in any of 200 rows, which are 2.78 h apart; the first to lack one is drift",
     ]);
     assert!(!run(&near).told.contains("no output"));
 }

@@ -14,7 +14,7 @@ use athermal::diagnosis::{health_reasons, of_truths};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::figures::{count, instant, number, seconds};
+use crate::figures::{count, counted, instant, number, seconds};
 use crate::message::Message;
 use crate::terminal::Terminal;
 
@@ -340,7 +340,7 @@ pub fn told(all: &[Faulty]) -> Vec<Message> {
 fn of_silence(faulty: &Faulty, silent: &Silence) -> String {
     let never = silent.rows == silent.of_rows;
     let rows = if never {
-        format!("any of {} rows", count(silent.rows))
+        format!("any of {}", counted(silent.rows, "row"))
     } else {
         format!(
             "{} of {} rows, from {} to {}",

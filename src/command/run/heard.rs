@@ -5,7 +5,7 @@ use athermal::core::engine::Engine;
 use athermal::core::live::{Frame, Sink, SinkError};
 use serde_json::json;
 
-use crate::figures::{count, time};
+use crate::figures::{counted, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
 
@@ -46,8 +46,8 @@ impl<'a, S> Heard<'a, S> {
             false => String::new(),
         };
         let words = format!(
-            "no output has a value in any of the {} rows{pace}; the first to lack one is {silent}",
-            count(self.rows)
+            "no output has a value in any of {}{pace}; the first to lack one is {silent}",
+            counted(self.rows, "row")
         );
         let facts = json!({ "ticks": self.rows, "first_silent": silent });
         terminal.warning(Message::new("no_output", facts, words));
