@@ -10,6 +10,7 @@ mod blending;
 mod course;
 mod failures;
 mod model;
+mod planted;
 mod properties;
 mod random_graph;
 mod snapshots;

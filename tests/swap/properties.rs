@@ -6,12 +6,15 @@
 //! - The report tells the truth.
 //! - Going back is as if nothing had happened.
 //!
+//! That faults of each kind would be found is shown in `planted`.
+//!
 //! `ATHERMAL_LONG=1` looks at a hundred thousand cases, `ATHERMAL_SEED=7` at those of one pair of graphs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use athermal::Model;
-use athermal::core::engine::Carry;
+use athermal::core::engine::{Carry, NodeCarry};
 use athermal::core::live::{Control, Feed, LiveOptions, Notice, StageError, Stepper, pair};
 use athermal::core::prng::Prng;
 
@@ -127,7 +130,7 @@ fn rows_before(happenings: &[Happening], at: usize) -> usize {
     happenings[..at].iter().filter(rows).count()
 }
 
-struct Case<'a> {
+pub(super) struct Case<'a> {
     name: String,
     old: (&'a Graph, &'a Model),
     new: (&'a Graph, &'a Model),
@@ -141,8 +144,18 @@ struct Case<'a> {
     retain: i64,
 }
 
+/// What came of a case.
+pub(super) struct Observed {
+    pub(super) rows: Vec<BTreeMap<String, u64>>,
+    pub(super) revisions: Vec<String>,
+    pub(super) notices: Vec<Notice>,
+    pub(super) carry: Vec<NodeCarry>,
+    /// The first happening of what was retained of the past.
+    retained: usize,
+}
+
 impl Case<'_> {
-    fn check(&self) {
+    pub(super) fn observed(&self) -> Observed {
         let mut live = Live::new(self.old.1, self.retain);
         let mut carry = Vec::new();
         let mut retained = 0;
@@ -165,13 +178,40 @@ impl Case<'_> {
             }
         }
         live.pump();
-        let rows = rows_before(self.happenings, self.happenings.len());
-        assert_eq!(live.rows.len(), rows, "{}", self.name);
-        assert_eq!(live.stepper.engine().state().tick(), rows as u64);
+        assert_eq!(live.stepper.engine().state().tick(), self.rows() as u64);
         assert_eq!(live.stepper.missed(), 0);
-        self.check_revisions(&live);
-        self.check_untouched(&live);
-        self.check_report(&live, &carry, retained);
+        Observed {
+            rows: live.rows,
+            revisions: live.revisions,
+            notices: live.notices,
+            carry,
+            retained,
+        }
+    }
+
+    pub(super) fn judge(&self, observed: &Observed) {
+        assert_eq!(observed.rows.len(), self.rows(), "{}", self.name);
+        self.check_revisions(observed);
+        self.check_untouched(observed);
+        self.check_report(observed);
+    }
+
+    /// How many rows there are, and between which the new graph runs.
+    fn rows(&self) -> usize {
+        rows_before(self.happenings, self.happenings.len())
+    }
+
+    pub(super) fn swapped(&self) -> Range<usize> {
+        rows_before(self.happenings, self.at)..self.until()
+    }
+
+    pub(super) fn untouched(&self) -> BTreeSet<String> {
+        self.old.0.untouched(self.new.0)
+    }
+
+    /// The instance of the new graph that an output column shows.
+    pub(super) fn shown(&self, column: &str) -> String {
+        instance(self.new.0, column)
     }
 
     /// The first happening of the retained past, of a whole number of seconds, before the swap.
@@ -216,10 +256,10 @@ impl Case<'_> {
         rows_before(self.happenings, self.back.unwrap_or(self.happenings.len()))
     }
 
-    fn check_revisions(&self, live: &Live) {
+    fn check_revisions(&self, observed: &Observed) {
         let [old, new] = &self.revisions;
         let (at, until) = (rows_before(self.happenings, self.at), self.until());
-        for (row, found) in live.revisions.iter().enumerate() {
+        for (row, found) in observed.revisions.iter().enumerate() {
             let swapped = row >= at && row < until;
             assert_eq!(
                 found,
@@ -228,20 +268,20 @@ impl Case<'_> {
                 self.name
             );
         }
-        let took_over = live.notices.iter().map(|notice| match notice {
+        let took_over = observed.notices.iter().map(|notice| match notice {
             Notice::TookOver { tick, .. } => *tick,
             other => panic!("{other:?}"),
         });
         let mut expected: Vec<_> = vec![at as u64 + 1];
         expected.extend(self.back.map(|_| until as u64 + 1));
-        expected.retain(|&tick| tick <= live.rows.len() as u64);
+        expected.retain(|&tick| tick <= observed.rows.len() as u64);
         assert_eq!(took_over.collect::<Vec<_>>(), expected, "{}", self.name);
     }
 
-    fn check_untouched(&self, live: &Live) {
-        let untouched = self.old.0.untouched(self.new.0);
+    fn check_untouched(&self, observed: &Observed) {
+        let untouched = self.untouched();
         let (at, until) = (rows_before(self.happenings, self.at), self.until());
-        for (row, (found, expected)) in live.rows.iter().zip(self.unswapped).enumerate() {
+        for (row, (found, expected)) in observed.rows.iter().zip(self.unswapped).enumerate() {
             let swapped = row >= at && row < until;
             for (column, value) in found {
                 let graph = if swapped { self.new.0 } else { self.old.0 };
@@ -264,13 +304,11 @@ impl Case<'_> {
         }
     }
 
-    fn check_report(
-        &self,
-        live: &Live,
-        carry: &[athermal::core::engine::NodeCarry],
-        retained: usize,
-    ) {
-        let untouched = self.old.0.untouched(self.new.0);
+    fn check_report(&self, observed: &Observed) {
+        let Observed {
+            carry, retained, ..
+        } = observed;
+        let untouched = self.untouched();
         let instances = self.new.1.plan.nodes.iter().map(|node| node.instance());
         let reported: Vec<_> = carry.iter().map(|node| node.node.clone()).collect();
         assert_eq!(reported, instances.collect::<Vec<_>>(), "{}", self.name);
@@ -299,15 +337,15 @@ impl Case<'_> {
         let always = self.new.0.hangs_on_others(&adopted);
         // What is warmed, with all before it, is a new graph that began with the retained past.
         let warmed = self.new.0.hangs_on_others(&afresh);
-        let begun = run(self.new.1, &feed(), &self.happenings[retained..]);
-        let skipped = rows_before(self.happenings, retained);
-        for row in rows_before(self.happenings, self.at)..self.until() {
-            for (column, value) in &live.rows[row] {
+        let begun = run(self.new.1, &feed(), &self.happenings[*retained..]);
+        let skipped = rows_before(self.happenings, *retained);
+        for row in self.swapped() {
+            for (column, value) in &observed.rows[row] {
                 if column.starts_with("slow_") {
                     continue;
                 }
                 let of = instance(self.new.0, column);
-                if retained == 0 && !always.contains(&of) {
+                if *retained == 0 && !always.contains(&of) {
                     assert_eq!(
                         *value, self.from_the_start[row][column],
                         "{}: {column} in row {row} as from the start",
@@ -327,7 +365,8 @@ impl Case<'_> {
     }
 }
 
-fn check_seed(seed: u64) {
+/// The cases of a pair of graphs.
+pub(super) fn cases_of(seed: u64, mut each: impl FnMut(&Case<'_>)) {
     let mut random = Prng::stream(seed, "swaps");
     let old = Graph::random(&mut random);
     let cosmetic = seed.is_multiple_of(5);
@@ -371,8 +410,12 @@ fn check_seed(seed: u64) {
             back,
             retain: pick(&mut random, &[0, 100, 100_000]),
         };
-        case.check();
+        each(&case);
     }
+}
+
+fn check_seed(seed: u64) {
+    cases_of(seed, |case| case.judge(&case.observed()));
 }
 
 #[test]
