@@ -35,8 +35,9 @@ macro_rules! reasons {
 /// (Huber 1981), so that neither a glitch nor the minutes after a change of set point are an alarm by themselves. Among the `first`
 /// errors, at most 100, 1.4826 times the median of their sizes stands for the usual error in this. All exactly 0, as of a machine
 /// that stands still, they say nothing of those to come and are passed over. Where more than half of the newest, as many as `first`
-/// and at most 100, are larger than five times the usual error, and a quarter of these to either side, what was usual is no more:
-/// they tell anew what is, and the test begins anew. Of sizes that is an alarm.
+/// and at most 100, are larger than five times the usual error, what was usual is no more: they tell anew what is, and the test
+/// begins anew. Of sizes that is an alarm; of errors with a sign it takes a quarter of those on either side, since more on one
+/// are a bias, which the test tells.
 ///
 /// Independent errors would give a false alarm in about `(exp(2δλ) − 2δλ − 1) / 2δ²` truths (Siegmund 1985), and in no fewer with a
 /// `φ` below 1. Those of truths that overlap follow each other, so it takes one in a while, see `every`, and the defaults leave much
