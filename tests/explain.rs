@@ -11,8 +11,9 @@ use athermal::core::diagnostic::{CODES, Diagnostics, Severity, Sources, explain}
 use athermal::core::document::{Memory, declare, load};
 use athermal::core::trial;
 
-/// Two crates with a node type of the same name, and a type whose code is at fault: no file shows these.
-const WITHOUT_FILE: [&str; 2] = ["A041", "A180"];
+/// Two crates with a node type of the same name, a type whose code is at fault, and what is wrong with a model beside the file: no
+/// graph alone shows these.
+const WITHOUT_FILE: [&str; 5] = ["A041", "A180", "A190", "A191", "A192"];
 
 fn check(text: &str) -> (Diagnostics, Sources) {
     let base = explain("A062").unwrap().right;

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use athermal::Model;
 use athermal::core::compile::{Plan, Wanted, compile_part};
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk, GraphFile};
+use athermal::core::engine::Fitted;
 use athermal::core::trial::{self, Trial};
 use clap::Args;
 use serde::Serialize;
@@ -55,20 +57,44 @@ impl Counts {
     }
 }
 
-/// A graph, its plan and its tests; `None` after any mistake in either, all of which are told.
-pub(super) fn plan_and_tests(
+/// A graph and its plan; `None` after any mistake in them, all of which are told with those of its tests.
+fn graph_and_plan(
     path: &Path,
     sources: &mut Sources,
     diagnostics: &mut Diagnostics,
-) -> Option<(GraphFile, Plan, Vec<Trial>)> {
+) -> Option<(GraphFile, Plan)> {
     let graph = document::load(path, &Disk, sources, diagnostics)
         .and_then(|read| document::declare(read, diagnostics))?;
     let compiled = compile_part(&graph, Wanted::default(), diagnostics);
     let plan = compiled
         .map_err(|part| trial::mistakes(&graph, &part, &Disk, sources, diagnostics))
         .ok()?;
+    Some((graph, plan))
+}
+
+/// The plan of a graph and its tests; `None` after any mistake in either, all of which are told.
+pub(super) fn plan_and_tests(
+    path: &Path,
+    sources: &mut Sources,
+    diagnostics: &mut Diagnostics,
+) -> Option<(Plan, Vec<Trial>)> {
+    let (graph, plan) = graph_and_plan(path, sources, diagnostics)?;
     let trials = trial::declare(&graph, &plan, &Disk, sources, diagnostics)?;
-    Some((graph, plan, trials))
+    Some((plan, trials))
+}
+
+/// A graph that can run: no mistake in it, in its tests, or in the model that it names.
+fn machine(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) -> Option<Model> {
+    let (graph, plan) = graph_and_plan(path, sources, diagnostics)?;
+    trial::declare(&graph, &plan, &Disk, sources, diagnostics);
+    let mut machine = Model {
+        graph,
+        plan: Arc::new(plan),
+        fitted: Fitted::new(),
+        card: None,
+    };
+    machine.take_named(path, sources, diagnostics);
+    Some(machine).filter(|_| !diagnostics.has_errors())
 }
 
 /// The number of mistakes in the tests of a graph that has no others, read from `sources`.
@@ -87,14 +113,12 @@ impl Check {
         let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
         let mut fine = Vec::new();
         for path in &self.graphs {
-            let before = diagnostics.error_count();
             let mut of_file = Diagnostics::new();
-            let planned = plan_and_tests(path, &mut sources, &mut of_file);
+            let machine = machine(path, &mut sources, &mut of_file);
             diagnostics.extend(of_file);
-            if let Some((graph, plan, _)) = planned.filter(|_| diagnostics.error_count() == before)
-            {
-                unread::tell(terminal, path, &graph);
-                fine.push((path, plan));
+            if let Some(machine) = machine {
+                unread::tell(terminal, path, &machine.graph);
+                fine.push((path, machine.plan));
             }
         }
         if terminal.format == Format::Json {

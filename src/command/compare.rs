@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use athermal::Model;
-use athermal::core::compile::Wanted;
+use athermal::core::diagnostic::Sources;
 use athermal::core::engine::{Engine, SampleRange};
 use athermal::core::fit::{FitOptions, FitReport, Outcome};
 use athermal::core::recording::Event;
@@ -142,7 +142,7 @@ impl Compare {
     fn models(&self, terminal: &Terminal) -> Result<Vec<(String, String, Model)>, Failure> {
         let mut models = Vec::new();
         for path in &self.graphs {
-            let model = model::load(path, Wanted::default(), terminal)?;
+            let model = model::load_to_fit(path, &mut Sources::new(), terminal)?;
             self.scored.check(&model)?;
             models.push((path.display().to_string(), model));
         }

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use athermal::Model;
-use athermal::core::compile::{Change, ParameterChange, PlanDiff, Wanted, diff};
+use athermal::core::compile::{Change, ParameterChange, PlanDiff, diff};
+use athermal::core::diagnostic::Sources;
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -34,7 +35,7 @@ impl Diff {
     /// # Errors
     /// When one of them cannot be read or has mistakes.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
-        let load = |path: &Path| model::load(path, Wanted::default(), terminal);
+        let load = |path: &Path| model::load_to_fit(path, &mut Sources::new(), terminal);
         let (before, after) = (load(&self.before)?, load(&self.after)?);
         let plans = diff(&before.plan, &after.plan);
         let fitted = fitted(&before, &after);

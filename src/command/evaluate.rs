@@ -53,7 +53,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal};
                         athermal evaluate model.json --data test.csv --mode free-run"
 )]
 pub struct Evaluate {
-    /// The model, or a graph in which nothing needs fitting
+    /// The model, or a graph that names one or in which nothing needs fitting
     model: PathBuf,
     #[command(flatten)]
     data: Data,

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use athermal::Model;
-use athermal::core::compile::{PlannedChannel, Wanted};
+use athermal::core::compile::PlannedChannel;
 use athermal::core::diagnostic::Sources;
 use athermal::core::fit::{EstimatorFit, FitOptions, FitProgress, FitReport, Outcome, fit};
 use athermal::core::model::{Card, EstimatorCard, Period};
@@ -84,7 +84,7 @@ impl Fit {
         check_apart("--output", &self.output, self.data.paths().chain(graph))?;
         self.data.check_lasting("--data")?;
         let mut sources = Sources::new();
-        let mut model = model::load_from(&self.graph, Wanted::default(), &mut sources, terminal)?;
+        let mut model = model::load_to_fit(&self.graph, &mut sources, terminal)?;
         self.doubt_tests(&model, sources, terminal);
         let options = FitOptions {
             memory: self.memory.saturating_mul(1 << 20),

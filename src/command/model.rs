@@ -10,27 +10,29 @@ use athermal::core::quantity::Quantity;
 
 use crate::terminal::{Failure, Terminal};
 
-/// A model, or a graph whose fits are still to be made. What is doubtful in a graph file is told; of a model it was when it was
-/// fitted.
+/// A model, or a graph, with the fits of the model that it names. What is doubtful in a graph file is told; of a model it was when it
+/// was fitted.
 ///
 /// # Errors
 /// When it cannot be loaded.
 pub fn load(path: &Path, wanted: Wanted, terminal: &Terminal) -> Result<Model, Failure> {
-    load_from(path, wanted, &mut Sources::new(), terminal)
+    let (mut sources, mut doubts) = (Sources::new(), Diagnostics::new());
+    let model = Model::load_from(path, wanted, &mut sources, &mut doubts)?;
+    terminal.doubts(&doubts, &sources);
+    Ok(model)
 }
 
-/// The same, adding the files of a graph to `sources`.
+/// A graph that is about to be fitted, or only compared: of a model that it names nothing is read.
 ///
 /// # Errors
 /// When it cannot be loaded.
-pub fn load_from(
+pub fn load_to_fit(
     path: &Path,
-    wanted: Wanted,
     sources: &mut Sources,
     terminal: &Terminal,
 ) -> Result<Model, Failure> {
     let mut doubts = Diagnostics::new();
-    let model = Model::load_from(path, wanted, sources, &mut doubts)?;
+    let model = Model::load_to_fit(path, Wanted::default(), sources, &mut doubts)?;
     terminal.doubts(&doubts, sources);
     Ok(model)
 }

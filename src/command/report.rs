@@ -33,7 +33,7 @@ use crate::terminal::{Answer, Failure, Format, Terminal, outside};
                         athermal report model.json --data test.csv --format json"
 )]
 pub struct Report {
-    /// The model, or a graph in which nothing needs fitting
+    /// The model, or a graph that names one or in which nothing needs fitting
     model: PathBuf,
     #[command(flatten)]
     data: Data,

@@ -7,18 +7,13 @@ use athermal::core::document::GraphFile;
 use crate::terminal::Terminal;
 
 /// What a machine file may say and `run` does not read: its key, how it is written, and what to do instead.
-const UNREAD: [(&str, &str, &str); 4] = [
+const UNREAD: [(&str, &str, &str); 3] = [
     ("source", "`[source]`", "give the input with `--input`"),
     ("sinks", "`[sinks]`", "give the output with `--output`"),
     (
         "runtime",
         "`[runtime]`",
         "do without heartbeats, since every tick is a row",
-    ),
-    (
-        "model",
-        "`model`",
-        "name the fitted model in place of the graph",
     ),
 ];
 

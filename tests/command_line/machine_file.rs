@@ -9,43 +9,19 @@ const TOLD: &str = "does not yet read";
 #[test]
 fn run_tells_once_which_sections_of_a_machine_file_it_does_not_read() {
     let (scratch, plain, data, _) = desk("machine-file");
-    let text = "extends = \"plain.toml\"\nschema = 1\nmodel = \"model.json\"\n\
+    let text = "extends = \"plain.toml\"\nschema = 1\n\
                 [source]\ntopic = \"a\"\n[sinks.log]\n[runtime]\nheartbeat = \"1s\"\n";
     let machine = scratch.file("machine.toml", text);
     let ran = athermal(&[&"run", &machine, &"--input", &data]).ended(0);
     ran.tells(&[
         "warning: ",
-        "machine.toml: `athermal run` does not yet read `[source]`, `[sinks]`, `[runtime]`, `model`: give the input with `--input`; \
-         give the output with `--output`; do without heartbeats, since every tick is a row; name the fitted model in place of the graph",
+        "machine.toml: `athermal run` does not yet read `[source]`, `[sinks]`, `[runtime]`: give the input with `--input`; \
+         give the output with `--output`; do without heartbeats, since every tick is a row",
     ]);
     assert_eq!(ran.told.matches(TOLD).count(), 1, "{}", ran.told);
     let quiet = athermal(&[&"run", &plain, &"--input", &data]).ended(0);
     assert_eq!(quiet.out, ran.out);
     assert!(!quiet.told.contains(TOLD), "{}", quiet.told);
-}
-
-#[test]
-fn run_tells_that_it_does_not_read_model_before_it_asks_for_a_fit() {
-    let (scratch, _, data, _) = desk("machine-file-model");
-    let text = "extends = \"fitted.toml\"\nschema = 1\nmodel = \"model.json\"\n";
-    let machine = scratch.file("machine.toml", text);
-    athermal(&[&"run", &machine, &"--input", &data])
-        .ended(2)
-        .tells(&[
-            "does not yet read `model`: name the fitted model in place of the graph",
-            "some nodes need a fit",
-        ]);
-}
-
-#[test]
-fn check_tells_that_a_model_is_not_read_as_run_does() {
-    let scratch = Scratch::new("command-line-check-model");
-    scratch.file("plain.toml", PLAIN);
-    let text = "extends = \"plain.toml\"\nschema = 1\nmodel = \"nosuch.json\"\n";
-    let machine = scratch.file("machine.toml", text);
-    athermal(&[&"check", &machine]).ended(0).tells(&[
-        "machine.toml: `athermal run` does not yet read `model`: name the fitted model in place of the graph",
-    ]);
 }
 
 #[test]

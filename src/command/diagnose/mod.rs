@@ -43,7 +43,7 @@ use tables::Tables;
   athermal diagnose model.json --data hours.csv --day 30min
   athermal diagnose model.json --data test.csv --no-fit --format json")]
 pub struct Diagnose {
-    /// The model, or a graph in which nothing needs fitting
+    /// The model, or a graph that names one or in which nothing needs fitting
     model: PathBuf,
     #[command(flatten)]
     data: Data,

@@ -48,7 +48,7 @@ use watched::Watched;
                         tail -n +1 -f log.csv | athermal run model.json --input - --output -"
 )]
 pub struct Run {
-    /// The model, or a graph in which nothing needs fitting
+    /// The model, or a graph that names one or in which nothing needs fitting
     model: PathBuf,
     /// CSV or JSON lines; `-` is standard input
     #[arg(long, short, value_name = "FILE")]

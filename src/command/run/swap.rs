@@ -5,6 +5,7 @@ mod told;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
 use athermal::core::live::{Control, Feed, StageError};
 use athermal::core::time::Civil;
@@ -13,7 +14,7 @@ use athermal::{Duration, Instant, Model};
 use clap::Args;
 
 use super::watched::Watched;
-use crate::command::model::{check_fitted, listed, tell_unfitted};
+use crate::command::model::{self, check_fitted, listed, tell_unfitted};
 use crate::figures::length;
 use crate::terminal::{Failure, Terminal};
 
@@ -145,7 +146,7 @@ fn load<'a>(
     known: impl Iterator<Item = &'a Model>,
     terminal: &Terminal,
 ) -> Result<Model, Failure> {
-    let mut model = Model::load(path)?;
+    let mut model = model::load(path, Wanted::default(), terminal)?;
     // A graph goes by the fits of what runs; a model in which some are missing was to bring its own.
     let mut taken = model
         .card

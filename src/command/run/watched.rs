@@ -1,4 +1,4 @@
-//! Decides when a graph has changed on disk, in its own file or in one that it extends or takes modules from; not what is done then.
+//! Decides when a graph has changed on disk, in its own file, in one that it extends or takes modules from, or in the model that it names; not what is done then.
 
 use std::cell::RefCell;
 use std::io;
@@ -7,6 +7,7 @@ use std::time::SystemTime;
 
 use athermal::core::diagnostic::{Diagnostics, Sources};
 use athermal::core::document::{self, Disk, FileReader};
+use athermal::core::model::named_model;
 
 /// When a file was written, and how long it is; none where there is no file.
 type Written = Option<(SystemTime, u64)>;
@@ -30,7 +31,11 @@ impl Watched {
         {
             // Mistakes are told when the graph is taken over; its files are watched all the same.
             let (mut sources, mut diagnostics) = (Sources::new(), Diagnostics::new());
-            document::load(path, &noting, &mut sources, &mut diagnostics);
+            let read = document::load(path, &noting, &mut sources, &mut diagnostics);
+            let model = read.and_then(|read| named_model(&read.tree, &sources));
+            if let Some((model, _)) = model {
+                noting.note(&model);
+            }
         } else {
             noting.note(path);
         }
@@ -118,5 +123,23 @@ mod tests {
         assert!(watched.changed());
         std::fs::remove_file(&path).unwrap();
         assert!(!watched.changed());
+    }
+
+    #[test]
+    fn a_graph_has_changed_when_the_model_that_it_names_has() {
+        let file = |ending: &str| {
+            let name = format!("athermal-watched-model-{}.{ending}", std::process::id());
+            std::env::temp_dir().join(name)
+        };
+        let (graph, model) = (file("toml"), file("json"));
+        let text = format!("schema = 1\nmodel = {:?}\n", model.file_name().unwrap());
+        std::fs::write(&graph, text).unwrap();
+        let mut watched = Watched::of(&graph);
+        assert!(!watched.changed() && !watched.changed());
+        std::fs::write(&model, "{}").unwrap();
+        assert!(!watched.changed(), "it may be half of it");
+        assert!(watched.changed());
+        std::fs::remove_file(&graph).unwrap();
+        std::fs::remove_file(&model).unwrap();
     }
 }

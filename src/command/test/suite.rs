@@ -60,7 +60,7 @@ pub(super) fn load(graphs: &[PathBuf], terminal: &Terminal) -> Result<Vec<Suite>
         let planned = plan_and_tests(path, &mut sources, &mut of_file);
         let broken = of_file.has_errors();
         diagnostics.extend(of_file);
-        if let Some((_, mut plan, trials)) = planned.filter(|_| !broken) {
+        if let Some((mut plan, trials)) = planned.filter(|_| !broken) {
             trial::observe(&mut plan, &trials);
             let line = |trial: &Trial| (trial.name.clone(), sources.line_column(trial.place).0);
             let path = path.display().to_string();

@@ -90,8 +90,13 @@ fn text_of(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
+fn is_graph(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension == "toml")
+}
+
 impl Model {
-    /// Reads a model, or a graph file in whose place nothing has been fitted.
+    /// Reads a model, or a graph file: with the fits of the model that it names (`model = "X.json"`), without any where it names none.
     ///
     /// # Errors
     /// When the file cannot be read or has mistakes.
@@ -120,12 +125,41 @@ impl Model {
         doubts: &mut Diagnostics,
     ) -> Result<Self, ModelError> {
         let path = path.as_ref();
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "toml")
-        {
-            return Self::load_graph(path, wanted, sources, doubts);
+        let mut model = Self::load_to_fit(path, wanted, sources, doubts)?;
+        if is_graph(path) {
+            let mut diagnostics = Diagnostics::new();
+            model.take_named(path, sources, &mut diagnostics);
+            if diagnostics.has_errors() {
+                return Err(ModelError::Graph {
+                    diagnostics: Box::new(diagnostics),
+                    sources: Box::new(std::mem::take(sources)),
+                });
+            }
+            doubts.extend(diagnostics);
         }
+        Ok(model)
+    }
+
+    /// The same without the fits of a model that the graph names, as for one that is about to be fitted.
+    ///
+    /// # Errors
+    /// As [`Model::load`], save those of the model that is named.
+    pub fn load_to_fit(
+        path: impl AsRef<Path>,
+        wanted: Wanted,
+        sources: &mut Sources,
+        doubts: &mut Diagnostics,
+    ) -> Result<Self, ModelError> {
+        let path = path.as_ref();
+        if is_graph(path) {
+            Self::load_graph(path, wanted, sources, doubts)
+        } else {
+            Self::load_fitted(path, wanted)
+        }
+    }
+
+    /// Reads a model, and no graph.
+    pub(super) fn load_fitted(path: &Path, wanted: Wanted) -> Result<Self, ModelError> {
         let text = text_of(path).map_err(|source| ModelError::Unreadable {
             path: path.to_owned(),
             source,

@@ -3,10 +3,14 @@
 mod card;
 mod error;
 mod file;
+mod named;
 pub mod number;
 pub mod number_or_none;
 pub mod numbers;
+mod problem;
 
 pub use card::{Card, DataCard, EstimatorCard, Period};
 pub use error::ModelError;
 pub use file::Model;
+pub use named::named_model;
+pub use problem::NamedModelProblem;

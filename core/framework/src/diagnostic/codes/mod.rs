@@ -30,7 +30,7 @@ macro_rules! code {
 }
 
 /// Every code, in ascending order: A001 to A039 for reading files, A040 and above for compiling them, A070 to A089 and from A170 for their tests,
-/// A110 for learning while they run, A180 for mistakes in the code of a node's kind.
+/// A110 for learning while they run, A180 for mistakes in the code of a node's kind, from A190 for the models that they name.
 pub const CODES: &[Code] = &[
     code!(
         "A001",
@@ -408,6 +408,21 @@ pub const CODES: &[Code] = &[
         "mistake of a plugin",
         "The code of the node's type does what no node may: it panics, or asks for values from the future. The graph is not at \
          fault, and can only do without the type until its author has mended it; `athermal nodes TYPE` names the crate."
+    ),
+    code!(
+        "A190",
+        "unusable model",
+        "`model` names what `athermal fit` has written. `fit`, `compare`, `diff` and `test` do without it."
+    ),
+    code!(
+        "A191",
+        "model of another graph",
+        "A machine file runs with the fits of its `model` only where the parameters and inputs of each estimator are those of the fit."
+    ),
+    code!(
+        "A192",
+        "fit on other values",
+        "An estimator is as in the `model`, and what it reads is now made in another way: its coefficients may no longer be right."
     ),
 ];
 
