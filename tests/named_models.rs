@@ -103,6 +103,30 @@ fn a_machine_file_that_extends_the_fitted_graph_runs_and_paths_are_those_of_the_
 }
 
 #[test]
+fn what_is_read_in_another_way_is_told_alike_by_check_and_by_what_wants_more_of_the_graph() {
+    let (scratch, _, data) = desk("doubt");
+    let text = page().replace(
+        "[nodes.thermal]",
+        "[nodes.motion]\ntype = \"ar\"\ninputs.truth = \"drift\"\nahead = \"5min\"\nlags = [\"0s\"]\n[nodes.thermal]",
+    ) + "motion = \"motion\"\n";
+    let machine = scratch.file("machine.toml", &text);
+    let model = scratch.path("machine.json");
+    athermal(&[&"fit", &machine, &"--data", &data, &"-o", &model, &"-q"]).ended(0);
+    let text = text.replace(
+        "type = \"slope\"\ninputs.signal = \"temperature\"",
+        "type = \"slope\"\nmin_samples = 4\ninputs.signal = \"temperature\"",
+    );
+    scratch.file("machine.toml", text);
+    for told in [
+        athermal(&[&"check", &machine]).ended(0),
+        athermal(&[&"evaluate", &machine, &"--data", &data]).ended(0),
+    ] {
+        told.tells(&["warning[A192]", "`thermal` is as in the model"]);
+        assert_eq!(told.told.matches("A192").count(), 1, "{}", told.told);
+    }
+}
+
+#[test]
 fn what_differs_from_the_fit_is_told_at_each_node_and_the_run_refused() {
     let (scratch, _, data) = desk("differs");
     let more = "[nodes.second]\ntype = \"linear\"\ninputs.features = \"gradients\"\n\

@@ -93,7 +93,7 @@ fn machine(path: &Path, sources: &mut Sources, diagnostics: &mut Diagnostics) ->
         fitted: Fitted::new(),
         card: None,
     };
-    machine.take_named(path, sources, diagnostics);
+    machine.take_named(path, Wanted::default(), sources, diagnostics);
     Some(machine).filter(|_| !diagnostics.has_errors())
 }
 

@@ -128,7 +128,7 @@ impl Model {
         let mut model = Self::load_to_fit(path, wanted, sources, doubts)?;
         if is_graph(path) {
             let mut diagnostics = Diagnostics::new();
-            model.take_named(path, sources, &mut diagnostics);
+            model.take_named(path, wanted, sources, &mut diagnostics);
             if diagnostics.has_errors() {
                 return Err(ModelError::Graph {
                     diagnostics: Box::new(diagnostics),

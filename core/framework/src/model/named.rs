@@ -19,13 +19,19 @@ pub fn named_model(tree: &Value, sources: &Sources) -> Option<(PathBuf, Place)> 
 }
 
 impl Model {
-    /// Takes the fits and the card of the model that the graph, which stands at `graph`, names. Every estimator must have the parameters and inputs that it has
+    /// Takes the fits and the card of the model that the graph, which stands at `graph` and is compiled for `wanted`, names. Every estimator must have the parameters and inputs that it has
     /// there; those that have not are reported, as is a model that cannot be used. A graph that names none stays as it is.
-    pub fn take_named(&mut self, graph: &Path, sources: &Sources, diagnostics: &mut Diagnostics) {
+    pub fn take_named(
+        &mut self,
+        graph: &Path,
+        wanted: Wanted,
+        sources: &Sources,
+        diagnostics: &mut Diagnostics,
+    ) {
         let Some((path, named)) = named_model(&self.graph.tree, sources) else {
             return;
         };
-        let other = match Self::load_fitted(&path, Wanted::default()) {
+        let other = match Self::load_fitted(&path, wanted) {
             Ok(other) => other,
             Err(error) => {
                 let problem = NamedModelProblem::Unusable {

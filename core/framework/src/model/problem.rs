@@ -69,16 +69,15 @@ impl Problem for NamedModelProblem {
                 path,
                 ..
             } => {
-                let as_well = match more {
-                    0 => String::new(),
-                    1 => ", and another of its instances".to_owned(),
-                    more => format!(", and {more} more of its instances"),
+                let are_not = match more {
+                    0 => "is not".to_owned(),
+                    more => format!("and {more} more of its node are not"),
                 };
                 let differs = match change {
                     Change::Changed(parameters) => differs(parameters),
                     _ => "there is none of that name".to_owned(),
                 };
-                format!("`{instance}`{as_well} is not as in the model {path}: {differs}")
+                format!("`{instance}` {are_not} as in the model {path}: {differs}")
             }
             Self::ReadsOther {
                 instances, path, ..
