@@ -474,3 +474,87 @@ fn samples_that_last_longer_than_time_reaches_are_a_mistake() {
         "{told}"
     );
 }
+
+#[test]
+fn what_stands_beside_predictions_is_computed_for_a_test_that_looks_at_it() {
+    let scratch = Scratch::new("beside-predictions");
+    let row = |nth: u32| {
+        let x = 20.0 * (f64::from(nth) / 9.0).sin() + f64::from(nth * nth % 7);
+        format!("{},20,20,{x}\n", 5 * nth)
+    };
+    let rows: String = (0..200).map(row).collect();
+    scratch.file("past.csv", format!("time_s,room,plate,Z\n{rows}"));
+    let text = graph(&format!(
+        r#"
+[nodes.follow]
+type = "kalman"
+inputs.truth = "drift.Z"
+ahead = "30s"
+[nodes.vote]
+type = "auto_weighted"
+inputs.voters = ["zero.Z", "same.Z"]
+inputs.truth = "drift.Z"
+memory = "2min"
+[nodes.both]
+type = "auto_weighted"
+inputs.voters = ["follow"]
+inputs.truth = "drift.Z"
+memory = "2min"
+[outputs.watched]
+from = "vote"
+[[tests]]
+name = "there they are"
+fit = "past.csv"
+{EVENLY}
+expect = [
+  {{ of = "vote:weights.*", from = "5min", between = ["0 1", "1 1"] }},
+  {{ of = "follow:deviation", from = "5min", between = ["0 nm/min", "1000 nm/min"] }},
+  {{ of = "both:deviation", from = "5min", between = ["0 nm/min", "1000 nm/min"] }},
+]
+[[tests]]
+name = "they are not absent"
+fit = "past.csv"
+{EVENLY}
+expect = [
+  {{ of = "vote:weights.*", absent = true }},
+  {{ of = "follow:deviation", absent = true }},
+  {{ of = "both:deviation", absent = true }},
+]
+"#
+    ));
+    let path = scratch.file("graph.toml", text);
+    let out = athermal(&[&"test", &path]).ended(1).out;
+    assert!(out.contains("✓ there they are"), "{out}");
+    assert_eq!(out.matches("absent: found").count(), 4, "{out}");
+}
+
+#[test]
+fn at_a_time_every_segment_is_to_be_as_expected() {
+    let scratch = Scratch::new("segments-at");
+    let log = |name: &str, step_nm: f64, every_s: u32| {
+        let row = |nth: u32| format!("{},20,20,{}\n", nth * every_s, step_nm * f64::from(nth));
+        let rows: String = (0..40).map(row).collect();
+        scratch.file(name, format!("time_s,room,plate,Z\n{rows}"))
+    };
+    log("fast.csv", 50.0, 5);
+    log("slow.csv", 5.0, 5);
+    log("odd.csv", 5.0, 7);
+    let tests = r#"
+[[tests]]
+name = "NAME"
+on = ["FIRST.csv", "SECOND.csv"]
+expect = [{ of = "drift.Z", at = "1min10s", KEY }]
+"#;
+    let of = |first: &str, second: &str, key: &str, status: i32| {
+        let tests = tests.replace("FIRST", first).replace("SECOND", second);
+        let path = scratch.file("graph.toml", graph(&tests.replace("KEY", key)));
+        athermal(&[&"test", &path]).ended(status).out
+    };
+    let slow = "between = [\"59 nm/min\", \"61 nm/min\"]";
+    of("slow", "slow", slow, 0);
+    let told = of("fast", "slow", slow, 1);
+    assert!(told.contains("found 600 nm/min at 70s"), "{told}");
+    of("slow", "fast", slow, 1);
+    of("odd", "slow", "absent = true", 1);
+    of("slow", "odd", "absent = true", 1);
+}

@@ -98,18 +98,10 @@ fn as_period<S: Serializer>(period_s: &Option<(f64, f64)>, to: S) -> Result<S::O
 fn telling(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
     ask_for_reasons(&mut plan);
-    for node in &mut plan.nodes {
-        if let PlannedRole::Combiner { beside, .. } = &mut node.role {
-            beside.weights = weights_of(&node.ports).map(|slots| slots.start);
-        }
-    }
+    let weights = plan.nodes.iter().filter_map(|node| node.port("weights"));
+    let weights: Vec<_> = weights.flatten().collect();
+    plan.observe(weights);
     plan
-}
-
-/// The slots of the port of weights; other ports stand beside a prediction too, such as the ends of its interval.
-fn weights_of(ports: &[(&'static str, Range<usize>)]) -> Option<Range<usize>> {
-    let weights = ports.iter().find(|(name, _)| *name == "weights");
-    weights.map(|(_, slots)| slots.clone())
 }
 
 /// Where the truth of an axis is, and the weights by which it is voted.
@@ -209,7 +201,7 @@ fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
         // One vote is shown, the first: the picture of two would not be read.
         let vote = all().map(|of| &plan.nodes[of.node]).find_map(|node| {
             let combines = matches!(node.role, PlannedRole::Combiner { .. });
-            Some((node, weights_of(&node.ports).filter(|_| combines)?))
+            Some((node, node.port("weights").filter(|_| combines)?))
         });
         let slots = vote.as_ref().map_or(0..0, |(_, slots)| slots.clone());
         let weight = |slot: usize| Weight {

@@ -18,6 +18,7 @@ mod mistakes_in_tests;
 mod next;
 mod numbers;
 mod programs;
+mod references;
 mod requests;
 mod scored;
 mod sensors;

@@ -231,3 +231,46 @@ now = "now"
     );
     plan(&text("5min"));
 }
+
+#[test]
+fn what_is_nearer_to_the_present_than_a_truth_that_is_late_itself_leaks_for_as_long_as_it_is_late()
+{
+    let text = |ahead: &str, feature: &str| {
+        format!(
+            r#"{SAMPLES}{SLOPES}
+[nodes.late]
+type = "lag"
+inputs.signal = "drift"
+lags = ["10min"]
+[nodes.warm]
+type = "linear"
+inputs.features = ["gradients", "{feature}"]
+inputs.truth = "late.Z"
+ahead = "{ahead}"
+[outputs]
+out = "warm"
+also = "drift"
+"#
+        )
+    };
+    for ahead in ["0s", "10min", "14min"] {
+        let told = problems(&text(ahead, "drift"));
+        assert!(told.contains("contains part of the answer"), "{told}");
+        assert!(
+            told.contains(&format!(
+                "the truth summarises 5min, is 10min late and is predicted {ahead} ahead"
+            )),
+            "{told}"
+        );
+    }
+    assert!(
+        problems(&text("10min", "drift")).contains("the smallest lag allowed is 5min"),
+        "{}",
+        problems(&text("10min", "drift"))
+    );
+    plan(&text("15min", "drift"));
+    // Beside the truth, as late as it is, the rule is that of a truth that is not.
+    let told = problems(&text("4min", "late"));
+    assert!(told.contains("contains part of the answer"), "{told}");
+    plan(&text("5min", "late"));
+}

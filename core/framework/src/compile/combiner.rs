@@ -1,8 +1,8 @@
 //! Decides which predictions a combiner may put together.
 
-use super::estimator::{DEVIATION, deviation_of};
+use super::estimator::deviation_of;
 use super::instance::Instance;
-use super::plan::{Beside, PlannedRole, TruthLink};
+use super::plan::{Beside, DEVIATION, PlannedRole, TruthLink, WEIGHTS};
 use super::provenance::Provenance;
 use super::resolver::{Resolver, Suspect};
 use crate::channel::Channel;
@@ -85,11 +85,13 @@ impl Resolver<'_> {
             }
             None => None,
         };
-        let (outputs, beside) = self.ports(instance, combiner, combined, (&port, &voters))?;
+        let (outputs, beside, deviations) =
+            self.ports(instance, combiner, combined, (&port, &voters))?;
         let channels = outputs.iter().map(|port| port.channels.len()).sum();
         let behind = vec![behind; channels];
         let role = PlannedRole::Combiner {
             voters: gather,
+            deviations,
             state,
             truth: link,
             beside,
@@ -121,14 +123,15 @@ impl Resolver<'_> {
         }
     }
 
-    /// What comes out of a combiner, and where in the plan that is which stands beside the prediction.
+    /// What comes out of a combiner, where in the plan that is which always stands beside the prediction, and the gather of the
+    /// deviations of its votes.
     fn ports(
         &mut self,
         instance: &Instance<'_>,
         combiner: &dyn Combiner,
         combined: Channel,
         (port, voters): (&InputPort, &[usize]),
-    ) -> Option<(Vec<OutputPort>, Beside)> {
+    ) -> Option<(Vec<OutputPort>, Beside, Option<usize>)> {
         let reason = self.beside(voters[0], combined.name.clone());
         let deviation = deviation_of(&combined);
         let mut outputs = vec![OutputPort {
@@ -142,9 +145,9 @@ impl Resolver<'_> {
             outputs.push(OutputPort { name, channels });
             first
         };
-        let mut beside = Beside::default();
+        let (mut beside, mut of_votes) = (Beside::default(), None);
         if combiner.weighs() {
-            beside.weights = Some(put("weights", self.weights(voters)));
+            put(WEIGHTS, self.weights(voters));
         }
         if combiner.reasons() {
             beside.reason = Some(put("reason", vec![reason]));
@@ -158,10 +161,10 @@ impl Resolver<'_> {
         {
             let unit = deviation.channels[0].unit.clone();
             let lags = [Duration::ZERO];
-            let gather = self.gather(instance, port, &of_voters, &lags, Some(&unit))?;
-            beside.deviation = Some((put(deviation.name, deviation.channels), gather));
+            put(deviation.name, deviation.channels);
+            of_votes = Some(self.gather(instance, port, &of_voters, &lags, Some(&unit))?);
         }
-        Some((outputs, beside))
+        Some((outputs, beside, of_votes))
     }
 
     /// The standard deviation that stands beside each of these predictions, where all have one.

@@ -6,7 +6,7 @@ use super::instance::{Declared, Instance};
 use super::keys::{EstimatorKeys, Limits};
 use super::kind_fault::KindFault;
 use super::learning;
-use super::plan::{PlannedRole, TrainingLimits, TruthLink};
+use super::plan::{DEVIATION, PlannedRole, TrainingLimits, TruthLink};
 use super::problem::CompileProblem;
 use super::provenance::Provenance;
 use super::resolver::Resolver;
@@ -15,9 +15,6 @@ use crate::channel::Channel;
 use crate::node::{Estimator, FREEZE, OutputPort};
 use crate::quantity::Quantity;
 use crate::time::Duration;
-
-/// The port of the standard deviation of the truth about its prediction.
-pub(super) const DEVIATION: &str = "deviation";
 
 /// The port of the standard deviation of the truth about a prediction.
 pub(super) fn deviation_of(prediction: &Channel) -> OutputPort {
@@ -120,9 +117,7 @@ impl Resolver<'_> {
         if learning.is_some() {
             ports.push(learning::port(&prediction));
         }
-        let mut deviation = None;
         if estimator.deviates() {
-            deviation = Some(self.channels.len() + ports.len());
             ports.push(deviation_of(&prediction));
         }
         let behind = vec![behind; ports.len()];
@@ -133,7 +128,7 @@ impl Resolver<'_> {
             truth: link,
             training,
             learning,
-            deviation,
+            deviation: None,
         };
         self.add(instance, ports, role, behind, Some(truth))?;
         // Asked for later by whoever wants to know whether it needs a fit, and to fail here where it fails.

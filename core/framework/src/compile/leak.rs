@@ -15,32 +15,33 @@ impl Resolver<'_> {
         for suspect in std::mem::take(&mut self.suspects) {
             let truth = self.provenance[suspect.link.slot].clone();
             let leak = suspect.features.iter().find_map(|&slot| {
-                let (source, delay) = self.nearest(slot, &truth)?;
-                let lag = delay + suspect.lag;
-                leaks(lag, suspect.link.span, suspect.link.ahead).then_some((slot, source, lag))
+                let (source, delay, late) = self.nearest(slot, &truth)?;
+                let (lag, link) = (delay + suspect.lag, &suspect.link);
+                leaks(lag - late, link.span, link.ahead).then_some((slot, source, lag, late))
             });
-            let Some((slot, source, lag)) = leak else {
+            let Some((slot, source, lag, late)) = leak else {
                 continue;
             };
             let path = self.way(slot, source);
-            let problem = self.leak((slot, suspect.lag), lag, &suspect.link, path);
+            let problem = self.leak((slot, suspect.lag), (lag, late), &suspect.link, path);
             let Suspect { place, context, .. } = suspect;
             self.diagnostics.report_in(context, place, problem);
         }
     }
 
-    /// The measured channel that a slot shares with the truth and has with the smallest delay.
-    fn nearest(&self, slot: usize, truth: &Provenance) -> Option<(usize, Duration)> {
+    /// The measured channel that a slot shares with the truth and has with the smallest delay behind it: with the delays of both.
+    fn nearest(&self, slot: usize, truth: &Provenance) -> Option<(usize, Duration, Duration)> {
         let sources = self.provenance[slot].sources();
-        let shared = sources.filter(|(source, _)| truth.delay_of(*source).is_some());
-        shared.min_by_key(|(_, delay)| *delay)
+        let shared =
+            sources.filter_map(|(source, delay)| Some((source, delay, truth.delay_of(source)?)));
+        shared.min_by_key(|(_, delay, late)| *delay - *late)
     }
 
-    /// The problem of a slot that is read at a lag, behind its sources by `lag` in all.
+    /// The problem of a slot that is read at a lag, behind its sources by `lag` in all, of a truth that is `late` behind them.
     pub(super) fn leak(
         &self,
         (slot, read_at): (usize, Duration),
-        lag: Duration,
+        (lag, late): (Duration, Duration),
         link: &TruthLink,
         path: Vec<String>,
     ) -> CompileProblem {
@@ -49,6 +50,7 @@ impl Resolver<'_> {
             lag,
             truth: self.channels[link.slot].name.clone(),
             span: link.span,
+            late,
             ahead: link.ahead,
             path,
         }

@@ -157,6 +157,14 @@ impl PlannedNode {
             None => self.name.clone(),
         }
     }
+
+    /// The slots of an output port; none where it has no port of that name.
+    #[must_use]
+    pub fn port(&self, name: &str) -> Option<Range<usize>> {
+        let mut ports = self.ports.iter();
+        let (_, slots) = ports.find(|(port, _)| *port == name)?;
+        Some(slots.clone())
+    }
 }
 
 /// What an instance does at a tick.
@@ -198,6 +206,8 @@ pub enum PlannedRole {
     Combiner {
         /// The gather of the votes.
         voters: usize,
+        /// The gather of their standard deviations, where all have one: read only for one of the combination.
+        deviations: Option<usize>,
         /// The gather of the state that it goes by, where it goes by one.
         state: Option<usize>,
         /// What is predicted, where it learns from errors.
@@ -351,6 +361,12 @@ impl PlannedNode {
         }
     }
 }
+
+/// The port of the standard deviation of the truth about a prediction.
+pub(super) const DEVIATION: &str = "deviation";
+
+/// The port of the weights of votes.
+pub(super) const WEIGHTS: &str = "weights";
 
 /// What a combiner gives beside its prediction: the slots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

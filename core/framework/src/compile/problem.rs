@@ -119,6 +119,8 @@ pub enum CompileProblem {
         lag: Duration,
         truth: String,
         span: Duration,
+        /// How far the truth itself is behind what was measured.
+        late: Duration,
         ahead: Duration,
         /// The channels from the regressor back to what was measured; none where the truth itself is lagged.
         path: Vec<String>,

@@ -447,7 +447,7 @@ impl<'g> Resolver<'g> {
             outputs,
             warm_up: Duration::ZERO,
         };
-        steps::mark_wanted(&mut plan, &self.read, wanted);
+        steps::mark_read(&mut plan, self.read, wanted);
         plan.steps = steps::steps(&plan);
         plan.warm_up = plan.warm_ups().into_iter().max().unwrap_or_default();
         if !self.diagnostics.has_errors() {

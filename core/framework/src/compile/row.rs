@@ -87,7 +87,7 @@ impl Resolver<'_> {
         for &lag in &lags {
             if leaks(lag, link.span, link.ahead) {
                 let place = Self::lag_place(instance, &lags, lag);
-                let problem = self.leak((truth, lag), lag, link, Vec::new());
+                let problem = self.leak((truth, lag), (lag, Duration::ZERO), link, Vec::new());
                 self.diagnostics.report(place, problem);
                 whole = false;
             }

@@ -93,9 +93,9 @@ impl Scopes {
     pub(crate) fn look_up(&self, text: &str) -> Result<Found, Box<CompileProblem>> {
         let reference = Reference::parse(text);
         if reference.is_member() {
-            // Such a reference was made from one that named a node; a scope that is not there belongs to a broken one.
+            // Such a reference was made from one that named a node.
             let whole = self.scopes.get(&*reference.whole_node());
-            if whole.is_none_or(|whole| whole.broken) || !self.scopes.contains_key(reference.node) {
+            if whole.is_some_and(|whole| whole.broken) {
                 return Ok(Found::Broken);
             }
         }

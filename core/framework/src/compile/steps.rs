@@ -1,10 +1,11 @@
 //! Decides the steps of a tick, which ports are computed at all, and what nobody uses.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 use super::Wanted;
 use super::column_unit;
-use super::plan::{Plan, PlannedNode, PlannedRole, Step};
+use super::plan::{DEVIATION, Plan, PlannedNode, PlannedRole, Step, WEIGHTS};
 use super::problem::CompileProblem;
 use super::slot_set::SlotSet;
 use crate::diagnostic::Diagnostics;
@@ -84,38 +85,53 @@ fn warm_up_of(plan: &Plan, slot_warm_up: &[Duration], node: &PlannedNode) -> Dur
     node.memory + learned + before()
 }
 
-/// Notes which ports of features somebody reads. The first is always computed.
-pub(super) fn mark_wanted(plan: &mut Plan, read: &SlotSet, wanted: Wanted) {
+impl Plan {
+    /// Computes these slots too, and what they are made of, whether anything reads them or not.
+    pub fn observe(&mut self, slots: impl IntoIterator<Item = usize>) {
+        mark_read(self, slots.into_iter().collect(), Wanted::default());
+        self.steps = steps(self);
+        self.warm_up = self.warm_ups().into_iter().max().unwrap_or_default();
+    }
+}
+
+/// Notes what is computed only where somebody reads it, beside what has been noted: all ports of features but the first, weights
+/// and standard deviations.
+pub(super) fn mark_read(plan: &mut Plan, mut read: SlotSet, wanted: Wanted) {
     let truths: SlotSet = plan
         .nodes
         .iter()
         .filter_map(|node| node.role.truth())
         .map(|truth| truth.slot)
         .collect();
-    let mut read = read.clone();
     // Whoever is read comes before its readers, and a combination of deviations reads those of its voters.
     for node in plan.nodes.iter_mut().rev() {
         let is_truth = truths.has_any(node.slots.clone());
-        if let PlannedRole::Combiner { voters, beside, .. } = &mut node.role {
-            let count = plan.gathers[*voters].entries.len();
-            beside.weights = beside
-                .weights
-                .filter(|&first| read.has_any(first..first + count));
-            beside.deviation = beside
-                .deviation
-                .filter(|(slot, _)| wanted.intervals || read.contains(*slot));
-            if let Some((_, of_voters)) = beside.deviation {
-                let entries = &plan.gathers[of_voters].entries;
-                read.extend(entries.iter().map(|entry| entry.slot));
+        let first = |port: Option<Range<usize>>, wanted: bool| {
+            let slots = port.filter(|slots| wanted || read.has_any(slots.clone()))?;
+            Some(slots.start)
+        };
+        let weights = first(node.port(WEIGHTS), false);
+        let deviation = first(node.port(DEVIATION), wanted.intervals);
+        match &mut node.role {
+            PlannedRole::Feature { wanted: ports, .. } => {
+                for (index, (name, slots)) in node.ports.iter().enumerate() {
+                    let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
+                    ports[index] |= index == 0 || error_of_truth || read.has_any(slots.clone());
+                }
             }
-        }
-        if let PlannedRole::Estimator { deviation, .. } = &mut node.role {
-            *deviation = deviation.filter(|slot| wanted.intervals || read.contains(*slot));
-        }
-        if let PlannedRole::Feature { wanted: ports, .. } = &mut node.role {
-            for (index, (name, slots)) in node.ports.iter().enumerate() {
-                let error_of_truth = wanted.standard_errors && is_truth && *name == "stderr";
-                ports[index] = index == 0 || error_of_truth || read.has_any(slots.clone());
+            PlannedRole::Estimator {
+                deviation: computed,
+                ..
+            } => *computed = computed.or(deviation),
+            PlannedRole::Combiner {
+                deviations, beside, ..
+            } => {
+                beside.weights = beside.weights.or(weights);
+                beside.deviation = beside.deviation.or(deviation.zip(*deviations));
+                if let Some((_, of_votes)) = beside.deviation {
+                    let entries = &plan.gathers[of_votes].entries;
+                    read.extend(entries.iter().map(|entry| entry.slot));
+                }
             }
         }
     }

@@ -156,6 +156,7 @@ pub(super) fn running(plan: &Plan, fitted: &Fitted) -> Result<Vec<Running>, Engi
                     state,
                     truth,
                     beside,
+                    ..
                 },
                 Role::Combiner(spec),
             ) => {

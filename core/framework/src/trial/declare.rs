@@ -11,7 +11,7 @@ use super::problem::{NotFound, TrialProblem};
 use super::series::{Series, Synthetic};
 use super::shape;
 use super::table::SimulationTable;
-use crate::compile::{CompileProblem, Part, Plan, PlannedRole, Reference, SourceChannel};
+use crate::compile::{CompileProblem, Part, Plan, Reference, SourceChannel};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{
     Data, DocumentProblem, FileReader, GraphFile, Lacks, Table, Value, decode_part, is_misspelt,
@@ -132,25 +132,8 @@ fn read(
 
 /// Makes the plan compute every port that its tests look at, whether another node reads it or not.
 pub fn observe(plan: &mut Plan, trials: &[Trial]) {
-    let slots = trials
-        .iter()
-        .flat_map(|trial| &trial.expect)
-        .flat_map(|expectation| &expectation.slots);
-    for &slot in slots {
-        let Some(node) = plan.channels[slot].node else {
-            continue;
-        };
-        let node = &mut plan.nodes[node];
-        let port = node
-            .ports
-            .iter()
-            .position(|(_, range)| range.contains(&slot));
-        if let (PlannedRole::Feature { wanted, .. }, Some(port)) = (&mut node.role, port)
-            && let Some(wanted) = wanted.get_mut(port)
-        {
-            *wanted = true;
-        }
-    }
+    let expectations = trials.iter().flat_map(|trial| &trial.expect);
+    plan.observe(expectations.flat_map(|expectation| expectation.slots.iter().copied()));
 }
 
 /// The schedules that have been read for a machine, so that mistakes in one are told once; nothing for one that has any.

@@ -1,5 +1,6 @@
 //! Decides whether an expectation holds of what was observed, and the figures that say so.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use super::expect::rival_of;
@@ -315,21 +316,24 @@ impl Judge<'_> {
 
     /// How many ticks there are in the period.
     fn ticks(&self) -> usize {
-        let within = |time: &&Duration| self.expectation.period.contains(**time);
+        let within = |tick: &&(u32, Duration)| self.expectation.period.contains(tick.1);
         self.observed.ticks.iter().filter(within).count()
     }
 
-    /// The first value where there should be none, or the one of the last tick at or before a time.
+    /// The last tick of each segment at or before a time.
+    fn last_ticks(&self, at: Duration) -> BTreeMap<u32, Duration> {
+        let by_then = self.observed.ticks.iter().filter(|tick| tick.1 <= at);
+        by_then.copied().collect()
+    }
+
+    /// The first value where there should be none, or at the last tick of any segment at or before a time.
     fn nothing(&self, check: &Check) -> Finding {
-        let tick = self.expectation.at.map(|at| {
-            let ticks = self.observed.ticks.iter().copied();
-            ticks.filter(|tick| *tick <= at).max()
-        });
+        let ticks = self.expectation.at.map(|at| self.last_ticks(at));
         let mut given = self.values().filter(|value| !value.2.is_nan());
-        let (value, instants) = match tick {
-            Some(tick) => (
-                given.find(|value| Some(value.1) == tick),
-                usize::from(tick.is_some()),
+        let (value, instants) = match &ticks {
+            Some(ticks) => (
+                given.find(|value| ticks.get(&value.0) == Some(&value.1)),
+                ticks.len(),
             ),
             None => (given.next(), self.ticks()),
         };
@@ -339,20 +343,28 @@ impl Judge<'_> {
         }
     }
 
-    /// Every value, or the one at a time.
+    /// Every value, or the one of each segment at a time.
     fn each_value(&self, check: &Check, wanted: Wanted) -> Finding {
         if let Some(at) = self.expectation.at {
-            let last = self.values().rfind(|(_, time, _)| *time <= at);
-            let found = last.filter(|value| !value.2.is_nan());
+            let by_then = self.values().filter(|value| value.1 <= at);
+            let last: BTreeMap<u32, _> = by_then.map(|value| (value.0, value)).collect();
+            let of_segments = self.last_ticks(at).into_keys();
+            let found = of_segments.map(|segment| {
+                let value = last.get(&segment).filter(|value| !value.2.is_nan())?;
+                Some((value.1, value.2))
+            });
+            let found: Vec<_> = found.collect();
+            let off = found.iter().flatten().find(|value| !wanted.admits(value.1));
+            // A segment without a value is told before one with a wrong one.
+            let lacks = found.contains(&None);
+            let shown = off.or_else(|| found.last()?.as_ref()).filter(|_| !lacks);
             return Finding {
-                first: found
-                    .filter(|value| !wanted.admits(value.2))
-                    .map(|value| (value.1, value.2)),
+                first: off.filter(|_| !lacks).copied(),
                 ..self.finding(
                     check,
-                    found.map(|value| value.2),
+                    shown.map(|value| value.1),
                     wanted,
-                    found.iter().count(),
+                    found.iter().flatten().count(),
                 )
             };
         }

@@ -14,8 +14,8 @@ pub(super) struct Observed {
     watch: Watch,
     /// When each truth of the watch was measured.
     truth_times: Vec<Vec<Duration>>,
-    /// The ticks.
-    pub(super) ticks: Vec<Duration>,
+    /// The ticks: segment and time.
+    pub(super) ticks: Vec<(u32, Duration)>,
     /// What the slots under test were given, be it nothing: segment, time and value.
     values: BTreeMap<usize, Vec<(u32, Duration, f64)>>,
     segment: u32,
@@ -47,7 +47,7 @@ impl Observed {
             return;
         };
         let time = now - *self.first.get_or_insert(now);
-        self.ticks.push(time);
+        self.ticks.push((self.segment, time));
         for (times, truth) in self.truth_times.iter_mut().zip(&self.watch.truths) {
             if times.len() < truth.values.len() {
                 times.push(time);

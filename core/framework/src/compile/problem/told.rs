@@ -1,9 +1,10 @@
 //! How each mistake in what a graph means is told; which there are stands above.
 
+use std::cmp::Ordering;
+
 use super::CompileProblem;
 use crate::compile::provenance::smallest_lag;
 use crate::diagnostic::{Names, Problem, Severity, nearest};
-use crate::time::Duration;
 
 fn names<I>(known: I) -> String
 where
@@ -365,7 +366,13 @@ impl Problem for CompileProblem {
             Self::KindTwice { .. } => {
                 "leave one of the crates out when the program is built".to_owned()
             }
-            Self::UnknownNode { node, known } => or_one_of(node, known, "the graph has"),
+            Self::UnknownNode { node, known } => match node.split_once('[') {
+                Some((owner, member)) if known.contains(owner) => format!(
+                    "a channel stands after a dot: `{owner}.{}`",
+                    member.trim_end_matches(']')
+                ),
+                _ => or_one_of(node, known, "the graph has"),
+            },
             Self::RemovedNode { .. } => "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`".to_owned(),
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
             Self::UnknownChannel {
@@ -404,15 +411,21 @@ impl Problem for CompileProblem {
             Self::Leak {
                 lag,
                 span,
+                late,
                 ahead,
                 path,
                 ..
             } => {
-                let smallest = smallest_lag(*span, *ahead);
-                let smallest = if *span == Duration::ZERO && *ahead == Duration::ZERO {
-                    "one sample".to_owned()
+                let smallest = smallest_lag(*late + *span, *ahead);
+                let smallest = match (span.is_zero(), late.cmp(ahead)) {
+                    (true, Ordering::Equal) => "one sample".to_owned(),
+                    (true, Ordering::Greater) => format!("one sample more than {smallest}"),
+                    _ => smallest.to_string(),
+                };
+                let is_late = if late.is_zero() {
+                    String::new()
                 } else {
-                    smallest.to_string()
+                    format!(", is {late} late")
                 };
                 let way = if path.is_empty() {
                     String::new()
@@ -420,7 +433,7 @@ impl Problem for CompileProblem {
                     format!("it is made of what the truth is made of: {}; ", names_in_order(path))
                 };
                 format!(
-                    "{way}the truth summarises {span} and is predicted {ahead} ahead, so the smallest lag allowed is \
+                    "{way}the truth summarises {span}{is_late} and is predicted {ahead} ahead, so the smallest lag allowed is \
                      {smallest} (here it is {lag})"
                 )
             }
