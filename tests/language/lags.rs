@@ -133,9 +133,9 @@ fn persistence_of_a_slope_is_the_one_at_the_smallest_lag_that_shares_nothing() {
     check_persistence("10min", 0.0);
 }
 
-/// A spike filter gives nothing at 40 s for the room. Nodes that look back hear of it, whether the chuck has a sample there or not.
+/// A spike filter gives nothing at 40 s for the room. Nodes behind it hear of it, whether the chuck has a sample there or not.
 #[test]
-fn looking_back_at_a_channel_does_not_depend_on_whether_another_is_fresh() {
+fn what_becomes_of_a_channel_does_not_depend_on_whether_another_is_fresh() {
     let text = format!(
         r#"{SAMPLES}
 [nodes.calm]
@@ -154,10 +154,25 @@ inputs.signal = "calm"
 type = "difference"
 inputs.signal = "calm"
 over = "10s"
+[nodes.scaled]
+type = "scale"
+inputs.signal = "calm"
+factor = 2.0
+[nodes.kept]
+type = "minimum_difference"
+inputs.signal = "calm"
+difference = "1 nK"
+[nodes.again]
+type = "hampel"
+inputs.signal = "calm"
+window = "2min"
 [outputs]
 past = "past"
 step = "step"
 over = "over"
+scaled = "scaled"
+kept = "kept"
+again = "again"
 "#
     );
     for beside in [false, true] {
@@ -173,6 +188,11 @@ over = "over"
                 let expected = bench.ran(channel) && !bench.value(channel).is_nan();
                 let at = format!("{channel} at {now}, beside {beside}");
                 assert_eq!(expected, ![0, 4, 5].contains(&tick), "{at}");
+            }
+            for channel in ["scaled.room", "kept.room", "again.room"] {
+                let at = format!("{channel} at {now}, beside {beside}");
+                assert!(bench.ran(channel), "{at}");
+                assert_eq!(bench.value(channel).is_nan(), tick == 4, "{at}");
             }
         }
     }

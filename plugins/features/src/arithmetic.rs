@@ -1,6 +1,6 @@
 //! Channels computed from channels at the same instant: sums, products, scalings, differences in time.
 
-use athermal_core::channel::Channel;
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach, Tick,
 };
@@ -284,6 +284,11 @@ impl Feature for Scale {
         }
     }
 
+    fn every_tick(&self) -> bool {
+        // A run of the producer that gave nothing is no new value, and still ends the hold of the one before.
+        true
+    }
+
     fn reach(&self, _port: &str) -> Reach {
         Reach::Own
     }
@@ -305,9 +310,15 @@ impl Operator for Scaling {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let inputs = tick.port(0).iter().zip(tick.stamps(0)).zip(&self.lines);
         for (i, ((&value, &stamp), (gain, offset))) in inputs.enumerate() {
-            if !value.is_nan() {
-                outputs.set_stamped(i, gain * value + offset, stamp);
+            if is_unchanged(value) {
+                continue;
             }
+            let scaled = if value.is_nan() {
+                ABSENT
+            } else {
+                gain * value + offset
+            };
+            outputs.set_stamped(i, scaled, stamp);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::channel::{ABSENT, Channel};
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
     Restored, State, Tick,
@@ -168,6 +168,11 @@ impl Feature for Hampel {
         self.window
     }
 
+    fn every_tick(&self) -> bool {
+        // A run of the producer that gave nothing is no new value, and still ends the hold of the one before.
+        true
+    }
+
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let channel = |channel: &Channel| Watched {
             floor: self.floor(channel).unwrap_or(ABSENT),
@@ -218,11 +223,14 @@ impl Watched {
 impl Operator for Judging {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let count = self.channels.len();
-        for (i, (channel, &value)) in self.channels.iter_mut().zip(tick.port(0)).enumerate() {
-            if value.is_nan() {
+        let samples = tick.port(0).iter().zip(tick.stamps(0));
+        for (i, (channel, (&value, &stamp))) in self.channels.iter_mut().zip(samples).enumerate() {
+            if is_unchanged(value) {
                 continue;
             }
-            let (passed, outlier) = if value.abs() >= LIMIT {
+            let (passed, outlier) = if value.is_nan() {
+                (ABSENT, ABSENT)
+            } else if value.abs() >= LIMIT {
                 (ABSENT, 1.0)
             } else {
                 channel.take(tick.now, value, self.spec.window);
@@ -233,8 +241,8 @@ impl Operator for Judging {
                     (Some((true, median)), Replacement::Median) => (median, 1.0),
                 }
             };
-            outputs.set_stamped(i, passed, tick.now);
-            outputs.set_stamped(count + i, outlier, tick.now);
+            outputs.set_stamped(i, passed, stamp);
+            outputs.set_stamped(count + i, outlier, stamp);
         }
     }
 

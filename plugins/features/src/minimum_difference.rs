@@ -1,6 +1,6 @@
 //! Values that change only by what counts.
 
-use athermal_core::channel::Channel;
+use athermal_core::channel::{ABSENT, Channel, is_unchanged};
 use athermal_core::node::{
     Feature, InputPort, Inputs, Mistake, Operator, OutputPort, Outputs, PortSummary, Reach,
     Restored, State, Tick,
@@ -79,6 +79,11 @@ impl Feature for MinimumDifference {
         Reach::Own
     }
 
+    fn every_tick(&self) -> bool {
+        // A run of the producer that gave nothing is no new value, and still ends the hold of the one before.
+        true
+    }
+
     fn build(&self, inputs: &Inputs, _wanted: &[bool]) -> Box<dyn Operator> {
         let channels = inputs.port("signal");
         let least = |channel| self.least(channel).unwrap_or(0.0);
@@ -98,7 +103,11 @@ impl Operator for Keeping {
     fn step(&mut self, tick: &Tick<'_>, outputs: &mut Outputs<'_>) {
         let samples = tick.port(0).iter().zip(tick.stamps(0));
         for (nth, (&value, &stamp)) in samples.enumerate() {
+            if is_unchanged(value) {
+                continue;
+            }
             if value.is_nan() {
+                outputs.set_stamped(nth, ABSENT, stamp);
                 continue;
             }
             let kept = match self.kept[nth] {
