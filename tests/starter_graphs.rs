@@ -433,3 +433,27 @@ fn a_log_in_long_format_is_told_to_be_that() {
         "{told}"
     );
 }
+
+#[test]
+fn of_columns_in_several_units_the_drift_is_told_in_a_unit_of_its_own_size() {
+    let folder = Folder::new("starter-mixed-units");
+    let row = |nth: u32| {
+        let time = f64::from(10 * nth);
+        let drift = 80.0 * (time / 700.0).sin();
+        let plate = 20.0 + 0.5 * (time / 700.0).cos();
+        format!(
+            "{time},{plate:.4},{:.6},{:.2}\n",
+            drift / 1000.0,
+            1.3 * drift
+        )
+    };
+    let rows: String = (0..2000).map(row).collect();
+    let log = format!("time_s,plate_degC,X_um,Z_nm\n{rows}");
+    folder.started("mix.csv", &log);
+    let text = folder.graph("mix.csv");
+    assert!(text.contains("unit = \"nm/min\""), "{text}");
+    let limit = text.split("below = \"").nth(1).unwrap();
+    let limit: f64 = limit.split(' ').next().unwrap().parse().unwrap();
+    // The steeper of the two moves by 1.3 · 80 nm · 60 s / 700 s at most.
+    assert!((8.0..=9.0).contains(&limit), "{limit}");
+}

@@ -8,6 +8,7 @@ mod group;
 mod name;
 mod own_times;
 mod placeholder;
+mod range;
 mod spacing;
 mod survey;
 mod text;

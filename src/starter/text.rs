@@ -8,12 +8,10 @@ use athermal::core::unit::Unit;
 use super::clock::Clock;
 use super::column::{Column, Kind};
 use super::group::{Group, groups};
+use super::range;
 use super::survey::Survey;
 use super::window::{Choice, ENOUGH};
 use crate::figures::{count, number};
-
-/// By how much a machine may be warmer or colder than in its log, in K: less than what a broken wire or a full scale seems to be.
-const PLAUSIBLE_K: f64 = 100.0;
 
 /// The text of the graph.
 pub fn graph(
@@ -212,7 +210,8 @@ impl Writer<'_> {
             );
             let members = group.columns.iter();
             let nothing = members.filter_map(|&index| self.survey.series[index].placeholder);
-            text.push_str(&range(&group.unit, low, high, &nothing.collect::<Vec<_>>()));
+            let nothing: Vec<f64> = nothing.collect();
+            text.push_str(&range::line(&group.unit, (low, high), &nothing));
         }
     }
 
@@ -303,7 +302,7 @@ impl Writer<'_> {
         else {
             return "1/min".to_owned();
         };
-        let spread = self.choice.spread.iter().copied().fold(0.0, f64::max);
+        let spread = self.largest(&self.choice.spread);
         let difference = unit.difference();
         let smaller = match difference.text() {
             "m" | "mm" | "um" | "[in_i]" | "[mil_i]" | "10*-6.[in_i]" => {
@@ -354,7 +353,7 @@ impl Writer<'_> {
             },
             self.clock.length(2.0 * self.choice.drift_s)
         );
-        let limit = self.choice.extreme.iter().copied().fold(0.0, f64::max);
+        let limit = self.largest(&self.choice.extreme);
         let limit = self.in_drift_unit(limit);
         let unit = self.drift_unit();
         let selection = "selection = { method = \"forward\", folds = 3, tolerance = 1e-3 }";
@@ -389,6 +388,22 @@ impl Writer<'_> {
         );
     }
 
+    /// The largest of what was measured of each drifting column, in the unit of the first drifting signal.
+    fn largest(&self, measured: &[f64]) -> f64 {
+        let unit = |name: &str| Unit::parse(name).ok().map(|unit| unit.difference());
+        let first = self.drifting.first().and_then(|group| unit(&group.unit));
+        let columns = self.columns.iter();
+        let drifting = columns.filter(|column| column.kind == Kind::Drifting);
+        let in_first = drifting.zip(measured).filter_map(|(column, value)| {
+            let factor = match (unit(&column.unit), &first) {
+                (Some(own), Some(first)) => own.factor_to(first)?,
+                _ => 1.0,
+            };
+            Some(factor * value)
+        });
+        in_first.fold(0.0, f64::max)
+    }
+
     /// A drift per second of the first drifting signal, in the unit of the drift node.
     fn in_drift_unit(&self, per_s: f64) -> f64 {
         let factor = || {
@@ -398,43 +413,6 @@ impl Writer<'_> {
         };
         per_s * factor().unwrap_or(1.0)
     }
-}
-
-/// A range in which temperatures can be, as these have been; of other quantities it is only proposed, unless it leaves out what
-/// stands for `nothing`.
-fn range(unit: &str, low: f64, high: f64, nothing: &[f64]) -> String {
-    let half = (high - low) / 2.0;
-    let per_kelvin = Unit::parse(unit).ok();
-    let per_kelvin = per_kelvin.and_then(|unit| Unit::kelvin().factor_to(&unit));
-    let seen = format!("seen: {} to {}", number(low), number(high));
-    match per_kelvin {
-        Some(factor) => {
-            let margin = half.max(PLAUSIBLE_K * factor);
-            let (from, to) = ((low - margin).floor(), (high + margin).ceil());
-            format!(
-                "range = [\"{from} {unit}\", \"{to} {unit}\"]  # {seen}; a value outside is a fault, and left out\n"
-            )
-        }
-        None if let Some(margin) = margin(low, high, nothing) => format!(
-            "range = [\"{} {unit}\", \"{} {unit}\"]  # {seen}; {} stands for no value, and is left out\n",
-            number(low - margin),
-            number(high + margin),
-            number(nothing[0])
-        ),
-        None => {
-            let (from, to) = (number(low - half), number(high + half));
-            format!(
-                "# range = [\"{from} {unit}\", \"{to} {unit}\"]  # {seen}; a value outside would be left out\n"
-            )
-        }
-    }
-}
-
-/// How far beyond its ends a range may reach that leaves out what stands for nothing; none where that lies between them.
-fn margin(low: f64, high: f64, nothing: &[f64]) -> Option<f64> {
-    let away = nothing.iter().map(|of| (low - of).max(of - high));
-    let nearest = away.reduce(f64::min).filter(|away| *away > 0.0)?;
-    Some((10.0 * (high - low)).min(0.5 * nearest))
 }
 
 /// What stands in a line, and a comment beside it.

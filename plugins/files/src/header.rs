@@ -98,7 +98,9 @@ fn delimiter_named(line: &[u8]) -> Option<u8> {
         [key @ .., _, b'\r', b'\n'] | [key @ .., _, b'\n' | b'"'] | [key @ .., _]
             if key.eq_ignore_ascii_case(DELIMITER_KEY.as_bytes()) =>
         {
-            line.get(key.len()).copied()
+            // A line that ends there names none.
+            let named = line.get(key.len()).copied();
+            named.filter(|delimiter| !matches!(delimiter, b'\r' | b'\n'))
         }
         _ => None,
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::aside::write_aside;
 use super::super::data::content_of;
-use crate::invocation::program;
+use crate::invocation::{program, quoted};
 use crate::terminal::Failure;
 
 /// The file that says which files the demo has written, and with which content.
@@ -44,11 +44,13 @@ impl Folder {
                 } else {
                     "is not the demo's"
                 };
+                // Without the `/` that it may end with.
+                let bare: PathBuf = path.components().collect();
                 return Err(Failure::Request(format!(
-                    "{} {what} and is left alone; name another folder: {} demo {}-2",
+                    "{} {what} and is left alone; name another folder: {} demo {}",
                     there.display(),
                     program(),
-                    path.display()
+                    quoted(&format!("{}-2", bare.display()))
                 )));
             }
         }
@@ -92,6 +94,21 @@ mod tests {
         let path = std::env::temp_dir().join(format!("athermal-{}-{name}", std::process::id()));
         let _ = std::fs::remove_dir_all(&path);
         path
+    }
+
+    #[test]
+    fn another_folder_is_named_so_that_the_command_can_be_typed() {
+        let path = fresh("my demo/");
+        std::fs::create_dir_all(&path).unwrap();
+        std::fs::write(path.join("a"), "mine").unwrap();
+        let refused = Folder::open(&path, &["a"]);
+        let bare = path.display().to_string();
+        let advice = format!("demo '{}-2'", bare.trim_end_matches('/'));
+        assert!(
+            matches!(&refused, Err(Failure::Request(text)) if text.ends_with(&advice)),
+            "{refused:?}"
+        );
+        std::fs::remove_dir_all(&path).unwrap();
     }
 
     #[test]

@@ -392,6 +392,7 @@ fn a_row_with_a_text_that_is_a_name_too_is_no_header() {
 fn what_stands_above_the_names_is_passed_over() {
     for above in [
         "sep=,\n",
+        "sep=\n",
         "\"sep=,\"\r\n",
         "Logger 3000\nSerial,12345\n\n",
         "t,12:00\na,5\n",
