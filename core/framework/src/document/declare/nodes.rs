@@ -91,48 +91,53 @@ fn node(
         };
         named.check(&entry.value, diagnostics);
     }
-    let inputs = match keys.get("inputs") {
-        Some(value) => inputs(value, &what, sample, diagnostics),
-        None => Vec::new(),
+    let mut template = Template {
+        inputs: match keys.get("inputs") {
+            Some(value) => inputs(value, &what, sample, diagnostics),
+            None => Vec::new(),
+        },
+        parameters: Value::new(
+            entry.value.place,
+            Data::Table(own_parameters(keys, type_key)),
+        ),
+        sample,
     };
-    let mut parameters = Value::new(
-        entry.value.place,
-        Data::Table(own_parameters(keys, type_key)),
-    );
-    convert_samples(&mut parameters, sample, diagnostics);
+    convert_samples(&mut template.parameters, sample, diagnostics);
     let members = if own.sound {
-        let count = inputs.len();
-        room_for(name, entry, &each, &parameters, count, total, diagnostics)
+        let (parameters, count) = (&template.parameters, template.inputs.len());
+        room_for(name, entry, &each, parameters, count, total, diagnostics)
     } else {
         None
     };
-    let faulty = (members.is_none() || diagnostics.reported() > before).then(|| {
+    let is_expanded = members.is_some();
+    let mut instances = Vec::new();
+    for member in members.into_iter().flatten() {
+        let (inputs, parameters) = template.of_member(name, &member, diagnostics);
+        instances.push(InstanceDecl {
+            inputs,
+            parameters,
+            scopes: scopes(placed, &member),
+            member: (!each.is_empty()).then_some(member.name),
+        });
+    }
+    let faulty = (!is_expanded || diagnostics.reported() > before).then(|| {
         let mut open = Vec::new();
-        open_texts(&parameters, &mut open);
+        open_texts(&template.parameters, &mut open);
         Faulty { open }
     });
-    let inputs_of = |pairs: &[(&str, &str)]| {
-        let inputs = inputs.iter().map(|input| filled_input(input, pairs));
-        inputs.collect()
-    };
-    let instances = match members {
-        Some(members) => members
-            .into_iter()
-            .map(|member| InstanceDecl {
-                inputs: inputs_of(&member.pairs),
-                parameters: filled(&parameters, &member.pairs),
-                scopes: scopes(placed, &member),
-                member: (!each.is_empty()).then_some(member.name),
-            })
-            .collect(),
+    if !is_expanded {
         // Without its members, a node is looked through as if it had none.
-        None => vec![InstanceDecl {
-            inputs: inputs_of(&[]),
-            parameters,
+        instances.push(InstanceDecl {
+            inputs: template
+                .inputs
+                .into_iter()
+                .map(|input| input.decl)
+                .collect(),
+            parameters: template.parameters,
             scopes: Vec::new(),
             member: None,
-        }],
-    };
+        });
+    }
     let each = around
         .iter()
         .flat_map(|around| &around.each)
@@ -226,12 +231,62 @@ impl Named<'_> {
     }
 }
 
+/// What a node says for all of its members.
+struct Template {
+    inputs: Vec<Input>,
+    parameters: Value,
+    sample: Option<Duration>,
+}
+
+/// An input, before it is known for which member.
+struct Input {
+    decl: InputDecl,
+    /// Its maximum age, where that says something only with a member in it.
+    max_age: Option<Value>,
+}
+
+impl Template {
+    /// The inputs and parameters of one member. A text may be a duration or a number of samples only with the member in it.
+    fn of_member(
+        &self,
+        node: &str,
+        member: &Member<'_>,
+        diagnostics: &mut Diagnostics,
+    ) -> (Vec<InputDecl>, Value) {
+        let mut parameters = filled(&self.parameters, &member.pairs);
+        if member.pairs.is_empty() {
+            let inputs = self.inputs.iter().map(|input| input.decl.clone());
+            return (inputs.collect(), parameters);
+        }
+        let context = format!("node `{node}`, member `{}`", member.name);
+        let outer = diagnostics.scope(Some(context));
+        // Those that stand there without a member have been converted, or told.
+        if !has_samples(&self.parameters) {
+            convert_samples(&mut parameters, self.sample, diagnostics);
+        }
+        let inputs = self.inputs.iter().map(|input| {
+            let mut decl = filled_input(&input.decl, &member.pairs);
+            let max_age = input.max_age.as_ref();
+            let max_age = max_age.map(|value| filled(value, &member.pairs));
+            // A placeholder that stands for nothing has been told.
+            if let Some(value) = max_age.filter(|value| !has_placeholders(value)) {
+                let length = length(&value, "max_age", self.sample, diagnostics);
+                decl.max_age = length.map(|length| (length, value.place));
+            }
+            decl
+        });
+        let inputs = inputs.collect();
+        diagnostics.scope(outer);
+        (inputs, parameters)
+    }
+}
+
 fn inputs(
     value: &Value,
     what: &str,
     sample: Option<Duration>,
     diagnostics: &mut Diagnostics,
-) -> Vec<InputDecl> {
+) -> Vec<Input> {
     let Some(ports) = table(value, "inputs", diagnostics) else {
         return Vec::new();
     };
@@ -248,15 +303,13 @@ fn input(
     what: &str,
     sample: Option<Duration>,
     diagnostics: &mut Diagnostics,
-) -> InputDecl {
+) -> Input {
     let input = format!("input \"{port}\" of {what}");
     let (from, max_age) = match &entry.value.data {
         Data::Table(keys) => {
             let known = ["from", "max_age"];
             known_keys(keys, &known, &input, diagnostics);
-            let max_age = meant(keys, "max_age", &known).and_then(|value| {
-                Some((length(value, "max_age", sample, diagnostics)?, value.place))
-            });
+            let max_age = meant(keys, "max_age", &known);
             let from = meant(keys, "from", &known);
             if from.is_none() {
                 let advice = "name what it reads, e.g. from = \"gradients\"";
@@ -267,11 +320,20 @@ fn input(
         _ => (Some(&entry.value), None),
     };
     let references = from.and_then(|from| one_or_more(from, port, &input, diagnostics));
-    InputDecl {
-        port: port.to_owned(),
-        place: entry.key,
-        references: references.unwrap_or_default(),
-        max_age,
+    let (open, closed) = match max_age {
+        Some(value) if has_placeholders(value) => (Some(value.clone()), None),
+        closed => (None, closed),
+    };
+    let closed = closed
+        .and_then(|value| Some((length(value, "max_age", sample, diagnostics)?, value.place)));
+    Input {
+        decl: InputDecl {
+            port: port.to_owned(),
+            place: entry.key,
+            references: references.unwrap_or_default(),
+            max_age: closed,
+        },
+        max_age: open,
     }
 }
 

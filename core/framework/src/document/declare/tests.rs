@@ -100,6 +100,23 @@ fn samples_become_durations_wherever_they_stand() {
 }
 
 #[test]
+fn a_member_may_be_a_number_of_samples_or_of_minutes() {
+    let graph = graph(
+        "[sets]\nn = [\"1\", \"2\"]\n[time]\nstep = \"10s\"\n[signals.p]\nunit = \"nm\"\nchannels = [\"a\"]\n\
+         [nodes.x]\ntype = \"x\"\neach = \"n\"\ninputs.y = { from = \"p\", max_age = \"{n} samples\" }\n\
+         inputs.z = { from = \"p\", max_age = \"{n}min\" }\nlags = [\"{n} samples\", \"1 sample\"]",
+    );
+    let seconds = |number: i64| Duration::from_ns(number * SECOND);
+    for (nth, instance) in (1..).zip(&graph.nodes[0].instances) {
+        let lags = serde_json::json!({ "lags": [seconds(10 * nth), seconds(10)] });
+        assert_eq!(instance.parameters.to_json(), lags);
+        let ages = instance.inputs.iter().map(|input| input.max_age);
+        let ages: Vec<_> = ages.map(|age| age.map(|(age, _)| age)).collect();
+        assert_eq!(ages, [Some(seconds(10 * nth)), Some(seconds(60 * nth))]);
+    }
+}
+
+#[test]
 fn two_sets_make_their_product_the_first_slowest() {
     let graph = graph(
         "[sets]\nside = [\"1\", \"2\"]\naxis = [\"X\", \"Y\"]\n[nodes.n]\ntype = \"x\"\neach = [\"side\", \"axis\"]\n\

@@ -374,6 +374,43 @@ error[A020]: "1 sample" counts samples, and the time of this graph does not
 }
 
 #[test]
+fn a_number_of_samples_that_a_member_makes_is_told_once_for_all_members() {
+    let files = [(
+        "a.toml",
+        r#"schema = 1
+[sets]
+n = ["1", "2"]
+[nodes.late]
+type = "lag"
+each = "n"
+by = ["{n} samples"]
+inputs.x = { from = "y", max_age = "{n}" }
+"#,
+    )];
+    assert_eq!(
+        rendered(&files),
+        r#"
+error[A020]: "1 samples" counts samples, and the time of this graph does not
+ --> a.toml:7:7
+  |
+7 | by = ["{n} samples"]
+  |       ^^^^^^^^^^^^^
+  |
+  = note: node `late`, member `1`, and 1 more member
+  = help: write a duration like "5min", or count samples: `[time] unit = "sample"`
+
+error[A018]: the number 1 needs a unit of time, e.g. "1s"; the units are ns, us, ms, s, min (or m), h and d
+ --> a.toml:8:36
+  |
+8 | inputs.x = { from = "y", max_age = "{n}" }
+  |                                    ^^^^^ not a duration
+  |
+  = note: node `late`, member `1`, and 1 more member
+"#
+    );
+}
+
+#[test]
 fn several_channels_need_several_columns() {
     let files = [(
         "a.toml",
