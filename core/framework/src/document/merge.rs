@@ -31,31 +31,41 @@ pub(super) fn merge(
 
 /// The nodes of a module merge as those of a graph do.
 fn merge_modules(merged: &mut Table, key: String, entry: Entry, diagnostics: &mut Diagnostics) {
-    let (Some(Data::Table(below)), Data::Table(above)) = (
-        merged.get_mut(&key).map(|value| &mut value.data),
-        &entry.value.data,
-    ) else {
+    let Entry {
+        key: key_place,
+        value: Value {
+            place,
+            data: Data::Table(above),
+        },
+    } = entry
+    else {
         merged.insert(key, entry);
         return;
     };
-    for (name, entry) in above.clone() {
-        let inherited = below.get(&name).and_then(Value::as_table).cloned();
-        match (inherited, entry.value.data) {
-            (Some(inherited), Data::Table(over)) => {
+    let mut below = match merged.get_mut(&key).map(|value| &mut value.data) {
+        Some(Data::Table(below)) => std::mem::take(below),
+        _ => Table::new(),
+    };
+    for (name, Entry { key, value }) in above {
+        let Value { place, data } = value;
+        let data = match data {
+            Data::Table(over) => {
+                let inherited = below.get(&name).and_then(Value::as_table).cloned();
                 // What is inside of a module has no name outside of it.
-                let laid = merge(Some(inherited), over, &mut Vec::new(), diagnostics);
-                let laid = Data::Table(laid);
-                let value = Value::new(entry.value.place, laid);
-                let key = entry.key;
-                below.insert(name, Entry { key, value });
+                let laid = merge(inherited, over, &mut Vec::new(), diagnostics);
+                Data::Table(laid)
             }
-            (_, data) => {
-                let value = Value::new(entry.value.place, data);
-                let key = entry.key;
-                below.insert(name, Entry { key, value });
-            }
-        }
+            other => other,
+        };
+        let value = Value::new(place, data);
+        below.insert(name, Entry { key, value });
     }
+    let value = Value::new(place, Data::Table(below));
+    let entry = Entry {
+        key: key_place,
+        value,
+    };
+    merged.insert(key, entry);
 }
 
 /// Nodes, or outputs.
@@ -131,7 +141,7 @@ fn is_another_kind(old: &Value, new: &Value) -> bool {
     })
 }
 
-pub(super) fn lay(merged: &mut Table, key: String, entry: Entry) {
+fn lay(merged: &mut Table, key: String, entry: Entry) {
     match (merged.get_mut(&key).map(|value| &mut value.data), entry) {
         (
             Some(Data::Table(below)),

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::gaps::Gaps;
-use super::merge::{lay, merge};
+use super::merge::merge;
 use super::problem::DocumentProblem;
 use super::salvage::Lost;
 use super::toml_text;
@@ -262,27 +262,35 @@ impl Chain<'_> {
                     .report(place, DocumentProblem::SchemaUnknown { found });
             }
         }
-        let base = match table.remove("extends") {
+        let mut base = match table.remove("extends") {
             Some(entry) => self.other(&entry.value, "extends"),
             None => None,
         };
-        self.borrow_modules(&mut table);
+        let borrowed = self.borrow_modules(&mut table);
+        let inherited = base.as_mut().and_then(|base| base.get_mut("modules"));
+        if let Some(inherited) = inherited.and_then(Value::as_table_mut) {
+            // A module of another file is another one: it takes the place of the inherited one of its name, whole.
+            for name in &borrowed {
+                inherited.remove(name);
+            }
+        }
         self.diagnostics.leave_open(self.gaps.anywhere, &[]);
         Some(merge(base, table, &mut self.removed, self.diagnostics))
     }
 
-    /// Puts the modules of other files (`modules.NAME.from`) in the place of their names.
-    fn borrow_modules(&mut self, table: &mut Table) {
+    /// Puts the modules of other files (`modules.NAME.from`) in the place of their names, which it gives.
+    fn borrow_modules(&mut self, table: &mut Table) -> Vec<String> {
+        let mut borrowed = Vec::new();
         let borrows = |value: &Value| {
             let modules = value.as_table().into_iter().flat_map(Table::iter);
             let mut keys = modules.filter_map(|(_, module)| module.value.as_table());
             keys.any(|keys| keys.contains("from"))
         };
         if !table.get("modules").is_some_and(borrows) {
-            return;
+            return borrowed;
         }
         let Some(modules) = table.get_mut("modules").and_then(Value::as_table_mut) else {
-            return;
+            return borrowed;
         };
         // The modules of each file, listed once for all that are not among them.
         let mut listed: HashMap<String, Arc<Names>> = HashMap::new();
@@ -321,13 +329,15 @@ impl Chain<'_> {
             {
                 module.insert("modules", entry.clone());
             }
-            let laid_over = std::mem::replace(&mut entry.value.data, Data::Table(module));
-            if let (Data::Table(over), Some(module)) = (laid_over, entry.value.as_table_mut()) {
-                for (key, entry) in over {
-                    lay(module, key, entry);
-                }
-            }
+            borrowed.push(name.to_owned());
+            let Some(over) = entry.value.as_table().cloned() else {
+                continue;
+            };
+            // What is inside of a module has no name outside of it.
+            let laid = merge(Some(module), over, &mut Vec::new(), self.diagnostics);
+            entry.value.data = Data::Table(laid);
         }
+        borrowed
     }
 
     fn lender(&mut self, from: &Value) -> Option<Table> {

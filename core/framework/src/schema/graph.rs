@@ -329,19 +329,26 @@ fn module(kinds: &[&str]) -> Value {
                 "description": "What it gives: a node inside, or a port of one. The first is the default.",
                 "type": "object",
                 "propertyNames": names_of("An output's name."),
-                "additionalProperties": { "type": "string", "minLength": 1 }
+                "additionalProperties": {
+                    "description": "A node inside, or a port of one; or `false` for one that is inherited.",
+                    "anyOf": [{ "type": "string", "minLength": 1 }, { "const": false }]
+                }
             },
             "nodes": {
                 "description": "Its nodes.",
                 "type": "object",
                 "propertyNames": names_of("A node's name."),
                 "additionalProperties": {
-                    "type": "object",
-                    "properties": {
-                        "type": { "description": "The kind of node.", "anyOf": [{ "enum": kinds }, { "type": "string", "pattern": "\\{" }] },
-                        "module": { "description": "The module that the node is an instance of, in place of `type`.", "type": "string" },
-                        "inputs": { "description": "What the node reads.", "type": "object" }
-                    }
+                    "description": "A node; or `false` for one that is inherited.",
+                    "if": { "type": "object" },
+                    "then": {
+                        "properties": {
+                            "type": { "description": "The kind of node.", "anyOf": [{ "enum": kinds }, { "type": "string", "pattern": "\\{" }] },
+                            "module": { "description": "The module that the node is an instance of, in place of `type`.", "type": "string" },
+                            "inputs": { "description": "What the node reads.", "type": "object" }
+                        }
+                    },
+                    "else": { "const": false }
                 }
             },
             "modules": {

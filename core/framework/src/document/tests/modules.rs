@@ -168,6 +168,76 @@ fn an_extending_file_changes_the_nodes_of_a_module() {
     );
 }
 
+/// The nodes of an instance of the module that [`LENT`] lends, each with its parameters.
+fn changed(over: &str) -> Vec<(String, String)> {
+    let graph = format!(
+        "schema = 1\n[modules.axis]\nfrom = \"lib.toml\"\n{over}\n[nodes.n]\nmodule = \"axis\"\n"
+    );
+    let files = [("a.toml", graph.as_str()), ("lib.toml", LENT)];
+    let Outcome {
+        graph,
+        sources,
+        diagnostics,
+    } = read(&files);
+    let whole = graph.filter(|_| !diagnostics.has_errors());
+    let graph = whole.unwrap_or_else(|| panic!("{}", diagnostics.render(&sources, false, 120)));
+    let nodes = graph.nodes.iter().map(|node| {
+        let parameters = node.instances[0].parameters.to_json().to_string();
+        (node.name.clone(), parameters)
+    });
+    nodes.collect()
+}
+
+const LENT: &str = r#"
+schema = 1
+[modules.axis]
+outputs = { a = "a", b = "b" }
+nodes.a = { type = "x", p = 1, q = 1 }
+nodes.b = { type = "y", p = 1 }
+"#;
+
+#[test]
+fn what_is_laid_over_a_module_of_another_file_merges_as_extends_does() {
+    let node = |name: &str, parameters: &str| (name.to_owned(), parameters.to_owned());
+    assert_eq!(
+        changed("nodes.b = false\noutputs.b = false"),
+        [node("n/a", r#"{"p":1,"q":1}"#)]
+    );
+    assert_eq!(
+        changed("nodes.a = { type = \"z\", r = 2 }\nnodes.b.p = 2"),
+        [node("n/a", r#"{"r":2}"#), node("n/b", r#"{"p":2}"#)]
+    );
+}
+
+#[test]
+fn a_node_that_a_module_lacks_is_not_removed_from_it() {
+    for (over, removed) in [
+        ("from = \"lib.toml\"\nnodes.c = false", "c"),
+        ("nodes.a.type = \"x\"\nnodes.d = false", "d"),
+    ] {
+        let graph = format!("schema = 1\n[modules.axis]\n{over}\n");
+        let told = rendered(&[("a.toml", &graph), ("lib.toml", LENT)]);
+        let expected = format!("error[A019]: there is no inherited node \"{removed}\" to remove");
+        assert!(told.contains(&expected), "{told}");
+        assert_eq!(told.matches("error[").count(), 1, "{told}");
+    }
+}
+
+#[test]
+fn a_module_from_a_file_replaces_an_inherited_one_of_its_name() {
+    let base = "schema = 1\n[modules.axis]\nparameters.old = 1\nnodes.before = { type = \"x\" }\n[nodes.n]\nmodule = \"axis\"\n";
+    let over = "schema = 1\nextends = \"base.toml\"\nmodules.axis = { from = \"lib.toml\", nodes.b = false, outputs.b = false }";
+    let files = [("a.toml", over), ("base.toml", base), ("lib.toml", LENT)];
+    let Outcome { graph, .. } = read(&files);
+    let graph = graph.expect("the files have no mistake");
+    let names: Vec<_> = graph.nodes.iter().map(|node| node.name.as_str()).collect();
+    assert_eq!(names, ["n/a"]);
+    assert_eq!(
+        graph.tree.to_json()["modules"]["axis"]["parameters"],
+        serde_json::Value::Null
+    );
+}
+
 #[test]
 fn values_that_each_module_repeats_are_weighed_before_they_are_made() {
     for (given, repeated) in [
