@@ -131,3 +131,76 @@ fn what_an_instance_lacks_or_has_too_much_is_told() {
     // What is misspelt is not missing as well.
     assert_eq!(told.matches("error[").count(), 3, "{told}");
 }
+
+#[test]
+fn an_output_of_a_module_names_a_port_that_there_is_whether_the_module_is_used_or_not() {
+    let module = r#"
+schema = 1
+[signals.position]
+unit = "nm"
+channels = ["Z"]
+max_age = "3min"
+[nodes.drift]
+type = "slope"
+inputs.signal = "position"
+windows = ["5min"]
+[outputs]
+drift = "drift"
+[modules.inner]
+inputs = ["truth"]
+outputs = { predicted = "zero" }
+nodes.zero = { type = "zero", inputs.truth = "{truth}", ahead = "5min" }
+[modules.none]
+nodes.zero = { type = "zero", inputs.truth = "drift", ahead = "5min" }
+[modules.outer]
+inputs = ["truth"]
+required = ["kind"]
+outputs = { OUTPUT }
+nodes.inner = { module = "inner", inputs.truth = "{truth}" }
+nodes.none = { module = "none" }
+nodes.vote = { type = "auto_weighted", inputs.voters = ["inner"], inputs.truth = "{truth}", memory = "15min" }
+nodes.slope = { type = "slope", inputs.signal = "{truth}", windows = ["5min"] }
+nodes.any = { type = "{kind}", inputs.truth = "{truth}" }
+"#;
+    let told = |output: &str| {
+        let text = module.replace("OUTPUT", &format!("w = \"{output}\""));
+        compiled(&text).1
+    };
+    for (output, expected) in [
+        (
+            "vote:nothing",
+            "error[A043]: \"vote\" has no output port \"nothing\"",
+        ),
+        (
+            "slope:slop",
+            "error[A043]: \"slope\" has no output port \"slop\"",
+        ),
+        (
+            "vote:",
+            "no output port of \"vote\" stands behind the colon",
+        ),
+        ("any:", "no output port of \"any\" stands behind the colon"),
+        (
+            "inner:predictd",
+            "error[A028]: \"inner\" has no output \"predictd\"",
+        ),
+        ("inner:", "error[A028]: \"inner\" has no output \"\""),
+        ("none", "error[A028]: module \"none\" has no outputs"),
+    ] {
+        let told = told(output);
+        assert!(told.contains(expected), "{expected}\n{told}");
+        assert_eq!(told.matches("error[").count(), 1, "{told}");
+    }
+    for output in [
+        "vote",
+        "vote:weights",
+        "vote:deviation",
+        "slope:stderr",
+        "any:what",
+        "inner",
+        "inner:predicted",
+    ] {
+        let told = told(output);
+        assert!(!told.contains("error["), "{output}\n{told}");
+    }
+}

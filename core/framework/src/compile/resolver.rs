@@ -21,7 +21,7 @@ use super::{Wanted, steps};
 use crate::channel::Channel;
 use crate::diagnostic::{Diagnostics, Place};
 use crate::document::GraphFile;
-use crate::node::{Kind, Mistake, OutputPort, Role};
+use crate::node::{Kind, Mistake, OutputPort, Role, RoleName};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -292,6 +292,11 @@ impl<'g> Resolver<'g> {
         let mut behind = behind.into_iter();
         let mut whole = true;
         for port in ports {
+            debug_assert!(
+                instance.kind.role == RoleName::Feature
+                    || instance.kind.outputs().contains(&port.name),
+                "the ports of estimators and combiners are those that are told of them"
+            );
             let first = self.channels.len();
             let single = port.channels.len() == 1;
             for channel in port.channels {

@@ -108,6 +108,23 @@ impl Kind {
         }
     }
 
+    /// The output ports that a node of it may have; none where it does not tell them.
+    #[must_use]
+    pub fn outputs(&self) -> Vec<&'static str> {
+        match self.role {
+            RoleName::Feature => (self.ports)().iter().map(|port| port.name).collect(),
+            RoleName::Estimator => vec!["prediction", "learning", "deviation"],
+            RoleName::Combiner => vec![
+                "prediction",
+                "weights",
+                "reason",
+                "lower",
+                "upper",
+                "deviation",
+            ],
+        }
+    }
+
     /// Whom a mistake in its code is for.
     #[must_use]
     pub fn author(&self) -> String {

@@ -100,6 +100,7 @@ impl Problem for DocumentProblem {
             Self::ModuleLoop { .. } => "A026",
             Self::OutOfReach { .. } => "A027",
             Self::UnknownOutput { .. } => "A028",
+            Self::UnknownPort { .. } => "A043",
         }
     }
 
@@ -206,17 +207,25 @@ impl Problem for DocumentProblem {
             Self::OutOfReach { name, module, .. } => {
                 format!("\"{name}\" is not a node of module \"{module}\"")
             }
-            Self::UnknownOutput { output, module, .. } if output.is_empty() => {
-                format!("module \"{module}\" has no outputs")
-            }
+            Self::UnknownOutput {
+                output: None,
+                module,
+                ..
+            } => format!("module \"{module}\" has no outputs"),
             Self::UnknownOutput {
                 node,
-                output,
+                output: Some(output),
                 module,
                 ..
             } => format!(
                 "\"{node}\" has no output \"{output}\": it is an instance of module \"{module}\""
             ),
+            Self::UnknownPort { node, port, .. } if port.is_empty() => {
+                format!("no output port of \"{node}\" stands behind the colon")
+            }
+            Self::UnknownPort { node, port, .. } => {
+                format!("\"{node}\" has no output port \"{port}\"")
+            }
         }
     }
 
@@ -248,6 +257,7 @@ impl Problem for DocumentProblem {
             Self::ModuleLoop { .. } => "comes back here".to_owned(),
             Self::OutOfReach { .. } => "out of the module's reach".to_owned(),
             Self::UnknownOutput { .. } => "no such output".to_owned(),
+            Self::UnknownPort { .. } => "no such port".to_owned(),
             _ => String::new(),
         }
     }
@@ -404,10 +414,13 @@ impl Problem for DocumentProblem {
                     listed(known.iter())
                 ),
             }),
-            Self::UnknownOutput { output, known, .. } => one_of(output, known, "its outputs are")
-                .or_else(|| {
-                    Some("say which, e.g. `outputs = { predicted = \"vote\" }`".to_owned())
-                }),
+            Self::UnknownOutput { output, known, .. } => {
+                one_of(output.as_deref().unwrap_or_default(), known, "its outputs are").or_else(
+                    || Some("say which, e.g. `outputs = { predicted = \"vote\" }`".to_owned()),
+                )
+            }
+            Self::UnknownPort { node, port, known } => suggestion(port, known, "its ports are")
+                .or_else(|| Some(format!("write \"{node}\" for its first port"))),
             _ => None,
         }
     }
@@ -453,6 +466,7 @@ impl Problem for DocumentProblem {
             | Self::TimeContradiction { .. }
             | Self::NoLength { .. }
             | Self::StepNotPositive
+            | Self::UnknownPort { .. }
             | Self::ModuleLoop { .. } => false,
         }
     }

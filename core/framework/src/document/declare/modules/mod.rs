@@ -101,7 +101,7 @@ pub(super) fn expand(
     diagnostics: &mut Diagnostics,
 ) -> Expanded {
     let before = diagnostics.reported();
-    check(root.get("modules"), diagnostics);
+    check(root.get("modules"), &[], diagnostics);
     let mut expanded = Expanded {
         nodes: Vec::new(),
         outputs: root.get("outputs").cloned(),

@@ -130,7 +130,7 @@ impl Expansion<'_> {
                 let known = self.known(outputs.as_slice(), []);
                 let problem = DocumentProblem::UnknownOutput {
                     node: node.to_owned(),
-                    output: port.unwrap_or_default().to_owned(),
+                    output: port.map(str::to_owned),
                     module: module.to_owned(),
                     known,
                 };
@@ -185,7 +185,7 @@ fn tables(list: &mut Value) -> impl Iterator<Item = &mut Table> {
 }
 
 /// What an output of a module stands for.
-enum Output<'a> {
+pub(super) enum Output<'a> {
     /// A node inside, and its port where one is named.
     Found(String),
     /// There is no such output; these there are, if any.
@@ -194,7 +194,8 @@ enum Output<'a> {
     Broken,
 }
 
-fn output<'a>(
+/// What an output of a module stands for; the first where no port is named.
+pub(super) fn output<'a>(
     module: &'a str,
     port: Option<&str>,
     modules: &[&'a Table],
