@@ -557,4 +557,41 @@ expect = [{ of = "drift.Z", at = "1min10s", KEY }]
     of("slow", "fast", slow, 1);
     of("odd", "slow", "absent = true", 1);
     of("slow", "odd", "absent = true", 1);
+
+fn what_has_no_meaning_beside_a_constant_or_samples_is_a_mistake_whichever_key_it_is() {
+    let scratch = Scratch::new("trials-shapes");
+    for (shape, told) in [
+        (
+            "constant = \"1 Cel\", for = \"1min\", delay = \"10s\"",
+            "`delay` has no meaning together with `constant`",
+        ),
+        (
+            "constant = \"1 Cel\", for = \"1min\", period = \"10s\"",
+            "`period` has no meaning without `sine`",
+        ),
+        (
+            "samples = [\"1 Cel\"], delay = \"10s\"",
+            "`delay` has no meaning together with `samples`",
+        ),
+        (
+            "samples = [\"1 Cel\"], period = \"10s\"",
+            "`period` has no meaning together with `samples`",
+        ),
+        (
+            "start = \"1 Cel\", for = \"1min\", delay = \"10s\"",
+            "`delay` has no meaning without `step`",
+        ),
+    ] {
+        let tests = format!(
+            "[[tests]]\nname = \"a\"\ninputs = {{ \"temperature.room\" = {{ every = \"1s\", {shape} }} }}\n\
+             expect = [{{ of = \"temperature.room\", given_above = 0.5 }}]"
+        );
+        let file = scratch.file("graph.toml", graph(&tests));
+        let told_of_all = athermal(&[&"check", &file]).ended(2);
+        told_of_all.tells(&[told, "error[A077]"]);
+    }
+    let tests = "[[tests]]\nname = \"a\"\ninputs = { \"temperature.room\" = { every = \"1s\", for = \"1min\", ramp = \"1 K/s\", \
+                 delay = \"10s\" } }\nexpect = [{ of = \"temperature.room\", given_above = 0.5 }]";
+    let file = scratch.file("graph.toml", graph(tests));
+    athermal(&[&"check", &file]).ended(0);
 }

@@ -74,7 +74,13 @@ impl Shaping<'_> {
                 let found = format!("{} for {} samples", table.every, samples.len());
                 self.range("every", found, "at most 292 years for all of them");
             }
-            for key in given.into_iter().chain(table.length.map(|_| "for")) {
+            let others = [
+                ("period", table.period.is_some()),
+                ("delay", table.delay.is_some()),
+                ("for", table.length.is_some()),
+            ];
+            let others = others.into_iter().filter(|(_, given)| *given);
+            for key in given.into_iter().chain(others.map(|(key, _)| key)) {
                 self.keys(key, "samples", true);
             }
             let samples = samples.iter().enumerate();
@@ -84,13 +90,22 @@ impl Shaping<'_> {
                     .collect(),
             );
         }
-        if given.is_empty() && table.noise.is_none() {
+        let shapeless = given.is_empty() && table.noise.is_none();
+        if shapeless {
             self.diagnostics
                 .report(self.value.place, TrialProblem::NoShape);
         }
         if table.constant.is_some() {
             for key in given.into_iter().filter(|key| *key != "constant") {
                 self.keys(key, "constant", true);
+            }
+        }
+        if table.delay.is_some() {
+            let changes = table.step.is_some() || table.ramp.is_some() || table.sine.is_some();
+            if table.constant.is_some() {
+                self.keys("delay", "constant", true);
+            } else if !changes && !shapeless {
+                self.keys("delay", "step", false);
             }
         }
         if table.period.is_some() && table.sine.is_none() {
@@ -114,7 +129,7 @@ impl Shaping<'_> {
         Curve {
             length: table.length.unwrap_or_default(),
             start: self.point(key, start),
-            delay: table.delay,
+            delay: table.delay.unwrap_or_default(),
             step: self.difference("step", table.step.as_ref(), &difference),
             ramp: self.difference("ramp", table.ramp.as_ref(), &rate),
             amplitude: self.difference("sine", table.sine.as_ref(), &difference),
@@ -144,8 +159,8 @@ impl Shaping<'_> {
             }
             Some(_) => {}
         }
-        if table.delay < Duration::ZERO {
-            self.range("delay", table.delay.to_string(), "0 or longer");
+        if let Some(delay) = table.delay.filter(|delay| *delay < Duration::ZERO) {
+            self.range("delay", delay.to_string(), "0 or longer");
         }
         if curve.period <= Duration::ZERO {
             self.range("period", curve.period.to_string(), "longer than 0");

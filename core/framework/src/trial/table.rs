@@ -91,9 +91,8 @@ pub(super) struct InputTable {
     pub(super) sine: Option<Quantity>,
     /// The period of the sine.
     pub(super) period: Option<Duration>,
-    /// When ramp, step and sine begin.
-    #[serde(default)]
-    pub(super) delay: Duration,
+    /// When ramp, step and sine begin; at once without it.
+    pub(super) delay: Option<Duration>,
     /// The standard deviation of normal noise: `"12 nm"`.
     pub(super) noise: Option<Quantity>,
     /// The seed of the noise.
