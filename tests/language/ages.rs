@@ -204,7 +204,8 @@ fn a_held_sample_that_nothing_bounds_is_a_mistake() {
         told.contains("nothing says how long a value of `temperature.room` counts"),
         "{told}"
     );
-    assert!(told.contains("max_age"), "{told}");
+    let advice = "say `max_age` on the signal `temperature`, or `inputs.";
+    assert!(told.contains(advice), "{told}");
 }
 
 #[test]

@@ -112,3 +112,25 @@ delay = "10s"
         (10.0, 15.0)
     );
 }
+
+#[test]
+fn what_closes_a_loop_is_given_an_age_where_it_is_read_since_its_signal_cannot_say_one() {
+    let nodes = r#"
+[nodes.now]
+type = "sum"
+inputs.signal = ["position.Z", "before"]
+[nodes.before]
+type = "delay"
+inputs.signal = "now"
+delay = "1 tick"
+unit = "nm"
+"#;
+    let told = problems(&graph(nodes, "now"));
+    let advice = "say it where it is read: `inputs.signal = { from = \"…\", max_age = \"1min\" }`";
+    assert!(told.contains(advice), "{told}");
+    let heeded = nodes.replace(
+        "inputs.signal = [\"position.Z\", \"before\"]",
+        "inputs.signal = { from = [\"position.Z\", \"before\"], max_age = \"1min\" }",
+    );
+    Bench::new(&graph(&heeded, "now"), &[]);
+}

@@ -13,7 +13,7 @@ pub(crate) fn max_age(stated: Option<Duration>, of: &Channel) -> Result<Duration
         Some(age) => Mistake::unless_lasting("max_age", age).map_or(Ok(age), Err),
         None => {
             let message = format!("how old a value of `{}` may be is not known", of.name);
-            let help = "add `max_age = \"1min\"` here, or to the signal";
+            let help = "add `max_age = \"1min\"` here, or to the signal that has none";
             Err(Mistake::at("max_age", message).help(help))
         }
     }

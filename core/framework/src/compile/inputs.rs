@@ -194,9 +194,14 @@ impl Resolver<'_> {
             if !told.insert(of) {
                 continue;
             }
+            let mut behind = self.provenance[slot].sources();
+            let unbounded = behind.find(|(of, _)| self.channels[*of].channel.max_age.is_none());
+            let signal =
+                unbounded.map(|(of, _)| Reference::parse(&self.channels[of].name).node.to_owned());
             let problem = CompileProblem::NoMaxAge {
                 channel,
                 input: port.to_owned(),
+                signal,
             };
             self.diagnostics.report(instance.input_place(port), problem);
         }

@@ -42,6 +42,12 @@ pub enum CompileProblem {
         port: String,
         known: Vec<&'static str>,
     },
+    /// A reference that ends, or goes on with a channel, where its port should stand.
+    EmptyPort {
+        node: String,
+        channel: Option<String>,
+        known: Vec<&'static str>,
+    },
     /// A reference that matches no channel.
     UnknownChannel {
         node: String,
@@ -125,8 +131,12 @@ pub enum CompileProblem {
         /// The channels from the regressor back to what was measured; none where the truth itself is lagged.
         path: Vec<String>,
     },
-    /// A held input whose age nothing bounds.
-    NoMaxAge { channel: String, input: String },
+    /// A held input whose age nothing bounds; with the signal that could say how long its samples count.
+    NoMaxAge {
+        channel: String,
+        input: String,
+        signal: Option<String>,
+    },
     /// A mistake that the kind found.
     Parameter {
         message: String,
@@ -172,8 +182,8 @@ pub enum CompileProblem {
         more: usize,
         alone: Option<String>,
     },
-    /// A node whose outputs nobody uses.
-    UnusedNode { node: String },
+    /// A node whose outputs nobody uses; of a file that the graph extends, or of its own.
+    UnusedNode { node: String, inherited: bool },
     /// A signal that nobody uses.
     UnusedSignal { signal: String },
     /// Columns that are named for another unit than their signal's.

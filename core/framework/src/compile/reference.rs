@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use super::problem::CompileProblem;
+
 /// A reference, taken apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reference<'a> {
@@ -48,6 +50,23 @@ impl<'a> Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
+    /// What is told where the node has no such port; none are known of a signal.
+    pub(crate) fn no_port(&self, known: Vec<&'static str>) -> CompileProblem {
+        let node = self.node.to_owned();
+        match self.port {
+            None | Some("") => CompileProblem::EmptyPort {
+                node,
+                channel: self.channel.map(str::to_owned),
+                known,
+            },
+            Some(port) => CompileProblem::UnknownPort {
+                node,
+                port: port.to_owned(),
+                known,
+            },
+        }
+    }
+
     /// The node without the members that are picked out of the modules around it: `axis[Z1]/thermal` is `axis/thermal`.
     pub(crate) fn whole_node(&self) -> Cow<'a, str> {
         if !self.is_member() {

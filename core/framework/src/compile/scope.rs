@@ -118,16 +118,16 @@ impl Scopes {
         if scope.broken {
             return Ok(Found::Broken);
         }
-        let port = match reference.port {
-            None => scope.ports.get_index(0).map(|(_, channels)| channels),
+        let named = match reference.port {
+            // A signal has its channels under no name.
+            Some("") => None,
             Some(port) => scope.ports.get(port),
+            None => scope.ports.get_index(0).map(|(_, channels)| channels),
         };
-        let Some(channels) = port else {
-            return Err(Box::new(CompileProblem::UnknownPort {
-                node: reference.node.to_owned(),
-                port: reference.port.unwrap_or_default().to_owned(),
-                known: scope.ports.keys().copied().collect(),
-            }));
+        let Some(channels) = named else {
+            let ports = scope.ports.keys().copied();
+            let ports = ports.filter(|port| !port.is_empty());
+            return Err(Box::new(reference.no_port(ports.collect())));
         };
         Ok(Found::Slots(channels.find(&reference)?))
     }

@@ -173,6 +173,7 @@ pub(super) fn warn(graph: &GraphFile, plan: &Plan, diagnostics: &mut Diagnostics
                 node.place,
                 CompileProblem::UnusedNode {
                     node: node.name.clone(),
+                    inherited: node.place.source != graph.tree.place.source,
                 },
             );
         }

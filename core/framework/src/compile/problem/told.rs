@@ -59,7 +59,7 @@ impl Problem for CompileProblem {
             Self::UnknownKind { .. } => "A040",
             Self::KindTwice { .. } | Self::WrittenTwice { .. } => "A041",
             Self::UnknownNode { .. } | Self::RemovedNode { .. } => "A042",
-            Self::UnknownPort { .. } => "A043",
+            Self::UnknownPort { .. } | Self::EmptyPort { .. } => "A043",
             Self::UnknownChannel { .. } => "A044",
             Self::UnknownInput { .. } => "A045",
             Self::MissingInput { .. } => "A046",
@@ -139,6 +139,7 @@ impl Problem for CompileProblem {
             Self::UnknownKind { .. }
             | Self::KindTwice { .. }
             | Self::WrittenTwice { .. }
+            | Self::EmptyPort { .. }
             | Self::UnknownInput { .. }
             | Self::Kind { .. }
             | Self::Parameter { .. } => false,
@@ -168,6 +169,9 @@ impl Problem for CompileProblem {
                 format!("`{node}` is referred to, and `nodes.{node} = false` removes it")
             }
             Self::UnknownPort { node, port, .. } => format!("`{node}` has no output port `{port}`"),
+            Self::EmptyPort { node, .. } => {
+                format!("no output port of `{node}` stands behind the colon")
+            }
             Self::UnknownChannel { node, channel, .. } => {
                 format!("`{node}` has no channel that matches `{channel}`")
             }
@@ -282,7 +286,7 @@ impl Problem for CompileProblem {
                 };
                 format!("there are two output columns named `{first}`{more}")
             }
-            Self::UnusedNode { node } => {
+            Self::UnusedNode { node, .. } => {
                 format!("nothing that comes out depends on the node `{node}`")
             }
             Self::ColumnUnit {
@@ -322,6 +326,7 @@ impl Problem for CompileProblem {
             Self::UnknownNode { .. } => "not found",
             Self::RemovedNode { .. } => "removed",
             Self::UnknownPort { .. } => "no such port",
+            Self::EmptyPort { .. } => "no port",
             Self::UnknownChannel { .. } => "matches nothing",
             Self::UnknownInput { .. } => "no such input",
             Self::MissingInput { .. } => "an input is missing",
@@ -374,7 +379,25 @@ impl Problem for CompileProblem {
                 _ => or_one_of(node, known, "the graph has"),
             },
             Self::RemovedNode { .. } => "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`".to_owned(),
+            Self::UnknownPort { node, known, .. } if known.is_empty() => {
+                format!("`{node}` has channels and no ports: `{node}.CHANNEL`")
+            }
             Self::UnknownPort { port, known, .. } => or_known(port, known, "its ports are"),
+            Self::EmptyPort {
+                node,
+                channel,
+                known,
+            } => {
+                let channel = channel.as_ref().filter(|channel| !channel.is_empty());
+                let written = match channel {
+                    Some(channel) => format!("write `{node}.{channel}`"),
+                    None => format!("write `{node}`"),
+                };
+                match known.is_empty() {
+                    true => written,
+                    false => format!("{written}, or name a port; its ports are {}", names(known)),
+                }
+            }
             Self::UnknownChannel {
                 node,
                 channel,
@@ -437,10 +460,13 @@ impl Problem for CompileProblem {
                      {smallest} (here it is {lag})"
                 )
             }
-            Self::NoMaxAge { input, .. } => {
-                format!(
-                    "say `max_age` on the signal, or `inputs.{input} = {{ from = \"…\", max_age = \"1min\" }}`"
-                )
+            Self::NoMaxAge { input, signal, .. } => {
+                let here = format!("`inputs.{input} = {{ from = \"…\", max_age = \"1min\" }}`");
+                match signal {
+                    Some(signal) => format!("say `max_age` on the signal `{signal}`, or {here}"),
+                    // What closes a loop has no signal behind it when it is read.
+                    None => format!("say it where it is read: {here}"),
+                }
             }
             Self::Parameter { help, .. } | Self::Doubt { help, .. } => return help.clone(),
             Self::NeverLearns { help, .. } => help
@@ -468,14 +494,18 @@ impl Problem for CompileProblem {
             Self::DuplicateName { .. } | Self::DuplicateColumns { .. } => {
                 "give one of them another name, or refer to fewer channels".to_owned()
             }
-            Self::UnusedNode { node } if node.contains('/') => {
+            Self::UnusedNode { node, .. } if node.contains('/') => {
                 "refer to it, name it under the module's `outputs`, or leave it out of the module"
                     .to_owned()
             }
-            Self::UnusedNode { node } => {
-                format!(
-                    "refer to it, name it under `[outputs]`, or remove it (`nodes.{node} = false`)"
-                )
+            Self::UnusedNode {
+                node,
+                inherited: true,
+            } => format!(
+                "refer to it, name it under `[outputs]`, or write `nodes.{node} = false` in the file that inherits it"
+            ),
+            Self::UnusedNode { .. } => {
+                "refer to it, name it under `[outputs]`, or delete it".to_owned()
             }
             Self::UnusedSignal { .. } => "refer to it or remove it".to_owned(),
             Self::ColumnUnit { named, .. } => format!(
