@@ -6,6 +6,7 @@
 #[path = "../workbench/mod.rs"]
 mod workbench;
 
+mod advice;
 mod beside;
 mod beyond;
 mod columns;

@@ -8,6 +8,7 @@ use indexmap::IndexMap;
 
 use crate::compile::{CompileProblem, Plan, PortChannels, Reference, outermost};
 use crate::diagnostic::Names;
+use crate::document::OutputDecl;
 
 /// The channels of a plan by what a reference calls them, listed once: a file may have thousands of tests.
 pub(super) struct Channels<'a> {
@@ -27,7 +28,7 @@ struct NodeChannels<'a> {
 }
 
 impl<'a> Channels<'a> {
-    pub(super) fn of(plan: &'a Plan) -> Self {
+    pub(super) fn of(plan: &'a Plan, declared: &'a [OutputDecl]) -> Self {
         let mut nodes: HashMap<&str, NodeChannels<'_>> = HashMap::new();
         for (slot, channel) in plan.channels.iter().enumerate() {
             let Reference {
@@ -45,7 +46,9 @@ impl<'a> Channels<'a> {
             let port = node.ports.entry(port).or_default();
             port.insert(name.unwrap_or_default().to_owned(), slot);
         }
-        let mut outputs: HashMap<&str, PortChannels> = HashMap::new();
+        // One of which nothing is known, since it has mistakes, is no node of its name either.
+        let empty = |output: &'a OutputDecl| (output.name.as_str(), PortChannels::default());
+        let mut outputs: HashMap<&str, PortChannels> = declared.iter().map(empty).collect();
         for output in &plan.outputs {
             let Reference { node, channel, .. } = Reference::parse(&output.name);
             let output_channels = outputs.entry(node).or_default();
@@ -59,43 +62,63 @@ impl<'a> Channels<'a> {
         }
     }
 
-    /// The slots of a reference, in the order of the plan. The names of outputs (`predicted.Z1`) are understood too.
+    /// The slots of a reference, in their order. An output (`predicted.Z1`) comes before a node or signal of its name, since
+    /// what it says is what the column of that name holds; behind a node's port stands no column.
     pub(super) fn look_up(&self, text: &str) -> Result<Vec<usize>, CompileProblem> {
         let reference = Reference::parse(text);
-        let Some(node) = self.nodes.get(reference.node) else {
-            let output = self.outputs.get(reference.node);
-            let output = output.filter(|_| reference.port.is_none());
-            return match output {
-                Some(channels) => channels.find(&reference),
-                None => Err(CompileProblem::UnknownNode {
-                    node: reference.node.to_owned(),
-                    known: Arc::clone(self.known()),
-                }),
-            };
-        };
-        let default = node.named.first().copied().unwrap_or_default();
-        let port = reference.port.filter(|&port| port != default);
-        match node.ports.get(&port) {
+        let output = self.outputs.get(reference.node);
+        match output.filter(|_| reference.port.is_none()) {
             Some(channels) => channels.find(&reference),
-            None => Err(CompileProblem::UnknownPort {
-                node: reference.node.to_owned(),
-                port: reference.port.unwrap_or_default().to_owned(),
-                known: node.named.clone(),
-            }),
+            None => self.look_up_inside(&reference),
         }
     }
 
-    /// The measured channels of a reference, as positions among [`Plan::sources`].
+    /// The same of nodes and signals alone.
+    fn look_up_inside(&self, reference: &Reference<'_>) -> Result<Vec<usize>, CompileProblem> {
+        let Some(node) = self.nodes.get(reference.node) else {
+            return Err(CompileProblem::UnknownNode {
+                node: reference.node.to_owned(),
+                known: Arc::clone(self.known()),
+            });
+        };
+        let default = node.named.first().copied().unwrap_or_default();
+        let channels = match reference.port {
+            // A signal has its channels under no name.
+            Some("") => None,
+            port => node.ports.get(&port.filter(|&port| port != default)),
+        };
+        match channels {
+            Some(channels) => channels.find(reference),
+            None => Err(reference.no_port(node.named.clone())),
+        }
+    }
+
+    /// The measured channels of a reference, as positions among [`Plan::sources`]: those of a signal, though an output may have its
+    /// name.
     pub(super) fn look_up_measured(
         &self,
         text: &str,
     ) -> Result<Result<Vec<usize>, String>, CompileProblem> {
-        let slots = self.look_up(text)?;
+        let reference = Reference::parse(text);
+        let slots = match self.nodes.contains_key(reference.node) {
+            true => self.look_up_inside(&reference)?,
+            false => self.look_up(text)?,
+        };
         let is_computed = |slot: &&usize| **slot >= self.plan.sources.len();
         Ok(match slots.iter().find(is_computed) {
             Some(&computed) => Err(self.plan.channels[computed].name.clone()),
             None => Ok(slots),
         })
+    }
+
+    /// How to name what a reference means of a node, where an output has the node's name; none where it means no such thing.
+    pub(super) fn of_the_node(&self, text: &str) -> Option<String> {
+        let reference = Reference::parse(text);
+        let port = *self.nodes.get(reference.node)?.named.first()?;
+        let is_output = reference.port.is_none() && self.outputs.contains_key(reference.node);
+        let is_there = is_output && self.look_up_inside(&reference).is_ok();
+        let channel = reference.channel.filter(|_| is_there)?;
+        Some(format!("{}:{port}.{channel}", reference.node))
     }
 
     fn known(&self) -> &Arc<Names> {

@@ -88,7 +88,7 @@ fn read(
     let mut names: Vec<(&str, Place)> = Vec::new();
     let mut schedules = Schedules::new();
     let mut compared = BTreeSet::new();
-    let channels = Channels::of(plan);
+    let channels = Channels::of(plan, &graph.outputs);
     for test in tests {
         let Some(table) = test.as_table() else {
             diagnostics.report(test.place, wrong_type("tests", "a table", test));
@@ -515,6 +515,7 @@ impl Declaring<'_> {
             let inherited_by = self.inherited_by.clone();
             let not_found = NotFound {
                 problem,
+                of_the_node: self.channels.of_the_node(reference),
                 inherited_by,
             };
             self.diagnostics.report(place, not_found);

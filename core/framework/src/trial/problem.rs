@@ -320,6 +320,8 @@ impl Problem for TrialProblem {
 /// A reference of a test that names nothing in the graph.
 pub(super) struct NotFound {
     pub(super) problem: CompileProblem,
+    /// What the node is called that has what is missing, where the reference means an output of the node's name.
+    pub(super) of_the_node: Option<String>,
     /// The file that inherits the test, and maybe lacks on purpose what it names.
     pub(super) inherited_by: Option<String>,
 }
@@ -342,7 +344,12 @@ impl Problem for NotFound {
     }
 
     fn help(&self) -> Option<String> {
-        let help = self.problem.help();
+        let help = match &self.of_the_node {
+            Some(node) => Some(format!(
+                "the output of that name lacks it; write `{node}` for what the node gives"
+            )),
+            None => self.problem.help(),
+        };
         let Some(file) = &self.inherited_by else {
             return help;
         };

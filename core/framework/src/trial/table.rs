@@ -126,7 +126,7 @@ impl<'de> Deserialize<'de> for Sample {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "TestExpectation")]
 pub(super) struct ExpectTable {
-    /// A channel, or several, each of which is checked: `"vote.Z1"`, `"vote"`, `"gradients.room@*"`.
+    /// A channel, or several, each of which is checked: `"vote.Z1"`, `"vote"`, `"gradients.room@*"`. An output comes before a node of its name.
     pub(super) of: String,
     /// Only truths whose absolute value is below count for `rmse_below`, `r2_above`, `beats` and the `valid_above` of a prediction.
     pub(super) abs_truth_below: Option<Quantity>,

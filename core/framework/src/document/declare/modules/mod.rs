@@ -146,7 +146,8 @@ pub(super) fn expand(
             expansion.outputs(outputs, &level);
         }
         if let Some(tests) = &mut expanded.tests {
-            expansion.tests(tests, &level);
+            let outputs = root.get("outputs").and_then(Value::as_table);
+            expansion.tests(tests, outputs, &level);
         }
     }
     expanded.cut = expansion.full;

@@ -155,18 +155,25 @@ impl Expansion<'_> {
         }
     }
 
-    /// What the tests expect, and of what; what is no reference stays as it is.
-    pub(super) fn tests(&mut self, tests: &mut Value, level: &Level<'_>) {
+    /// What the tests expect, and of what; what is no reference to a node stays as it is, as does the name of an output, which comes
+    /// before a node of its name.
+    pub(super) fn tests(&mut self, tests: &mut Value, outputs: Option<&Table>, level: &Level<'_>) {
+        let is_column = |value: &Value| {
+            let (head, port, _) = value.as_text().map(parts)?;
+            Some(port.is_none() && outputs?.contains(head))
+        };
+        let is_column = |value: &Value| is_column(value).unwrap_or_default();
         let tests = tables(tests).filter_map(|test| test.get_mut("expect"));
         for expectation in tests.flat_map(tables) {
-            if let Some(of) = expectation.get_mut("of") {
+            if let Some(of) = expectation.get_mut("of").filter(|of| !is_column(of)) {
                 *of = self.input(of, level);
             }
             let rivals = expectation.get_mut("beats");
             if let Some(Data::List(rivals)) = rivals.map(|rivals| &mut rivals.data) {
                 for rival in rivals {
                     // These two are no nodes.
-                    if !matches!(rival.as_text(), Some("zero" | "persistence")) {
+                    let is_kind = matches!(rival.as_text(), Some("zero" | "persistence"));
+                    if !is_kind && !is_column(rival) {
                         *rival = self.input(rival, level);
                     }
                 }
