@@ -54,14 +54,15 @@ impl<'a> Reference<'a> {
     pub(crate) fn no_port(&self, known: Vec<&'static str>) -> CompileProblem {
         let node = self.node.to_owned();
         match self.port {
-            None | Some("") => CompileProblem::EmptyPort {
+            Some("") => CompileProblem::EmptyPort {
                 node,
                 channel: self.channel.map(str::to_owned),
                 known,
             },
-            Some(port) => CompileProblem::UnknownPort {
+            // A node of which something could not be read may have no port that could be meant.
+            port => CompileProblem::UnknownPort {
                 node,
-                port: port.to_owned(),
+                port: port.unwrap_or_default().to_owned(),
                 known,
             },
         }
