@@ -637,7 +637,9 @@ expect = [{ of = "drift.Z", at = "1min10s", KEY }]
     of("slow", "fast", slow, 1);
     of("odd", "slow", "absent = true", 1);
     of("slow", "odd", "absent = true", 1);
+}
 
+#[test]
 fn what_has_no_meaning_beside_a_constant_or_samples_is_a_mistake_whichever_key_it_is() {
     let scratch = Scratch::new("trials-shapes");
     for (shape, told) in [
