@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use athermal_control::Stability;
-use athermal_core::compile::{Plan, PlannedRole};
+use athermal_core::compile::{Entry, Plan, PlannedRole};
 use athermal_core::engine::{Engine, EngineError};
 use athermal_core::model::{Model, Period};
 use athermal_core::quantity::Quantity;
@@ -40,8 +40,14 @@ pub struct Course {
 /// A truth and its predictions.
 #[derive(Debug, Clone, Serialize)]
 pub struct Axis {
-    /// The channel: `Z1`.
+    /// Its channel: `Z1`, or `drift.Z1` where another truth is called `Z1` too.
     pub name: String,
+    /// The whole name of its channel: `drift.Z1`.
+    #[serde(skip)]
+    pub(super) truth_name: String,
+    /// Its slot.
+    #[serde(skip)]
+    pub(super) slot: usize,
     /// Its unit.
     pub unit: String,
     /// The unit of a difference of two of its values, such as an error.
@@ -52,9 +58,6 @@ pub struct Axis {
     pub voters: Vec<Voter>,
     /// Which of them is what the graph puts out.
     pub main: usize,
-    /// Its channel: `vote.Z1`.
-    #[serde(skip)]
-    pub(super) prediction: String,
     /// How far ahead that looks, in s.
     pub ahead_s: f64,
     /// The weights of a vote's voters at each truth; empty where nothing is weighed.
@@ -69,8 +72,11 @@ pub struct Axis {
 pub struct Weight {
     /// The node that votes.
     pub node: String,
-    /// The voter.
+    /// The voter's node, or its channel where several voters are of one node.
     pub voter: String,
+    /// The slot of the voter.
+    #[serde(skip)]
+    pub(super) slot: usize,
     /// Its weight at each truth.
     pub value: Vec<f64>,
 }
@@ -80,6 +86,14 @@ pub struct Weight {
 pub struct Voter {
     /// The node's name.
     pub node: String,
+    /// Its channel: `vote.Z1`.
+    pub prediction: String,
+    /// The slot of its channel.
+    #[serde(skip)]
+    pub(super) slot: usize,
+    /// What it is called beside others of the same truth: its node, or its channel where that node predicts the truth twice.
+    #[serde(skip)]
+    pub(super) called: String,
     /// Its type.
     #[serde(rename = "type")]
     pub kind: &'static str,
@@ -192,6 +206,8 @@ fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
     truths.sort_by_key(|truth| truth.predictions.first().map(|of| of.slot));
     let axis = |truth: &TruthTrace| {
         let of = &plan.channels[truth.slot].channel;
+        let named = |other: &&TruthTrace| plan.channels[other.slot].channel.name == of.name;
+        let namesakes = trace.truths.iter().filter(named).count();
         let all = || truth.predictions.iter();
         let main = all()
             .enumerate()
@@ -200,42 +216,59 @@ fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
         let main = main.map_or(0, |(nth, _)| nth);
         // One vote is shown, the first: the picture of two would not be read.
         let vote = all().map(|of| &plan.nodes[of.node]).find_map(|node| {
-            let combines = matches!(node.role, PlannedRole::Combiner { .. });
-            Some((node, node.port("weights").filter(|_| combines)?))
+            let PlannedRole::Combiner { voters, .. } = node.role else {
+                return None;
+            };
+            Some((node, voters, node.port("weights")?))
         });
-        let slots = vote.as_ref().map_or(0..0, |(_, slots)| slots.clone());
-        let weight = |slot: usize| Weight {
-            node: vote
-                .as_ref()
-                .map_or_else(String::new, |(node, _)| node.name.clone()),
-            voter: plan.channels[slot]
-                .channel
-                .name
-                .trim_start_matches("weight-")
-                .to_owned(),
-            value: Vec::new(),
-        };
-        let voter = |of: &PredictionTrace| Voter {
-            node: plan.nodes[of.node].name.clone(),
-            kind: plan.nodes[of.node].kind.name,
-            value: of.values.clone(),
+        let slots = vote.as_ref().map_or(0..0, |(.., slots)| slots.clone());
+        let weights = vote.iter().flat_map(|(node, voters, slots)| {
+            let entries = plan.gathers[*voters].entries.iter();
+            let weight = |(slot, voter): (usize, &Entry)| {
+                let name = &plan.channels[slot].channel.name;
+                Weight {
+                    node: node.name.clone(),
+                    // A node may be called `weight-…` itself.
+                    voter: name.strip_prefix("weight-").unwrap_or(name).to_owned(),
+                    slot: voter.slot,
+                    value: Vec::new(),
+                }
+            };
+            slots.clone().zip(entries).map(weight)
+        });
+        let voter = |of: &PredictionTrace| {
+            let (node, prediction) = (&plan.nodes[of.node], &plan.channels[of.slot].name);
+            let of_node = all().filter(|other| plan.nodes[other.node].name == node.name);
+            let called = match of_node.count() {
+                1 => &node.name,
+                _ => prediction,
+            };
+            Voter {
+                node: node.name.clone(),
+                prediction: prediction.clone(),
+                slot: of.slot,
+                called: called.clone(),
+                kind: node.kind.name,
+                value: of.values.clone(),
+            }
         };
         let axis = Axis {
-            name: of.name.clone(),
+            name: match namesakes {
+                1 => of.name.clone(),
+                _ => plan.channels[truth.slot].name.clone(),
+            },
+            truth_name: plan.channels[truth.slot].name.clone(),
+            slot: truth.slot,
             unit: of.unit.to_string(),
             error_unit: of.unit.difference().to_string(),
             truth: Series::default(),
             voters: all().map(voter).collect(),
             main,
-            prediction: truth
-                .predictions
-                .get(main)
-                .map_or_else(String::new, |of| plan.channels[of.slot].name.clone()),
             ahead_s: truth
                 .predictions
                 .get(main)
                 .map_or(0.0, |of| of.ahead.secs()),
-            weights: slots.clone().map(weight).collect(),
+            weights: weights.collect(),
             states: states(plan, &of.unit),
         };
         let places = Places {
@@ -248,6 +281,11 @@ fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
 }
 
 impl Axis {
+    /// The prediction that the graph puts out.
+    pub(super) fn put_out(&self) -> &Voter {
+        &self.voters[self.main]
+    }
+
     fn look(&mut self, places: &Places, engine: &Engine, now_s: f64) {
         let truth = engine.value(places.truth);
         if truth.is_nan() {

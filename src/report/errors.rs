@@ -26,7 +26,7 @@ impl Axis {
     /// Prediction minus truth of what is put out, for each truth.
     #[must_use]
     pub fn errors(&self) -> Vec<f64> {
-        let main = &self.voters[self.main].value;
+        let main = &self.put_out().value;
         main.iter()
             .zip(&self.truth.value)
             .map(|(p, y)| p - y)
@@ -58,7 +58,7 @@ impl Errors {
             counts,
             residuals: residuals
                 .iter()
-                .find(|of| of.prediction == axis.prediction)
+                .find(|of| of.prediction == axis.put_out().prediction)
                 .cloned(),
         }
     }

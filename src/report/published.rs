@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::course::{Axis, Course};
+use super::course::{Axis, Course, Voter};
 use super::rms;
 
 /// A table of the article beside the same figures here.
@@ -104,8 +104,7 @@ const TABLES: [Table; 3] = [
 pub(super) fn published(course: &Course) -> Vec<Published> {
     let of_same_kind = |table: &&Table| {
         let found = course.axes.iter().map(|axis| axis.name.as_str());
-        let voters = course.axes.first().map_or(&[][..], |axis| &axis.voters);
-        let has = |kind: &str| voters.iter().any(|voter| voter.kind == kind);
+        let has = |kind: &str| course.axes.iter().any(|axis| voter(axis, kind).is_some());
         let kinds = || table.rows.iter().filter(|(_, kind, _)| !kind.is_empty());
         let compared = kinds().filter(|(_, kind, _)| has(kind));
         found.eq(table.axes.iter().copied())
@@ -119,72 +118,80 @@ pub(super) fn published(course: &Course) -> Vec<Published> {
         .collect()
 }
 
+/// The first prediction of an axis by a node of a kind: axes need not have the same predictions.
+fn voter<'a>(axis: &'a Axis, kind: &str) -> Option<&'a Voter> {
+    axis.voters.iter().find(|voter| voter.kind == kind)
+}
+
 fn beside(table: &Table, course: &Course) -> Published {
-    let first = &course.axes[0];
-    let known: Vec<(&str, Option<usize>)> = table
-        .rows
-        .iter()
-        .map(|(_, kind, _)| {
-            (
-                *kind,
-                first.voters.iter().position(|voter| voter.kind == *kind),
-            )
-        })
-        .collect();
-    let nodes: Vec<usize> = known.iter().filter_map(|(_, nth)| *nth).collect();
-    let row = |(&(name, kind, figures), nth): (&(&'static str, &str, &[f64]), Option<usize>)| {
-        let ours = |axis: &Axis| match nth {
-            None if kind.is_empty() => error(axis, None, &nodes, table.limit),
-            None => None,
-            Some(nth) => error(axis, Some(nth), &nodes, table.limit),
-        };
-        PublishedRow {
-            name,
-            node: nth.map(|nth| first.voters[nth].node.clone()),
-            published: figures.to_vec(),
-            ours: course.axes.iter().map(ours).collect(),
-        }
+    let row = |&(name, kind, figures): &(&'static str, &str, &[f64])| PublishedRow {
+        name,
+        node: nodes(course, kind),
+        published: figures.to_vec(),
+        ours: course
+            .axes
+            .iter()
+            .map(|axis| error(axis, kind, table))
+            .collect(),
     };
     Published {
         source: table.source,
         limit_nm_per_min: table.limit,
         axes: table.axes.to_vec(),
-        rows: table
-            .rows
-            .iter()
-            .zip(known.iter().map(|(_, nth)| *nth))
-            .map(row)
-            .collect(),
+        rows: table.rows.iter().map(row).collect(),
     }
 }
 
-/// The error of a voter, or of predicting nothing, where the truth is below the limit and all that are compared are there.
-fn error(axis: &Axis, voter: Option<usize>, compared: &[usize], limit: f64) -> Option<f64> {
+/// The nodes of a kind that predict the axes, each once: mostly one for all.
+fn nodes(course: &Course, kind: &str) -> Option<String> {
+    let mut nodes: Vec<&str> = Vec::new();
+    for voter in course.axes.iter().filter_map(|axis| voter(axis, kind)) {
+        if !nodes.contains(&voter.node.as_str()) {
+            nodes.push(&voter.node);
+        }
+    }
+    (!nodes.is_empty()).then(|| nodes.join(", "))
+}
+
+/// The error of an axis' prediction by a kind, or of predicting nothing, where the truth is below the limit and all of the axis that
+/// are compared are there.
+fn error(axis: &Axis, kind: &str, table: &Table) -> Option<f64> {
+    let of_kinds = table
+        .rows
+        .iter()
+        .filter_map(|(_, kind, _)| voter(axis, kind));
+    let compared: Vec<&Voter> = of_kinds.collect();
+    let of_kind = match kind {
+        "" => None,
+        kind => Some(voter(axis, kind)?),
+    };
     let there = |i: &usize| {
-        let all = compared
-            .iter()
-            .all(|&nth| !axis.voters[nth].value[*i].is_nan());
-        all && axis.truth.value[*i].abs() < limit
+        let all = compared.iter().all(|voter| !voter.value[*i].is_nan());
+        all && axis.truth.value[*i].abs() < table.limit
     };
     let counted = (0..axis.truth.value.len()).filter(there);
-    rms(counted.map(|i| voter.map_or(0.0, |nth| axis.voters[nth].value[i]) - axis.truth.value[i]))
+    rms(counted.map(|i| of_kind.map_or(0.0, |voter| voter.value[i]) - axis.truth.value[i]))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Series, Voter};
+    use super::super::Series;
     use super::*;
 
     fn axis(name: &str, truth: &[f64], voters: &[(&'static str, &[f64])]) -> Axis {
         let voter = |(kind, value): &(&'static str, &[f64])| Voter {
             node: (*kind).to_owned(),
+            prediction: format!("{kind}.{name}"),
+            slot: 0,
+            called: (*kind).to_owned(),
             kind,
             value: value.to_vec(),
         };
         Axis {
             name: name.to_owned(),
+            truth_name: format!("drift.{name}"),
+            slot: 0,
             error_unit: "nm/min".into(),
-            prediction: String::new(),
             unit: "nm/min".to_owned(),
             truth: Series {
                 time_s: (0..truth.len()).map(|i| i as f64).collect(),
@@ -250,5 +257,30 @@ mod tests {
         ];
         assert_eq!(ours, expected);
         assert_eq!(table.rows[3].published, [6.55, 8.81, 13.67]);
+    }
+
+    #[test]
+    fn each_axis_is_read_by_its_own_predictions() {
+        let course = Course {
+            axes: vec![
+                axis(
+                    "X",
+                    &[4.0],
+                    &[("zero", &[0.0]), ("linear", &[3.0]), ("arx", &[2.0])],
+                ),
+                axis("Y", &[4.0], &[("arx", &[1.0])]),
+                axis("Z", &[4.0], &[("linear", &[4.5]), ("zero", &[0.0])]),
+            ],
+            ..Course::default()
+        };
+        let table = &published(&course)[0];
+        let of = |name: &str| {
+            let row = table.rows.iter().find(|row| row.name == name).unwrap();
+            (row.node.as_deref(), row.ours.clone())
+        };
+        let regression = vec![Some(1.0), None, Some(0.5)];
+        assert_eq!(of("thermal regression"), (Some("linear"), regression));
+        assert_eq!(of("ARX"), (Some("arx"), vec![Some(2.0), Some(3.0), None]));
+        assert_eq!(of("no model"), (None, vec![Some(4.0); 3]));
     }
 }

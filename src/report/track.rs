@@ -30,6 +30,8 @@ pub(super) struct Track {
 #[derive(Debug)]
 pub(super) struct TrackAxis {
     pub(super) name: String,
+    /// The slots of the truth and of the prediction of it that is integrated.
+    pub(super) predicted: (usize, usize),
     /// The unit of its positions.
     pub(super) position: String,
     /// The unit of its drift, and over which time that is measured.
@@ -102,6 +104,7 @@ pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
             let drift = &plan.channels[truth].channel;
             axes.push(TrackAxis {
                 name: correcting.name.clone(),
+                predicted: (truth, rate),
                 position: unit.to_string(),
                 drift: drift.unit.to_string(),
                 span: drift.span,

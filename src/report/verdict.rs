@@ -17,6 +17,11 @@ pub struct Verdict {
     pub axis: String,
     /// The node that predicts it.
     pub node: String,
+    /// The prediction: `vote.Z1`.
+    pub prediction: String,
+    /// What the sentence calls it: its node, or its channel where that node predicts the axis twice.
+    #[serde(skip)]
+    pub(super) called: String,
     /// The unit.
     pub unit: String,
     /// Whether the truth is a point on a scale, such as a temperature in °C, of which no model says nothing.
@@ -50,10 +55,10 @@ impl Verdict {
                 .zip(&errors)
                 .filter(|(_, e)| !e.is_nan())
         };
-        let node = &axis.voters[axis.main].node;
+        let put_out = axis.put_out();
         let score = scores
             .iter()
-            .find(|score| score.node == *node && is_channel(&score.truth, &axis.name));
+            .find(|score| score.output == put_out.prediction);
         // As the table of scores has it, unless it hides much of what happened where other predictions have no value.
         let scored = score.filter(|score| !score.leaves_many_out());
         let scored = scored.and_then(|score| Some((score.rmse?, score.baseline_zero?)));
@@ -61,7 +66,7 @@ impl Verdict {
         let figures = scored.or_else(own);
         let measured = axis.truth.value.iter().filter(|y| !y.is_nan()).count();
         let corrected = worth.and_then(|worth| {
-            let i = worth.axes.iter().position(|name| *name == axis.name)?;
+            let i = worth.place_of(axis)?;
             let pairs = worth.drift_without[i]
                 .value
                 .iter()
@@ -71,7 +76,9 @@ impl Verdict {
         });
         Self {
             axis: axis.name.clone(),
-            node: node.clone(),
+            node: put_out.node.clone(),
+            prediction: put_out.prediction.clone(),
+            called: put_out.called.clone(),
             unit: axis.error_unit.clone(),
             on_scale: axis.error_unit != axis.unit,
             error: figures.map(|of| of.0),
@@ -101,13 +108,13 @@ impl Verdict {
     pub fn sentence(&self) -> String {
         let (Some(error), Some(no_model)) = (self.error, self.baseline_zero) else {
             return if self.measured {
-                format!("{} gave no prediction on these data.", self.node)
+                format!("{} gave no prediction on these data.", self.called)
             } else {
-                format!("these data have no truth to compare {} with.", self.node)
+                format!("these data have no truth to compare {} with.", self.called)
             };
         };
         let less = |with: f64, without: f64| 100.0 * (1.0 - with / without);
-        let (node, unit) = (&self.node, &self.unit);
+        let (node, unit) = (&self.called, &self.unit);
         let left = figure(Some(error));
         let mut text = if self.on_scale {
             format!("{node} predicts it to {left} {unit} RMS")
@@ -155,12 +162,6 @@ impl Verdict {
     }
 }
 
-/// Whether a reference such as `drift.Z1` or `drift:slope.Z1` names a channel.
-pub(super) fn is_channel(reference: &str, channel: &str) -> bool {
-    let node_and_port = reference.strip_suffix(channel);
-    node_and_port.is_some_and(|rest| rest.ends_with('.'))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,6 +171,8 @@ mod tests {
         let mut verdict = Verdict {
             axis: "Z1".into(),
             node: "vote".into(),
+            prediction: "vote.Z1".into(),
+            called: "vote".into(),
             unit: "nm/min".into(),
             on_scale: false,
             error: Some(20.0),

@@ -16,13 +16,16 @@ use serde_json::Value;
 use super::change::{Changes, Settling, StepLoss};
 use super::departure::{Departure, departures};
 use super::track::{Track, TrackAxis};
-use super::{ReportError, Series};
+use super::{Axis, ReportError, Series};
 
 /// What a correction is worth.
 #[derive(Debug, Clone, Serialize)]
 pub struct Worth {
     /// Names of the axes.
     pub axes: Vec<String>,
+    /// Of each axis the slots of the truth and of the prediction of it that is integrated.
+    #[serde(skip)]
+    predicted: Vec<(usize, usize)>,
     /// Unit of each axis' drift.
     pub units: Vec<String>,
     /// Drift of each axis without the correction.
@@ -62,6 +65,7 @@ impl Worth {
         let limit = track.settled.as_ref().zip(decibel.as_ref());
         Self {
             axes: of_axes(|axis| &axis.name),
+            predicted: track.axes.iter().map(|axis| axis.predicted).collect(),
             units: of_axes(|axis| &axis.drift),
             drift_without: empty(),
             drift_with: empty(),
@@ -79,6 +83,13 @@ impl Worth {
             settling: Vec::new(),
             steps: Vec::new(),
         }
+    }
+
+    /// The place of the axis that is corrected for a truth: of several corrections, that of what the graph puts out.
+    pub(super) fn place_of(&self, axis: &Axis) -> Option<usize> {
+        let put_out = (axis.slot, axis.put_out().slot);
+        let of_put_out = self.predicted.iter().position(|of| *of == put_out);
+        of_put_out.or_else(|| self.predicted.iter().position(|of| of.0 == axis.slot))
     }
 
     /// What the correction does for light and waiting, in a sentence; none without losses.
@@ -299,6 +310,7 @@ mod tests {
         };
         let worth = Worth {
             axes: Vec::new(),
+            predicted: Vec::new(),
             units: Vec::new(),
             drift_without: Vec::new(),
             drift_with: Vec::new(),

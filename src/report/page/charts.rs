@@ -41,10 +41,10 @@ fn over_time(axis: &Axis, title: &str, hours: &Hours) -> Chart<'static> {
 
 /// Drift measured, predicted, and what is left of it.
 pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> Chart<'a> {
-    let main = &axis.voters[axis.main];
+    let main = axis.put_out();
     let time_s = &axis.truth.time_s;
     let corrected = facts.worth.as_ref().and_then(|worth| {
-        let i = worth.axes.iter().position(|name| *name == axis.name)?;
+        let i = worth.place_of(axis)?;
         Some(&worth.drift_with[i])
     });
     let mut chart = over_time(axis, "Drift", &Hours::of(&facts.course));
@@ -61,7 +61,7 @@ pub(super) fn drift<'a>(axis: &'a Axis, errors: &'a [f64], facts: &'a Facts) -> 
                 time_s,
                 &main.value,
                 "c2",
-                format!("predicted ({})", main.node),
+                format!("predicted ({})", main.called),
             ),
             match corrected {
                 Some(with) => Layer::line(&with.time_s, &with.value, "c3", "left after correction"),
@@ -85,7 +85,12 @@ pub(super) fn votes<'a>(axis: &'a Axis, hours: &Hours) -> Chart<'a> {
         .iter()
         .zip(LINES)
         .map(|(voter, class)| {
-            Layer::line(&axis.truth.time_s, &voter.value, class, voter.node.as_str())
+            Layer::line(
+                &axis.truth.time_s,
+                &voter.value,
+                class,
+                voter.called.as_str(),
+            )
         })
         .collect();
     chart
@@ -94,7 +99,7 @@ pub(super) fn votes<'a>(axis: &'a Axis, hours: &Hours) -> Chart<'a> {
 /// The voters of which lines can be told apart: all, or of many what is put out and those that weigh most.
 fn shown(axis: &Axis) -> Vec<&Voter> {
     let weight = |voter: &Voter| {
-        let of = axis.weights.iter().find(|of| of.voter == voter.node);
+        let of = axis.weights.iter().find(|of| of.slot == voter.slot);
         of.map_or(0.0, |of| {
             of.value.iter().filter(|weight| **weight > 0.0).sum::<f64>()
         })
@@ -115,8 +120,8 @@ pub(super) fn weights<'a>(axis: &'a Axis, hours: &Hours) -> Option<Chart<'a>> {
     let first = axis.weights.first()?;
     let shown = shown(axis);
     let layer = |weight: &'a Weight| {
-        let nth = shown.iter().position(|voter| voter.node == weight.voter)?;
-        let name = weight.voter.as_str();
+        let nth = shown.iter().position(|voter| voter.slot == weight.slot)?;
+        let name = shown[nth].called.as_str();
         Some(Layer::line(
             &axis.truth.time_s,
             &weight.value,
@@ -166,7 +171,7 @@ pub(super) fn errors<'a>(axis: &'a Axis, errors: &'a Errors) -> [(&'static str, 
         format!("measured, in {}", axis.unit),
         format!("{name} predicted, in {}", axis.unit),
         &axis.truth.value,
-        &axis.voters[axis.main].value,
+        &axis.put_out().value,
         Mark::Dots,
     );
     let histogram = small(

@@ -1,6 +1,5 @@
 //! Decides which correlations and responses of an axis are shown; how, is decided by [`crate::diagnosis`].
 
-use super::super::verdict::is_channel;
 use super::super::{Axis, Facts};
 use crate::chart::Chart;
 use crate::diagnosis::{Picture, autocorrelation_picture, response_pictures, truth_picture};
@@ -31,13 +30,13 @@ pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
     let left = left.filter(|of| !of.bound.is_empty());
     let left = left.map(|of| ("autocorrelation".to_owned(), autocorrelation_picture(of)));
     let lags = facts.lags.iter();
-    let lags = lags.filter(|of| is_channel(&of.truth, &axis.name)).take(1);
+    let lags = lags.filter(|of| of.truth == axis.truth_name).take(1);
     let lags = lags.map(|of| ("lags".to_owned(), truth_picture(of)));
     let of_axis = || {
         let all = facts.responses.iter();
-        all.filter(|of| is_channel(&of.truth, &axis.name))
+        all.filter(|of| of.truth == axis.truth_name)
     };
-    let answers = of_axis().find(|of| of.node == axis.prediction);
+    let answers = of_axis().find(|of| of.node == axis.put_out().prediction);
     let answers = answers.or_else(|| of_axis().next()).into_iter();
     let responses = answers.flat_map(|of| {
         [("steps", false), ("impulses", true)].map(|(kind, impulse)| {
