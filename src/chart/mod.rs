@@ -14,7 +14,7 @@ pub use colours::{COLOURS, STYLE};
 use colours::{UNSCALED, in_light};
 pub use plot::Plot;
 
-use scale::{decimated, label, range, ticks};
+use scale::{decimated, label, range, thinned, ticks};
 
 /// What is left free about the frame, in user units.
 const LEFT: f64 = 62.0;
@@ -372,7 +372,10 @@ impl Layer<'_> {
             shapes.extend(there.map(bar));
             return;
         }
-        let kept = decimated(self.x, self.y, BUCKETS);
+        let kept = match self.mark {
+            Mark::Dots => thinned(self.x, self.y, 2 * BUCKETS),
+            _ => decimated(self.x, self.y, BUCKETS),
+        };
         shapes.push(Shape::Path {
             class: self.class,
             points: kept

@@ -1,4 +1,4 @@
-//! Decides how numbers fall on an axis: ranges, round marks, decimation that keeps extremes.
+//! Decides how numbers fall on an axis: ranges, round marks, decimation of lines that keeps extremes and of dots that keeps density.
 
 /// At most about twice as many points as `buckets`: of each stretch of x the lowest and the highest, in their order.
 pub(super) fn decimated(x: &[f64], y: &[f64], buckets: usize) -> Vec<(f64, f64)> {
@@ -24,6 +24,32 @@ pub(super) fn decimated(x: &[f64], y: &[f64], buckets: usize) -> Vec<(f64, f64)>
         }
     }
     kept
+}
+
+/// At most so many points and the outermost four, one of each stretch, so that of many dots as large a share is left anywhere: where they are
+/// dense stays seen. Those without a value are left out.
+pub(super) fn thinned(x: &[f64], y: &[f64], most: usize) -> Vec<(f64, f64)> {
+    let points = x.iter().copied().zip(y.iter().copied());
+    let there: Vec<(f64, f64)> = points.filter(|(x, y)| !x.is_nan() && !y.is_nan()).collect();
+    let count = there.len();
+    if count <= most {
+        return there;
+    }
+    // One of each stretch, and not the same in all: what comes again and again in the data would be met always or never.
+    let one_of = |nth: usize| {
+        let (from, to) = (nth * count / most, (nth + 1) * count / most);
+        let mixed = (nth as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        from + mixed as usize % (to - from)
+    };
+    let mut kept: Vec<usize> = (0..most).map(one_of).collect();
+    for of in [|of: &(f64, f64)| of.0, |of: &(f64, f64)| of.1] {
+        let by = |a: &usize, b: &usize| of(&there[*a]).total_cmp(&of(&there[*b]));
+        kept.extend((0..count).min_by(by));
+        kept.extend((0..count).max_by(by));
+    }
+    kept.sort_unstable();
+    kept.dedup();
+    kept.into_iter().map(|nth| there[nth]).collect()
 }
 
 /// Round numbers that divide a range.
@@ -76,6 +102,26 @@ mod tests {
         assert!(kept.contains(&(12_345.0, 50.0)) && kept.contains(&(70_001.0, -40.0)));
         assert!(kept.iter().any(|(_, y)| y.is_nan()));
         assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0));
+    }
+
+    #[test]
+    fn of_many_dots_an_equal_share_is_left_anywhere_and_the_outermost() {
+        let sizes = (0..20_000_u32).map(|nth| f64::from(nth.wrapping_mul(2_654_435_761) >> 8));
+        let mut x: Vec<f64> = sizes.map(|of| of / f64::from(1_u32 << 24)).collect();
+        // Nine in ten lie in the lower half.
+        for (nth, x) in x.iter_mut().enumerate() {
+            *x = 0.5 * *x + if nth % 10 == 7 { 0.5 } else { 0.0 };
+        }
+        let mut y = x.clone();
+        (x[5], y[777], y[778]) = (-3.0, 9.0, f64::NAN);
+        let kept = thinned(&x, &y, 3000);
+        assert!(kept.len() <= 3004 && kept.len() >= 3000);
+        let low = kept.iter().filter(|of| of.0 < 0.5).count() as f64;
+        let share = low / kept.len() as f64;
+        assert!((share - 0.9).abs() < 0.03, "{share}");
+        assert!(kept.contains(&(-3.0, y[5])) && kept.contains(&(x[777], 9.0)));
+        assert!(kept.iter().all(|of| !of.1.is_nan()));
+        assert_eq!(thinned(&x[..100], &y[..100], 3000).len(), 100);
     }
 
     #[test]
