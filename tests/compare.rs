@@ -460,3 +460,20 @@ predicted = "side"
     let told = compared("table").out;
     assert!(told.contains("side.chuck-* (linear)"), "{told}");
 }
+
+#[test]
+fn what_graphs_are_fitted_on_is_known_again_by_its_content() {
+    let scratch = Scratch::new("compare-same-file");
+    let log = simulated(&scratch, "log.csv", "die-tester", 0.2, 1);
+    let copy = scratch.file("copy.csv", std::fs::read(&log).unwrap());
+    let other = simulated(&scratch, "other.csv", "die-tester", 0.2, 2);
+    let same = scratch.path("../compare-same-file/log.csv");
+    let compared = |on: &Path| {
+        let graph = graph("die-tester");
+        athermal(&[&"compare", &graph, &"--data", &log, &"--on", &on]).ended(0)
+    };
+    for on in [&log, &same, &copy] {
+        compared(on).tells(&["the graphs are fitted on this file and scored on it"]);
+    }
+    assert!(!compared(&other).told.contains("the graphs are fitted on"));
+}

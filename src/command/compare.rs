@@ -124,7 +124,9 @@ impl Compare {
                 println!();
             }
             for comparison in &comparisons {
-                println!("{}", describe(comparison, options.mode, fits.len() > 1));
+                let spans = is_one_of_several(comparison, &comparisons);
+                let told = describe(comparison, options.mode, fits.len() > 1, spans);
+                println!("{told}");
             }
             for fit in &fits {
                 println!("{} was fitted in {} s", fit.graph, number(fit.seconds));
@@ -269,7 +271,11 @@ impl Compare {
 
     /// Tells where graphs are scored on what they were fitted on.
     fn tell_fitted_on(&self, terminal: &Terminal, report: &FitReport, trace: &Trace) {
-        let same = |on: &&PathBuf| self.data.paths().any(|data| data == **on);
+        let same = |on: &&PathBuf| {
+            self.data
+                .paths()
+                .any(|data| data::is_same_content(data, on))
+        };
         if let Some(path) = self.on.iter().find(same) {
             terminal.warning(format_args!(
                 "{}: the graphs are fitted on this file and scored on it, so {FITS}",
@@ -369,7 +375,7 @@ fn failed(terminal: &Terminal, fits: &[Fitted]) -> bool {
 }
 
 /// A table, with the names of graphs where there are several.
-fn describe(comparison: &Comparison, mode: Mode, several: bool) -> String {
+fn describe(comparison: &Comparison, mode: Mode, several: bool, spans: bool) -> String {
     let columns: Vec<String> = comparison.truths.iter().map(|of| of.name.clone()).collect();
     let plain = |of: fn(&Column) -> Option<f64>| -> Vec<String> {
         let truths = comparison.truths.iter();
@@ -393,10 +399,17 @@ fn describe(comparison: &Comparison, mode: Mode, several: bool) -> String {
         let label = format!("{indent}{} ({})", row.label(), row.kind);
         rows.push((label, cells.collect()));
     }
-    heading(comparison, mode) + &matrix("", &columns, &rows)
+    heading(comparison, mode, spans) + &matrix("", &columns, &rows)
 }
 
-fn heading(comparison: &Comparison, mode: Mode) -> String {
+/// Whether another table is of the same unit and horizon, and so of truths over another span.
+fn is_one_of_several(comparison: &Comparison, all: &[Comparison]) -> bool {
+    let heads = |of: &Comparison| of.unit == comparison.unit && of.ahead_s == comparison.ahead_s;
+    all.iter().filter(|of| heads(of)).count() > 1
+}
+
+/// What stands above a table; the span of the truths where other tables differ in nothing else.
+fn heading(comparison: &Comparison, mode: Mode, spans: bool) -> String {
     let counts = comparison.truths.iter().map(|truth| truth.n as u64);
     let (fewest, most) = (counts.clone().min(), counts.max());
     let instants = match (fewest, most) {
@@ -427,8 +440,13 @@ fn heading(comparison: &Comparison, mode: Mode) -> String {
         Mode::OneStep => (format!(", {ahead} ahead"), ' '),
         Mode::Steps(_) | Mode::FreeRun => (format!(" of what looks {ahead} ahead"), '\n'),
     };
+    let (span, then) = match comparison.span_s {
+        _ if !spans => (String::new(), then),
+        0.0 => (" of truths at an instant".to_owned(), '\n'),
+        span_s => (format!(" of truths over {}", stated(span_s)), '\n'),
+    };
     format!(
-        "RMSE in {}{ahead}, {instants};{then}* best, ! worse than no model\n\
+        "RMSE in {}{span}{ahead}, {instants};{then}* best, ! worse than no model\n\
          ± standard error of the difference to the best; ~ that may be chance\n{few}{own}",
         comparison.unit
     )
@@ -494,14 +512,19 @@ mod tests {
 
     #[test]
     fn the_best_row_may_be_worse_than_no_model() {
-        assert!(describe(&one_row(100, 8.49), Mode::OneStep, false).contains(" *!8.49"));
-        assert!(describe(&one_row(100, 2.0), Mode::OneStep, false).contains(" *2.00"));
+        assert!(describe(&one_row(100, 8.49), Mode::OneStep, false, false).contains(" *!8.49"));
+        assert!(describe(&one_row(100, 2.0), Mode::OneStep, false, false).contains(" *2.00"));
     }
 
     #[test]
     fn with_few_instants_it_is_said_that_the_best_may_be_chance() {
-        assert!(describe(&one_row(19, 2.0), Mode::OneStep, false).contains("best may be chance"));
-        assert!(!describe(&one_row(20, 2.0), Mode::OneStep, false).contains("best may be chance"));
+        assert!(
+            describe(&one_row(19, 2.0), Mode::OneStep, false, false).contains("best may be chance")
+        );
+        assert!(
+            !describe(&one_row(20, 2.0), Mode::OneStep, false, false)
+                .contains("best may be chance")
+        );
     }
 
     #[test]
@@ -512,23 +535,48 @@ mod tests {
             n: 40,
             baseline_zero: Some(2.6),
         });
-        let told = describe(&seldom, Mode::OneStep, false);
+        let told = describe(&seldom, Mode::OneStep, false, false);
         assert!(told.contains(" 2.50 @40"), "{told}");
         assert!(told.contains("@ valid at so few instants"), "{told}");
     }
 
     #[test]
     fn of_several_graphs_each_row_stands_below_the_name_of_its_own() {
-        let told = describe(&one_row(100, 2.0), Mode::OneStep, true);
+        let told = describe(&one_row(100, 2.0), Mode::OneStep, true, false);
         let lines: Vec<&str> = told.lines().map(str::trim_end).collect();
         let at = lines.iter().position(|line| *line == "  a").unwrap();
         assert!(lines[at + 1].starts_with("    vote (mean)"), "{told}");
     }
 
     #[test]
+    fn tables_that_differ_in_the_span_of_their_truths_alone_tell_it() {
+        let table = |span_s: f64, ahead_s: f64| Comparison {
+            span_s,
+            ahead_s,
+            ..one_row(100, 2.0)
+        };
+        let all = [table(300.0, 60.0), table(1800.0, 60.0), table(0.0, 120.0)];
+        let told = all.each_ref().map(|of| {
+            let told = describe(of, Mode::OneStep, false, is_one_of_several(of, &all));
+            told.lines().next().unwrap().to_owned()
+        });
+        let expected = [
+            "RMSE in nm of truths over 5min, 1min ahead, 100 instants;",
+            "RMSE in nm of truths over 30min, 1min ahead, 100 instants;",
+            "RMSE in nm, 2min ahead, 100 instants; * best, ! worse than no model",
+        ];
+        assert_eq!(told, expected);
+    }
+
+    #[test]
     fn a_single_instant_is_no_plural() {
-        assert!(describe(&one_row(1, 2.0), Mode::OneStep, false).contains("ahead, 1 instant; *"));
-        assert!(describe(&one_row(2, 2.0), Mode::OneStep, false).contains("ahead, 2 instants; *"));
+        assert!(
+            describe(&one_row(1, 2.0), Mode::OneStep, false, false).contains("ahead, 1 instant; *")
+        );
+        assert!(
+            describe(&one_row(2, 2.0), Mode::OneStep, false, false)
+                .contains("ahead, 2 instants; *")
+        );
     }
 
     #[test]

@@ -196,6 +196,20 @@ pub fn tell_overlap(terminal: &Terminal, fit: (f64, f64), data: (f64, f64)) {
     }
 }
 
+/// Whether two paths lead to files of one content. Only files of the same length are read for their checksums.
+pub fn is_same_content(one: &Path, other: &Path) -> bool {
+    let length = |path: &Path| {
+        let of = std::fs::metadata(path).ok().filter(Metadata::is_file)?;
+        Some(of.len())
+    };
+    let of_one = length(one);
+    let content = |path: &Path| content_of(path).ok();
+    one == other
+        || of_one.is_some()
+            && of_one == length(other)
+            && content(one).is_some_and(|of_one| content(other) == Some(of_one))
+}
+
 /// The length of a file in bytes and the checksum of its content as text: [`Fnv1a`] in hexadecimal digits.
 ///
 /// # Errors
