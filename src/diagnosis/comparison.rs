@@ -133,11 +133,7 @@ impl Entry<'_> {
         let own = &channels[self.of.slot].name;
         let own = own.split_once('.').map_or(&**own, |(_, channel)| channel);
         let truth = &channels[self.truth.slot].channel.name;
-        let mut parts: Vec<&str> = own.split('-').collect();
-        if let Some(part) = parts.iter_mut().find(|part| **part == truth) {
-            *part = "*";
-        }
-        parts.join("-")
+        starred(own, truth)
     }
 
     /// Its row, yet empty.
@@ -153,6 +149,19 @@ impl Entry<'_> {
             difference_error: Vec::new(),
             valid: Vec::new(),
         }
+    }
+}
+
+/// A channel with `*` for the name of the truth, where that stands alone: it may have parts joined by `-` itself.
+fn starred(channel: &str, truth: &str) -> String {
+    let around = |at: usize| (&channel[..at], &channel[at + truth.len()..]);
+    let stands_alone = |(before, after): &(&str, &str)| {
+        (before.is_empty() || before.ends_with('-')) && (after.is_empty() || after.starts_with('-'))
+    };
+    let places = channel.match_indices(truth).map(|(at, _)| around(at));
+    match places.into_iter().find(stands_alone) {
+        Some((before, after)) => format!("{before}*{after}"),
+        None => channel.to_owned(),
     }
 }
 
@@ -373,6 +382,15 @@ fn difference_error(a: &[f64], b: &[f64]) -> Option<f64> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_star_stands_for_a_truth_whose_name_has_parts_too() {
+        assert_eq!(starred("Z1-front-150s", "Z1-front"), "*-150s");
+        assert_eq!(starred("room-Z1-front", "Z1-front"), "room-*");
+        assert_eq!(starred("Z1-front", "Z1-front"), "*");
+        assert_eq!(starred("XZ1-front-Z1", "Z1"), "XZ1-front-*");
+        assert_eq!(starred("Z1-frontal", "Z1-front"), "Z1-frontal");
+    }
 
     #[test]
     fn a_series_differs_from_itself_by_nothing_for_sure() {
