@@ -418,6 +418,12 @@ expect = [{{ of = "drift.Z", at = "1min", equals = "50 nm/min" }}]
     ] {
         assert!(xml.contains(part), "`{part}` is not in\n{xml}");
     }
+    // `-` is standard output, which has no room for anything else then.
+    let printed = athermal(&[&"test", &path, &"--junit", &"-"]).ended(1);
+    assert!(printed.out.starts_with("<?xml") && printed.out.contains("</testsuites>"));
+    assert!(!std::path::Path::new("-").exists());
+    let both = athermal(&[&"test", &path, &"--junit", &"-", &"--format", &"json"]).ended(2);
+    both.tells(&["--junit -", "cannot both go to standard output"]);
 }
 
 #[test]

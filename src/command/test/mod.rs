@@ -34,7 +34,7 @@ pub struct Test {
     /// Only tests whose name contains this text, in upper or lower case
     #[arg(long, value_name = "TEXT")]
     filter: Option<String>,
-    /// Also write the results as JUnit XML
+    /// Also write the results as JUnit XML; `-` is standard output, in place of the lines for people
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
     #[command(flatten)]
@@ -48,6 +48,14 @@ impl Test {
     /// When a file has mistakes, data cannot be read, or the results not be written.
     pub fn run(&self, terminal: &Terminal) -> Result<Answer, Failure> {
         let began = Instant::now();
+        let printed = self
+            .junit
+            .as_deref()
+            .is_some_and(|path| path.as_os_str() == "-");
+        if printed && terminal.format == Format::Json {
+            let told = "--junit -: the results as JUnit XML and as JSON cannot both go to standard output; name a file for the XML";
+            return Err(Failure::Request(told.to_owned()));
+        }
         if let Some(path) = &self.junit {
             check_apart("--junit", path, self.graphs.iter().map(|path| &**path))?;
         }
@@ -70,7 +78,7 @@ impl Test {
                 terminal.warning(format_args!("{} has no tests", suite.path));
             }
         }
-        let people = terminal.format != Format::Json;
+        let people = terminal.format != Format::Json && !printed;
         let mut told = None;
         let results = work::run(&suites, self.threads.count(), &mut |result| {
             if people {
@@ -85,8 +93,10 @@ impl Test {
             }
         });
         let summary = Summary::of(&suites, &results, began.elapsed());
-        if let Some(path) = &self.junit {
-            write_aside(path, summary.junit())?;
+        match &self.junit {
+            Some(_) if printed => print!("{}", summary.junit()),
+            Some(path) => write_aside(path, summary.junit())?,
+            None => {}
         }
         let mut warned = BTreeSet::new();
         for warning in results.iter().flat_map(|ran| &ran.warnings) {
@@ -94,10 +104,10 @@ impl Test {
                 terminal.warning(warning);
             }
         }
-        if people {
-            terminal.note(summary.line());
-        } else {
+        if terminal.format == Format::Json {
             println!("{:#}", summary.json());
+        } else {
+            terminal.note(summary.line());
         }
         summary.answer()
     }
