@@ -1,5 +1,6 @@
 //! `athermal report`: what a model is worth on recorded data, as a page.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use athermal::chart::Plot;
@@ -148,8 +149,8 @@ fn sample_range(of: &SensorFacts) -> Option<SampleRange> {
 pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::Outside(format!("cannot make {}: {error}", folder.display())))?;
-    for plot in plots {
-        let name = file_name(&plot.name);
+    let names = file_names(plots.iter().map(|plot| plot.name.as_str()));
+    for (plot, name) in plots.iter().zip(names) {
         write_aside(&folder.join(format!("{name}.svg")), &plot.svg)?;
         #[cfg(feature = "png")]
         write_aside(&folder.join(format!("{name}.png")), &plot.png)?;
@@ -162,8 +163,12 @@ pub fn write_plots(terminal: &Terminal, folder: &Path, plots: &[Plot]) -> Result
     Ok(())
 }
 
-/// A name that is one file in any folder, whatever an axis is called.
-fn file_name(name: &str) -> String {
+/// The most bytes of a name: file systems take 255, of which an ending and what a file is called while it is written have a share.
+const LONGEST: usize = 180;
+
+/// Names that are one file each in any folder, whatever axes are called: those that are too long lose their ends, and those that
+/// would be the same have a number, also where only letters are upper or lower.
+fn file_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let plain = |c: char| {
         if c.is_alphanumeric() || "-_@".contains(c) {
             c
@@ -171,5 +176,31 @@ fn file_name(name: &str) -> String {
             '_'
         }
     };
-    name.chars().map(plain).collect()
+    let mut taken = BTreeSet::new();
+    let one = |name: &str| {
+        let mut name: String = name.chars().map(plain).collect();
+        while name.len() > LONGEST {
+            name.pop();
+        }
+        let numbered = (2..).map(|nth: u32| format!("{name}-{nth}"));
+        let mut all = std::iter::once(name.clone()).chain(numbered);
+        all.find(|name| taken.insert(name.to_lowercase()))
+            .unwrap_or(name)
+    };
+    names.map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_picture_has_a_file_of_its_own_whatever_its_axis_is_called() {
+        let long = format!("drift-{}", "é".repeat(400));
+        let names = ["drift-a.b", "drift-a_b", "drift-A_b", &long, &long];
+        let files = file_names(names.into_iter());
+        assert_eq!(files[..3], ["drift-a_b", "drift-a_b-2", "drift-A_b-3"]);
+        let short = format!("drift-{}", "é".repeat(87));
+        assert_eq!(files[3..], [short.clone(), format!("{short}-2")]);
+    }
 }
