@@ -326,7 +326,18 @@ impl<'a> Tables<'a> {
         if widths.is_empty() {
             return String::new();
         }
-        let columns: Vec<String> = shown.iter().map(|of| axis_of(&of.truth)).collect();
+        // Two truths of one axis are told apart by their nodes.
+        let namesakes = |of: &str| {
+            let all = shown
+                .iter()
+                .filter(|other| axis_of(&other.truth) == axis_of(of));
+            all.count()
+        };
+        let column = |truth: &str| match namesakes(truth) {
+            1 => axis_of(truth),
+            _ => truth.to_owned(),
+        };
+        let columns: Vec<String> = shown.iter().map(|of| column(&of.truth)).collect();
         let rows = widths.iter().map(|&width| {
             let cell = |of: &&athermal::diagnosis::window::Windows| {
                 let here = of.widths.iter().find(|of| of.window_s == width);
