@@ -66,7 +66,7 @@ fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
     let cool = |losses: &[f64]| {
         let counted: Vec<f64> = losses
             .iter()
-            .zip(&worth.set_point)
+            .zip(&worth.light.set_point)
             .filter(|(_, chuck)| **chuck <= 71.0)
             .map(|(loss, _)| *loss)
             .collect();
@@ -74,21 +74,27 @@ fn the_correction_takes_three_quarters_of_the_drift_and_half_of_the_waiting() {
         low as f64 / counted.len() as f64
     };
     let (without, with) = (
-        cool(&worth.loss_without.value),
-        cool(&worth.loss_with.value),
+        cool(&worth.light.loss_without.value),
+        cool(&worth.light.loss_with.value),
     );
     println!("share of losses below 0.2 dB: {without:.3} → {with:.3}");
     assert!(with >= 0.97 && without < 0.7, "{without} → {with}");
-    println!("{:#?}", worth.settling);
-    assert_eq!(worth.settling.len(), 7);
+    println!("{:#?}", worth.light.settling);
+    assert_eq!(worth.light.settling.len(), 7);
     let minutes = |pick: fn(&athermal::report::Settling) -> Option<f64>| {
-        let mut minutes: Vec<f64> = worth.settling.iter().map(|s| pick(s).unwrap()).collect();
+        let mut minutes: Vec<f64> = worth
+            .light
+            .settling
+            .iter()
+            .map(|s| pick(s).unwrap())
+            .collect();
         minutes.sort_by(f64::total_cmp);
         minutes
     };
     let (without, with) = (minutes(|s| s.without_min), minutes(|s| s.with_min));
     // data/README.md, "Compensation": minutes without a correction, found by another program.
     for (settling, reference) in worth
+        .light
         .settling
         .iter()
         .zip([24.0, 40.0, 57.0, 48.0, 92.0, 50.0, 62.0])

@@ -88,6 +88,9 @@ impl Report {
         for told in Lack::told(&facts.lacks) {
             terminal.warning(told);
         }
+        for of in &facts.unjudged {
+            terminal.warning(format_args!("nothing is told of `{}`: {}", of.of, of.why));
+        }
         if course.axes.is_empty() {
             terminal.warning(
                 "the graph has no prediction of a measured truth, so there is little to report",

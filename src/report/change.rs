@@ -11,10 +11,10 @@ pub struct StepLoss {
     pub to: f64,
     /// How many such changes there were.
     pub changes: usize,
-    /// Largest loss without the correction.
-    pub largest_without: f64,
+    /// Largest loss without the correction; none where none was measured.
+    pub largest_without: Option<f64>,
     /// The same with it.
-    pub largest_with: f64,
+    pub largest_with: Option<f64>,
 }
 
 /// A change of the set point.
@@ -30,10 +30,10 @@ pub struct Settling {
     pub without_min: Option<f64>,
     /// The same with the correction.
     pub with_min: Option<f64>,
-    /// Largest loss in dB until the next change, without and with.
-    pub largest_without: f64,
+    /// Largest loss in dB until the next change, without and with; none where none was measured.
+    pub largest_without: Option<f64>,
     /// See `largest_without`.
-    pub largest_with: f64,
+    pub largest_with: Option<f64>,
 }
 
 /// How long after a change the set point may still move, in s: what it is then is what was meant.
@@ -80,14 +80,14 @@ impl Changes {
                     from: set_point,
                     to: set_point,
                     changes: 0,
-                    largest_without: 0.0,
-                    largest_with: 0.0,
+                    largest_without: None,
+                    largest_with: None,
                 });
                 [&mut steady.largest_without, &mut steady.largest_with]
             }
         };
         for (largest, loss) in largest.into_iter().zip(losses) {
-            *largest = largest.max(loss);
+            *largest = larger(*largest, Some(loss));
         }
     }
 
@@ -124,8 +124,8 @@ impl Changes {
             to: self.set_point(),
             without_min: None,
             with_min: None,
-            largest_without: 0.0,
-            largest_with: 0.0,
+            largest_without: None,
+            largest_with: None,
         });
         self.current = Some(self.settling.len() - 1);
         self.waits = [self.current; 2];
@@ -144,6 +144,11 @@ impl Changes {
     }
 }
 
+/// The larger of two losses, or the one that there is.
+fn larger(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    one.into_iter().chain(other).reduce(f64::max)
+}
+
 /// Changes between the same set points, up to half of what counts as a change, taken together.
 fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<StepLoss> {
     let mut steps: Vec<StepLoss> = Vec::new();
@@ -154,8 +159,8 @@ fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<St
         match steps.iter_mut().find(same) {
             Some(step) => {
                 step.changes += 1;
-                step.largest_without = step.largest_without.max(s.largest_without);
-                step.largest_with = step.largest_with.max(s.largest_with);
+                step.largest_without = larger(step.largest_without, s.largest_without);
+                step.largest_with = larger(step.largest_with, s.largest_with);
             }
             None => steps.push(StepLoss {
                 from: s.from,
@@ -181,8 +186,8 @@ mod tests {
             to,
             without_min: None,
             with_min: None,
-            largest_without: without,
-            largest_with: with,
+            largest_without: Some(without),
+            largest_with: Some(with),
         };
         let settling = [
             change(20.001, 49.999, 2.0, 0.2),
@@ -193,6 +198,26 @@ mod tests {
             .iter()
             .map(|step| (step.changes, step.largest_without, step.largest_with))
             .collect();
-        assert_eq!(found, [(2, 3.0, 0.2), (1, 1.0, 0.3)]);
+        assert_eq!(
+            found,
+            [(2, Some(3.0), Some(0.2)), (1, Some(1.0), Some(0.3))]
+        );
+    }
+
+    #[test]
+    fn a_change_after_which_no_loss_was_measured_has_no_largest_one() {
+        let mut changes = Changes::default();
+        changes.set(20.0);
+        changes.lose([0.3, 0.1]);
+        changes.go_on(0.0, f64::NAN, [f64::NAN; 2]);
+        changes.set(50.0);
+        changes.go_on(600.0, 1.0, [f64::NAN; 2]);
+        let (settling, steps) = changes.told(3.0);
+        assert_eq!(
+            (settling[0].largest_without, settling[0].largest_with),
+            (None, None)
+        );
+        let largest: Vec<_> = steps.iter().map(|step| step.largest_without).collect();
+        assert_eq!(largest, [Some(0.3), None]);
     }
 }

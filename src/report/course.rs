@@ -16,7 +16,7 @@ use athermal_core::unit::Unit;
 use serde::{Serialize, Serializer};
 
 use super::sensors::{SensorFacts, ask_for_reasons, sensors};
-use super::track::{Track, parameters, places};
+use super::track::{Track, Unjudged, places, reads_drift};
 use super::{ReportError, Series};
 
 /// What happened over time.
@@ -129,16 +129,16 @@ pub(super) fn follow(
     model: &Model,
     recording: &dyn Recording,
     trace: &Trace,
-) -> Result<(Course, Option<Track>), ReportError> {
+) -> Result<(Course, Track, Vec<Unjudged>), ReportError> {
     let plan = Arc::new(telling(&model.plan));
     let mut engine = Engine::new(Arc::clone(&plan), &model.fitted)?;
-    let (axes, of_axes) = axes(&plan, trace);
+    let (corrected, mut track, unjudged) = places(&plan);
+    let (axes, of_axes) = axes(&plan, trace, &track);
     let mut course = Course {
         sensors: sensors(&plan),
         axes,
         ..Course::default()
     };
-    let mut found = places(&plan);
     let mut rows = recording.open(&plan)?;
     let mut values = vec![f64::NAN; plan.sources.len()];
     // Segments may start their clocks again; here they follow each other.
@@ -173,8 +173,8 @@ pub(super) fn follow(
         for (axis, places) in course.axes.iter_mut().zip(&of_axes) {
             axis.look(places, &engine, now_s);
         }
-        if let Some((places, track)) = &mut found {
-            track.look(places, &engine, now, begins);
+        if !track.axes.is_empty() {
+            track.look(&corrected, &engine, now, begins);
         }
         begins = false;
     }
@@ -183,22 +183,13 @@ pub(super) fn follow(
     }
     course.refused = engine.refused();
     course.rejected = engine.rejected_channels();
-    Ok((course, found.map(|(_, track)| track)))
+    Ok((course, track, unjudged))
 }
 
 /// Every truth with its predictions, in the order of the first of these.
-fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
+fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
     let put_out: Vec<usize> = plan.outputs.iter().map(|output| output.slot).collect();
-    let rates: Vec<usize> = plan
-        .nodes
-        .iter()
-        .filter(|node| node.kind.name == "compensate")
-        .filter_map(|node| match &node.role {
-            PlannedRole::Feature { gathers, .. } => gathers.first(),
-            _ => None,
-        })
-        .flat_map(|&gather| plan.gathers[gather].entries.iter().map(|entry| entry.slot))
-        .collect();
+    let rates: Vec<usize> = track.axes.iter().map(|axis| axis.predicted.1).collect();
     // What is integrated counts most, then what is put out, of several the first.
     let stands =
         |slot: usize| 2 * u8::from(rates.contains(&slot)) + u8::from(put_out.contains(&slot));
@@ -269,7 +260,7 @@ fn axes(plan: &Plan, trace: &Trace) -> (Vec<Axis>, Vec<Places>) {
                 .get(main)
                 .map_or(0.0, |of| of.ahead.secs()),
             weights: weights.collect(),
-            states: states(plan, &of.unit),
+            states: states(plan, truth.slot, &of.unit),
         };
         let places = Places {
             truth: truth.slot,
@@ -298,9 +289,13 @@ impl Axis {
     }
 }
 
-/// The limits of the states of stability in the unit of a drift; none where it is no drift, or nobody gives them.
-fn states(plan: &Plan, unit: &Unit) -> Option<(f64, f64)> {
+/// The limits of the states of stability in the unit of a drift, from the first node that tells of it; none where it is no drift, or
+/// nobody gives them.
+fn states(plan: &Plan, drift: usize, unit: &Unit) -> Option<(f64, f64)> {
+    let mut nodes = plan.nodes.iter();
+    let node =
+        nodes.find(|node| node.kind.name == "stability" && reads_drift(plan, node, drift))?;
+    let limits: Stability = serde_json::from_value(node.spec.parameters()).ok()?;
     let in_unit = |quantity: &Quantity| quantity.in_unit(unit);
-    let node = parameters::<Stability>(plan, "stability")?;
-    in_unit(&node.stable_below).zip(in_unit(&node.transient_above))
+    in_unit(&limits.stable_below).zip(in_unit(&limits.transient_above))
 }

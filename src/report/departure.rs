@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::rms;
-use super::track::{Track, TrackRow};
+use super::track::{Track, TrackAxis, TrackRow};
 
 /// How an axis departs from where it was when its correction began.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -18,10 +18,10 @@ pub struct Departure {
     pub rms_without: Option<f64>,
     /// The same with it.
     pub rms_with: Option<f64>,
-    /// The largest without the correction.
-    pub largest_without: f64,
+    /// The largest without the correction; none where no position was measured.
+    pub largest_without: Option<f64>,
     /// The same with it.
-    pub largest_with: f64,
+    pub largest_with: Option<f64>,
     /// The share of all ticks at which something held the correction back, by what.
     pub held_back: BTreeMap<&'static str, f64>,
 }
@@ -53,13 +53,13 @@ impl Departure {
 
 /// One for each axis that is corrected.
 pub(super) fn departures(track: &Track) -> Vec<Departure> {
-    let of_axis = |(nth, axis): (usize, &super::track::TrackAxis)| {
+    let of_axis = |(nth, axis): (usize, &TrackAxis)| {
         let (without, with) = from_start(&track.rows, nth);
-        let largest = |of: &[f64]| of.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let largest = |of: &[f64]| of.iter().map(|value| value.abs()).reduce(f64::max);
         let share = |(by, ticks): (&&'static str, &u64)| (*by, *ticks as f64 / track.ticks as f64);
         Departure {
             axis: axis.name.clone(),
-            unit: axis.position.clone(),
+            unit: track.positions[nth].clone(),
             rms_without: rms(without.iter().copied()),
             rms_with: rms(with.iter().copied()),
             largest_without: largest(&without),
@@ -99,7 +99,7 @@ mod tests {
             at: Instant::from_ns(0),
             position: vec![position],
             correction: vec![correction],
-            set_point: f64::NAN,
+            set_points: Vec::new(),
             begins,
         }
     }
@@ -126,8 +126,8 @@ mod tests {
             unit: "nm".into(),
             rms_without: None,
             rms_with: None,
-            largest_without: 0.0,
-            largest_with: 0.0,
+            largest_without: None,
+            largest_with: None,
             held_back: [("rate cut", 0.002), ("no valid prediction", 0.3)].into(),
         };
         assert_eq!(departure.limited(), None);

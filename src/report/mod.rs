@@ -8,8 +8,10 @@ mod course;
 mod departure;
 mod errors;
 mod hours;
+mod light;
 mod page;
 mod published;
+mod recomputed;
 mod sensors;
 mod text;
 mod track;
@@ -21,10 +23,12 @@ pub use course::{Axis, Course, Voter, Weight};
 pub use departure::Departure;
 pub use errors::Errors;
 use hours::Hours;
+pub use light::Light;
 pub use page::{page, plots};
 pub use published::{Published, PublishedRow};
 pub use sensors::SensorFacts;
 pub use text::text;
+pub use track::Unjudged;
 pub use verdict::Verdict;
 pub use worth::Worth;
 
@@ -62,8 +66,10 @@ pub struct Facts {
     pub lags: Vec<Lags>,
     /// How estimators answer a change of one sensor.
     pub responses: Vec<Responses>,
-    /// What the correction is worth; none for a graph without a `compensate` node.
+    /// What the correction is worth; none for a graph without a `compensate` node, or where nothing can be told of it.
     pub worth: Option<Worth>,
+    /// Corrections, losses and settle times that nothing can be told of, and why.
+    pub unjudged: Vec<Unjudged>,
     /// How the model was made.
     pub card: Option<Card>,
 }
@@ -138,10 +144,8 @@ pub fn gather(
         &mut |_| {},
     )?;
     let observation = observe(model, recording)?;
-    let (course, track) = course::follow(model, recording, &observation.trace)?;
-    let worth = track
-        .map(|mut track| worth::worth(&mut track))
-        .transpose()?;
+    let (course, track, mut unjudged) = course::follow(model, recording, &observation.trace)?;
+    let worth = worth::worth(track, &mut unjudged)?;
     let verdict = |axis| Verdict::of(axis, &scores, worth.as_ref());
     let residuals = residuals(&model.plan, &observation);
     Ok(Facts {
@@ -160,6 +164,7 @@ pub fn gather(
         lacks,
         course,
         worth,
+        unjudged,
         card: model.card.clone(),
     })
 }

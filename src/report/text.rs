@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::published::ARTICLE;
-use super::{Departure, Facts, Hours, Published, Worth, figure, spelled};
+use super::{Departure, Facts, Hours, Light, Published, figure, spelled};
 use crate::figures::{paragraph, table, time};
 
 /// The verdicts, the article's figures beside ours, what the correction is worth, and the sensors that somebody should look at.
@@ -26,7 +26,14 @@ pub fn text(facts: &Facts) -> String {
     }
     if let Some(worth) = &facts.worth {
         departures(&mut text, &worth.departures);
-        loss(&mut text, worth, &Hours::of(&facts.course));
+        for light in worth.lights() {
+            loss(
+                &mut text,
+                light,
+                !worth.others.is_empty(),
+                &Hours::of(&facts.course),
+            );
+        }
     }
     let sensors = facts.course.sensors.iter();
     let odd: Vec<_> = sensors
@@ -81,8 +88,8 @@ fn departures(text: &mut String, departures: &[Departure]) {
         let figures = [
             of.rms_without,
             of.rms_with,
-            Some(of.largest_without),
-            Some(of.largest_with),
+            of.largest_without,
+            of.largest_with,
         ];
         let cells = [of.axis.clone(), spelled(&of.unit).to_owned()];
         cells.into_iter().chain(figures.map(figure)).collect()
@@ -108,19 +115,19 @@ fn departures(text: &mut String, departures: &[Departure]) {
     }
 }
 
-fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
-    let Some(headline) = worth.headline() else {
+fn loss(text: &mut String, light: &Light, of_several: bool, hours: &Hours) {
+    let Some(headline) = light.headline(of_several) else {
         return;
     };
     text.push('\n');
     text.push_str(&paragraph("", 0, &headline));
-    if worth.settling.is_empty() {
+    if light.settling.is_empty() {
         return;
     }
     if hours.from_s != 0.0 {
         let _ = writeln!(text, "\nChanges of the set point, in {}:", hours.label);
     }
-    let unit = spelled(worth.set_point_unit.as_deref().unwrap_or_default());
+    let unit = spelled(light.set_point_unit.as_deref().unwrap_or_default());
     let _ = writeln!(
         text,
         "\n{:>27}{:>21}{:>27}\n{:>6}{:>9}{:>9}{:>15}{:>9}{:>17}{:>9}",
@@ -136,7 +143,7 @@ fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
         "with"
     );
     let minutes = |m: Option<f64>| m.map_or("never".to_owned(), |m| format!("{m:.1}"));
-    for s in &worth.settling {
+    for s in &light.settling {
         let _ = writeln!(
             text,
             "{:>6.1}{:>9.1}{:>9.1}{:>15}{:>9}{:>17}{:>9}",
@@ -145,8 +152,8 @@ fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
             s.to,
             minutes(s.without_min),
             minutes(s.with_min),
-            figure(Some(s.largest_without)),
-            figure(Some(s.largest_with)),
+            figure(s.largest_without),
+            figure(s.largest_with),
         );
     }
     let _ = writeln!(
@@ -154,7 +161,7 @@ fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
         "\n{:<32}{:>28}",
         "largest loss per step, dB", "without     with"
     );
-    for step in &worth.steps {
+    for step in &light.steps {
         let name = match step.changes {
             0 => format!("{:.0} {unit}, before any step", step.to),
             1 => format!("{:.0} to {:.0} {unit}", step.from, step.to),
@@ -163,8 +170,8 @@ fn loss(text: &mut String, worth: &Worth, hours: &Hours) {
         let _ = writeln!(
             text,
             "{name:<32}{:>19}{:>9}",
-            figure(Some(step.largest_without)),
-            figure(Some(step.largest_with))
+            figure(step.largest_without),
+            figure(step.largest_with)
         );
     }
 }

@@ -1,11 +1,16 @@
-//! Decides where a graph's correction comes from and what it acts on, and writes both down.
+//! Decides what a correction acts on and which drifts and losses are recomputed from that, and writes both down; not how.
 
 use std::collections::BTreeMap;
+use std::iter::successors;
 
 use athermal_control::{OpticalLoss, Settled, held_back_by};
 use athermal_core::compile::{Plan, PlannedNode, PlannedRole};
 use athermal_core::engine::Engine;
+use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
+use athermal_core::unit::Unit;
+use serde::Serialize;
+use serde_json::Value;
 
 use crate::diagnosis::window::measured_by;
 
@@ -16,10 +21,11 @@ const INVALID: f64 = 1.0;
 #[derive(Debug)]
 pub(super) struct Track {
     pub(super) axes: Vec<TrackAxis>,
-    pub(super) loss: Option<OpticalLoss>,
-    pub(super) settled: Option<Settled>,
-    /// The unit of the set point.
-    pub(super) set_point: Option<String>,
+    /// Which drifts are recomputed: first that of each axis.
+    pub(super) drifts: Vec<TrackDrift>,
+    pub(super) losses: Vec<TrackLoss>,
+    /// The units of the positions: first that of each axis, then of those that are not corrected and yet cost light.
+    pub(super) positions: Vec<String>,
     pub(super) rows: Vec<TrackRow>,
     pub(super) ticks: u64,
     /// Which axes have had a valid prediction: before, there is no correction to be judged.
@@ -29,16 +35,44 @@ pub(super) struct Track {
 /// An axis that is corrected.
 #[derive(Debug)]
 pub(super) struct TrackAxis {
+    /// Its channel: `Z1`, or `compensate.Z1` where another correction is called `Z1` too.
     pub(super) name: String,
     /// The slots of the truth and of the prediction of it that is integrated.
     pub(super) predicted: (usize, usize),
-    /// The unit of its positions.
-    pub(super) position: String,
-    /// The unit of its drift, and over which time that is measured.
-    pub(super) drift: String,
-    pub(super) span: Duration,
     /// How many ticks its correction was held back at, by what.
     pub(super) held_back: BTreeMap<&'static str, u64>,
+}
+
+/// A drift, as a slope of a position.
+#[derive(Debug, PartialEq)]
+pub(super) struct TrackDrift {
+    /// Which of the positions.
+    pub(super) position: usize,
+    pub(super) unit: String,
+    /// The parameters of the node that takes the slope, for this window alone.
+    pub(super) slope: Value,
+}
+
+/// An optical loss.
+#[derive(Debug)]
+pub(super) struct TrackLoss {
+    /// The node: `loss`.
+    pub(super) node: String,
+    /// Which of the drifts, in the order in which the node reads them.
+    pub(super) drifts: Vec<usize>,
+    pub(super) spec: OpticalLoss,
+    /// What tells how long it takes until the loss has settled.
+    pub(super) settled: Option<TrackSettled>,
+}
+
+/// A settle time.
+#[derive(Debug)]
+pub(super) struct TrackSettled {
+    pub(super) spec: Settled,
+    /// The unit of the set point.
+    pub(super) set_point: String,
+    /// The smallest change of it that counts, in its unit.
+    pub(super) change: f64,
 }
 
 /// One instant at which something was measured.
@@ -47,9 +81,19 @@ pub(super) struct TrackRow {
     pub(super) at: Instant,
     pub(super) position: Vec<f64>,
     pub(super) correction: Vec<f64>,
-    pub(super) set_point: f64,
+    /// The set point of each loss.
+    pub(super) set_points: Vec<f64>,
     /// Whether another segment begins here.
     pub(super) begins: bool,
+}
+
+/// What a graph has and a report cannot tell the worth of.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unjudged {
+    /// The node, or its channel: `compensate.Z1`.
+    pub of: String,
+    /// Why not.
+    pub why: String,
 }
 
 /// Where to look for what a correction does.
@@ -60,75 +104,287 @@ pub(super) struct Places {
     why: Vec<usize>,
     /// From the unit of each correction to that of its position.
     factors: Vec<f64>,
-    set_point: Option<usize>,
+    set_points: Vec<Option<usize>>,
 }
 
-pub(super) fn parameters<T: serde::de::DeserializeOwned>(plan: &Plan, kind: &str) -> Option<T> {
-    let node = plan.nodes.iter().find(|node| node.kind.name == kind)?;
-    serde_json::from_value(node.spec.parameters()).ok()
+fn of_kind<'a>(plan: &'a Plan, kind: &'static str) -> impl Iterator<Item = &'a PlannedNode> {
+    let nodes = plan.nodes.iter();
+    nodes.filter(move |node| node.kind.name == kind)
 }
 
-fn first_input(plan: &Plan, node: &PlannedNode, port: usize, nth: usize) -> Option<usize> {
+/// The slots that an input port of a feature reads.
+fn reads(plan: &Plan, node: &PlannedNode, port: usize) -> Vec<usize> {
     let PlannedRole::Feature { gathers, .. } = &node.role else {
-        return None;
+        return Vec::new();
     };
-    let gather = plan.gathers.get(*gathers.get(port)?)?;
-    gather.entries.get(nth).map(|entry| entry.slot)
+    let gather = gathers.get(port).map(|&gather| &plan.gathers[gather]);
+    let entries = gather.into_iter().flat_map(|gather| &gather.entries);
+    entries.map(|entry| entry.slot).collect()
 }
 
-/// Finds the correction, the positions that it acts on, and how its worth is judged.
-pub(super) fn places(plan: &Plan) -> Option<(Places, Track)> {
-    let mut places = Places {
-        positions: Vec::new(),
-        corrections: Vec::new(),
-        why: Vec::new(),
-        factors: Vec::new(),
-        set_point: None,
+/// A channel and what it is made of, as long as each node gives a channel for every one that it takes, in their order: a filter, a
+/// limit.
+fn made_of(plan: &Plan, slot: usize) -> impl Iterator<Item = usize> {
+    successors(Some(slot), |&slot| {
+        let node = &plan.nodes[plan.channels[slot].node?];
+        let (_, outputs) = node.ports.first()?;
+        let inputs = reads(plan, node, 0);
+        let nth = slot.checked_sub(outputs.start)?;
+        (inputs.len() == outputs.len()).then_some(())?;
+        inputs.get(nth).copied()
+    })
+}
+
+/// The slot of the measured drift that a channel is, or predicts, or is made of, and that of the channel which is either.
+fn measured_drift(plan: &Plan, slot: usize) -> Option<(usize, usize)> {
+    made_of(plan, slot).find_map(|slot| match plan.channels[slot].predicts {
+        Some(truth) => Some((truth, slot)),
+        None => measured_by(plan, slot).map(|_| (slot, slot)),
+    })
+}
+
+/// Whether a node reads a truth, or what predicts it, or is made of either.
+pub(super) fn reads_drift(plan: &Plan, node: &PlannedNode, truth: usize) -> bool {
+    let mut drifts = reads(plan, node, 0).into_iter();
+    drifts.any(|slot| measured_drift(plan, slot).is_some_and(|of| of.0 == truth))
+}
+
+/// Finds the corrections, the positions that they act on, and how their worth is judged; and what cannot be judged.
+pub(super) fn places(plan: &Plan) -> (Places, Track, Vec<Unjudged>) {
+    let mut finder = Finder {
+        plan,
+        places: Places {
+            positions: Vec::new(),
+            corrections: Vec::new(),
+            why: Vec::new(),
+            factors: Vec::new(),
+            set_points: Vec::new(),
+        },
+        track: Track {
+            axes: Vec::new(),
+            drifts: Vec::new(),
+            losses: Vec::new(),
+            positions: Vec::new(),
+            rows: Vec::new(),
+            ticks: 0,
+            begun: Vec::new(),
+        },
+        unjudged: Vec::new(),
     };
-    let mut axes = Vec::new();
-    for node in plan
-        .nodes
-        .iter()
-        .filter(|node| node.kind.name == "compensate")
-    {
-        for (nth, correction) in node.ports.first()?.1.clone().enumerate() {
-            let rate = first_input(plan, node, 0, nth)?;
-            let truth = plan.channels[rate].predicts?;
-            let position = measured_by(plan, truth)?;
-            let unit = &plan.channels[position].channel.unit;
-            let correcting = &plan.channels[correction].channel;
-            places.factors.push(correcting.unit.factor_to(unit)?);
-            places.positions.push(position);
-            places.corrections.push(correction);
-            places.why.push(node.ports.get(1)?.1.start + nth);
-            let drift = &plan.channels[truth].channel;
-            axes.push(TrackAxis {
-                name: correcting.name.clone(),
-                predicted: (truth, rate),
-                position: unit.to_string(),
-                drift: drift.unit.to_string(),
-                span: drift.span,
-                held_back: BTreeMap::new(),
-            });
+    finder.axes();
+    if !finder.track.axes.is_empty() {
+        finder.losses();
+    }
+    (finder.places, finder.track, finder.unjudged)
+}
+
+struct Finder<'a> {
+    plan: &'a Plan,
+    places: Places,
+    track: Track,
+    unjudged: Vec<Unjudged>,
+}
+
+impl Finder<'_> {
+    fn axes(&mut self) {
+        let plan = self.plan;
+        let each = |node: &PlannedNode| {
+            let port = |nth: usize| node.ports.get(nth).map_or(0..0, |(_, slots)| slots.clone());
+            let rates = reads(plan, node, 0).into_iter();
+            let all = port(0).zip(port(1)).zip(rates);
+            all.collect::<Vec<_>>()
+        };
+        let all: Vec<_> = of_kind(plan, "compensate").flat_map(each).collect();
+        let named = |slot: usize| &plan.channels[slot].channel.name;
+        for &((correction, why), rate) in &all {
+            let namesakes = all
+                .iter()
+                .filter(|((other, _), _)| named(*other) == named(correction));
+            let name = match namesakes.count() {
+                1 => named(correction).clone(),
+                _ => plan.channels[correction].name.clone(),
+            };
+            if let Err(why) = self.axis(name, correction, why, rate) {
+                let of = plan.channels[correction].name.clone();
+                self.unjudged.push(Unjudged { of, why });
+            }
+        }
+        self.track.begun = vec![false; self.track.axes.len()];
+    }
+
+    /// Takes an axis, if drift can be recomputed from its corrected position.
+    fn axis(
+        &mut self,
+        name: String,
+        correction: usize,
+        why: usize,
+        rate: usize,
+    ) -> Result<(), String> {
+        let channels = &self.plan.channels;
+        let (truth, prediction) = measured_drift(self.plan, rate).ok_or_else(|| {
+            format!(
+                "it integrates `{}`, which neither predicts a measured drift nor is made of one channel that does",
+                channels[rate].name
+            )
+        })?;
+        let position = measured_by(self.plan, truth).ok_or_else(|| {
+            format!(
+                "`{}` is no slope of a position, so that it cannot be taken again from the corrected one",
+                channels[truth].name
+            )
+        })?;
+        let (unit, correcting) = (
+            &channels[position].channel.unit,
+            &channels[correction].channel.unit,
+        );
+        let factor = correcting.factor_to(unit).ok_or_else(|| {
+            format!(
+                "it is in {correcting}, and the position `{}` in {unit}",
+                channels[position].name
+            )
+        })?;
+        let drift = self
+            .slope(truth, self.track.axes.len())
+            .ok_or_else(|| format!("the window of `{}` is not known", channels[truth].name))?;
+        self.places.factors.push(factor);
+        self.places.positions.push(position);
+        self.places.corrections.push(correction);
+        self.places.why.push(why);
+        self.track.positions.push(unit.to_string());
+        self.track.drifts.push(drift);
+        self.track.axes.push(TrackAxis {
+            name,
+            predicted: (truth, prediction),
+            held_back: BTreeMap::new(),
+        });
+        Ok(())
+    }
+
+    /// How a drift is taken again from one of the positions.
+    fn slope(&self, drift: usize, position: usize) -> Option<TrackDrift> {
+        let channels = &self.plan.channels;
+        let channel = &channels[drift].channel;
+        let of = &channels[measured_by(self.plan, drift)?].channel;
+        // A filtered position has a span of its own, which is no part of the window.
+        let window: Duration = channel.span - of.span;
+        let node = &self.plan.nodes[channels[drift].node?];
+        let mut slope = node.spec.parameters();
+        let parameters = slope.as_object_mut()?;
+        parameters.insert("windows".to_owned(), vec![window.to_string()].into());
+        parameters.insert("unit".to_owned(), channel.unit.to_string().into());
+        Some(TrackDrift {
+            position,
+            unit: channel.unit.to_string(),
+            slope,
+        })
+    }
+
+    fn losses(&mut self) {
+        let plan = self.plan;
+        let mut settled: Vec<&PlannedNode> = of_kind(plan, "settled").collect();
+        for node in of_kind(plan, "optical_loss") {
+            let (of, found) = (node.instance(), self.loss(node));
+            let of_loss = |settled: &&PlannedNode| {
+                let of = reads(plan, settled, 0);
+                of.iter().any(|slot| node.slots.contains(slot))
+            };
+            let place = settled.iter().position(of_loss);
+            let own = place.map(|place| settled.remove(place));
+            match found {
+                Ok(mut loss) => {
+                    let set_point = own.and_then(|own| reads(plan, own, 1).first().copied());
+                    loss.settled = own
+                        .zip(set_point)
+                        .and_then(|(own, slot)| self.settled(own, slot));
+                    let set_point = set_point.filter(|_| loss.settled.is_some());
+                    self.places.set_points.push(set_point);
+                    self.track.losses.push(loss);
+                }
+                Err(why) => self.unjudged.push(Unjudged { of, why }),
+            }
+        }
+        for node in settled {
+            let of = node.instance();
+            let why = "it reads no optical loss, or one that another node reads already".to_owned();
+            self.unjudged.push(Unjudged { of, why });
         }
     }
-    if axes.is_empty() {
-        return None;
+
+    fn loss(&mut self, node: &PlannedNode) -> Result<TrackLoss, String> {
+        let parameters = serde_json::from_value(node.spec.parameters());
+        let mut spec: OpticalLoss = parameters.map_err(|error| error.to_string())?;
+        let read = reads(self.plan, node, 0);
+        let channels = &self.plan.channels;
+        if let Some(preset) = spec.preset.take() {
+            // A preset goes by names, and drifts have others where they are taken again.
+            let radius = |&slot: &usize| {
+                let value = preset.radius_um(&channels[slot].channel.name)?;
+                let unit = Unit::parse("um").ok()?;
+                Some(Quantity { value, unit })
+            };
+            spec.radii = read.iter().map(radius).collect();
+        }
+        let mut drifts = Vec::with_capacity(read.len());
+        for slot in read {
+            let drift = measured_drift(self.plan, slot).map(|of| of.0);
+            let drift = drift.and_then(|drift| self.drift(drift));
+            drifts.push(drift.ok_or_else(|| {
+                format!(
+                    "it reads `{}`, which is no drift of a measured position",
+                    channels[slot].name
+                )
+            })?);
+        }
+        let corrected = |&drift: &usize| {
+            let position = self.track.drifts[drift].position;
+            position < self.track.axes.len()
+        };
+        if !drifts.iter().any(corrected) {
+            return Err("none of the axes whose drifts it reads is corrected".to_owned());
+        }
+        Ok(TrackLoss {
+            node: node.instance(),
+            drifts,
+            spec,
+            settled: None,
+        })
     }
-    let settled = plan.nodes.iter().find(|node| node.kind.name == "settled");
-    places.set_point = settled.and_then(|node| first_input(plan, node, 1, 0));
-    let track = Track {
-        begun: vec![false; axes.len()],
-        axes,
-        loss: parameters(plan, "optical_loss"),
-        settled: parameters(plan, "settled"),
-        set_point: places
-            .set_point
-            .map(|slot| plan.channels[slot].channel.unit.to_string()),
-        rows: Vec::new(),
-        ticks: 0,
-    };
-    Some((places, track))
+
+    /// The place of a drift among those that are recomputed, where it is taken up if it is not one yet.
+    fn drift(&mut self, drift: usize) -> Option<usize> {
+        let source = |slot: usize| made_of(self.plan, slot).last();
+        let measured = measured_by(self.plan, drift)?;
+        let positions = &self.places.positions;
+        let of_axis = positions.iter().position(|slot| *slot == measured);
+        // What is corrected may be filtered, or rid of what the machine corrects itself, and this drift not.
+        let of_source = || {
+            let mut all = positions.iter();
+            all.position(|slot| source(*slot) == source(measured))
+        };
+        let place = of_axis.or_else(of_source).unwrap_or(positions.len());
+        let slope = self.slope(drift, place)?;
+        if place == self.places.positions.len() {
+            self.places.positions.push(measured);
+            let unit = &self.plan.channels[measured].channel.unit;
+            self.track.positions.push(unit.to_string());
+        }
+        let drifts = &mut self.track.drifts;
+        let known = drifts.iter().position(|known| *known == slope);
+        Some(known.unwrap_or_else(|| {
+            drifts.push(slope);
+            drifts.len() - 1
+        }))
+    }
+
+    fn settled(&self, node: &PlannedNode, set_point: usize) -> Option<TrackSettled> {
+        let spec: Settled = serde_json::from_value(node.spec.parameters()).ok()?;
+        let unit = &self.plan.channels[set_point].channel.unit;
+        Some(TrackSettled {
+            change: spec.change.as_difference(&unit.difference())?,
+            set_point: unit.to_string(),
+            spec,
+        })
+    }
 }
 
 impl Track {
@@ -144,7 +400,8 @@ impl Track {
             .iter()
             .map(|&slot| engine.value(slot))
             .collect();
-        let set_point = places.set_point.map_or(f64::NAN, |slot| engine.value(slot));
+        let set_point = |slot: &Option<usize>| slot.map_or(f64::NAN, |slot| engine.value(slot));
+        let set_points: Vec<f64> = places.set_points.iter().map(set_point).collect();
         if begins {
             self.begun.fill(false);
         }
@@ -152,7 +409,11 @@ impl Track {
             // Kept on the row before, so that it is seen even where nothing is measured at the break.
             row.begins = true;
         }
-        if position.iter().all(|value| value.is_nan()) && set_point.is_nan() {
+        if position
+            .iter()
+            .chain(&set_points)
+            .all(|value| value.is_nan())
+        {
             return;
         }
         for (begun, &why) in self.begun.iter_mut().zip(&places.why) {
@@ -169,7 +430,7 @@ impl Track {
             at: now,
             position,
             correction: correction.collect(),
-            set_point,
+            set_points,
             begins: false,
         });
     }

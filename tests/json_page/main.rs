@@ -262,8 +262,15 @@ each = ["sensor", "axis"]
 inputs.features = "gradients.{{sensor}}@*"
 inputs.truth = "drift.{{axis}}"
 ahead = "150s"
+[nodes.wait]
+type = "settled"
+inputs.loss = "loss"
+inputs.set_point = "temperature.chuck"
+below = "0.5 dB"
+change = "3 K"
 [outputs]
 side = "side"
+wait = "wait"
 "#,
             graph("die-tester-compensate")
         ),

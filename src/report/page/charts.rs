@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::super::{Axis, Errors, Facts, Hours, Voter, Weight, Worth};
+use super::super::{Axis, Errors, Facts, Hours, Light, Voter, Weight};
 use crate::chart::{Chart, LINES, Layer, Mark};
 
 /// Stretches that are quasi-stable or transient, run together where they follow each other.
@@ -189,22 +189,22 @@ pub(super) fn errors<'a>(axis: &'a Axis, errors: &'a Errors) -> [(&'static str, 
 }
 
 /// Optical loss without and with the correction; none without losses.
-pub(super) fn loss<'a>(worth: &'a Worth, hours: &Hours) -> Option<Chart<'a>> {
-    let (without, with) = (&worth.loss_without, &worth.loss_with);
+pub(super) fn loss<'a>(light: &'a Light, hours: &Hours) -> Option<Chart<'a>> {
+    let (without, with) = (&light.loss_without, &light.loss_with);
     (!with.value.is_empty()).then(|| Chart {
-        title: "Optical loss over five minutes".into(),
+        title: format!("Optical loss over {}", light.span()),
         x_label: hours.label.clone(),
         y_label: format!(
             "loss in dB, cut at {}; dashed: its limit",
-            10.0 * worth.loss_limit
+            10.0 * light.loss_limit
         ),
         height: 260.0,
         layers: vec![
             Layer::line(&without.time_s, &without.value, "c1", "without correction"),
             Layer::line(&with.time_s, &with.value, "c3", "with correction"),
         ],
-        limits: vec![worth.loss_limit],
-        y_range: Some((0.0, 10.0 * worth.loss_limit)),
+        limits: vec![light.loss_limit],
+        y_range: Some((0.0, 10.0 * light.loss_limit)),
         time: true,
         zero: hours.from_s,
         ..Chart::default()

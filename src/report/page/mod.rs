@@ -7,7 +7,7 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use super::{Facts, Hours, Worth, figure};
+use super::{Axis, Facts, Hours, Light, Worth, figure};
 use crate::chart::{COLOURS, Chart, Plot, STYLE};
 use crate::markup::escaped;
 
@@ -21,9 +21,7 @@ pub fn page(facts: &Facts) -> String {
         style::STYLE
     );
     verdicts(&mut html, facts);
-    if let Some(worth) = &facts.worth {
-        worth_section(&mut html, worth, &Hours::of(&facts.course));
-    }
+    worth_section(&mut html, facts);
     html.push_str("<h2>Scores</h2><p class=\"muted\">Every prediction against the drift measured later, on the instants at which all are valid.</p>");
     html.push_str(&tables::scores(&facts.scores));
     published(&mut html, facts);
@@ -47,7 +45,7 @@ fn verdicts(html: &mut String, facts: &Facts) {
         facts.course.ticks,
         (to - from) / 86400.0
     );
-    if let Some(headline) = facts.worth.as_ref().and_then(Worth::headline) {
+    for headline in facts.worth.iter().flat_map(Worth::headlines) {
         let _ = write!(html, "<li><b>{}</b></li>", escaped(&headline));
     }
     for verdict in &facts.verdicts {
@@ -66,32 +64,56 @@ fn verdicts(html: &mut String, facts: &Facts) {
     html.push_str("</ul>");
 }
 
-fn worth_section(html: &mut String, worth: &Worth, hours: &Hours) {
+fn worth_section(html: &mut String, facts: &Facts) {
+    if facts.worth.is_none() && facts.unjudged.is_empty() {
+        return;
+    }
     html.push_str("<h2>What the correction is worth</h2>");
-    html.push_str(&tables::departures(&worth.departures));
-    if let Some(chart) = charts::loss(worth, hours) {
-        let worst = |losses: &[f64]| figure(Some(losses.iter().copied().fold(0.0, f64::max)));
+    for of in &facts.unjudged {
         let _ = write!(
             html,
-            "<p>Largest loss over five minutes: {} dB without, {} dB with correction; the picture ends at {} dB.</p><div class=\"wide\">{}</div>",
-            worst(&worth.loss_without.value),
-            worst(&worth.loss_with.value),
-            10.0 * worth.loss_limit,
+            "<p class=\"bad\">Nothing is told of <b>{}</b>: {}.</p>",
+            escaped(&of.of),
+            escaped(&of.why)
+        );
+    }
+    let Some(worth) = &facts.worth else {
+        return;
+    };
+    html.push_str(&tables::departures(&worth.departures));
+    for light in worth.lights() {
+        if let Some(name) = light.loss.as_ref().filter(|_| !worth.others.is_empty()) {
+            let _ = write!(html, "<h3>{}</h3>", escaped(name));
+        }
+        light_section(html, light, &Hours::of(&facts.course));
+    }
+}
+
+fn light_section(html: &mut String, light: &Light, hours: &Hours) {
+    if let Some(chart) = charts::loss(light, hours) {
+        let worst = |losses: &[f64]| figure(losses.iter().copied().reduce(f64::max));
+        let _ = write!(
+            html,
+            "<p>Largest loss over {}: {} dB without, {} dB with correction; the picture ends at {} dB.</p><div class=\"wide\">{}</div>",
+            light.span(),
+            worst(&light.loss_without.value),
+            worst(&light.loss_with.value),
+            10.0 * light.loss_limit,
             chart.svg()
         );
     }
-    if !worth.settling.is_empty() {
+    if !light.settling.is_empty() {
         html.push_str("<h3>Settle time and largest loss per change of the set point</h3>");
-        html.push_str(&tables::settling(worth, hours));
+        html.push_str(&tables::settling(light, hours));
         let _ = write!(
             html,
             "<p class=\"muted\">From the change, in {}, to the start of the first ten minutes that are stable throughout.</p>",
             hours.label
         );
     }
-    if !worth.steps.is_empty() {
+    if !light.steps.is_empty() {
         html.push_str("<h3>Largest loss per temperature step</h3>");
-        html.push_str(&tables::steps(worth));
+        html.push_str(&tables::steps(light));
     }
 }
 
@@ -115,19 +137,40 @@ fn published(html: &mut String, facts: &Facts) {
 fn over_time(html: &mut String, facts: &Facts) {
     html.push_str("<h2>Drift over time</h2><p class=\"muted screen\">Drag across a picture to look closer, double-click for all; the wheel with Ctrl or Shift zooms.</p>");
     let axes = &facts.course.axes;
-    if let Some((axis, (stable, transient))) =
-        axes.iter().find_map(|axis| Some((axis, axis.states?)))
-    {
+    for (states, of) in limits(axes) {
         let _ = write!(
             html,
-            "<p class=\"muted\">Shaded: quasi-stable from {stable}, transient from {transient} {}.</p>",
-            escaped(&axis.unit)
+            "<p class=\"muted\">Shaded{}: quasi-stable from {}.</p>",
+            escaped(&of),
+            escaped(&states)
         );
     }
     for axis in axes {
         let errors = axis.errors();
         wide(html, &charts::drift(axis, &errors, facts));
     }
+}
+
+/// Limits of the states of stability, each with the axes of which they are where others have others.
+fn limits(axes: &[Axis]) -> Vec<(String, String)> {
+    let mut limits: Vec<(String, Vec<&str>)> = Vec::new();
+    for axis in axes {
+        let Some((stable, transient)) = axis.states else {
+            continue;
+        };
+        let told = format!("{stable}, transient from {transient} {}", axis.unit);
+        match limits.iter_mut().find(|(known, _)| *known == told) {
+            Some((_, names)) => names.push(&axis.name),
+            None => limits.push((told, vec![&axis.name])),
+        }
+    }
+    let several = limits.len() > 1;
+    let of = |names: Vec<&str>| match several {
+        true => format!(" of {}", names.join(", ")),
+        false => String::new(),
+    };
+    let limits = limits.into_iter();
+    limits.map(|(told, names)| (told, of(names))).collect()
 }
 
 fn wide(html: &mut String, chart: &Chart<'_>) {
@@ -242,12 +285,15 @@ pub fn plots(facts: &Facts) -> Vec<Plot> {
             add(format!("{kind}-{name}"), &chart);
         }
     }
-    if let Some(chart) = facts
-        .worth
-        .as_ref()
-        .and_then(|worth| charts::loss(worth, &hours))
-    {
-        add("loss".to_owned(), &chart);
+    if let Some(worth) = &facts.worth {
+        let several = !worth.others.is_empty();
+        for light in worth.lights() {
+            let named = light.loss.as_ref().filter(|_| several);
+            let name = named.map_or("loss".to_owned(), |node| format!("loss-{node}"));
+            if let Some(chart) = charts::loss(light, &hours) {
+                add(name, &chart);
+            }
+        }
     }
     plots
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use athermal_core::model::EstimatorCard;
 use athermal_core::score::Score;
 
-use super::super::{Departure, Hours, Published, SensorFacts, Worth, figure, spelled};
+use super::super::{Departure, Hours, Light, Published, SensorFacts, figure, spelled};
 use crate::figures::count;
 use crate::markup::escaped;
 
@@ -89,10 +89,10 @@ pub(super) fn published(tables: &[Published]) -> String {
     html
 }
 
-pub(super) fn settling(worth: &Worth, hours: &Hours) -> String {
-    let unit = escaped(spelled(worth.set_point_unit.as_deref().unwrap_or_default()));
+pub(super) fn settling(light: &Light, hours: &Hours) -> String {
+    let unit = escaped(spelled(light.set_point_unit.as_deref().unwrap_or_default()));
     let mut rows = String::new();
-    for s in &worth.settling {
+    for s in &light.settling {
         let minutes =
             |m: Option<f64>| m.map_or("not settled".to_owned(), |m| format!("{m:.1} min"));
         let _ = write!(
@@ -103,8 +103,8 @@ pub(super) fn settling(worth: &Worth, hours: &Hours) -> String {
             s.to,
             minutes(s.without_min),
             minutes(s.with_min),
-            figure(Some(s.largest_without)),
-            figure(Some(s.largest_with))
+            figure(s.largest_without),
+            figure(s.largest_with)
         );
     }
     let header = [
@@ -119,10 +119,10 @@ pub(super) fn settling(worth: &Worth, hours: &Hours) -> String {
     table(&header, &rows)
 }
 
-pub(super) fn steps(worth: &Worth) -> String {
-    let unit = escaped(spelled(worth.set_point_unit.as_deref().unwrap_or_default()));
+pub(super) fn steps(light: &Light) -> String {
+    let unit = escaped(spelled(light.set_point_unit.as_deref().unwrap_or_default()));
     let mut rows = String::new();
-    for step in &worth.steps {
+    for step in &light.steps {
         let name = match step.changes {
             0 => format!("at {:.0} {unit}, before any step", step.to),
             _ => format!("{:.0} → {:.0} {unit}", step.from, step.to),
@@ -131,8 +131,8 @@ pub(super) fn steps(worth: &Worth) -> String {
             rows,
             "<tr><td>{name}</td><td>{}</td><td>{} dB</td><td>{} dB</td></tr>",
             step.changes,
-            figure(Some(step.largest_without)),
-            figure(Some(step.largest_with))
+            figure(step.largest_without),
+            figure(step.largest_with)
         );
     }
     table(
@@ -156,8 +156,8 @@ pub(super) fn departures(departures: &[Departure]) -> String {
             figure(of.rms_without),
             if of.is_worse() { " class=\"bad\"" } else { "" },
             figure(of.rms_with),
-            figure(Some(of.largest_without)),
-            figure(Some(of.largest_with)),
+            figure(of.largest_without),
+            figure(of.largest_with),
             escaped(spelled(&of.unit)),
             if of.limited().is_some() { " bad" } else { "" },
             held.collect::<Vec<_>>().join("; "),
