@@ -320,6 +320,10 @@ fn losses_are_those_of_the_drifts_that_their_nodes_read_in_any_order_and_each_of
     let told = reported.report(&[]).out.replace('\n', " ");
     assert!(told.contains("losses (side.Z1) below 0.3 dB"), "{told}");
     let page = reported.page();
+    assert!(
+        !page.contains("NaN"),
+        "without a set point there are no steps"
+    );
     assert!(page.contains("<h3>turned</h3>") && page.contains("<h3>side.X1</h3>"));
 }
 

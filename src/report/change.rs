@@ -83,6 +83,9 @@ impl Changes {
                     largest_without: None,
                     largest_with: None,
                 });
+                if steady.from.is_nan() {
+                    (steady.from, steady.to) = (set_point, set_point);
+                }
                 [&mut steady.largest_without, &mut steady.largest_with]
             }
         };
@@ -171,6 +174,8 @@ fn steps(steady: Option<StepLoss>, settling: &[Settling], change: f64) -> Vec<St
             }),
         }
     }
+    // Of a recording without a set point there is nothing to tell but the losses.
+    let steady = steady.filter(|steady| !steady.from.is_nan());
     steady.into_iter().chain(steps).collect()
 }
 
@@ -219,5 +224,21 @@ mod tests {
         );
         let largest: Vec<_> = steps.iter().map(|step| step.largest_without).collect();
         assert_eq!(largest, [Some(0.3), None]);
+    }
+
+    #[test]
+    fn the_time_before_any_change_has_the_first_set_point_that_is_known() {
+        let mut changes = Changes::default();
+        changes.lose([0.3, 0.1]);
+        assert!(steps(changes.steady.clone(), &[], 3.0).is_empty());
+        changes.set(20.0);
+        changes.lose([0.2, 0.2]);
+        let (_, steps) = changes.told(3.0);
+        let steady = &steps[0];
+        assert_eq!((steady.from, steady.to), (20.0, 20.0));
+        assert_eq!(
+            (steady.largest_without, steady.largest_with),
+            (Some(0.3), Some(0.2))
+        );
     }
 }
