@@ -456,6 +456,12 @@ impl<'g> Resolver<'g> {
         plan.steps = steps::steps(&plan);
         plan.warm_up = plan.warm_ups().into_iter().max().unwrap_or_default();
         if !self.diagnostics.has_errors() {
+            let declared = self.graph.nodes.iter().map(|node| node.instances.len());
+            debug_assert_eq!(
+                plan.nodes.len(),
+                declared.sum::<usize>(),
+                "what is left out has been told"
+            );
             steps::warn(self.graph, &plan, self.diagnostics);
         }
         plan
