@@ -97,7 +97,7 @@ impl Resolver<'_> {
         let role = PlannedRole::Feature {
             inputs,
             gathers,
-            wanted: vec![true; outputs.len()],
+            wanted: vec![false; outputs.len()],
             every_tick: feature.every_tick(),
             closes_loops: feature.closes_loops(),
             fit,
