@@ -2,12 +2,16 @@
 //! decide which variances the model has.
 
 use super::Structural;
-use super::matrix::{NOTHING_NEW, carry, diagonal, product, rank, shrink};
+use super::matrix::{NOTHING_NEW, Told, carry, diagonal, product, rank, shrink};
 use crate::NumericsError;
 use crate::checks::{check_length, check_parameter};
 use crate::scratch::Scratch;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
+
+/// Where what is expected of an observation is more uncertain than the observation by this factor, what is left of a covariance
+/// is a small difference of large numbers, and is worked out in another way, which costs more.
+const UNSURE: f64 = 1e3;
 
 /// What is known of level, trend and coefficients, in this order.
 ///
@@ -64,20 +68,19 @@ impl TryFrom<Saved> for Kalman {
         if unknown > 0 || !diffuse.is_empty() {
             check_length("diffuse", order * order, diffuse.len())?;
         }
-        let sound = state.iter().all(|value| value.is_finite())
-            && is_covariance(&covariance, order)
-            && is_covariance(&diffuse, order);
-        if !sound {
-            return Err(NumericsError::NotFinite);
-        }
-        Ok(Self {
+        let filter = Self {
             model,
             state,
             covariance,
             diffuse,
             unknown,
-            room: Scratch(vec![0.0; 2 * order]),
-        })
+            room: Scratch(vec![0.0; 3 * order]),
+        };
+        if filter.is_sound() {
+            Ok(filter)
+        } else {
+            Err(NumericsError::NotFinite)
+        }
     }
 }
 
@@ -165,7 +168,7 @@ impl Kalman {
             covariance: covariance.to_vec(),
             diffuse: Vec::new(),
             unknown: 0,
-            room: Scratch(vec![0.0; 2 * order]),
+            room: Scratch(vec![0.0; 3 * order]),
         };
         for i in 0..order {
             if filter.covariance[i * order + i] == f64::INFINITY {
@@ -207,6 +210,16 @@ impl Kalman {
     #[must_use]
     pub fn is_diffuse(&self) -> bool {
         self.unknown > 0
+    }
+
+    /// Whether what is known is finite, and how well may be a covariance: after numbers so small or so large that their squares
+    /// are none it is not.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let order = self.state.len();
+        self.state.iter().all(|value| value.is_finite())
+            && is_covariance(&self.covariance, order)
+            && is_covariance(&self.diffuse, order)
     }
 
     /// Lets time pass.
@@ -280,15 +293,15 @@ impl Kalman {
         self.take(x, error, share, states)
     }
 
-    /// Makes a state more uncertain by a variance of its own, as of a leap that nothing else tells of.
+    /// Makes a state more uncertain by a variance of its own, as of a leap that nothing else tells of. One that is no number, or
+    /// not above 0, adds nothing; the largest number is the most.
     ///
     /// # Panics
-    /// When there is no such state, or the variance is negative or not finite.
+    /// When there is no such state.
     pub fn widen(&mut self, state: usize, variance: f64) {
-        let fine = variance >= 0.0 && variance.is_finite();
-        assert!(fine, "a variance is finite and not negative");
         let order = self.state.len();
-        self.covariance[state * order + state] += variance;
+        let own = &mut self.covariance[state * order + state];
+        *own = (*own + variance.max(0.0)).min(f64::MAX);
     }
 
     /// The same with one more coefficient before the others, which is known to be 0. Only where nothing is diffuse.
@@ -309,7 +322,7 @@ impl Kalman {
             covariance.extend([&row[..place], &[0.0], &row[place..]].concat());
         }
         Self {
-            room: Scratch(vec![0.0; 2 * state.len()]),
+            room: Scratch(vec![0.0; 3 * state.len()]),
             model: self.model,
             state,
             covariance,
@@ -334,9 +347,10 @@ impl Kalman {
     #[inline]
     fn take(&mut self, x: &[f64], error: f64, share: f64, states: usize) -> Option<Innovation> {
         let order = self.state.len();
-        let (shared, _) = self.room.0.split_at_mut(order);
+        let (shared, rest) = self.room.0.split_at_mut(order);
+        let own = self.model.observation / share;
         let explained = product(&self.covariance, &self.model, x, shared);
-        let variance = explained + self.model.observation / share;
+        let variance = explained + own;
         if !(variance > 0.0 && variance.is_finite()) {
             return None;
         }
@@ -348,12 +362,22 @@ impl Kalman {
         for (state, share) in self.state.iter_mut().zip(&*shared).take(states) {
             *state += share * step;
         }
-        let rows = self.covariance.chunks_exact_mut(order);
-        for (i, (row, a)) in rows.zip(&*shared).enumerate() {
-            // What two states that stay have in common stays too.
-            let columns = if i < states { order } else { states };
-            for (value, b) in row.iter_mut().zip(&*shared).take(columns) {
-                *value -= a * b;
+        if explained > UNSURE * own {
+            let told = Told {
+                states,
+                variance: own * (explained / variance),
+                shared: |i: usize| shared[i] * (own / root),
+                left: |i: usize, j: usize, value: f64| value - shared[i] * shared[j],
+            };
+            told.settle(&mut self.covariance, &self.model, x, &mut rest[..order]);
+        } else {
+            let rows = self.covariance.chunks_exact_mut(order);
+            for (i, (row, a)) in rows.zip(&*shared).enumerate() {
+                // What two states that stay have in common stays too.
+                let columns = if i < states { order } else { states };
+                for (value, b) in row.iter_mut().zip(&*shared).take(columns) {
+                    *value -= a * b;
+                }
             }
         }
         Some(Innovation {
@@ -499,21 +523,38 @@ impl Kalman {
     /// Takes an observation of something that nothing is known of; none where all that it tells of is known.
     fn learn_of_the_unknown(&mut self, x: &[f64], error: f64, share: f64) -> Option<Innovation> {
         let order = self.state.len();
-        let (of_diffuse, shared) = self.room.0.split_at_mut(order);
+        let (of_diffuse, rest) = self.room.0.split_at_mut(order);
+        let (shared, rest) = rest.split_at_mut(order);
         let variance = product(&self.diffuse, &self.model, x, of_diffuse);
         let most = 1.0 + x.iter().map(|x| x * x).sum::<f64>();
         if variance.is_nan() || variance <= NOTHING_NEW * most {
             return None;
         }
         let own = self.model.observation / share;
-        let finite = product(&self.covariance, &self.model, x, shared) + own;
+        let explained = product(&self.covariance, &self.model, x, shared);
+        let finite = explained + own;
         for (state, gain) in self.state.iter_mut().zip(&*of_diffuse) {
             *state += gain / variance * error;
         }
+        let left = |i: usize, j: usize, value: f64| {
+            let (a, b) = (of_diffuse[i] / variance, of_diffuse[j] / variance);
+            value + (a * b * finite - (a * shared[j] + b * shared[i]))
+        };
+        if explained > UNSURE * own {
+            let told = Told {
+                states: order,
+                variance: own,
+                shared: |i: usize| of_diffuse[i] / variance * own,
+                left,
+            };
+            told.settle(&mut self.covariance, &self.model, x, rest);
+        } else {
+            for (at, value) in self.covariance.iter_mut().enumerate() {
+                *value = left(at / order, at % order, *value);
+            }
+        }
         for i in 0..order {
             for j in 0..order {
-                let (a, b) = (of_diffuse[i] / variance, of_diffuse[j] / variance);
-                self.covariance[i * order + j] += a * b * finite - (a * shared[j] + b * shared[i]);
                 self.diffuse[i * order + j] -= of_diffuse[i] * of_diffuse[j] / variance;
             }
         }

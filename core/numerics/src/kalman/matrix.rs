@@ -74,3 +74,69 @@ pub(super) fn product(matrix: &[f64], model: &Structural, x: &[f64], to: &mut [f
     let terms = to[moving..].iter().zip(x);
     terms.fold(to[0], |sum, (value, x)| sum + value * x)
 }
+
+/// What an observation tells of the sum `z = (1, 0, x)ᵀs` of the states `s`.
+pub(super) struct Told<Shared, Left> {
+    /// How many of the states it moves; what the others have in common stays.
+    pub(super) states: usize,
+    /// The variance of `z` after it.
+    pub(super) variance: f64,
+    /// The covariance of `z` and a state after it.
+    pub(super) shared: Shared,
+    /// What is left of an element of the covariance of the states.
+    pub(super) left: Left,
+}
+
+impl<Shared: Fn(usize) -> f64, Left: Fn(usize, usize, f64) -> f64> Told<Shared, Left> {
+    /// Leaves of a covariance what an observation leaves of it, where nearly nothing of a large variance is left.
+    ///
+    /// The usual difference `P − PhhᵀP / F` rounds as much as `P` is large, and may come out negative (Bierman 1977, section
+    /// V.2). Known to within the observation is `z` alone, and its variance and covariances are products, which round as much as they
+    /// are large themselves. So of the states the one that makes most of `z` is written as `z` less the others, and the difference
+    /// is taken of the others alone. None of those is known better than what it has in common with `z` says.
+    pub(super) fn settle(
+        &self,
+        matrix: &mut [f64],
+        model: &Structural,
+        x: &[f64],
+        sums: &mut [f64],
+    ) {
+        let (order, moving) = (sums.len(), model.moving());
+        let weight = |i: usize| match i.checked_sub(moving) {
+            Some(regressor) => x[regressor],
+            None if i == 0 => 1.0,
+            None => 0.0,
+        };
+        let part = |i: usize| weight(i).powi(2) * matrix[i * order + i];
+        let pivot = (1..order).fold(0, |most, i| if part(i) > part(most) { i } else { most });
+        sums.fill(0.0);
+        for i in (0..order).filter(|&i| i != pivot) {
+            for j in (0..order).filter(|&j| j != pivot) {
+                let value = &mut matrix[i * order + j];
+                let mut left = (self.left)(i, j, *value);
+                if i == j {
+                    let least = (self.shared)(i).powi(2) / self.variance;
+                    left = left.max(0.0).max(least);
+                }
+                sums[j] += weight(i) * left;
+                if i < self.states || j < self.states {
+                    *value = left;
+                }
+            }
+        }
+        let own = weight(pivot);
+        let mut variance = self.variance;
+        for k in (0..order).filter(|&k| k != pivot) {
+            let shared = (self.shared)(k);
+            let left = shared - sums[k];
+            variance -= weight(k) * (shared + left);
+            if k < self.states || pivot < self.states {
+                matrix[k * order + pivot] = left / own;
+                matrix[pivot * order + k] = left / own;
+            }
+        }
+        if pivot < self.states {
+            matrix[pivot * order + pivot] = (variance / own / own).max(0.0);
+        }
+    }
+}

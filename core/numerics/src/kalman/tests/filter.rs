@@ -428,3 +428,159 @@ fn one_more_coefficient_that_is_known_to_be_0_changes_nothing() {
         filter.forecast(3.0, &[4.0])
     );
 }
+
+/// A step: the time that passes, the regressor and the observation.
+type Step = (f64, f64, f64);
+
+/// Follows steps from these variances of level, trend and a coefficient, and compares state and covariance with those that the
+/// textbook's recursion gives with 80 digits.
+fn compare(variances: [f64; 3], steps: &[Step], state: [f64; 3], covariance: [f64; 9]) {
+    let model = Structural {
+        observation: 1.0,
+        level: 0.25,
+        trend: Some(1.0),
+        returning: 0.0,
+        passage: Passage::Continuous,
+    };
+    let mut start = [0.0; 9];
+    for (nth, variance) in variances.into_iter().enumerate() {
+        start[4 * nth] = variance;
+    }
+    let mut filter = Kalman::starting_at(model, vec![0.0; 3], &start).unwrap();
+    for &(time, x, y) in steps {
+        filter.advance(time);
+        filter.observe(&[x], y).unwrap();
+    }
+    for (found, expected) in filter.state().iter().zip(state) {
+        near(found / expected, 1.0, 1e-7);
+    }
+    for (found, expected) in filter.covariance().iter().zip(covariance) {
+        near(found / expected, 1.0, 1e-7);
+    }
+}
+
+#[test]
+fn after_a_gap_that_makes_a_level_unknown_what_is_known_is_that_of_exact_arithmetic() {
+    let steps = [
+        (1.0, 0.5, 3.0),
+        (1.0, -1.25, 4.5),
+        (3e6, 0.75, -2e9),
+        (1.0, 2.0, -2.0005e9),
+        (2.0, -0.5, -2.00125e9),
+    ];
+    compare(
+        [4.0, 1.0, 9.0],
+        &steps[..3],
+        [
+            -1_999_999_999.759693,
+            -1000.5430954228848,
+            -0.320409463939139,
+        ],
+        [
+            1.6598944284785908,
+            0.3627971463773913,
+            -0.8798592379717768,
+            0.3627971463773913,
+            750000.5508738761,
+            -0.48372886183701136,
+            -0.8798592379717768,
+            -0.48372886183701136,
+            1.1731456506294657,
+        ],
+    );
+    compare(
+        [4.0, 1.0, 9.0],
+        &steps,
+        [-2001270135.8913832, -420646.8859646229, -30032.202943360873],
+        [
+            0.976516858421331,
+            0.515124629197411,
+            0.1141223047234698,
+            0.515124629197411,
+            1.4968501071864875,
+            0.3954240789829986,
+            0.1141223047234698,
+            0.3954240789829986,
+            0.46850242405694814,
+        ],
+    );
+}
+
+#[test]
+fn a_coefficient_of_which_hardly_anything_is_known_is_found_as_in_exact_arithmetic() {
+    compare(
+        [4.0, 1.0, 1e18],
+        &[(1.0, 0.5, 3.0), (1.0, -1.25, 4.5)],
+        [3.905142052124912, 1.0481333646395867, -0.36769194646630665],
+        [
+            1.7699186037410972,
+            1.4779290913359944,
+            1.1555920795178838,
+            1.4779290913359944,
+            2.3230805353369335,
+            1.1124677154261564,
+            1.1555920795178838,
+            1.1124677154261564,
+            1.348986460045394,
+        ],
+    );
+}
+
+#[test]
+fn states_that_stay_are_as_uncertain_after_a_gap_as_before() {
+    let model = Structural {
+        observation: 1.0,
+        level: 1e18,
+        trend: None,
+        returning: 0.0,
+        passage: Passage::Continuous,
+    };
+    let start = [4.0, 0.5, 0.5, 9.0];
+    let mut filter = Kalman::starting_at(model, vec![0.0; 2], &start).unwrap();
+    filter.advance(1.0);
+    filter.observe_with(1, &[0.5], 7.0, 1.0).unwrap();
+    assert_eq!(filter.state()[1], 0.0);
+    // The level is the observation less what the coefficient makes of it: Var = R + x² Var(b), Cov = −x Var(b).
+    for (found, expected) in filter.covariance().iter().zip([3.25, -4.5, -4.5, 9.0]) {
+        near(*found, expected, 1e-9);
+    }
+}
+
+#[test]
+fn no_noises_however_far_apart_leave_a_variance_below_0() {
+    let times: Vec<f64> = (0..40)
+        .map(|nth| if nth == 0 { f64::NAN } else { 300.0 })
+        .collect();
+    let observations: Vec<f64> = (0..40).map(|nth| 3.0 * f64::from(nth).sin()).collect();
+    for observation in [1.0, 1e-6, 1e-12, 0.0] {
+        for (level, trend) in [
+            (1e12, None),
+            (1e18, None),
+            (0.0, Some(1e6)),
+            (0.0, Some(1e16)),
+        ] {
+            for regressors in [&[][..], &observations] {
+                let series = Series {
+                    times: &times,
+                    observations: &observations,
+                    regressors,
+                    prior: 1.0,
+                    shared: 0.0,
+                };
+                let model = Structural {
+                    observation,
+                    level,
+                    trend,
+                    returning: 0.0,
+                    passage: Passage::Continuous,
+                };
+                let followed = follow(model, &series).unwrap();
+                assert!(followed.filter.can_restart(&followed.at_large), "{model:?}");
+                let order = followed.filter.state().len();
+                for state in 0..order {
+                    assert!(followed.filter.covariance()[state * (order + 1)] >= 0.0);
+                }
+            }
+        }
+    }
+}
