@@ -321,7 +321,8 @@ fn what_follows_truths_predicts_from_as_many_steps_back_as_are_asked_for() {
 fn a_model_that_goes_on_from_the_last_truth_knows_as_many_with_a_horizon_of_one_sample_as_with_none()
  {
     let scratch = Scratch::new("modes-horizon");
-    let data = scratch.file("data.csv", csv(&series(400)));
+    // A gap before the last truth is not how far ahead the others are predicted.
+    let data = scratch.file("data.csv", csv(&series(400)) + "4470,0.5,0.5\n");
     let text = GRAPH.replace("LEARN", "") + "followed = \"followed\"\n" + FOLLOWED;
     let models = ["0s", "10s"].map(|ahead| {
         let node = format!("inputs.truth = \"output.y\"\nahead = \"{ahead}\"");
@@ -340,6 +341,8 @@ fn a_model_that_goes_on_from_the_last_truth_knows_as_many_with_a_horizon_of_one_
                 (one / none - 1.0).abs() < 0.01,
                 "{node} {steps}: {none} {one}"
             );
+            let ahead = 10.0 * (steps.parse::<f64>().unwrap() - 1.0);
+            assert_eq!(figure(&scores[0], node, "horizon_s"), ahead, "{node}");
         }
     }
 }

@@ -26,8 +26,8 @@ NODE
 model = "model"
 "#;
 
-/// A series that follows an input, every 10 s: so many rows from one on.
-fn csv(from: usize, rows: usize) -> String {
+/// A series that follows an input, every 10 s: so many rows from one on. One in so many is a spike, none where that is 0.
+fn csv(from: usize, rows: usize, spikes: usize) -> String {
     let mut state = 12_345_u64;
     let mut random = move || {
         state = state
@@ -40,7 +40,9 @@ fn csv(from: usize, rows: usize) -> String {
         let a = random();
         y = 0.9 * y + 0.3 * a + random();
         if nth >= from {
-            lines.push_str(&format!("{},{a},{y}\n", 10 * (nth - from)));
+            let spike = spikes > 0 && nth % spikes == spikes - 1;
+            let told = if spike { y + 80.0 } else { y };
+            lines.push_str(&format!("{},{a},{told}\n", 10 * (nth - from)));
         }
     }
     lines
@@ -52,9 +54,9 @@ fn of_model(all: &Value) -> Value {
 }
 
 /// What a fit on two segments tells of a model, and its score on the same rows.
-fn fitted_and_scored(scratch: &Scratch, node: &str) -> (Value, Value) {
-    let first = scratch.file("first.csv", csv(0, 250));
-    let second = scratch.file("second.csv", csv(250, 150));
+fn fitted_and_scored(scratch: &Scratch, node: &str, spikes: usize) -> (Value, Value) {
+    let first = scratch.file("first.csv", csv(0, 250, spikes));
+    let second = scratch.file("second.csv", csv(250, 150, spikes));
     let graph = scratch.file("graph.toml", GRAPH.replace("NODE", node));
     let model = scratch.path("model.json");
     let fit = athermal(&[
@@ -83,7 +85,7 @@ fn fitted_and_scored(scratch: &Scratch, node: &str) -> (Value, Value) {
 }
 
 #[test]
-fn the_error_of_a_fit_of_an_identified_model_is_that_of_evaluating_it_on_the_same_rows() {
+fn the_error_of_a_fit_of_what_follows_truths_is_that_of_evaluating_it_on_the_same_rows() {
     let scratch = Scratch::new("in-sample");
     let features = "inputs.features = \"input.a\"";
     for (kind, more) in [
@@ -93,15 +95,25 @@ fn the_error_of_a_fit_of_an_identified_model_is_that_of_evaluating_it_on_the_sam
         ("bj", features),
         ("oe", features),
         ("state_space", features),
+        ("kalman", ""),
+        ("kalman", features),
+        ("kalman", "trend = true"),
     ] {
-        for learn in ["", "learn = false"] {
-            let node = format!("type = \"{kind}\"\nahead = \"30s\"\n{more}\n{learn}");
-            let (fit, score) = fitted_and_scored(&scratch, &node);
+        for (ahead, learn, spikes) in [
+            ("30s", "", 0),
+            ("30s", "learn = false", 0),
+            ("10s", "", 0),
+            ("30s", "", 90),
+            ("10s", "", 90),
+            ("10s", "learn = { outliers = inf }", 90),
+        ] {
+            let node = format!("type = \"{kind}\"\nahead = \"{ahead}\"\n{more}\n{learn}");
+            let (fit, score) = fitted_and_scored(&scratch, &node, spikes);
             let told = fit["in_sample_rmse"].as_f64().unwrap();
             let scored = score["rmse"].as_f64().unwrap();
             assert!(
                 (told / scored - 1.0).abs() < 1e-9,
-                "{kind} {learn}: {told}, and {scored} as it is scored"
+                "{node}, {spikes}: {told}, and {scored} as it is scored"
             );
         }
     }
@@ -112,7 +124,7 @@ fn the_error_one_step_ahead_is_told_beside_that_of_a_longer_horizon_and_not_wher
     let scratch = Scratch::new("in-sample-one-step");
     let fit = |ahead: &str| {
         let node = format!("type = \"arma\"\nahead = \"{ahead}\"");
-        fitted_and_scored(&scratch, &node).0
+        fitted_and_scored(&scratch, &node, 0).0
     };
     let (near, far) = (fit("10s"), fit("30s"));
     let figure = |of: &Value| of["figures"]["rmse_one_step_ahead"].as_f64();

@@ -317,7 +317,7 @@ mod tests {
     use athermal_core::time::Duration;
 
     use super::*;
-    use athermal_core::node::Regressor;
+    use athermal_core::node::{LearningLimits, Regressor};
 
     fn stack(rows: &[(&[f64], f64)]) -> Result<Trained, TrainingError> {
         let regressor = |i: usize| Regressor {
@@ -335,6 +335,7 @@ mod tests {
             ahead: Duration::ZERO,
             span: Duration::ZERO,
             learns: false,
+            limits: LearningLimits::NONE,
         };
         let mut trainer = Stack {}.trainer(&setup);
         for (row, truth) in rows {

@@ -6,7 +6,7 @@ use super::plan::PlannedLearning;
 use super::problem::CompileProblem;
 use super::resolver::Resolver;
 use crate::channel::Channel;
-use crate::node::{Estimator, FREEZE, InputPort, Learns, Mistake, OutputPort};
+use crate::node::{Estimator, FREEZE, InputPort, LearningLimits, Learns, Mistake, OutputPort};
 use crate::time::Duration;
 use crate::unit::Unit;
 
@@ -52,8 +52,10 @@ impl Resolver<'_> {
             Some(self.gather(instance, &port, &slots, &[Duration::ZERO], None)?)
         };
         sound.then_some(Some(PlannedLearning {
-            outliers: limits.outliers,
-            margin: limits.margin.unwrap_or(0.0),
+            limits: LearningLimits {
+                outliers: limits.outliers,
+                margin: limits.margin.unwrap_or(0.0),
+            },
             freeze,
         }))
     }

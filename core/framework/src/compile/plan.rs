@@ -8,7 +8,7 @@ use super::provenance::smallest_lag;
 use super::slot_set::SlotSet;
 use crate::channel::Channel;
 use crate::document::TimeBase;
-use crate::node::{Inputs, Kind, NodeSpec, Predictor, Read, Regressor, Role};
+use crate::node::{Inputs, Kind, LearningLimits, NodeSpec, Predictor, Read, Regressor, Role};
 use crate::quantity::Quantity;
 use crate::time::Duration;
 
@@ -384,11 +384,8 @@ pub struct Beside {
 /// How an estimator goes on learning while it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedLearning {
-    /// A truth that misses its prediction by more than this multiple of the recent error is not learned from; both in units of
-    /// the learner's deviation, where it tells one.
-    pub outliers: f64,
-    /// By which multiple of its width a regressor may lie outside its range in the fit.
-    pub margin: f64,
+    /// What is not learned from.
+    pub limits: LearningLimits,
     /// The gather of the channels that must all be 0 for learning to go on.
     pub freeze: Option<usize>,
 }

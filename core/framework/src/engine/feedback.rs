@@ -93,9 +93,9 @@ impl Feedback {
         })
     }
 
-    /// How long a step is, by the last truths where it was not planned.
-    pub(crate) fn step(&self) -> Duration {
-        self.step.length()
+    /// How long a step was planned to be; none where it is as long as the time between truths.
+    pub(crate) fn step(&self) -> Option<Duration> {
+        self.step.planned()
     }
 
     /// A truth of this tick that the run may read belongs to an earlier run; where there is no horizon, to the one to come.

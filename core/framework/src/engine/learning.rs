@@ -5,11 +5,10 @@ use std::sync::Arc;
 use super::Mode;
 use super::gather::Gathered;
 use super::mode::Step;
-use super::recent_error::RecentError;
 use super::state::NodeState;
 use super::withheld::{Released, Withheld};
 use crate::compile::{PlannedLearning, TrainingLimits, TruthLink};
-use crate::node::{Learner, LinearForm, Predictor, Restored};
+use crate::node::{Learner, LearningGate, LinearForm, Offered, Predictor, Restored};
 use crate::time::{Duration, Instant};
 
 /// A learner in a running plan, with the truths that the embargo still withholds from it.
@@ -59,7 +58,7 @@ impl Learning {
     ) -> Option<Self> {
         let width = predictor.uses().len();
         let learner = predictor.learner()?;
-        let recent = RecentError::of_fit(learner.usual_error());
+        let own = LearningGate::new(planned.limits, &*learner);
         Some(Self {
             at_once: truth.allows_present() && learner.extrapolates(),
             learner,
@@ -69,9 +68,8 @@ impl Learning {
             freeze: planned.freeze,
             gate: Gate {
                 predictor: Arc::clone(predictor),
-                planned,
                 training,
-                recent,
+                own,
             },
             mode: Mode::OneStep,
             step: Step::new(truth.ahead.max(truth.span)),
@@ -84,9 +82,9 @@ impl Learning {
         self.mode = mode;
     }
 
-    /// How long a step is, by the last truths where it was not planned.
-    pub(crate) fn step(&self) -> Duration {
-        self.step.length()
+    /// How long a step was planned to be; none where it is as long as the time between truths.
+    pub(crate) fn step(&self) -> Option<Duration> {
+        self.step.planned()
     }
 
     /// The newest arrival that a prediction made at `now` may know of.
@@ -211,7 +209,7 @@ impl Learning {
     pub(crate) fn snapshot(&self) -> NodeState {
         let mut state = NodeState::pack(Some(self.learner.snapshot()));
         state.learning = Some(self.withheld.state());
-        state.recent = Some(self.gate.recent);
+        state.recent = Some(self.gate.own.recent);
         state
     }
 
@@ -226,7 +224,8 @@ impl Learning {
             if let Some(from) = &state.learning {
                 self.withheld.restore(from);
             }
-            self.gate.recent = state.recent.unwrap_or(self.gate.recent);
+            let recent = &mut self.gate.own.recent;
+            *recent = state.recent.unwrap_or(*recent);
         }
         answer
     }
@@ -253,9 +252,8 @@ impl Learning {
 #[derive(Debug)]
 struct Gate {
     predictor: Arc<dyn Predictor>,
-    planned: PlannedLearning,
     training: TrainingLimits,
-    recent: RecentError,
+    own: LearningGate,
 }
 
 impl Gate {
@@ -282,23 +280,10 @@ impl Gate {
             return Became::OutsideLimits;
         }
         let range = self.predictor.trained_range();
-        let outside = range.is_some_and(|range| !range.contains(row, self.planned.margin));
-        if outside && !learner.has_level() {
-            return Became::OutsideRange;
+        match self.own.offer(learner, range, row, truth, arrived) {
+            Offered::Learned => Became::Learned,
+            Offered::Outlier => Became::Outlier,
+            Offered::OutsideRange => Became::OutsideRange,
         }
-        let error = truth - learner.predict(row, arrived);
-        let deviation = learner.deviation(row, arrived);
-        let most = self.planned.outliers;
-        // What has yet to find out where it is may be far off.
-        let starts_anywhere = learner.extrapolates();
-        if learner.settled() && !self.recent.admits(error, deviation, most, starts_anywhere) {
-            return Became::Outlier;
-        }
-        if outside {
-            learner.follow_level(row, truth, arrived);
-            return Became::OutsideRange;
-        }
-        learner.learn(row, truth, arrived);
-        Became::Learned
     }
 }

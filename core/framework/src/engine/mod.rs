@@ -19,7 +19,6 @@ mod outlets;
 mod pairing;
 mod part;
 mod products;
-mod recent_error;
 mod revision;
 mod rows;
 mod running;
@@ -261,8 +260,9 @@ impl Engine {
         self.work = work(&self.plan, &self.nodes);
     }
 
-    /// How long a step of a node is; none where no past truth changes what it predicts in the mode of the engine.
-    pub(crate) fn step_of(&self, node: usize) -> Option<Duration> {
+    /// How long a step of a node was planned to be, which is none where it is as long as the time between truths; none of either
+    /// where no past truth changes what it predicts in the mode of the engine.
+    pub(crate) fn step_of(&self, node: usize) -> Option<Option<Duration>> {
         match self.nodes.get(node) {
             Some(Running::Estimate { estimate, .. }) => estimate.as_ref()?.step(),
             _ => None,

@@ -7,11 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::blend::Blending;
 use super::history::History;
-use super::recent_error::RecentError;
 use super::revision::fnv_1a;
 use super::withheld::LearningState;
 use crate::channel::Extremes;
-use crate::node::{Restored, State};
+use crate::node::{RecentError, Restored, State};
 use crate::time::Instant;
 
 /// What every snapshot begins with.

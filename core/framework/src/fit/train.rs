@@ -11,7 +11,9 @@ use super::report::{EstimatorFit, Outcome};
 use crate::channel::Extremes;
 use crate::compile::{Plan, PlannedRole};
 use crate::engine::AtHand;
-use crate::node::{Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup};
+use crate::node::{
+    LearningLimits, Predictor, Regressor, Role, Trained, Trainer, TrainingError, TrainingSetup,
+};
 use crate::time::Instant;
 
 /// A fit in the making: the complete rows of the candidates that were kept go to the trainer.
@@ -109,10 +111,11 @@ pub(super) type Made = (EstimatorFit, Option<Box<dyn Predictor>>);
 pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec<usize>) -> Making {
     let node = &plan.nodes[trainee.node];
     let regressors = node.rows().map_or(&[][..], |rows| rows.regressors);
-    let learns = match &node.role {
-        PlannedRole::Estimator { learning, .. } => learning.is_some(),
-        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => false,
+    let learning = match &node.role {
+        PlannedRole::Estimator { learning, .. } => learning.as_ref(),
+        PlannedRole::Feature { .. } | PlannedRole::Combiner { .. } => None,
     };
+    let learns = learning.is_some();
     let mut kept = trainee.validity.kept();
     kept.retain(|candidate| !constant.contains(candidate));
     let setup = TrainingSetup {
@@ -130,6 +133,7 @@ pub(super) fn begin(plan: &Plan, trainee: &Trainee, memory: usize, constant: Vec
         ahead: trainee.link.ahead,
         span: trainee.link.span,
         learns,
+        limits: learning.map_or(LearningLimits::NONE, |learning| learning.limits),
     };
     let (trainer, may_leave_out) = match node.spec.role() {
         Role::Estimator(estimator) if estimator.needs_constants() => {

@@ -6,7 +6,9 @@ use std::fmt::Debug;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Figure, Figures, InputPort, Learns, Mistake, Predictor, TrainingError};
+use super::{
+    Figure, Figures, InputPort, LearningLimits, Learns, Mistake, Predictor, TrainingError,
+};
 use crate::time::{Duration, Instant};
 use crate::unit::Unit;
 
@@ -214,6 +216,8 @@ pub struct TrainingSetup {
     pub span: Duration,
     /// Whether the estimator will go on learning while it runs, so that its predictor needs what that takes.
     pub learns: bool,
+    /// What it will not learn from then.
+    pub limits: LearningLimits,
 }
 
 /// Takes the rows of one fit, in order.

@@ -17,10 +17,12 @@ mod feature;
 mod figure;
 mod forms;
 mod learner;
+mod learning_gate;
 mod linear_form;
 mod port;
 mod predictor;
 mod reach;
+mod recent_error;
 mod registry;
 mod state;
 mod training_error;
@@ -38,6 +40,7 @@ pub use feature::{Feature, Operator, Outputs, Tick};
 pub use figure::{Figure, Figures};
 pub use forms::Forms;
 pub use learner::{Learner, Learns, TrainedRange};
+pub use learning_gate::{LearningGate, LearningLimits, Offered};
 pub use linear_form::LinearForm;
 pub(crate) use linear_form::Strands;
 pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read};
@@ -45,6 +48,7 @@ pub use port::{FREEZE, InputPort, Inputs, Mistake, OutputPort, PortSummary, Read
 pub use predictor::InModel;
 pub use predictor::Predictor;
 pub use reach::Reach;
+pub(crate) use recent_error::RecentError;
 #[cfg(feature = "testkit")]
 pub(crate) use registry::as_toml;
 #[doc(hidden)]

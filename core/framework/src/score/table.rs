@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::watch::{Truth, Watch};
 use super::{IntervalScore, Lack, Mode, ScoreOptions, Unscored};
 use crate::channel::Extremes;
-use crate::compile::Plan;
+use crate::compile::{Plan, PlannedNode};
 use crate::engine::{Engine, SampleRange};
 use crate::time::{Duration, Instant};
 
@@ -115,7 +115,7 @@ pub(super) fn table(
     ticks: u64,
     options: &ScoreOptions,
 ) -> Scores {
-    let earlier = earlier(plan, engine, options.mode);
+    let earlier = earlier(plan, engine, &watch.truths, options.mode);
     let (mut rows, mut unscored) = (Vec::new(), Vec::new());
     for truth in &watch.truths {
         let within = within_limit(plan, truth, options);
@@ -141,13 +141,22 @@ pub(super) fn table(
 }
 
 /// For each node how much earlier than in one step the truths lie that it goes by, itself or through what it is made of; none where
-/// it goes by its own predictions of them.
-fn earlier(plan: &Plan, engine: &Engine, mode: Mode) -> Vec<Option<Duration>> {
+/// it goes by its own predictions of them. Steps from truth to truth are told as long as they typically are.
+fn earlier(plan: &Plan, engine: &Engine, truths: &[Truth], mode: Mode) -> Vec<Option<Duration>> {
+    let between = |node: &PlannedNode| {
+        let slot = node.role.truth()?.slot;
+        let truth = truths.iter().find(|truth| truth.slot == slot)?;
+        Some(truth.typical_gap())
+    };
     let mut found = vec![Some(Duration::ZERO); plan.nodes.len()];
     for (nth, node) in plan.nodes.iter().enumerate() {
         let own = match engine.step_of(nth) {
             Some(_) if mode == Mode::FreeRun => None,
-            step => Some(mode.earlier(step.unwrap_or(Duration::ZERO))),
+            None => Some(Duration::ZERO),
+            Some(planned) => {
+                let step = planned.or_else(|| between(node));
+                Some(mode.earlier(step.unwrap_or(Duration::ZERO)))
+            }
         };
         let entries = node.role.inputs().flat_map(|of| &plan.gathers[of].entries);
         let inputs = entries.filter_map(|entry| plan.channels[entry.slot].node);

@@ -25,6 +25,9 @@ pub(crate) struct Truth {
     error_slot: Option<usize>,
     pub(crate) values: Vec<f64>,
     pub(crate) errors: Vec<f64>,
+    /// When the last one of the segment was measured, and how long after the one before each was.
+    last: Option<Instant>,
+    between: Vec<Duration>,
     pub(crate) predictions: Vec<Prediction>,
     pub(crate) persistences: BTreeMap<Duration, Persistence>,
 }
@@ -130,6 +133,8 @@ impl Truth {
             error_slot,
             values: Vec::new(),
             errors: Vec::new(),
+            last: None,
+            between: Vec::new(),
             predictions: Vec::new(),
             persistences: BTreeMap::new(),
         }
@@ -166,6 +171,8 @@ impl Truth {
         if value.is_nan() {
             return;
         }
+        self.between
+            .extend(self.last.replace(now).map(|last| now - last));
         self.values.push(value);
         self.errors
             .push(self.error_slot.map_or(f64::NAN, |slot| engine.value(slot)));
@@ -188,7 +195,16 @@ impl Truth {
         }
     }
 
+    /// The median time from one truth to the next; nothing where there are no two.
+    pub(crate) fn typical_gap(&self) -> Duration {
+        let mut between = self.between.clone();
+        between.sort_unstable();
+        let middle = between.get(between.len() / 2);
+        middle.copied().unwrap_or(Duration::ZERO)
+    }
+
     fn segment(&mut self) {
+        self.last = None;
         for prediction in &mut self.predictions {
             prediction.pairing.clear();
         }

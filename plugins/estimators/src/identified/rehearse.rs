@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use athermal_core::node::Predictor;
+use athermal_core::node::{LearningGate, LearningLimits, Predictor};
 use athermal_core::time::{Duration, Instant};
 
 use super::model::Identified;
@@ -18,11 +18,14 @@ pub(super) struct Reach {
     pub(super) earlier: Duration,
     /// Whether the model will follow truths while it runs.
     pub(super) follows: bool,
+    /// Which truths it will not follow.
+    pub(super) limits: LearningLimits,
 }
 
 /// The root mean square error, the horizon ahead and from the truths that the embargo lets through; none where no row is predicted.
 pub(super) fn error(rows: &Rows, of: &Identified, reach: Reach) -> Option<f64> {
     let mut following = of.learner()?;
+    let mut gate = LearningGate::new(reach.limits, &*following);
     let mut withheld = VecDeque::new();
     let (mut squares, mut count) = (0.0, 0_u64);
     let mut first = Instant::MIN;
@@ -40,7 +43,7 @@ pub(super) fn error(rows: &Rows, of: &Identified, reach: Reach) -> Option<f64> {
         while let Some(&(at, inputs, truth)) = withheld.front()
             && at <= newest
         {
-            following.learn(inputs, truth, at);
+            gate.offer(&mut *following, of.trained_range(), inputs, truth, at);
             withheld.pop_front();
         }
         following.run(seen.inputs, seen.of, newest);

@@ -95,6 +95,7 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
                 ahead: setup.ahead,
                 earlier: setup.span.max(setup.ahead).max(Duration::from_ns(1)),
                 follows: setup.learns,
+                limits: setup.limits,
             },
             memory: setup.memory,
             rows: Rows::new(setup.regressors.len()),
@@ -197,10 +198,8 @@ impl<Kind: Identify> IdentifiedTrainer<Kind> {
         } = self.reach;
         let ahead = steps(earlier, of.step);
         let further = of.model.follows() && ahead > 1;
-        // The fit finds where filters begin, which a run is told by its truths.
-        let differs = !follows || further || of.model.starts() > 0;
-        let error = differs.then(|| rehearse::error(&self.rows, of, self.reach));
-        let error = error.flatten();
+        // The fit finds where filters begin, which a run is told by its truths; and a run is kept from truths that miss by too much.
+        let error = rehearse::error(&self.rows, of, self.reach);
         report.in_sample_rmse = Some(error.unwrap_or(one_step));
         let Some(error) = error else {
             return;

@@ -1,9 +1,12 @@
 //! Decides what a structural model learns from its rows; not how it is followed afterwards.
 
+use std::collections::VecDeque;
+
 use athermal_core::channel::Extremes;
 use athermal_core::diagnostic::digits;
 use athermal_core::node::{
-    Figure, Learner, Trained, TrainedRange, Trainer, TrainingError, TrainingReport, TrainingSetup,
+    Figure, Learner, LearningGate, LearningLimits, Trained, TrainedRange, Trainer, TrainingError,
+    TrainingReport, TrainingSetup,
 };
 use athermal_core::quantity::Quantity;
 use athermal_core::time::{Duration, Instant};
@@ -28,10 +31,14 @@ pub(super) struct KalmanTrainer {
     names: Vec<String>,
     unit: String,
     every: Duration,
+    ahead: Duration,
     /// How much earlier than a truth the newest one arrived that its prediction knows of.
     earlier: Duration,
-    /// Whether it will follow truths while it runs.
+    /// Whether it will follow truths while it runs, and which of them not.
     follows: bool,
+    limits: LearningLimits,
+    /// Whether there are no features.
+    alone: bool,
     most: usize,
     /// Of the rows, one in so many is kept.
     stride: usize,
@@ -64,6 +71,9 @@ impl KalmanTrainer {
             every: parameters.every.unwrap_or(setup.span),
             earlier: setup.span.max(setup.ahead).max(Duration::from_ns(1)),
             follows: setup.learns,
+            limits: setup.limits,
+            alone: names.is_empty(),
+            ahead: setup.ahead,
             parameters,
             unit: setup.error_unit.clone(),
             most: (setup.memory / bytes).clamp(16, MOST_ROWS),
@@ -204,35 +214,49 @@ impl KalmanTrainer {
             every: self.every,
             range: Some(self.range.clone()),
         };
-        report.in_sample_rmse = Some(self.in_sample_rmse(&predictor));
+        report.in_sample_rmse = self.in_sample_rmse(&predictor);
         Ok(predictor)
     }
 
-    /// The error of predicting each row as `evaluate` does: the horizon ahead, from the truths that the embargo lets through.
-    fn in_sample_rmse(&self, predictor: &KalmanPredictor) -> f64 {
+    /// The error of predicting each row as `evaluate` does: the horizon ahead, from the truths that the embargo lets through and that
+    /// are no outliers; none where no row is predicted.
+    fn in_sample_rmse(&self, predictor: &KalmanPredictor) -> Option<f64> {
         let width = self.names.len();
         let row = |nth: usize| &self.regressors[nth * width..(nth + 1) * width];
         let mut following = Following::new(predictor);
-        // The first row that has not been learned from.
-        let mut next = 0;
-        let mut squares = 0.0;
+        let mut gate = LearningGate::new(self.limits, &following);
+        let range = predictor.range.as_ref();
+        let mut withheld = VecDeque::<usize>::new();
+        let (mut squares, mut count) = (0.0, 0_u64);
+        let mut first = Instant::MIN;
         for (nth, kept) in self.kept.iter().enumerate() {
             let newest = if kept.begins {
                 Instant::MAX
             } else {
                 kept.at - self.earlier
             };
-            while self.follows && next < nth && self.kept[next].at <= newest {
+            while let Some(&next) = withheld.front()
+                && self.kept[next].at <= newest
+            {
                 let Kept { at, truth, .. } = self.kept[next];
-                following.learn(row(next), truth, at);
-                next += 1;
+                gate.offer(&mut following, range, row(next), truth, at);
+                withheld.pop_front();
             }
             if kept.begins {
                 following.segment(Duration::ZERO);
+                first = kept.at + self.ahead;
+            }
+            // Without features rows are truths, of which the first ones come before what the first run predicts.
+            if self.alone && kept.at < first {
+                continue;
             }
             squares += (following.predict(row(nth), kept.at) - kept.truth).powi(2);
+            count += 1;
+            if self.follows {
+                withheld.push_back(nth);
+            }
         }
-        (squares / self.kept.len() as f64).sqrt()
+        (count > 0).then(|| (squares / count as f64).sqrt())
     }
 
     fn tell(&self, model: Structural, report: &mut TrainingReport) {
@@ -375,9 +399,29 @@ impl Noises {
 
 #[cfg(test)]
 mod tests {
-    use athermal_core::node::{Estimator, Regressor};
+    use athermal_core::node::{Estimator, LearningLimits, Regressor};
 
     use super::*;
+
+    fn setup(regressors: &[&str]) -> TrainingSetup {
+        let regressor = |name: &&str| Regressor {
+            name: (*name).to_owned(),
+            unit: "K".to_owned(),
+            sensors: vec![(*name).to_owned()],
+            lag: Duration::ZERO,
+            of_truth: false,
+        };
+        TrainingSetup {
+            regressors: regressors.iter().map(regressor).collect(),
+            places: (0..regressors.len()).collect(),
+            error_unit: "nm".to_owned(),
+            memory: 0,
+            ahead: Duration::ZERO,
+            span: Duration::ZERO,
+            learns: true,
+            limits: LearningLimits::NONE,
+        }
+    }
 
     #[test]
     fn what_is_the_same_in_the_rows_that_are_kept_is_not_needed_to_predict() {
@@ -387,23 +431,7 @@ mod tests {
             penalty: 1.0,
             every: None,
         };
-        let regressor = |name: &str| Regressor {
-            name: name.to_owned(),
-            unit: "K".to_owned(),
-            sensors: vec![name.to_owned()],
-            lag: Duration::ZERO,
-            of_truth: false,
-        };
-        let setup = TrainingSetup {
-            regressors: ["a", "seldom"].map(regressor).to_vec(),
-            places: vec![0, 1],
-            error_unit: "nm".to_owned(),
-            memory: 0,
-            ahead: Duration::ZERO,
-            span: Duration::ZERO,
-            learns: true,
-        };
-        let mut trainer = parameters.trainer(&setup);
+        let mut trainer = parameters.trainer(&setup(&["a", "seldom"]));
         for nth in 0..100_i32 {
             let a = f64::from(nth * 37 % 11);
             // Rows with an odd number are the first to go.

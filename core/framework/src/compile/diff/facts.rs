@@ -269,8 +269,8 @@ fn node_facts(plan: &Plan, node: &PlannedNode) -> Facts {
         ..
     } = &node.role
     {
-        facts.plain("learn.outliers", learning.outliers.to_string());
-        facts.plain("learn.margin", learning.margin.to_string());
+        facts.plain("learn.outliers", learning.limits.outliers.to_string());
+        facts.plain("learn.margin", learning.limits.margin.to_string());
     }
     if let Value::Object(parameters) = node.spec.parameters() {
         let measured = measured_parameters(node.kind);

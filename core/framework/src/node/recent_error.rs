@@ -28,7 +28,7 @@ impl RecentError {
     const PATIENCE: u32 = 20;
 
     /// None yet, with the root mean square of those of the fit; NaN where it is not known.
-    pub(super) fn of_fit(usual: f64) -> Self {
+    pub(crate) fn of_fit(usual: f64) -> Self {
         let square = usual * usual;
         if square > 0.0 && square.is_finite() {
             Self {
@@ -47,7 +47,7 @@ impl RecentError {
     /// One that is not below counts as if it were as large as that, so that what has changed for good is learned after a few; when
     /// as many as there is patience for have been, what was before is forgotten. A deviation says how large the first errors are,
     /// but for a learner that goes on from the last truths, and `starts_anywhere`.
-    pub(super) fn admits(
+    pub(crate) fn admits(
         &mut self,
         error: f64,
         deviation: f64,
