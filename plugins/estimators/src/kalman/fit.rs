@@ -24,6 +24,9 @@ use crate::scaling::Scaling;
 /// The most rows that the search for variances goes through, again and again.
 const MOST_ROWS: usize = 20_000;
 
+/// Of smaller variances than this, what is left after a truth has not all its digits any more.
+const LEAST_VARIANCE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 /// Takes rows, fewer of them the more there are.
 #[derive(Debug)]
 pub(super) struct KalmanTrainer {
@@ -201,7 +204,20 @@ impl KalmanTrainer {
         tell_rows(&self.names, &scaled, truths.iter().copied(), report);
         self.tell(followed.model, report);
         let mut filter = followed.filter;
+        let beyond_numbers = || {
+            unsolvable(
+                "the truths or the noises are so small or so large, or the rows so far apart, that variances are beyond what numbers hold",
+            )
+        };
+        let variances = followed.at_large.iter().map(|(_, variance)| *variance);
+        let largest = variances.fold(followed.model.observation, f64::max);
+        if !filter.can_restart(&followed.at_large) || largest < LEAST_VARIANCE {
+            return Err(beyond_numbers());
+        }
         filter.restart_level(&followed.at_large);
+        if !filter.is_sound() {
+            return Err(beyond_numbers());
+        }
         let predictor = KalmanPredictor {
             regressors: self.names.clone(),
             scaling: Scaling {
@@ -421,6 +437,62 @@ mod tests {
             learns: true,
             limits: LearningLimits::NONE,
         }
+    }
+
+    /// A fit of forty truths, 300 s apart.
+    fn fitted(parameters: &Kalman, truth: impl Fn(f64) -> f64) -> Result<Trained, TrainingError> {
+        let mut trainer = parameters.trainer(&TrainingSetup {
+            memory: 1 << 20,
+            ..setup(&[])
+        });
+        for nth in 0..40_i32 {
+            let at = Instant::from_ns(i64::from(nth) * 300_000_000_000);
+            trainer.row_at(at, &[], truth(f64::from(nth)));
+        }
+        trainer.finish()
+    }
+
+    #[test]
+    fn whatever_noises_are_given_a_fit_ends_in_a_model_or_in_words() {
+        let quantity = |value: f64| Quantity {
+            value,
+            unit: "nm".parse().unwrap(),
+        };
+        for observation in [1e-170, 1e-6, 1.0, 1e170] {
+            for trend in [0.0, 1e3, 1e6, 1e12, 1e170] {
+                let parameters = Kalman {
+                    trend: true,
+                    noises: Some(Noises {
+                        observation: quantity(observation),
+                        level: quantity(0.0),
+                        trend: Some(quantity(trend)),
+                        per: Duration::from_ns(1_000_000_000),
+                        returns: None,
+                    }),
+                    penalty: 1.0,
+                    every: None,
+                };
+                for truth in [|_: f64| 12.0, f64::sin] {
+                    match fitted(&parameters, truth) {
+                        Ok(trained) => assert!(trained.predictor.mistakes().is_empty()),
+                        Err(error) => assert!(error.to_string().contains(' ')),
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn truths_whose_squares_are_no_numbers_are_refused() {
+        let parameters = Kalman {
+            trend: true,
+            noises: None,
+            penalty: 1.0,
+            every: None,
+        };
+        let refused = fitted(&parameters, |nth| 1e-160 * (7.0 * nth * nth).sin());
+        let told = refused.map(|_| ()).unwrap_err().to_string();
+        assert!(told.contains("so small or so large"), "{told}");
     }
 
     #[test]
