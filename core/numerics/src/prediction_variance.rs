@@ -2,7 +2,7 @@
 //! decide the coefficients.
 
 use crate::normal_equations::Problem;
-use crate::{Gram, LeastSquares, LinearFit, NumericsError, SINGULAR_BOUND};
+use crate::{Gram, LeastSquares, LinearFit, Method, NumericsError, SINGULAR_BOUND};
 use serde::{Deserialize, Serialize};
 
 /// The variance of an observation about its prediction, `s²(1 + 1/n + |W(x − x̄)|²)`, with `WᵀW` the inverse of the
@@ -101,7 +101,12 @@ impl LeastSquares {
             .or_else(|| penalised.inverse_root(least))
             .ok_or(NumericsError::NoConvergence)?;
         let squares: f64 = (0..order).map(|j| inverse.col(j).squared_norm_l2()).sum();
-        let effective = order as f64 - self.alpha * squares + f64::from(u8::from(self.intercept));
+        // Of columns that are combinations of others the rows determine as many coefficients as there are directions.
+        let determined = match fit.method {
+            Method::Svd { rank } if self.alpha == 0.0 => rank as f64,
+            _ => order as f64 - self.alpha * squares,
+        };
+        let effective = determined + f64::from(u8::from(self.intercept));
         let rows = gram.count();
         let free = rows as f64 - effective;
         if free <= 0.0 {
@@ -213,6 +218,28 @@ mod tests {
         let (seen, unseen) = (variance.at(&[8.0, 16.0]), variance.at(&[8.0, 40.0]));
         assert!((seen / 2.0 - 1.0).abs() < 0.1, "{seen}");
         assert!(unseen > 1e3 * seen, "{unseen}");
+    }
+
+    #[test]
+    fn a_column_that_says_nothing_new_costs_no_degree_of_freedom() {
+        let mut blocks = GramBlocks::new(3);
+        for i in 0..20 {
+            let x = f64::from(i % 7);
+            blocks.push(&[x, 2.0 * x, 3.0 - x], 3.0 * x + f64::from(i % 5));
+        }
+        let gram = blocks.total();
+        let scales = Standardization::of(&gram).scales;
+        let squares = LeastSquares::ordinary();
+        let noise = |columns: &[usize]| {
+            let fit = squares
+                .solve(&gram, columns, &scales, blocks.rows())
+                .unwrap();
+            let variance = squares.prediction_variance(&gram, &scales, &fit).unwrap();
+            (variance.noise, variance.at(&[4.0, 8.0, -1.0]))
+        };
+        let (one, all) = (noise(&[0]), noise(&[0, 1, 2]));
+        assert!((all.0 / one.0 - 1.0).abs() < 1e-9, "{all:?} and {one:?}");
+        assert!((all.1 / one.1 - 1.0).abs() < 1e-3, "{all:?} and {one:?}");
     }
 
     #[test]
