@@ -9,6 +9,8 @@ use faer::{Mat, Side};
 const MOST_STEPS: usize = 100;
 /// Where no more than this share of the objective can be gained, one step more is the last.
 const NEAR: f64 = 1e-12;
+/// Where no more than this share of the objective is promised, rounding may be why no step leads down.
+const ROUNDING: f64 = 1e-6;
 /// From so many standard deviations on an error is an outlier's.
 const OUTLYING: f64 = 3.0;
 /// Rows per step of the sums.
@@ -83,14 +85,14 @@ impl Huber {
         if !descent.residuals.iter().all(|r| r.is_finite()) {
             return Err(NumericsError::NotFinite);
         }
-        let mut converged = false;
+        let mut reached = Step::Down;
         for _ in 0..MOST_STEPS {
-            if !descent.step()? {
-                converged = true;
+            reached = descent.step()?;
+            if reached != Step::Down {
                 break;
             }
         }
-        Ok(descent.end(converged))
+        Ok(descent.end(reached == Step::End))
     }
 }
 
@@ -185,41 +187,63 @@ impl<'a> Descent<'a> {
         residuals.iter().map(loss).sum::<f64>() + self.how.alpha * squares
     }
 
-    /// One step downhill; false when nothing is gained any more. Newton's method where it leads down at once, and else the
-    /// least squares with outliers weighed down, which always do, though slowly (Huber 1981, section 7.8).
-    fn step(&mut self) -> Result<bool, NumericsError> {
+    /// One step downhill. Newton's method where it leads down at once, and else the least squares with outliers weighed down, which
+    /// always do, though slowly (Huber 1981, section 7.8).
+    fn step(&mut self) -> Result<Step, NumericsError> {
+        let mut last = None;
+        let mut most_promised = 0.0;
         for curvature in [Curvature::Newton, Curvature::Weighted] {
             let (matrix, downhill) = self.second_order(curvature)?;
             let direction = solved(&matrix, &downhill)?;
             // The objective falls by 2/σ of this to first order.
             let slope: f64 = direction.iter().zip(&downhill).map(|(d, g)| d * g).sum();
             let promised = 2.0 / self.sigma * slope;
-            if promised <= NEAR * self.objective {
-                // Too near for the objective to tell, and so near that Newton's step ends there.
-                self.go(&direction);
-                return Ok(false);
+            let near = if last.is_some() { ROUNDING } else { NEAR };
+            if promised <= near * self.objective {
+                // Where hardly any rows are within, Newton's matrix says nothing, and promises nothing anywhere.
+                last.get_or_insert(direction);
+                continue;
             }
             if self.descend(&direction) {
-                return Ok(true);
+                return Ok(Step::Down);
             }
+            most_promised = promised.max(most_promised);
         }
-        Ok(false)
+        if most_promised > ROUNDING * self.objective {
+            return Ok(Step::Stuck);
+        }
+        if let Some(direction) = last {
+            // Too near for the objective to tell, and so near that Newton's step ends there; but where rows hardly determine a
+            // direction, a step that promises nothing may be so long that it leads up.
+            let most = self.objective * (1.0 + NEAR);
+            self.go_where(&direction, |reached| reached <= most);
+        }
+        Ok(Step::End)
     }
 
     /// Goes along a direction, halving the way until it leads down.
     fn descend(&mut self, direction: &[f64]) -> bool {
         let mut way = direction.to_vec();
         for _ in 0..7 {
-            let before = (self.weights.clone(), self.residuals.clone());
-            let (sigma, objective) = (self.sigma, self.objective);
-            self.go(&way);
-            if self.objective < objective {
+            let objective = self.objective;
+            if self.go_where(&way, |reached| reached < objective) {
                 return true;
             }
-            (self.weights, self.residuals) = before;
-            (self.sigma, self.objective) = (sigma, objective);
             way.iter_mut().for_each(|step| *step *= 0.5);
         }
+        false
+    }
+
+    /// Goes a way if the objective that it leads to is good enough; whether it did.
+    fn go_where(&mut self, way: &[f64], good: impl Fn(f64) -> bool) -> bool {
+        let before = (self.weights.clone(), self.residuals.clone());
+        let (sigma, objective) = (self.sigma, self.objective);
+        self.go(way);
+        if good(self.objective) {
+            return true;
+        }
+        (self.weights, self.residuals) = before;
+        (self.sigma, self.objective) = (sigma, objective);
         false
     }
 
@@ -326,6 +350,16 @@ impl<'a> Descent<'a> {
 /// The standard deviation of normal errors of these sizes; NaN of none.
 fn spread(sizes: impl Iterator<Item = f64>) -> f64 {
     robust_deviation(&mut sizes.collect::<Vec<_>>()).unwrap_or(f64::NAN)
+}
+
+/// Where a step has led.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Step {
+    Down,
+    /// To the minimum.
+    End,
+    /// Nowhere, though the slope says that it goes on downhill: the objective has an edge there.
+    Stuck,
 }
 
 /// What a step takes for the matrix of second derivatives.
@@ -475,6 +509,41 @@ mod tests {
         assert!(share(fit.beyond) > 0.2);
         assert!((0.9..1.3).contains(&fit.deviation), "{}", fit.deviation);
         assert!(fit.target_deviation > 2.0 * fit.deviation);
+    }
+
+    #[test]
+    fn what_is_told_to_be_the_minimum_is_no_higher_for_a_column_more() {
+        let mut converged = 0;
+        for seed in 0..40 {
+            let mut uniform = crate::draws::uniform(seed);
+            let mut blocks = GramBlocks::new(3);
+            for _ in 0..200 {
+                let (a, b) = (20.0 + uniform(), 300.0 + 50.0 * uniform());
+                // Errors of a Cauchy distribution: many of them are large.
+                let error = 0.2 * (std::f64::consts::FRAC_PI_2 * uniform()).tan();
+                blocks.push(&[a, b, a + b + 1e-6 * uniform()], a + 0.02 * b + error);
+            }
+            let gram = blocks.total();
+            let (means, scales) = (gram.means(), Standardization::of(&gram).scales);
+            for epsilon in [1.0, 1.0001, 1.05, 1.35] {
+                let how = Huber {
+                    epsilon,
+                    alpha: 0.0,
+                };
+                let fit = |columns: &[usize]| {
+                    let rows = blocks.rows().unwrap();
+                    how.solve(rows, columns, &means, &scales).unwrap()
+                };
+                let (two, three) = (fit(&[0, 1]), fit(&[0, 1, 2]));
+                let most = two.objective * (1.0 + 1e-6);
+                assert!(
+                    three.objective <= most || !three.converged,
+                    "{three:?} instead of at most {most} with {epsilon} of {seed}"
+                );
+                converged += usize::from(three.converged);
+            }
+        }
+        assert!(converged > 60, "{converged}");
     }
 
     #[test]
