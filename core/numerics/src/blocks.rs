@@ -10,14 +10,20 @@ pub const BLOCK_ROWS: usize = 256;
 /// How many bytes of rows are kept unless stated otherwise.
 pub const DEFAULT_ROW_MEMORY: usize = 64 << 20;
 const MOST_BLOCKS: usize = 1024;
-const FEWEST_BLOCKS: usize = 64;
+/// So many blocks stay, and twice as many while they fill up, whatever they take.
+const FEWEST_BLOCKS: usize = 8;
+/// So many blocks per part of a cross-validation: once neighbours are merged there are two, and a gap beside a fold leaves one.
+const BLOCKS_PER_PART: usize = 4;
+/// How many blocks are never too few, however many the parts.
+const ENOUGH_BLOCKS: usize = 64;
 const BLOCK_MEMORY: usize = 8 << 20;
 
 /// Rows of regressors and a target, streamed into blocks of 256 rows.
 ///
 /// The rows themselves are kept while they fit a stated memory. Then fold edges are exact and a solver can go back to the
-/// rows. Beyond it only the blocks stay: at most 1,024 of them (fewer, but at least 64, when they would take more than 8 MB),
-/// since neighbours are merged in pairs when there are more. So memory is bounded for any number of rows.
+/// rows. Beyond it only the blocks stay: at most 1,024 of them, since neighbours are merged in pairs when there are more; fewer when
+/// they would take more than 8 MB, but at least 8 and what [folds](GramBlocks::cut_into) need. So memory is bounded for any number
+/// of rows, though by the square of the width. How many blocks there are does not depend on the memory for rows.
 /// All blocks share the first row as their shift. The same rows in the same order give the same bits.
 #[derive(Debug, Clone)]
 pub struct GramBlocks {
@@ -70,6 +76,17 @@ impl GramBlocks {
             pending: Chunk::default(),
             kept: (row_memory > 0).then(Vec::new),
             scratch: Vec::new(),
+        }
+    }
+
+    /// The same for folds of up to so many parts, which need blocks to be cut into. Wide blocks are no more than these need, so that the
+    /// edges of folds move farther. Only before the first row.
+    #[must_use]
+    pub fn cut_into(self, parts: usize) -> Self {
+        let needed = parts.saturating_mul(BLOCKS_PER_PART).min(ENOUGH_BLOCKS);
+        Self {
+            most_blocks: self.most_blocks.max(needed),
+            ..self
         }
     }
 
@@ -433,6 +450,29 @@ mod tests {
             filled(5000, DEFAULT_ROW_MEMORY).total()
         );
         assert_ne!(filled(5000, 0).total(), filled(5001, 0).total());
+    }
+
+    #[test]
+    fn wide_rows_are_summed_in_no_more_blocks_than_their_folds_need() {
+        let width = 500;
+        let filled = |blocks: GramBlocks| {
+            let mut blocks = blocks;
+            let x = vec![1.0; width];
+            for i in 0..30 * BLOCK_ROWS {
+                blocks.push(&x, i as f64);
+            }
+            blocks
+        };
+        let without = || GramBlocks::with_row_memory(width, 0);
+        assert!(filled(without()).blocks() <= 9);
+        let blocks = filled(without().cut_into(4));
+        assert!(blocks.blocks() <= 17);
+        let gap = Folds::Blocked {
+            folds: 4,
+            gap: 1,
+            embargo: 0,
+        };
+        assert_eq!(blocks.splits(&gap).unwrap().len(), 4);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::active_set::ActiveSet;
 use crate::checks::{check_columns, check_parameter, check_penalty, check_scale, check_splits};
 use crate::normal_equations::Problem;
 use crate::penalty::TestMoments;
+use crate::quiet_folds::telling;
 use crate::{Gram, NumericsError, Split};
 
 /// Minimises `1/(2n) Σ(y − b₀ − xᵀb)² + α (ρ t Σ|s_j b_j| + (1 − ρ)/2 Σ(s_j b_j)²)` with column scales `s` and a scale `t` of the
@@ -78,7 +79,8 @@ impl ElasticNet {
         Ok(largest / gram.weight() / (self.l1_ratio * self.target_scale))
     }
 
-    /// The score of each penalty in each fold: `R²` on its test rows of the model of its training rows.
+    /// The score of each penalty in each fold but the [quiet](crate::quiet_folds) ones: `R²` on its test rows of the model of its
+    /// training rows.
     ///
     /// # Errors
     /// As [`ElasticNet::solve`], and [`NumericsError::Folds`], [`NumericsError::Width`].
@@ -94,7 +96,7 @@ impl ElasticNet {
         // From the largest on, each solution is a good start for the next.
         order.sort_by(|&a, &b| alphas[b].total_cmp(&alphas[a]));
         let mut scores = vec![Vec::with_capacity(splits.len()); alphas.len()];
-        for split in splits {
+        for split in telling(splits) {
             self.check(&split.train, columns, scales)?;
             let problem = Problem::new(true, &split.train, columns, scales);
             let used: Vec<usize> = problem.active.iter().map(|&k| columns[k]).collect();

@@ -57,6 +57,11 @@ impl Folds {
         }
     }
 
+    /// Into how many parts rows are cut.
+    pub fn parts(&self) -> usize {
+        self.count() + usize::from(matches!(self, Self::Expanding { .. }))
+    }
+
     /// How many folds there are.
     pub fn count(&self) -> usize {
         match *self {
@@ -80,7 +85,7 @@ impl Folds {
     /// one by one would do; [`NumericsError::FoldsApart`] for a fold without a row to train on.
     pub fn of_blocks(&self, rows: u64, size: u64) -> Result<Vec<FoldRows>, NumericsError> {
         let folds = self.count();
-        let parts = folds as u64 + u64::from(matches!(self, Self::Expanding { .. }));
+        let parts = self.parts() as u64;
         if folds < 2 || rows < parts {
             return Err(NumericsError::Folds { folds, rows });
         }

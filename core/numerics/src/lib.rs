@@ -45,6 +45,7 @@ mod orthogonal;
 mod penalty;
 mod prediction_error;
 mod prediction_variance;
+mod quiet_folds;
 mod rls;
 mod robust;
 mod scaler;
@@ -81,6 +82,7 @@ pub use prediction_error::{
     PredictionErrorFit, Samples, Stepper, Transfer,
 };
 pub use prediction_variance::PredictionVariance;
+pub use quiet_folds::quiet_folds;
 pub use rls::{Forgetting, Rls, RlsOptions, covariance_of};
 pub use robust::{median, robust_deviation};
 pub use scaler::{Standardization, Standardizer};

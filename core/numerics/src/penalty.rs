@@ -3,17 +3,31 @@
 
 use crate::checks::{check_columns, check_penalty, check_splits};
 use crate::normal_equations::Problem;
+use crate::quiet_folds::telling;
 use crate::{Gram, NumericsError, Split};
 use faer::{Mat, Side};
 
 /// Penalties on a logarithmic scale, both ends among them, `per_decade` to each factor of ten or a little closer.
 pub fn logarithmic_grid(smallest: f64, largest: f64, per_decade: u32) -> Vec<f64> {
-    let decades = (largest / smallest).log10();
+    let ratio = largest / smallest;
+    // A ratio beyond all numbers has a logarithm all the same.
+    let decades = if ratio.is_finite() {
+        ratio.log10()
+    } else {
+        largest.log10() - smallest.log10()
+    };
     let steps = (decades * f64::from(per_decade)).ceil();
     if !(smallest > 0.0 && steps >= 1.0 && steps.is_finite()) {
         return vec![smallest];
     }
-    let between = (0..steps as usize).map(|i| smallest * 10_f64.powf(decades * i as f64 / steps));
+    let between = (0..steps as usize).map(|i| {
+        let half = decades * i as f64 / steps / 2.0;
+        if ratio.is_finite() {
+            smallest * 10_f64.powf(decades * i as f64 / steps)
+        } else {
+            smallest * 10_f64.powf(half) * 10_f64.powf(half)
+        }
+    });
     between.chain([largest]).collect()
 }
 
@@ -56,7 +70,8 @@ pub fn generalised_cross_validation(
     Ok(alphas.iter().map(score).collect())
 }
 
-/// The score of each penalty in each fold: `R²` on its test rows of the model of its training rows.
+/// The score of each penalty in each fold but the [quiet](crate::quiet_folds) ones: `R²` on its test rows of the model of its
+/// training rows.
 ///
 /// # Errors
 /// As [`generalised_cross_validation`], and [`NumericsError::Folds`], [`NumericsError::Scale`], [`NumericsError::Width`].
@@ -69,7 +84,7 @@ pub fn cross_validated_penalties(
     check_splits(splits, scales)?;
     check(columns, scales.len(), alphas)?;
     let mut scores = vec![Vec::with_capacity(splits.len()); alphas.len()];
-    for split in splits {
+    for split in telling(splits) {
         let spectrum = Spectrum::of(&split.train, columns, scales)?;
         let test = TestMoments::of(split, &spectrum.columns, scales);
         let turned = spectrum.vectors.transpose() * &test.cross * &spectrum.vectors;
@@ -271,5 +286,46 @@ mod tests {
             assert!((pair[1] / pair[0] - 10_f64.sqrt()).abs() < 1e-12);
         }
         assert_eq!(logarithmic_grid(1.0, 1.0, 4), [1.0]);
+    }
+
+    #[test]
+    fn a_grid_may_span_more_than_the_largest_number() {
+        let grid = logarithmic_grid(1e-200, 1e200, 1);
+        assert_eq!((grid.len(), grid[0], grid[400]), (401, 1e-200, 1e200));
+        for pair in grid.windows(2) {
+            assert!((pair[1] / pair[0] / 10.0 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_fold_in_which_the_target_hardly_changes_has_no_part_in_a_score() {
+        let mut blocks = GramBlocks::new(1);
+        for i in 0..300 {
+            let x = (0.37 * f64::from(i)).sin();
+            let jitter = 1e-9 * (0.11 * f64::from(i)).cos();
+            blocks.push(
+                &[x],
+                if i < 100 {
+                    jitter
+                } else {
+                    2.0 * x + (7.0 * x).cos()
+                },
+            );
+        }
+        let splits = blocks.splits(&Folds::contiguous(3)).unwrap();
+        assert_eq!(crate::quiet_folds(&splits), [0]);
+        let found = cross_validated_penalties(&splits, &[0], &[1.0], &[1.0]).unwrap();
+        let of_the_others = cross_validated_penalties(&splits[1..], &[0], &[1.0], &[1.0]).unwrap();
+        assert_eq!(found, of_the_others);
+        assert!(found[0].iter().all(|score| *score > 0.1), "{found:?}");
+        let sparse = crate::ElasticNet {
+            alpha: 0.0,
+            l1_ratio: 1.0,
+            target_scale: 1.0,
+        };
+        let found = sparse
+            .cross_validated(&splits, &[0], &[1.0], &[0.1])
+            .unwrap();
+        assert_eq!(found[0].len(), 2);
     }
 }

@@ -4,13 +4,15 @@ use athermal_core::node::{
     Estimator, Forms, InputPort, Mistake, Regressor, Regressors, Trained, Trainer, TrainingError,
     TrainingReport, TrainingSetup,
 };
-use athermal_numerics::{Gram, GramBlocks, NumericsError, Standardization, logarithmic_grid};
+use athermal_numerics::{
+    Gram, GramBlocks, NumericsError, Standardization, logarithmic_grid, quiet_folds,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::conditioning::tell_columns;
 use crate::features::{FEATURES_AND_TRUTH, present_features, too_many};
-use crate::folds::Folds;
+use crate::folds::{Folds, tell_moved, tell_quiet};
 use crate::penalty::{best_of, means};
 use crate::regression::LinearPredictor;
 use crate::unsolved::unsolved;
@@ -165,11 +167,16 @@ pub(crate) struct SparseTrainer {
 
 impl SparseTrainer {
     pub(crate) fn new(setup: &TrainingSetup, alpha: SparsePenalty, l1_ratio: f64) -> Self {
+        let parts = match alpha {
+            SparsePenalty::Fixed(_) => 1,
+            SparsePenalty::Chosen(path) => path.folds.cut().parts(),
+        };
+        let blocks = GramBlocks::with_row_memory(setup.regressors.len(), setup.memory);
         Self {
             regressors: setup.regressors.clone(),
             alpha,
             l1_ratio,
-            blocks: GramBlocks::with_row_memory(setup.regressors.len(), setup.memory),
+            blocks: blocks.cut_into(parts),
         }
     }
 
@@ -201,6 +208,8 @@ impl SparseTrainer {
         let alphas = logarithmic_grid(path.smallest_share * largest, largest, path.per_decade);
         let splits = self.blocks.splits(&path.folds.cut())?;
         let folds = how.cross_validated(&splits, &all, scales, &alphas)?;
+        tell_moved(&self.blocks, report);
+        tell_quiet(&quiet_folds(&splits), splits.len(), report);
         let means = means(&folds);
         let best = best_of(&means);
         let edge = if best == 0 {

@@ -56,6 +56,22 @@ pub(crate) fn tell_moved(blocks: &GramBlocks, report: &mut TrainingReport) {
     ));
 }
 
+/// Tells of folds in which the truth stays the same; once, where several cross-validations cut them alike.
+pub(crate) fn tell_quiet(quiet: &[usize], folds: usize, report: &mut TrainingReport) {
+    if quiet.is_empty() {
+        return;
+    }
+    let which: Vec<String> = quiet.iter().map(|fold| (fold + 1).to_string()).collect();
+    let note = format!(
+        "the truth hardly changes in fold {} of {folds}, so R² says nothing there and is the mean of the others",
+        which.join(", ")
+    );
+    if !report.notes.contains(&note) {
+        report.figure("quiet_folds", quiet.len());
+        report.notes.push(note);
+    }
+}
+
 impl<'de> Deserialize<'de> for Folds {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Forms::new("a whole number or a table with `type` and `count`")

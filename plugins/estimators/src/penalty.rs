@@ -3,12 +3,12 @@
 use athermal_core::node::{Forms, Mistake, TrainingReport};
 use athermal_numerics::{
     GramBlocks, NumericsError, cross_validated_penalties, generalised_cross_validation,
-    logarithmic_grid,
+    logarithmic_grid, quiet_folds,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::folds::{Folds, tell_moved};
+use crate::folds::{Folds, tell_moved, tell_quiet};
 
 /// The penalty of ridge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -24,7 +24,7 @@ pub enum Penalty {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Choice {
-    /// By the mean R² over folds.
+    /// By the mean R² over folds, but those in which the truth hardly changes.
     CrossValidation {
         /// How the rows are cut: a number of contiguous folds, or a table.
         #[serde(default = "Folds::three")]
@@ -95,6 +95,8 @@ struct Chosen {
     place: usize,
     /// The mean R² over the folds, where there are any.
     r2: Option<f64>,
+    /// The folds that have no part in it.
+    quiet: Vec<usize>,
 }
 
 /// The mean of each penalty's scores over the folds.
@@ -117,18 +119,20 @@ impl Settled {
             tried,
             place,
             r2,
-        }) = self.chosen
+            quiet,
+        }) = &self.chosen
         else {
             return;
         };
         let (smallest, largest, _) = by.range();
         report.figure("penalty", self.alpha);
-        report.figure("penalties_tried", tried);
+        report.figure("penalties_tried", *tried);
         report.figure("smallest_penalty", smallest);
         report.figure("largest_penalty", largest);
         let how = match by {
-            Choice::CrossValidation { .. } => {
+            Choice::CrossValidation { folds, .. } => {
                 tell_moved(blocks, report);
+                tell_quiet(quiet, folds.cut().count(), report);
                 "cross-validation"
             }
             Choice::GeneralisedCrossValidation { .. } => "generalised cross-validation",
@@ -139,7 +143,7 @@ impl Settled {
         });
         let edge = match place {
             0 => "; it is the smallest tried, a smaller one may be better",
-            _ if place == tried - 1 => "; it is the largest tried, a larger one may be better",
+            _ if *place == tried - 1 => "; it is the largest tried, a larger one may be better",
             _ => "",
         };
         report.notes.push(format!(
@@ -183,6 +187,14 @@ impl Penalty {
         mistakes
     }
 
+    /// Into how many parts it cuts the rows.
+    pub(crate) fn parts(&self) -> usize {
+        match self {
+            Self::Chosen(Choice::CrossValidation { folds, .. }) => folds.cut().parts(),
+            Self::Chosen(Choice::GeneralisedCrossValidation { .. }) | Self::Fixed(_) => 1,
+        }
+    }
+
     /// The penalty for these columns of the rows.
     pub(crate) fn settle(
         &self,
@@ -201,9 +213,11 @@ impl Penalty {
         };
         let (smallest, largest, per_decade) = choice.range();
         let alphas = logarithmic_grid(smallest, largest, per_decade);
+        let mut quiet = Vec::new();
         let scores: Vec<f64> = match choice {
             Choice::CrossValidation { folds, .. } => {
                 let splits = blocks.splits(&folds.cut())?;
+                quiet = quiet_folds(&splits);
                 let folds = cross_validated_penalties(&splits, columns, scales, &alphas)?;
                 means(&folds)
             }
@@ -225,6 +239,7 @@ impl Penalty {
                 tried: alphas.len(),
                 place: best,
                 r2,
+                quiet,
             }),
         })
     }

@@ -42,12 +42,14 @@ pub(crate) struct Found {
 impl LinearTrainer {
     pub(crate) fn new(setup: &TrainingSetup, solver: Solver, selection: Option<Selection>) -> Self {
         let blocks = GramBlocks::with_row_memory(setup.regressors.len(), setup.memory);
+        let of_selection = selection.as_ref().map_or(1, Selection::parts);
+        let parts = of_selection.max(solver.penalty().parts());
         Self {
             regressors: setup.regressors.clone(),
             solver,
             selection,
             order: None,
-            blocks,
+            blocks: blocks.cut_into(parts),
             range: setup
                 .learns
                 .then(|| TrainedRange::new(setup.regressors.len())),
@@ -351,9 +353,9 @@ impl Predictor for LinearPredictor {
         if let Some(variance) = &self.variance {
             let PredictionVariance {
                 noise,
+                rows,
                 centre,
                 root,
-                ..
             } = variance;
             mistakes.extend(Mistake::of_lengths(width, &[("centre", centre.len())]));
             let triangle = width * (width + 1) / 2;
@@ -361,6 +363,10 @@ impl Predictor for LinearPredictor {
             if *noise < 0.0 || noise.is_infinite() {
                 let message = format!("`noise` is {noise} and must be from 0 on");
                 mistakes.push(Mistake::at("noise", message));
+            }
+            if *rows == 0 {
+                let message = "`rows` is 0 and must be from 1 on";
+                mistakes.push(Mistake::at("rows", message));
             }
         }
         mistakes

@@ -9,7 +9,7 @@ use athermal_numerics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::folds::{Folds, tell_moved};
+use crate::folds::{Folds, tell_moved, tell_quiet};
 
 /// How regressors are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -148,6 +148,16 @@ impl Selection {
         mistakes
     }
 
+    /// Into how many parts it cuts the rows.
+    pub(crate) fn parts(&self) -> usize {
+        match self {
+            Self::Forward(how) | Self::Backward(how) | Self::Floating(how) => {
+                how.folds.cut().parts()
+            }
+            Self::Stepwise { .. } => 1,
+        }
+    }
+
     /// The columns chosen with this penalty, in order; the steps go into the report.
     pub(crate) fn run(
         &self,
@@ -186,7 +196,7 @@ impl Selection {
         let splits = blocks.splits(&how.folds.cut())?;
         let selected = search.over(&splits, scales, &candidates)?;
         tell_moved(blocks, report);
-        tell_quiet(&selected, splits.len(), report);
+        tell_quiet(&selected.quiet, splits.len(), report);
         let name = |candidate: usize| {
             let units = candidates.units_of(candidate).iter();
             let names: Vec<&str> = units.map(|&unit| names[unit].as_str()).collect();
@@ -245,18 +255,6 @@ impl Selection {
             return Ok(smallest.columns);
         }
         Ok(selected.columns)
-    }
-}
-
-/// Tells of folds in which the truth stays the same.
-fn tell_quiet(selected: &athermal_numerics::Selection, folds: usize, report: &mut TrainingReport) {
-    let quiet: Vec<String> = selected.quiet.iter().map(|f| (f + 1).to_string()).collect();
-    if !quiet.is_empty() {
-        report.figure("quiet_folds", quiet.len());
-        report.notes.push(format!(
-            "the truth hardly changes in fold {} of {folds}, so R² says nothing there and is the mean of the others",
-            quiet.join(", ")
-        ));
     }
 }
 

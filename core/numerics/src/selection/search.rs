@@ -4,6 +4,7 @@
 use super::fold_state::FoldState;
 use super::{CandidateScore, Candidates, Change, Selection, SelectionScore, SelectionStep, Start};
 use crate::checks::{check_parameter, check_penalty, check_splits};
+use crate::quiet_folds::quiet_folds;
 use crate::{Folds, GramBlocks, NumericsError, Split};
 use std::borrow::Cow;
 
@@ -88,7 +89,7 @@ impl Search {
         self.check(splits, scales, candidates)?;
         let reversible = self.direction != Direction::Forward;
         let quiet = match self.score {
-            SelectionScore::R2 => quiet(splits),
+            SelectionScore::R2 => quiet_folds(splits),
             SelectionScore::NegativeRmse => Vec::new(),
         };
         let telling = splits.iter().enumerate();
@@ -144,37 +145,6 @@ impl Search {
             });
         }
         check_splits(splits, scales)
-    }
-}
-
-/// A target whose variance in a fold is below this share of that of all test rows has no spread there: one such R² would rule the
-/// mean.
-const QUIET_SHARE: f64 = 1e-12;
-
-/// The folds without a spread of the target; none where all are.
-fn quiet(splits: &[Split]) -> Vec<usize> {
-    let moments = splits.iter().map(|Split { test, .. }| {
-        let target = test.width();
-        (
-            test.weight(),
-            test.means()[target],
-            test.variances()[target],
-        )
-    });
-    let moments: Vec<(f64, f64, f64)> = moments.collect();
-    let weight: f64 = moments.iter().map(|(weight, ..)| weight).sum();
-    let sum: f64 = moments.iter().map(|(weight, mean, _)| weight * mean).sum();
-    let centre = sum / weight;
-    let squares = moments
-        .iter()
-        .map(|(weight, mean, variance)| weight * (variance + (mean - centre).powi(2)));
-    let whole = squares.sum::<f64>() / weight;
-    let folds = (0..splits.len()).filter(|&fold| moments[fold].2 <= QUIET_SHARE * whole);
-    let quiet: Vec<usize> = folds.collect();
-    if quiet.len() < splits.len() {
-        quiet
-    } else {
-        Vec::new()
     }
 }
 
