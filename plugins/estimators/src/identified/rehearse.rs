@@ -31,8 +31,11 @@ pub(super) fn error(rows: &Rows, of: &Identified, reach: Reach) -> Option<f64> {
     let mut first = Instant::MIN;
     for seen in rows.all() {
         if seen.begins {
+            // What was withheld moves nothing any more but how large an error is for an outlier.
+            for (at, inputs, truth) in withheld.drain(..) {
+                gate.offer(&mut *following, of.trained_range(), inputs, truth, at);
+            }
             following.segment(Duration::ZERO);
-            withheld.clear();
             first = seen.of + reach.ahead;
         }
         // Without inputs rows are truths, of which the first ones come before what the first run predicts.
