@@ -125,14 +125,16 @@ fn reads(plan: &Plan, node: &PlannedNode, port: usize) -> Vec<usize> {
 /// A channel and what it is made of, as long as each node gives a channel for every one that it takes, in their order: a filter, a
 /// limit.
 fn made_of(plan: &Plan, slot: usize) -> impl Iterator<Item = usize> {
-    successors(Some(slot), |&slot| {
+    let way = successors(Some(slot), |&slot| {
         let node = &plan.nodes[plan.channels[slot].node?];
         let (_, outputs) = node.ports.first()?;
         let inputs = reads(plan, node, 0);
         let nth = slot.checked_sub(outputs.start)?;
         (inputs.len() == outputs.len()).then_some(())?;
         inputs.get(nth).copied()
-    })
+    });
+    // A loop through a delay has no beginning.
+    way.take(plan.channels.len())
 }
 
 /// The slot of the measured drift that a channel is, or predicts, or is made of, and that of the channel which is either.

@@ -26,5 +26,5 @@ fn a_channel_in_brackets_is_no_reference_and_told_as_such_wherever_it_stands() {
     let graph = scratch.file("wrong.toml", inputs);
     athermal(&[&"check", &graph])
         .ended(2)
-        .tells(&["a channel stands after a dot: `temperature.room`"]);
+        .tells(&["a channel is written `temperature.room`, a port `temperature:room`"]);
 }

@@ -372,10 +372,10 @@ impl Problem for CompileProblem {
                 "leave one of the crates out when the program is built".to_owned()
             }
             Self::UnknownNode { node, known } => match node.split_once('[') {
-                Some((owner, member)) if known.contains(owner) => format!(
-                    "a channel stands after a dot: `{owner}.{}`",
-                    member.trim_end_matches(']')
-                ),
+                Some((owner, member)) if known.contains(owner) => {
+                    let member = member.trim_end_matches(']');
+                    format!("a channel is written `{owner}.{member}`, a port `{owner}:{member}`")
+                }
                 _ => or_one_of(node, known, "the graph has"),
             },
             Self::RemovedNode { .. } => "remove or change what refers to it as well, as by `outputs.NAME = false` or `nodes.NAME = false`".to_owned(),
