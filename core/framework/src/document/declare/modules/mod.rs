@@ -29,7 +29,9 @@
 //!   (or the one that `module = "…"` names) from another file, whose own modules it goes on seeing. Other keys there are
 //!   laid over it. A file that `extends` another inherits its modules.
 
+mod check;
 mod module;
+mod outlet;
 mod references;
 mod substitution;
 
@@ -45,7 +47,8 @@ use super::sets::Sets;
 use crate::diagnostic::{Diagnostics, Names};
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
-use module::{Module, check, find};
+use check::check;
+use module::{Module, find};
 
 /// How deep modules may nest.
 const DEEPEST: usize = 16;

@@ -1,8 +1,8 @@
 //! Which node of the whole graph a reference means that is written beside or inside a module.
 
-use super::module::{Module, find};
+use super::outlet::{Outlet, outlet, parts};
 use super::{DEEPEST, Expansion, Level};
-use crate::diagnostic::{Diagnostics, Place};
+use crate::diagnostic::Place;
 use crate::document::problem::DocumentProblem;
 use crate::document::tree::{Data, Entry, Table, Value};
 
@@ -124,9 +124,9 @@ impl Expansion<'_> {
         let Some(module) = instantiates.and_then(Value::as_text) else {
             return format!("{prefix}{text}");
         };
-        let target = match output(module, port, &level.modules, DEEPEST) {
-            Output::Found(target) => format!("{prefix}{node}/{target}"),
-            Output::Unknown(outputs) => {
+        let target = match outlet(module, port, &level.modules, DEEPEST) {
+            Outlet::Found(target) => format!("{prefix}{node}/{target}"),
+            Outlet::Unknown(outputs) => {
                 let known = self.known(outputs.as_slice(), []);
                 let problem = DocumentProblem::UnknownOutput {
                     node: node.to_owned(),
@@ -138,7 +138,7 @@ impl Expansion<'_> {
                 text.to_owned()
             }
             // What is wrong with the module is told there.
-            Output::Broken => text.to_owned(),
+            Outlet::Broken => text.to_owned(),
         };
         match channel {
             Some(channel) => format!("{target}.{channel}"),
@@ -191,74 +191,7 @@ fn tables(list: &mut Value) -> impl Iterator<Item = &mut Table> {
     values.iter_mut().filter_map(Value::as_table_mut)
 }
 
-/// What an output of a module stands for.
-pub(super) enum Output<'a> {
-    /// A node inside, and its port where one is named.
-    Found(String),
-    /// There is no such output; these there are, if any.
-    Unknown(Option<&'a Table>),
-    /// Something has been told of it already.
-    Broken,
-}
-
-/// What an output of a module stands for; the first where no port is named.
-pub(super) fn output<'a>(
-    module: &'a str,
-    port: Option<&str>,
-    modules: &[&'a Table],
-    depth: usize,
-) -> Output<'a> {
-    let Some((found, sight)) = find(module, modules).filter(|_| depth > 0) else {
-        return Output::Broken;
-    };
-    let Some(module) = Module::read(module, found, &mut Diagnostics::new()) else {
-        return Output::Broken;
-    };
-    let outputs = module.outputs;
-    let wanted = match port {
-        None => outputs.and_then(|outputs| outputs.iter().next().map(|(_, entry)| entry)),
-        Some(port) => outputs.and_then(|outputs| outputs.entry(port)),
-    };
-    let Some(entry) = wanted else {
-        return Output::Unknown(outputs);
-    };
-    let Some(reference) = entry.value.as_text() else {
-        return Output::Broken;
-    };
-    let (node, port, _) = parts(reference);
-    let Some(inner) = module.nodes.get(node) else {
-        return Output::Broken;
-    };
-    let instantiates = inner.as_table().and_then(|keys| keys.get("module"));
-    let Some(inner) = instantiates.and_then(Value::as_text) else {
-        return Output::Found(reference.to_owned());
-    };
-    let mut seen = modules[..=sight].to_vec();
-    seen.extend(module.modules);
-    match output(inner, port, &seen, depth - 1) {
-        Output::Found(target) => Output::Found(format!("{node}/{target}")),
-        // The mistake stands in this module's outputs, not in the reference.
-        Output::Unknown(_) => Output::Broken,
-        Output::Broken => Output::Broken,
-    }
-}
-
 /// The input in braces with which a text begins, and what follows it.
 fn leading(text: &str) -> Option<(&str, &str)> {
     text.strip_prefix('{')?.split_once('}')
-}
-
-/// Node, port and channel of a reference.
-fn parts(text: &str) -> (&str, Option<&str>, Option<&str>) {
-    let Some(end) = text.find(['.', ':']) else {
-        return (text, None, None);
-    };
-    let (node, rest) = (&text[..end], &text[end + 1..]);
-    if text.as_bytes()[end] == b'.' {
-        return (node, None, Some(rest));
-    }
-    match rest.split_once('.') {
-        Some((port, channel)) => (node, Some(port), Some(channel)),
-        None => (node, Some(rest), None),
-    }
 }
