@@ -1,4 +1,5 @@
-//! Decides when a graph has changed on disk, in its own file, in one that it extends or takes modules from, or in the model that it names; not what is done then.
+//! Decides when a graph has changed on disk, in its own file, in one that it extends or takes modules from, or in the model that it
+//! names; not what is done then.
 
 use std::cell::RefCell;
 use std::io;

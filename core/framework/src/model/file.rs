@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Card, ModelError};
-use crate::compile::{Change, Plan, PlannedNode, Wanted, compile_part, diff};
+use crate::compile::{Change, Plan, PlanDiff, PlannedNode, Wanted, compile_part, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{self, Disk, Document, GraphFile, Value};
 use crate::engine::{Engine, FitAtHand, Fitted, SampleRange};
@@ -289,7 +289,11 @@ impl Model {
     /// Takes from another model the fits of estimators that mean the same in both. Gives those among them that read, over however
     /// many nodes, what is now made in another way than it was for the fit.
     pub fn take_fits_of(&mut self, other: &Self) -> Vec<String> {
-        let diff = diff(&other.plan, &self.plan);
+        self.take_fits_unless(other, &diff(&other.plan, &self.plan))
+    }
+
+    /// The same, where it is known what differs between the other and this one.
+    pub(super) fn take_fits_unless(&mut self, other: &Self, diff: &PlanDiff) -> Vec<String> {
         let changed = |index: usize| {
             let change = diff.node(&self.plan.nodes[index].instance());
             change.is_some_and(|change| *change != Change::Unchanged)

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 
 use super::problem::NamedModelProblem;
 use super::{Model, ModelError};
-use crate::compile::{Change, Wanted, diff};
+use crate::compile::{Change, PlanDiff, Wanted, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{Value, unreadable};
 
@@ -44,8 +44,9 @@ impl Model {
             }
         };
         let path = path.display().to_string();
-        let doubtful = self.take_fits_of(&other);
-        self.report_unlike(&other, graph, (&path, named), diagnostics);
+        let between = diff(&other.plan, &self.plan);
+        let doubtful = self.take_fits_unless(&other, &between);
+        self.report_unlike(&between, graph, (&path, named), diagnostics);
         if let Some(first) = doubtful.first() {
             let mut nodes = self.plan.nodes.iter();
             let node = nodes.find(|node| node.instance() == *first);
@@ -60,15 +61,14 @@ impl Model {
         self.card = other.card;
     }
 
-    /// Reports each node of which an instance needs a fit and is another than in `fitted`, the model at a path, and named at a place.
+    /// Reports each node of which an instance needs a fit and is another than in the model at a path, which is named at a place.
     fn report_unlike(
         &self,
-        fitted: &Self,
+        between: &PlanDiff,
         graph: &Path,
         (path, named): (&str, Place),
         diagnostics: &mut Diagnostics,
     ) {
-        let between = diff(&fitted.plan, &self.plan);
         let mut unlike: IndexMap<&str, (String, usize, &Change)> = IndexMap::new();
         for node in self.plan.nodes.iter().filter(|node| node.rows().is_some()) {
             let instance = node.instance();
