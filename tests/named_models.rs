@@ -170,6 +170,11 @@ fn a_model_that_cannot_be_used_is_told_with_the_reason_and_what_fits_does_withou
             scratch.file("machine.json", text);
         }
         let model = scratch.path("machine.json");
+        // A file that is there may be somebody's data, and is not to be written over.
+        let advised = match text {
+            None => model.display().to_string(),
+            Some(_) => "MODEL.json".to_owned(),
+        };
         for refused in [
             athermal(&[&"check", &graph]),
             athermal(&[&"run", &graph, &"--input", &data]),
@@ -179,9 +184,8 @@ fn a_model_that_cannot_be_used_is_told_with_the_reason_and_what_fits_does_withou
                 "error[A190]",
                 &format!("the model {} cannot be used: {reason}", model.display()),
                 &format!(
-                    "`athermal fit {} --data FILE -o {}`",
-                    graph.display(),
-                    model.display()
+                    "`athermal fit {} --data FILE -o {advised}`",
+                    graph.display()
                 ),
             ]);
         }

@@ -38,6 +38,7 @@ impl Model {
                     path: path.display().to_string(),
                     reason: in_words(&error),
                     machine: graph.display().to_string(),
+                    is_free: !path.exists(),
                 };
                 diagnostics.report(named, problem);
                 return;

@@ -16,6 +16,8 @@ pub enum NamedModelProblem {
         reason: String,
         /// The file that names it.
         machine: String,
+        /// Whether there is no file at its path, which a fit may then write.
+        is_free: bool,
     },
     /// An estimator is another than the model's.
     Unlike {
@@ -102,8 +104,15 @@ impl Problem for NamedModelProblem {
 
     fn help(&self) -> Option<String> {
         Some(match self {
-            Self::Unusable { path, machine, .. } => {
-                format!("`athermal fit {machine} --data FILE -o {path}` writes it")
+            Self::Unusable {
+                path,
+                machine,
+                is_free: true,
+                ..
+            } => format!("`athermal fit {machine} --data FILE -o {path}` writes it"),
+            // What stands there may be somebody's data.
+            Self::Unusable { machine, .. } => {
+                format!("name what `athermal fit {machine} --data FILE -o MODEL.json` writes")
             }
             Self::Unlike { path, machine, .. } => format!(
                 "fit this graph (`athermal fit {machine} --data FILE -o {path}`), or say what was fitted"
