@@ -4,7 +4,7 @@ use std::path::Path;
 
 use athermal::Model;
 use athermal::core::compile::Wanted;
-use athermal::core::diagnostic::{Diagnostics, Sources};
+use athermal::core::diagnostic::{Diagnostics, Sources, listed};
 use athermal::core::model::ModelError;
 use athermal::core::quantity::Quantity;
 
@@ -67,22 +67,15 @@ pub fn tell_unfitted(terminal: &Terminal, model: &Model, path: &Path) {
         terminal.warning(format_args!(
             "{}: {} could not be fitted and {} nothing",
             path.display(),
-            listed(&nodes),
+            few(&nodes),
             if nodes.len() == 1 { "gives" } else { "give" },
         ));
     }
 }
 
 /// Names, the first few of many.
-pub fn listed(names: &[String]) -> String {
-    const MOST: usize = 6;
-    let more = names.len().saturating_sub(MOST);
-    let shown = names[..names.len().min(MOST)].join(", ");
-    if more > 0 {
-        format!("{shown} and {more} more")
-    } else {
-        shown
-    }
+pub fn few(names: &[String]) -> String {
+    listed(names, 6)
 }
 
 /// Refuses a limit that truths cannot have.

@@ -2,7 +2,7 @@
 
 use athermal::core::score::Unscored;
 
-use super::model::listed;
+use super::model::few;
 use crate::figures::{counted, stated};
 use crate::terminal::Terminal;
 
@@ -17,7 +17,7 @@ pub fn tell(terminal: &Terminal, unscored: &[Unscored]) {
         }
     }
     for (outputs, why) in told {
-        let outputs = listed(&outputs);
+        let outputs = few(&outputs);
         terminal.warning(format_args!("{outputs}: nothing is scored: {why}"));
     }
 }

@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::rejected::Ranged;
 use crate::command::faults::{self, Looks, Purpose, of_standstill, places};
-use crate::command::model::listed;
+use crate::command::model::few;
 use crate::figures::{count, instant, number, seconds, time};
 use crate::message::Message;
 use crate::terminal::Terminal;
@@ -308,5 +308,5 @@ fn tell<'a>(terminal: &Terminal, sensors: impl Iterator<Item = &'a Sensor>, at_s
 fn together(all: &[(&Sensor, f64)]) -> (String, f64) {
     let names: Vec<String> = all.iter().map(|(of, _)| of.source.name.clone()).collect();
     let since_s = all.iter().map(|(_, from_s)| *from_s);
-    (listed(&names), since_s.fold(f64::INFINITY, f64::min))
+    (few(&names), since_s.fold(f64::INFINITY, f64::min))
 }

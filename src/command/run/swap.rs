@@ -14,7 +14,7 @@ use athermal::{Duration, Instant, Model};
 use clap::Args;
 
 use super::watched::Watched;
-use crate::command::model::{self, check_fitted, listed, tell_unfitted};
+use crate::command::model::{self, check_fitted, few, tell_unfitted};
 use crate::figures::length;
 use crate::terminal::{Failure, Terminal};
 
@@ -159,7 +159,7 @@ fn load<'a>(
         terminal.warning(format_args!(
             "{}: {} could not be fitted there, and {} the fit of what ran before",
             path.display(),
-            listed(&taken),
+            few(&taken),
             if taken.len() == 1 { "keeps" } else { "keep" },
         ));
     }

@@ -24,9 +24,20 @@ pub fn counted<N: Display + PartialEq + From<u8>>(value: N, what: &str) -> Strin
     format!("{} {what}{plural}", count(value))
 }
 
+/// Several by their names, the first few of many: `a, b, c`, or `a, b and 3,000 more`.
+#[must_use]
+pub fn listed(all: impl IntoIterator<Item = impl Display>, most: usize) -> String {
+    let mut all = all.into_iter();
+    let shown: Vec<_> = all.by_ref().take(most).map(|one| one.to_string()).collect();
+    match all.count() {
+        0 => shown.join(", "),
+        more => format!("{} and {} more", shown.join(", "), count(more)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{count, counted};
+    use super::{count, counted, listed};
 
     #[test]
     fn counts_have_separators() {
@@ -42,5 +53,13 @@ mod tests {
         assert_eq!(told, ["0 rows", "1 row", "2 rows", "1,234 rows"]);
         let told = [0.5, 1.0].map(|value| counted(value, "day"));
         assert_eq!(told, ["0.5 days", "1 day"]);
+    }
+
+    #[test]
+    fn of_many_names_the_first_few_are_told() {
+        assert_eq!(listed(["a", "b", "c"], 3), "a, b, c");
+        assert_eq!(listed(["a", "b", "c"], 2), "a, b and 1 more");
+        assert_eq!(listed(0..2000, 1), "0 and 1,999 more");
+        assert_eq!(listed([""; 0], 3), "");
     }
 }

@@ -13,7 +13,7 @@ mod render;
 
 pub use codes::{CODES, Code, explain};
 pub use collector::{Diagnostic, Diagnostics, Problem, Severity};
-pub use counted::{count, counted};
+pub use counted::{count, counted, listed};
 pub use digits::digits;
 pub use names::Names;
 pub use nearest::nearest;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::diagnostic::{Diagnostics, Sources};
+use crate::diagnostic::{Diagnostics, Sources, listed};
 use crate::document::unreadable;
 use crate::engine::EngineError;
 use crate::node::Mistake;
@@ -106,18 +106,11 @@ impl fmt::Display for ModelError {
                 sources,
             } => write!(f, "{}", diagnostics.render(sources, false, 100)),
             Self::NotFitted { path, nodes } => {
-                const MOST: usize = 6;
-                let more = nodes.len().saturating_sub(MOST);
-                let more = if more > 0 {
-                    format!(" and {more} more")
-                } else {
-                    String::new()
-                };
-                let shown = nodes[..nodes.len().min(MOST)].join(", ");
                 write!(
                     f,
-                    "{} is a graph of which some nodes need a fit ({shown}{more}): run `athermal fit {} --data FILE -o MODEL` and use MODEL",
+                    "{} is a graph of which some nodes need a fit ({}): run `athermal fit {} --data FILE -o MODEL` and use MODEL",
                     path.display(),
+                    listed(nodes, 6),
                     path.display()
                 )
             }

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::compile::{Change, ParameterChange};
-use crate::diagnostic::{Place, Problem, Severity};
+use crate::diagnostic::{Place, Problem, Severity, listed};
 
 /// Why a machine file cannot run with the model that it names, or only with doubt.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,12 +161,12 @@ fn told(change: &ParameterChange) -> String {
             let has: Vec<_> = now.iter().filter(|one| !fitted.contains(one)).collect();
             match (lacks.is_empty(), has.is_empty()) {
                 (true, true) => format!("`{path}` is in another order"),
-                (false, true) => format!("`{path}` lacks {}", listed(&lacks)),
-                (true, false) => format!("`{path}` has {} too", listed(&has)),
+                (false, true) => format!("`{path}` lacks {}", all(lacks)),
+                (true, false) => format!("`{path}` has {} too", all(has)),
                 (false, false) => format!(
                     "`{path}` has {}, and had {} for the fit",
-                    listed(&has),
-                    listed(&lacks)
+                    all(has),
+                    all(lacks)
                 ),
             }
         }
@@ -185,20 +185,14 @@ fn told(change: &ParameterChange) -> String {
     }
 }
 
-fn listed(values: &[&Value]) -> String {
-    const MOST: usize = 4;
-    let mut shown: Vec<_> = values.iter().take(MOST).map(|one| plain(one)).collect();
-    let more = values.len().saturating_sub(MOST);
-    if more > 0 {
-        shown.push(format!("{more} more"));
-    }
-    shown.join(", ")
+fn all<'a>(values: impl IntoIterator<Item = &'a Value>) -> String {
+    listed(values.into_iter().map(plain), 4)
 }
 
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
-        Value::Array(values) => listed(&values.iter().collect::<Vec<_>>()),
+        Value::Array(values) => all(values),
         other => other.to_string(),
     }
 }

@@ -1,7 +1,7 @@
 //! Decides what can be wrong with a test before it is run, and how it is said.
 
 use crate::compile::CompileProblem;
-use crate::diagnostic::{Place, Problem, nearest};
+use crate::diagnostic::{Place, Problem, listed, nearest};
 use crate::fault::FaultError;
 use crate::machine::schedule::Reason;
 use crate::unit::Unit;
@@ -79,18 +79,11 @@ pub enum TrialProblem {
     BareSample { number: f64, unit: Unit },
 }
 
-fn listed<T: AsRef<str>>(names: &[T]) -> String {
-    const MOST: usize = 12;
-    let shown: Vec<_> = names
-        .iter()
-        .take(MOST)
-        .map(|name| format!("`{}`", name.as_ref()))
-        .collect();
-    match names.len() {
-        0 => "nothing".to_owned(),
-        n if n > MOST => format!("{} and {} more", shown.join(", "), n - MOST),
-        _ => shown.join(", "),
+fn quoted<T: AsRef<str>>(names: &[T]) -> String {
+    if names.is_empty() {
+        return "nothing".to_owned();
     }
+    listed(names.iter().map(|name| format!("`{}`", name.as_ref())), 12)
 }
 
 /// How a file does without the tests that it inherits.
@@ -175,7 +168,7 @@ impl Problem for TrialProblem {
                 machine, channels, ..
             } => format!(
                 "the machine `{machine}` does not measure {}",
-                listed(channels)
+                quoted(channels)
             ),
             Self::Units {
                 key,
@@ -265,7 +258,7 @@ impl Problem for TrialProblem {
             Self::UnknownMachine { machine, known } => {
                 match nearest(machine, known.iter().copied()) {
                     Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("there are {}", listed(known)),
+                    None => format!("there are {}", quoted(known)),
                 }
             }
             Self::MachineTwice { .. } => {
@@ -280,7 +273,7 @@ impl Problem for TrialProblem {
                 let way_out = "a signal may call channels `optional`";
                 match inherited_by {
                     Some(file) => format!("{way_out}; {}", without_inherited(file)),
-                    None => format!("it measures {}; {way_out}", listed(has)),
+                    None => format!("it measures {}; {way_out}", quoted(has)),
                 }
             }
             Self::Units { expected, .. } => format!("write it in {expected}"),
@@ -302,7 +295,7 @@ impl Problem for TrialProblem {
                 "give `constant`, `ramp`, `step`, `sine`, `noise` or `samples`".to_owned()
             }
             Self::Range { .. } | Self::Fault(_) | Self::Schedule(_) => return None,
-            Self::NotMeasured { known, .. } => format!("measured are {}", listed(known)),
+            Self::NotMeasured { known, .. } => format!("measured are {}", quoted(known)),
             Self::ChannelTwice { .. } => "let each channel stand once".to_owned(),
             Self::BareSample { .. } => "only `nan`, for no value, stands without a unit".to_owned(),
         })

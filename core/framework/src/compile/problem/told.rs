@@ -4,24 +4,13 @@ use std::cmp::Ordering;
 
 use super::CompileProblem;
 use crate::compile::provenance::smallest_lag;
-use crate::diagnostic::{Names, Problem, Severity, nearest};
+use crate::diagnostic::{Names, Problem, Severity, listed, nearest};
 
-fn names<I>(known: I) -> String
-where
-    I: IntoIterator<Item: AsRef<str>, IntoIter: ExactSizeIterator>,
-{
-    const MOST: usize = 12;
-    let known = known.into_iter();
-    let count = known.len();
-    let shown: Vec<_> = known
-        .take(MOST)
-        .map(|name| format!("`{}`", name.as_ref()))
-        .collect();
-    match count {
-        0 => "nothing".to_owned(),
-        n if n > MOST => format!("{} and {} more", shown.join(", "), n - MOST),
-        _ => shown.join(", "),
-    }
+fn names(known: impl IntoIterator<Item: AsRef<str>>) -> String {
+    let quoted = known.into_iter().map(|name| format!("`{}`", name.as_ref()));
+    Some(listed(quoted, 12))
+        .filter(|names| !names.is_empty())
+        .unwrap_or_else(|| "nothing".to_owned())
 }
 
 /// A way through the graph; the middle of a long one is left out.

@@ -1,26 +1,16 @@
 //! How each mistake in reading a graph file is told; which there are stands above.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use super::DocumentProblem;
-use crate::diagnostic::{Names, Place, Problem, nearest};
+use crate::diagnostic::{Names, Place, Problem, listed, nearest};
 use crate::document::lacks::Lacks;
 use crate::document::salvage::DUPLICATE_KEY;
 use crate::quantity::QuantityError;
 
 /// At most twelve names in quotes, for a list of what there is.
-fn listed<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
-    const SHOWN: usize = 12;
-    let count = names.len();
-    let mut text = String::new();
-    for (index, name) in names.take(SHOWN).enumerate() {
-        let _ = write!(text, "{}\"{name}\"", if index == 0 { "" } else { ", " });
-    }
-    if count > SHOWN {
-        let _ = write!(text, " and {} more", count - SHOWN);
-    }
-    text
+fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    listed(names.map(|name| format!("\"{name}\"")), 12)
 }
 
 /// "did you mean" or a list of what there is.
@@ -42,8 +32,8 @@ fn near_or_all<'a>(
     match (near, known.len()) {
         (Some(near), _) => Some(format!("did you mean \"{near}\"?")),
         (None, 0) => None,
-        (None, 1) => Some(format!("there is only {}", listed(known))),
-        (None, _) => Some(format!("{there_are} {}", listed(known))),
+        (None, 1) => Some(format!("there is only {}", quoted(known))),
+        (None, _) => Some(format!("{there_are} {}", quoted(known))),
     }
 }
 
@@ -297,7 +287,7 @@ impl Problem for DocumentProblem {
                     )
                 }),
                 None => {
-                    let graphs = listed(beside.iter().map(String::as_str));
+                    let graphs = quoted(beside.iter().map(String::as_str));
                     Some(format!("in that folder there is {graphs}"))
                 }
             },
@@ -411,7 +401,7 @@ impl Problem for DocumentProblem {
                 Some(near) => format!("did you mean \"{near}\"?"),
                 None => format!(
                     "name it under the module's `inputs`; there it has {}",
-                    listed(known.iter())
+                    quoted(known.iter())
                 ),
             }),
             Self::UnknownOutput { output, known, .. } => {
