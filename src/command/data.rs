@@ -25,7 +25,7 @@ use crate::terminal::{Failure, Terminal};
 /// Recorded data.
 #[derive(Debug, Args)]
 pub struct Data {
-    /// CSV or JSON lines; several files are joined in the order of time, or are segments when their times start again
+    /// CSV or JSON lines; several files of one clock are joined in the order of time; those whose times start again are segments, in the order given
     #[arg(long = "data", short, required = true, num_args = 1.., value_name = "FILE", value_parser = recording())]
     files: Vec<PathBuf>,
     /// Take cells and rows that cannot be read as missing, and count them

@@ -291,6 +291,7 @@ mod tests {
             valid: None,
             baseline_zero: Some(zero),
             baseline_persistence: None,
+            persistence_n: 0,
             truth_noise: Some(3.85),
             own_instants: false,
             left_out: 0,

@@ -216,14 +216,22 @@ fn describe(scores: &Scores, asked: &[String]) -> String {
 
 /// How far off the truth of before is, for each horizon where that differs.
 fn persistence(rows: &[&Score]) -> String {
+    let of = |row: &Score| match row.persistence_on_few() {
+        Some(few) => format!(
+            "{} on {} of them",
+            or_dash(row.baseline_persistence),
+            count(few)
+        ),
+        None => or_dash(row.baseline_persistence),
+    };
     let mut all: Vec<(f64, String)> = Vec::new();
     for row in rows.iter().filter(|row| !row.own_instants) {
         if all.iter().all(|(ahead_s, _)| *ahead_s != row.ahead_s) {
-            all.push((row.ahead_s, or_dash(row.baseline_persistence)));
+            all.push((row.ahead_s, of(row)));
         }
     }
     let Some((_, first)) = all.first() else {
-        return or_dash(rows.first().and_then(|row| row.baseline_persistence));
+        return rows.first().map_or_else(|| or_dash(None), |row| of(row));
     };
     if all.iter().all(|(_, error)| error == first) {
         return first.clone();

@@ -61,10 +61,22 @@ pub struct Column {
     pub baseline_zero: Option<f64>,
     /// The error of the truth at the smallest lag that sees nothing of the answer.
     pub baseline_persistence: Option<f64>,
+    /// How many of these instants that is the error on.
+    pub persistence_n: usize,
     /// The row with the smallest error on these instants.
     pub best: Option<usize>,
     /// Graphs whose own truth of this name is another one than that of the first graph, which all are scored on.
     pub otherwise: Vec<String>,
+}
+
+impl Column {
+    /// On how many instants the error of persistence is, where these are so few that it says little of the others.
+    #[must_use]
+    pub fn persistence_on_few(&self) -> Option<usize> {
+        self.baseline_persistence?;
+        let few = hide_much(self.n - self.persistence_n, self.n);
+        few.then_some(self.persistence_n)
+    }
 }
 
 /// A node of a graph.
@@ -335,14 +347,17 @@ fn column(
         .map(|row| (left_out, row))
         .filter(|_| hide_much(left_out, most));
     let persistence = first.truth.persistence.get(&first.of.ahead);
-    let lasting = |places: &Vec<usize>| persistence.map_or(f64::NAN, |values| values[places[0]]);
+    let lasting = |at: &&Vec<usize>| persistence.map(|values| values[at[0]] - truth(at));
+    let lasting = common.iter().filter_map(lasting);
+    let lasting: Vec<f64> = lasting.filter(|error| !error.is_nan()).collect();
     Column {
         truth: first.truth_name().to_owned(),
         name: channel.name.clone(),
         n: common.len(),
         left_out,
         baseline_zero: rms(common.iter().map(|at| truth(at))),
-        baseline_persistence: rms(common.iter().map(|at| lasting(at) - truth(at))),
+        persistence_n: lasting.len(),
+        baseline_persistence: rms(lasting.into_iter()),
         best: best.filter(|&best| rows[best].rmse[nth].is_some()),
         otherwise,
     }

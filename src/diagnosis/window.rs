@@ -49,9 +49,10 @@ pub struct Width {
     pub ratio: f64,
 }
 
-/// A measured series: instants in s and values.
+/// A measured series: instants in s, from its first one, and values.
 #[derive(Debug, Clone, Default)]
 struct Measured {
+    began: Option<Instant>,
     time_s: Vec<f64>,
     values: Vec<f64>,
 }
@@ -74,7 +75,8 @@ pub fn windows(model: &Model, recording: &dyn Recording) -> Result<Vec<Windows>,
         for (segments, &(_, slot)) in series.iter_mut().zip(&pairs) {
             match (event, segments.last_mut()) {
                 (Event::Row(now), Some(segment)) if !engine.value(slot).is_nan() => {
-                    segment.time_s.push((now - Instant::from_ns(0)).secs());
+                    let began = *segment.began.get_or_insert(now);
+                    segment.time_s.push((now - began).secs());
                     segment.values.push(engine.value(slot));
                 }
                 (Event::Segment, _) => segments.push(Measured::default()),
@@ -179,7 +181,7 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Of one series: instants in s and values.
+    /// Of one series: instants in s, counted from near its first one, and values.
     #[must_use]
     pub fn of(times: &[f64], values: &[f64], width_s: f64) -> Self {
         let mut drift = Self::default();
@@ -193,15 +195,19 @@ impl Drift {
         let [first, .., last] = times else {
             return;
         };
+        // Whole nanoseconds: which samples a window holds is not for the rounding of seconds to decide.
+        let ns = |seconds: f64| (seconds * 1e9).round() as i64;
+        let at: Vec<i64> = times.iter().map(|time| ns(time - first)).collect();
+        let width = ns(width_s);
         let apart_s = (last - first) / (times.len() - 1) as f64;
         let every = (width_s / 4.0 / apart_s - 1e-6).ceil().max(1.0) as usize;
-        let begin = times.partition_point(|time| *time < first + width_s);
+        let begin = at.partition_point(|&at| at < width);
         let mut from = 0;
         for to in (begin..times.len()).step_by(every) {
-            while times[from] <= times[to] - width_s {
+            while at[from] <= at[to] - width {
                 from += 1;
             }
-            if times[to] - times[from] < LEAST_COVERED * width_s {
+            if ((at[to] - at[from]) as f64) < LEAST_COVERED * width as f64 {
                 continue;
             }
             let Some((slope, error)) = line(&times[from..=to], &values[from..=to]) else {
@@ -289,11 +295,15 @@ mod tests {
                 (t / 100.0).sin() * 100.0 + if bit == 1 { noise } else { -noise }
             })
             .collect();
-        Measured { time_s, values }
+        Measured {
+            time_s,
+            values,
+            ..Measured::default()
+        }
     }
 
     fn drift(noise: f64, width_s: f64) -> Drift {
-        let Measured { time_s, values } = series(noise);
+        let Measured { time_s, values, .. } = series(noise);
         Drift::of(&time_s, &values, width_s)
     }
 
@@ -323,6 +333,23 @@ mod tests {
         let ratio = |width| drift(5.0, width).ratio();
         assert!(ratio(10.0) < ratio(20.0) && ratio(20.0) < ratio(40.0));
         assert!(ratio(600.0) < ratio(100.0));
+    }
+
+    #[test]
+    fn a_window_holds_the_same_samples_wherever_times_are_counted_from() {
+        let values: Vec<f64> = (0..4000).map(|nth| f64::from(nth % 7)).collect();
+        let noise = |from_s: f64| {
+            let times = (0..4000).map(|nth| from_s + f64::from(nth) * 0.02);
+            Drift::of(&times.collect::<Vec<_>>(), &values, 0.1).noise()
+        };
+        let (here, later) = (noise(0.0), noise(1000.0));
+        assert!((here / later - 1.0).abs() < 1e-9, "{here} {later}");
+        let five: Vec<f64> = (0..5).map(|nth| 0.02 * f64::from(nth)).collect();
+        let all: Vec<f64> = (5..4000)
+            .map(|last| line(&five, &values[last - 4..=last]).unwrap().1)
+            .collect();
+        let mean = (all.iter().map(|error| error * error).sum::<f64>() / all.len() as f64).sqrt();
+        assert!((here / mean - 1.0).abs() < 1e-3, "{here} {mean}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::workbench::{Finished, Scratch, athermal};
+use crate::workbench::{Finished, Scratch, athermal, athermal_on};
 
 /// What reads past truths, what follows them, what reads none, and a vote of two.
 const MODES: &str = r#"
@@ -181,4 +181,52 @@ fn graphs_are_compared_in_the_mode_that_is_asked_for() {
     ])
     .ended(2)
     .tells(&["--mode k-step"]);
+}
+
+#[test]
+fn persistence_that_is_there_at_a_few_of_the_instants_is_told_with_their_number() {
+    let scratch = Scratch::new("few-persistent");
+    let graph = scratch.file(
+        "bursts.toml",
+        r#"schema = 1
+signals.position = { unit = "nm", channels = ["z"], max_age = "3min" }
+nodes.drift = { type = "slope", inputs.signal = "position", windows = ["5min"], unit = "nm/min" }
+nodes.nothing = { type = "zero", inputs.truth = "drift", ahead = "5min" }
+outputs.nothing = "nothing"
+"#,
+    );
+    // Eight minutes of positions in each hour.
+    let burst = |minute: &i32| minute % 60 < 9;
+    let position = |minute: i32| f64::from(minute * minute % 97);
+    let lines = (0..3000).filter(burst);
+    let lines = lines.map(|minute| format!("{},{}\n", 60 * minute, position(minute)));
+    let data = scratch.file(
+        "bursts.csv",
+        format!("time_s,z\n{}", lines.collect::<String>()),
+    );
+    let told = athermal_on("evaluate", &graph, &data, &[]).ended(0);
+    let json = athermal_on("evaluate", &graph, &data, &[&"--format", &"json"]).ended(0);
+    let score = &json.json()["scores"][0];
+    let (n, few) = (&score["n"], &score["persistence_n"]);
+    assert!(
+        few.as_u64() > Some(0) && few.as_u64() < n.as_u64().map(|n| n / 2),
+        "{score}"
+    );
+    assert!(
+        told.out.contains(&format!(" on {few} of them,")),
+        "{}",
+        told.out
+    );
+    let compared = athermal(&[
+        &"compare",
+        &graph,
+        &"--data",
+        &data,
+        &"--on",
+        &data,
+        &"--format",
+        &"json",
+    ]);
+    let column = &compared.ended(0).json()["comparisons"][0]["truths"][0];
+    assert_eq!((&column["n"], &column["persistence_n"]), (n, few));
 }

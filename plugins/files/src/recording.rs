@@ -1,6 +1,5 @@
 //! Several files as one recording: their order, and where one does not continue the other. Not how a file is read.
 
-use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -19,10 +18,11 @@ pub enum Event {
 
 /// The rows of one or more files, one file open at a time.
 ///
-/// Files whose first instants all differ are read in the order of these, others in the order given. A file that starts after the last
-/// instant of the one before continues it; one that starts at or before it, such as when each counts from 0, is a segment of its own.
-/// That also holds for files that cover the same period with different columns: they are not merged. A file
-/// without rows is passed over.
+/// Files of one clock are read in the order of time: those whose times are dates and whose first instants all differ, and those
+/// of which, in that order, each begins after the last instant of the one before. Others, such as those that each count from their
+/// beginning, are read in the order given. A file that starts after the last instant of the one before continues it; one that starts
+/// at or before it is a segment of its own. That also holds for files that cover the same period with different columns: they
+/// are not merged. A file without rows is passed over.
 ///
 /// Where times are dates, or numbers that must be some, the reports tell how many rows lie in the period of another file.
 pub struct Recording {
@@ -122,21 +122,12 @@ impl Recording {
         self.last_ns = Some(now);
         let first = self.period.as_ref().map_or(now, |period| *period.start());
         self.period = Some(first..=now);
-        if self.is_dated(now) {
+        if is_dated(&self.layout, now) {
             for (rows, (_, period)) in self.within.iter_mut().zip(&self.periods) {
                 *rows += u64::from(period.contains(&now));
             }
         }
         Event::Row
-    }
-
-    /// Whether an instant is the same in all files, and not counted from the beginning of its own.
-    fn is_dated(&self, time_ns: i64) -> bool {
-        match self.layout.time.form {
-            TimeForm::Rfc3339 | TimeForm::Format(_) => true,
-            TimeForm::Numbers { .. } => time_ns >= DATED_NS,
-            TimeForm::Samples { .. } => false,
-        }
     }
 
     fn close(&mut self) {
@@ -158,24 +149,58 @@ impl Recording {
     }
 }
 
+/// Whether an instant is the same in all files, and not counted from the beginning of its own.
+fn is_dated(layout: &Layout, time_ns: i64) -> bool {
+    match layout.time.form {
+        TimeForm::Rfc3339 | TimeForm::Format(_) => true,
+        TimeForm::Numbers { .. } => time_ns >= DATED_NS,
+        TimeForm::Samples { .. } => false,
+    }
+}
+
+/// The files as they are to be read.
 fn in_order(
     paths: Vec<PathBuf>,
     layout: &Layout,
     options: &Options,
 ) -> Result<Vec<PathBuf>, FileError> {
     let mut row = Row::default();
-    let mut known = Vec::with_capacity(paths.len());
+    let mut as_given = Vec::with_capacity(paths.len());
     for path in paths {
         let mut reader = Reader::open(&path, layout.clone(), options.clone())?;
-        let first = reader.next_into(&mut row)?.then_some(row.time_ns);
-        known.push((first, path));
+        let start = reader.next_into(&mut row)?.then_some(row.time_ns);
+        as_given.push((start, path));
     }
-    let starts: Vec<i64> = known.iter().filter_map(|(first, _)| *first).collect();
-    let different: BTreeSet<i64> = starts.iter().copied().collect();
-    if different.len() == starts.len() {
-        known.sort_by_key(|(first, _)| *first);
+    let mut by_time = as_given.clone();
+    by_time.sort_by_key(|(start, _)| *start);
+    let starts = || by_time.iter().filter_map(|(start, _)| *start);
+    let all_differ = starts().zip(starts().skip(1)).all(|(one, next)| one < next);
+    let one_clock = by_time != as_given
+        && all_differ
+        && (starts().all(|start| is_dated(layout, start))
+            || follow_each_other(&by_time, layout, options)?);
+    let files = if one_clock { by_time } else { as_given };
+    Ok(files.into_iter().map(|(_, path)| path).collect())
+}
+
+/// Whether each file begins after the last instant of the one before; they are read to their ends.
+fn follow_each_other(
+    files: &[(Option<i64>, PathBuf)],
+    layout: &Layout,
+    options: &Options,
+) -> Result<bool, FileError> {
+    let mut row = Row::default();
+    let mut last = None;
+    for (start, path) in files {
+        if start.is_some() && *start <= last {
+            return Ok(false);
+        }
+        let mut reader = Reader::open(path, layout.clone(), options.clone())?;
+        while reader.next_into(&mut row)? {
+            last = Some(row.time_ns);
+        }
     }
-    Ok(known.into_iter().map(|(_, path)| path).collect())
+    Ok(true)
 }
 
 #[cfg(test)]
@@ -236,9 +261,31 @@ mod tests {
     }
 
     #[test]
-    fn files_that_overlap_are_segments() {
+    fn files_that_overlap_are_segments_in_the_order_of_dates_or_else_as_they_are_given() {
         let parts = ["t,x\n5,3\n15,4\n", "t,x\n0,1\n10,2\n"];
-        assert_eq!(told("overlap", &parts), "1@0 2@10 | 3@5 4@15");
+        assert_eq!(told("overlap", &parts), "3@5 4@15 | 1@0 2@10");
+        let dated = [
+            "t,x\n1700000005,3\n1700000015,4\n",
+            "t,x\n1700000000,1\n1700000010,2\n",
+        ];
+        assert_eq!(
+            told("overlap-dated", &dated),
+            "1@1700000000 2@1700000010 | 3@1700000005 4@1700000015"
+        );
+    }
+
+    #[test]
+    fn logs_that_each_count_from_their_beginning_stay_in_the_order_given_however_soon_each_begins()
+    {
+        let parts = [
+            "t,x\n0.3,1\n10,2\n",
+            "t,x\n0.1,3\n10,4\n",
+            "t,x\n0.2,5\n10,6\n",
+        ];
+        assert_eq!(
+            told("jitter", &parts),
+            "1@0.3 2@10 | 3@0.1 4@10 | 5@0.2 6@10"
+        );
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub(super) fn scores(scores: &[Score]) -> String {
             escaped(&score.unit),
             figure(score.rmse),
             figure(score.baseline_zero),
-            figure(score.baseline_persistence),
+            persistence(score),
             figure(score.truth_noise),
             figure(score.r2_zero),
             figure(score.bias),
@@ -57,6 +57,15 @@ pub(super) fn scores(scores: &[Score]) -> String {
         "instants scored",
     ];
     table(&header, &rows)
+}
+
+/// The error of persistence, with the number of instants where these are few.
+fn persistence(score: &Score) -> String {
+    let error = figure(score.baseline_persistence);
+    match score.persistence_on_few() {
+        Some(few) => format!("{error} on {} of them", count(few)),
+        None => error,
+    }
 }
 
 /// The article's figures, ours below.

@@ -73,8 +73,11 @@ pub struct Score {
     /// Root mean square of the truth on the same instants: the error of predicting zero.
     pub baseline_zero: Option<f64>,
     /// Root mean square error of the truth at the smallest lag that sees nothing of the answer, several steps ahead of that so
-    /// many steps back, on the same instants; none in a free run, which would repeat the first truth of each segment.
+    /// many steps back, on those of the same instants at which there is such a truth; none in a free run, which would repeat the
+    /// first truth of each segment.
     pub baseline_persistence: Option<f64>,
+    /// How many instants that is the error on.
+    pub persistence_n: usize,
     /// Root mean square of the truth's standard error on the same instants, from the residuals of its own fit lines: both the
     /// scatter of the samples and the curvature of what they follow count, and a prediction may come below it.
     pub truth_noise: Option<f64>,
@@ -98,6 +101,14 @@ impl Score {
     #[must_use]
     pub fn leaves_many_out(&self) -> bool {
         hide_much(self.left_out, self.n + self.left_out)
+    }
+
+    /// On how many instants the error of persistence is, where these are so few that it [says](hide_much) little of the others.
+    #[must_use]
+    pub fn persistence_on_few(&self) -> Option<usize> {
+        self.baseline_persistence?;
+        let few = hide_much(self.n - self.persistence_n, self.n);
+        few.then_some(self.persistence_n)
     }
 
     /// Whether the prediction is worse than predicting zero.
@@ -224,6 +235,11 @@ fn scores(
             };
             let truths = || instants.iter().map(|&i| truth.values[i]);
             let persistence = &truth.persistences[&prediction.ahead].values;
+            let lasting: Vec<f64> = instants
+                .iter()
+                .map(|&i| persistence[i] - truth.values[i])
+                .filter(|e| !e.is_nan() && options.mode != Mode::FreeRun)
+                .collect();
             let n = instants.len();
             let mean = mean(truths());
             let mut range = Extremes::NONE;
@@ -254,13 +270,8 @@ fn scores(
                 max_abs: errors().map(f64::abs).reduce(f64::max),
                 valid: (!counted.is_empty()).then(|| valid(nth)),
                 baseline_zero: root_mean_square(truths()),
-                baseline_persistence: root_mean_square(
-                    instants
-                        .iter()
-                        .map(|&i| persistence[i] - truth.values[i])
-                        .filter(|e| !e.is_nan()),
-                )
-                .filter(|_| options.mode != Mode::FreeRun),
+                persistence_n: lasting.len(),
+                baseline_persistence: root_mean_square(lasting.into_iter()),
                 truth_noise: root_mean_square(
                     instants
                         .iter()
