@@ -221,3 +221,42 @@ fn a_model_that_names_its_own_graph_as_model_ends_as_any_that_is_none() {
         .ended(2)
         .tells(&["error[A190]", "it is no fitted model"]);
 }
+
+#[test]
+fn a_machine_file_in_another_unit_is_held_to_the_range_of_the_fit_in_its_own() {
+    let (scratch, _, data) = desk("units");
+    let log = std::fs::read_to_string(&data).unwrap();
+    let in_fahrenheit = |warmer: f64| {
+        let row = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let of = |cell: &str| (cell.parse::<f64>().unwrap() + warmer) * 1.8 + 32.0;
+            format!(
+                "{},{},{},{}\n",
+                cells[0],
+                of(cells[1]),
+                of(cells[2]),
+                cells[3]
+            )
+        };
+        let rows: String = log.lines().skip(1).map(row).collect();
+        format!("time_s,plate,room,X\n{rows}")
+    };
+    let window = "windows = [\"5min\"]";
+    let text = page().replacen(window, &format!("{window}\nunit = \"mK/min\""), 1);
+    let graph = scratch.file("celsius.toml", &text);
+    let model = scratch.path("machine.json");
+    athermal(&[
+        &"fit", &graph, &"--data", &data, &"-o", &model, &"-q", &"--force",
+    ])
+    .ended(0);
+    let machine = scratch.file("fahrenheit.toml", text.replace("\"Cel\"", "\"[degF]\""));
+    let told = |name: &str, warmer: f64| {
+        let log = scratch.file(name, in_fahrenheit(warmer));
+        athermal(&[&"evaluate", &machine, &"--data", &log])
+            .ended(0)
+            .told
+    };
+    let (same, warm) = (told("same.csv", 0.0), told("warm.csv", 60.0));
+    assert!(!same.contains("in the data of the fit"), "{same}");
+    assert!(warm.contains("in the data of the fit"), "{warm}");
+}

@@ -31,6 +31,9 @@ pub struct Data {
     /// Take cells and rows that cannot be read as missing, and count them
     #[arg(long)]
     lenient: bool,
+    /// Take each file as a segment of its own, also where its times go on: windows, lags and filters start afresh with it
+    #[arg(long)]
+    segments: bool,
 }
 
 /// Reads the path of a recording. An option that takes several swallows a graph that comes behind them.
@@ -49,6 +52,7 @@ impl Data {
         Self {
             files,
             lenient: false,
+            segments: false,
         }
     }
 
@@ -81,6 +85,7 @@ impl Data {
         Self {
             files,
             lenient: self.lenient,
+            segments: self.segments,
         }
     }
 
@@ -91,6 +96,7 @@ impl Data {
             self.files.clone(),
             Options {
                 lenient: self.lenient,
+                segments: self.segments,
                 ..Options::default()
             },
         )
@@ -99,10 +105,12 @@ impl Data {
     /// These files as a command for a shell names them; more of them may follow.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
-        let lenient = self.lenient.then(|| "--lenient".to_owned());
+        let options = [(self.lenient, "--lenient"), (self.segments, "--segments")];
+        let options = options.into_iter().filter(|(given, _)| *given);
+        let options = options.map(|(_, option)| option.to_owned());
         let files = self.files.iter();
         let files = files.map(|path| quoted(&path.display().to_string()));
-        let words = lenient.into_iter().chain(["--data".to_owned()]);
+        let words = options.chain(["--data".to_owned()]);
         words.chain(files).collect()
     }
 

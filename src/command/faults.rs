@@ -9,7 +9,7 @@ use athermal::core::recording::{Event, Recording, RecordingError, Rows};
 use athermal::diagnosis::leap::{self, Leaps};
 use athermal::diagnosis::silence::{self, Silence};
 use athermal::diagnosis::standstill::{self, Standstill};
-use athermal::diagnosis::{health_reasons, of_truths};
+use athermal::diagnosis::{guarded, of_truths};
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -142,18 +142,21 @@ impl Recording for FaultWatch<'_> {
 impl Looks {
     /// Looks at the channels of this plan.
     pub fn at(plan: &Plan) -> Self {
-        let watched = health_reasons(plan);
+        let (no_leaps, no_standstill) = (
+            guarded(plan, &["max_rate"]),
+            guarded(plan, &["stuck_after", "noise_below"]),
+        );
         let channels = plan.sources.iter().zip(leap::finders(plan));
         let channels = channels.zip(of_truths(plan)).enumerate();
         let looked = channels.map(|(slot, ((source, leaps), of_truth))| {
             let rests = source.optional;
-            // Such a node takes out what is stuck.
-            let watched = watched.contains_key(&slot);
+            // A node takes such samples out.
+            let stuck = !rests && !no_standstill.contains(&slot);
             Looked {
                 source: source.clone(),
                 of_truth,
-                leaps,
-                stuck: (!rests && !watched).then(Default::default),
+                leaps: leaps.filter(|_| !no_leaps.contains(&slot)),
+                stuck: stuck.then(Default::default),
                 silent: (!rests).then(Default::default),
             }
         });
@@ -371,11 +374,13 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
     if faulty.of_truth {
         let then = match faulty.purpose {
             Purpose::Fit => {
-                "That is learned as drift: begin another file there, or leave the rows of the largest drifts out by \
-                 `train.abs_truth`"
+                "That is learned as drift: begin another file there and give all of them with `--segments`, or leave the rows of \
+                 the largest drifts out by `train.abs_truth`"
             }
-            Purpose::Scores => "That counts as drift: begin another file there",
-            Purpose::Run => "That was taken for drift: begin another file there",
+            Purpose::Scores => {
+                "That counts as drift: begin another file there and give all of them with `--segments`"
+            }
+            Purpose::Run => "That was taken for drift",
         };
         return format!("was it moved, or zeroed anew? {then}");
     }
@@ -383,11 +388,17 @@ fn of_leaps(faulty: &Faulty, leaps: &Leaps) -> String {
         Purpose::Fit => "That is learned too",
         Purpose::Scores | Purpose::Run => "Predictions from that mean nothing",
     };
+    let (low, high) = leaps.usual;
+    if (low..=high).contains(&leaps.first.to) {
+        return format!(
+            "did the sensor fail? {then}: a `health` node takes such samples out by its `max_rate`"
+        );
+    }
     format!(
         "did the sensor fail? {then}: leave such samples out by a `range` in [signals.{}]; nine in ten are between {} and {}",
         faulty.signal(),
-        number(leaps.usual.0),
-        number(leaps.usual.1)
+        number(low),
+        number(high)
     )
 }
 

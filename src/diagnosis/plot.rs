@@ -20,7 +20,7 @@ const KNOWN: &str = "c6";
 const WINDOWS_SHOWN: f64 = 12.0;
 /// Errors of fits on fewer days are shown up to so many times that of fits on all others: whether they come near is asked.
 const RATIOS_SHOWN: f64 = 2.0;
-/// Impulses are shown whole unless the largest is so many times beyond all but so many points of each line.
+/// Impulses are shown whole unless the largest is so many times beyond all but so many points of each line that has twice as many.
 const SPIKE: f64 = 10.0;
 const IN_SPIKES: usize = 4;
 
@@ -419,13 +419,46 @@ fn response(of: &Responses, of_unit: &str, impulse: bool) -> Picture {
     }
 }
 
-/// Where the lines lie but for a few points of each, if all lie far beyond. An impulse makes a spike where a level enters, and beside
-/// that nothing would be seen.
+/// Where the lines lie but for a few points of each, if these lie far beyond. An impulse makes a spike where a level enters, and beside
+/// that nothing would be seen. A line that is hardly more than so few points is no spike: it is all that is answered.
 fn most_of(lines: &[Points]) -> Option<(f64, f64)> {
-    let values = lines.iter().flat_map(|line| &line.y);
-    let mut sizes: Vec<f64> = values.map(|v| v.abs()).filter(|v| *v > 0.0).collect();
-    sizes.sort_by(f64::total_cmp);
-    let most = sizes.len().checked_sub(1 + IN_SPIKES * lines.len())?;
-    let size = sizes[most];
-    (*sizes.last()? > SPIKE * size).then_some((-1.1 * size, 1.1 * size))
+    let (mut size, mut largest) = (0.0_f64, 0.0_f64);
+    for line in lines {
+        let sizes = line.y.iter().map(|y| y.abs()).filter(|y| *y > 0.0);
+        let mut sizes: Vec<f64> = sizes.collect();
+        sizes.sort_by(f64::total_cmp);
+        let Some(&last) = sizes.last() else {
+            continue;
+        };
+        let is_few = sizes.len() <= 2 * IN_SPIKES;
+        let rest = if is_few {
+            last
+        } else {
+            sizes[sizes.len() - 1 - IN_SPIKES]
+        };
+        (size, largest) = (size.max(rest), largest.max(last));
+    }
+    (largest > SPIKE * size).then_some((-1.1 * size, 1.1 * size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(y: impl IntoIterator<Item = f64>) -> Points {
+        let y: Vec<f64> = y.into_iter().collect();
+        Points::line(0, "", vec![0.0; y.len()], y)
+    }
+
+    #[test]
+    fn spikes_are_cut_where_they_hide_the_rest_of_an_answer_and_no_answer_is_one() {
+        let slow = || line((0..100).map(|nth| 0.02 * f64::from(-nth).exp2().max(0.1)));
+        let spike = || line([5.0, -5.0].into_iter().chain((0..100).map(|_| 0.02)));
+        let short = || line([1.0, 1.5, 1.8, 1.2, -0.9, -1.5, -1.8, -1.1, 0.0, 0.0]);
+        let size = |lines: &[Points]| most_of(lines).map(|range| range.1);
+        assert_eq!(size(&[slow()]), None);
+        assert!(size(&[spike(), slow()]).is_some_and(|size| size < 0.03));
+        assert_eq!(size(&[slow(), short()]), None);
+        assert_eq!(size(&[line([0.0; 9])]), None);
+    }
 }

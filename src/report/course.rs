@@ -86,6 +86,9 @@ pub struct Weight {
 pub struct Voter {
     /// The node's name.
     pub node: String,
+    /// The same with the member of its set that it is of.
+    #[serde(skip)]
+    pub(super) instance: String,
     /// Its channel: `vote.Z1`.
     pub prediction: String,
     /// The slot of its channel.
@@ -236,6 +239,7 @@ fn axes(plan: &Plan, trace: &Trace, track: &Track) -> (Vec<Axis>, Vec<Places>) {
             };
             Voter {
                 node: node.name.clone(),
+                instance: node.instance(),
                 prediction: prediction.clone(),
                 slot: of.slot,
                 called: called.clone(),

@@ -181,6 +181,7 @@ mod tests {
     fn axis(name: &str, truth: &[f64], voters: &[(&'static str, &[f64])]) -> Axis {
         let voter = |(kind, value): &(&'static str, &[f64])| Voter {
             node: (*kind).to_owned(),
+            instance: format!("{kind}.{name}"),
             prediction: format!("{kind}.{name}"),
             slot: 0,
             called: (*kind).to_owned(),

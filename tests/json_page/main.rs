@@ -240,6 +240,26 @@ level = "level"
     model
 }
 
+/// Tests of every kind of expectation, some of which do not hold.
+fn tests(scratch: &Scratch) -> PathBuf {
+    let text = r#"schema = 1
+signals.position = { unit = "nm", channels = ["z"], max_age = "3min" }
+nodes.still = { type = "zero", inputs.truth = "position.z", ahead = "10s" }
+outputs.still = "still"
+[[tests]]
+name = "a ramp"
+inputs = { "position.z" = { ramp = "1 nm/s", for = "5min", every = "2s" } }
+expect = [
+  { of = "position.z", equals = "3 nm", within = 1e-6 },
+  { of = "position.z", between = ["0 nm", "1 um"] },
+  { of = "position.z", absent = true },
+  { of = "still", rmse_below = "1 nm", beats = ["persistence"] },
+  { of = "still", given_above = 0.99 },
+]
+"#;
+    scratch.file("tests.toml", text)
+}
+
 /// What the commands print, each with the section of the page that it belongs to.
 fn printed(scratch: &Scratch) -> Vec<(&'static str, Value)> {
     let json = |arguments: &[&dyn AsRef<OsStr>]| {
@@ -283,6 +303,11 @@ wait = "wait"
     let wrong = scratch.file("wrong.toml", "schema = 1\nnodes.a = { type = \"slop\" }\n");
     let (made, starter) = (scratch.path("made.csv"), scratch.path("starter.toml"));
     let kinds = many_kinds(scratch);
+    let text = std::fs::read_to_string(&scarce).unwrap();
+    let otherwise = scratch.file(
+        "otherwise.toml",
+        text.replace("unit = \"V\"", "unit = \"K\""),
+    );
     let data = [&"--data" as &dyn AsRef<OsStr>, &one, &two];
     let with = |command: &'static str, more: &[&'static str]| {
         let mut arguments: Vec<&dyn AsRef<OsStr>> = vec![&command, &model];
@@ -323,6 +348,11 @@ wait = "wait"
             json(&[&"simulate", &"die-tester", &"--days", &"0.01", &"-o", &made]),
         ),
         ("simulate", json(&[&"simulate"])),
+        ("test", json(&[&"test", &tests(scratch)])),
+        ("diff", json(&[&"diff", &several, &scarce])),
+        ("diff", json(&[&"diff", &scarce, &otherwise])),
+        ("explain", json(&[&"explain"])),
+        ("explain", json(&[&"explain", &"A048"])),
     ];
     printed.into_iter().chain(told).collect()
 }
@@ -365,7 +395,7 @@ fn every_section_of_the_page_on_json_is_that_of_a_command_or_used_by_one() {
     let page = Page::read();
     let commands = [
         "evaluate", "compare", "diagnose", "report", "show", "check", "run", "nodes", "init",
-        "simulate",
+        "simulate", "test", "diff", "explain",
     ];
     let links = page.0.values().flatten();
     let links: BTreeSet<&str> = links.filter_map(|row| row.below.as_deref()).collect();

@@ -30,6 +30,8 @@ pub struct Options {
     /// What is read goes on later, and is read again then: leave out at its end what only more of it would confirm. That is a last
     /// line without an end, even if it lacks nothing, since its last number may lack digits, and a second row that leaps.
     pub goes_on: bool,
+    /// Of several files each is a segment of its own, also where its times go on from those of the one before.
+    pub segments: bool,
 }
 
 /// One row of a recording. Reused from row to row, so that reading does not allocate.

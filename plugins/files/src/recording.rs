@@ -22,7 +22,7 @@ pub enum Event {
 /// of which, in that order, each begins after the last instant of the one before. Others, such as those that each count from their
 /// beginning, are read in the order given. A file that starts after the last instant of the one before continues it; one that starts
 /// at or before it is a segment of its own. That also holds for files that cover the same period with different columns: they
-/// are not merged. A file without rows is passed over.
+/// are not merged; with [`Options::segments`] every file is one. A file without rows is passed over.
 ///
 /// Where times are dates, or numbers that must be some, the reports tell how many rows lie in the period of another file.
 pub struct Recording {
@@ -96,7 +96,8 @@ impl Recording {
             if let Some((_, reader)) = &mut self.current {
                 let first = reader.report().rows == 0;
                 if reader.next_into(row)? {
-                    if first && self.last_ns.is_some_and(|last| row.time_ns <= last) {
+                    let apart = |last| self.options.segments || row.time_ns <= last;
+                    if first && self.last_ns.is_some_and(apart) {
                         self.waiting = Some(std::mem::take(row));
                         return Ok(Event::Segment);
                     }
@@ -272,6 +273,37 @@ mod tests {
             told("overlap-dated", &dated),
             "1@1700000000 2@1700000010 | 3@1700000005 4@1700000015"
         );
+    }
+
+    #[test]
+    fn each_file_is_a_segment_where_that_is_asked_for() {
+        let read = |segments: bool| {
+            let folder = std::env::temp_dir();
+            let of = |nth: u8| {
+                let name = format!(
+                    "athermal-files-{}-apart-{segments}-{nth}",
+                    std::process::id()
+                );
+                let path = folder.join(name);
+                std::fs::write(&path, format!("t,x\n{nth}0,1\n{nth}5,2\n")).unwrap();
+                path
+            };
+            let layout = Layout::new("t", TimeForm::SECONDS, ["x"]);
+            let options = Options {
+                segments,
+                ..Options::default()
+            };
+            let mut recording = Recording::join([of(1), of(2), of(3)], layout, options).unwrap();
+            let (mut row, mut breaks) = (Row::default(), 0);
+            loop {
+                match recording.next_into(&mut row).unwrap() {
+                    Event::Segment => breaks += 1,
+                    Event::Row => {}
+                    Event::End => return breaks,
+                }
+            }
+        };
+        assert_eq!([read(false), read(true)], [0, 2]);
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub(super) fn of(axis: &Axis, facts: &Facts) -> Vec<Curves> {
         let all = facts.responses.iter();
         all.filter(|of| of.truth == axis.truth_name)
     };
-    let answers = of_axis().find(|of| of.node == axis.put_out().prediction);
+    let answers = of_axis().find(|of| of.node == axis.put_out().instance);
     let answers = answers.or_else(|| of_axis().next()).into_iter();
     let responses = answers.flat_map(|of| {
         [("steps", false), ("impulses", true)].map(|(kind, impulse)| {

@@ -16,9 +16,11 @@ fn of_name(column: &str) -> Option<Unit> {
     Unit::in_words(ending)
 }
 
-/// The unit that columns are named for, where it measures the same as the signal's and is another one.
+/// The unit that columns are named for, where it is another one than the signal's that measures the same, or the scale of
+/// temperature that was meant by its letter.
 pub(super) fn other_than(unit: &Unit, column: &str) -> Option<Unit> {
-    of_name(column).filter(|named| named.is_another_than(unit))
+    let meant = |named: &Unit| unit.scale_meant().is_some() && named.measures_same(&Unit::kelvin());
+    of_name(column).filter(|named| named.is_another_than(unit) || meant(named))
 }
 
 #[cfg(test)]
@@ -39,6 +41,8 @@ mod tests {
         assert_eq!(told("um", "Z [mm]").as_deref(), Some("mm"));
         assert_eq!(told("1", "{channel} (%)").as_deref(), Some("%"));
         assert_eq!(told("1", "{channel}_pct").as_deref(), Some("%"));
+        assert_eq!(told("C", "{channel}_degC").as_deref(), Some("Cel"));
+        assert_eq!(told("F", "{channel}_degF").as_deref(), Some("[degF]"));
     }
 
     #[test]
@@ -47,6 +51,7 @@ mod tests {
             ("um", "{channel}_µm"),
             ("Cel", "{channel}_degC"),
             ("um", "{channel}_m"),
+            ("C", "{channel}_kWh"),
             ("um", "{channel}"),
             ("um", "{channel}_pos"),
             ("V", "heater_degC"),

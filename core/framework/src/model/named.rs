@@ -7,9 +7,10 @@ use indexmap::IndexMap;
 
 use super::problem::NamedModelProblem;
 use super::{Model, ModelError};
-use crate::compile::{Change, PlanDiff, Wanted, diff};
+use crate::compile::{Change, Plan, PlanDiff, Wanted, diff};
 use crate::diagnostic::{Diagnostics, Place, Sources};
 use crate::document::{Value, unreadable};
+use crate::engine::SampleRange;
 
 /// The model that a graph names at its top, relative to the file in which it does, and where; none where it names none.
 #[must_use]
@@ -60,6 +61,10 @@ impl Model {
             diagnostics.report(place, problem);
         }
         self.card = other.card;
+        if let Some(card) = &mut self.card {
+            let in_own_unit = |range| in_unit_of(range, &other.plan, &self.plan);
+            card.ranges = card.ranges.iter().filter_map(in_own_unit).collect();
+        }
     }
 
     /// Reports each node of which an instance needs a fit and is another than in the model at a path, which is named at a place.
@@ -100,6 +105,21 @@ impl Model {
         let mut nodes = self.graph.nodes.iter();
         nodes.find(|decl| decl.name == node).map(|decl| decl.place)
     }
+}
+
+/// A range of samples in the unit that another plan has for the channel; none where it has no such channel.
+fn in_unit_of(range: &SampleRange, of: &Plan, to: &Plan) -> Option<SampleRange> {
+    let unit = |plan: &'_ Plan| {
+        let mut channels = plan.channels.iter();
+        let found = channels.find(|found| found.name == range.channel);
+        found.map(|found| found.channel.unit.clone())
+    };
+    let (of, to) = (unit(of)?, unit(to)?);
+    Some(SampleRange {
+        channel: range.channel.clone(),
+        lowest: of.convert(range.lowest, &to)?,
+        highest: of.convert(range.highest, &to)?,
+    })
 }
 
 /// Why a model cannot be used, to stand after its path.

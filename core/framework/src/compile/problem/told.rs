@@ -408,10 +408,13 @@ impl Problem for CompileProblem {
                 format!("the reference stands for {}", names(found))
             }
             Self::Units { .. } => {
-                "give both in the same unit, with `unit = \"…\"` where they are computed".to_owned()
+                "they are different quantities, which no unit makes one: refer to one of the same kind".to_owned()
             }
             Self::Spans { .. } => "compute both over windows of the same length".to_owned(),
-            Self::Horizons { .. } => "give both the same `ahead`".to_owned(),
+            Self::Horizons { .. } => {
+                "give both the same `ahead`; what is no prediction has none, and a `persistence` node makes one of it"
+                    .to_owned()
+            }
             Self::Truths { .. } => {
                 "combine predictions of one axis; `each` makes a node for each of several".to_owned()
             }
