@@ -130,6 +130,66 @@ fn a_fit_names_the_position_that_was_zeroed_anew_and_says_nothing_of_sound_data(
 }
 
 #[test]
+fn a_log_that_is_split_where_its_position_was_zeroed_anew_has_no_leap_in_segments_of_its_own() {
+    let scratch = Scratch::new("split");
+    let graph = scratch.file("graph.toml", GRAPH);
+    let whole = log(|row, values| values[2] -= if row < 1500 { 0.0 } else { 4000.0 });
+    let (header, rows) = whole.split_once('\n').unwrap();
+    let rows: Vec<&str> = rows.lines().collect();
+    let part =
+        |name: &str, rows: &[&str]| scratch.file(name, format!("{header}\n{}\n", rows.join("\n")));
+    let (one, two) = (
+        part("one.csv", &rows[..1500]),
+        part("two.csv", &rows[1500..]),
+    );
+    let fit = |more: &[&str]| {
+        let model = scratch.path("model.json");
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"fit", &graph, &"--data", &two, &one, &"-o", &model];
+        arguments.extend(more.iter().map(|of| of as &dyn AsRef<std::ffi::OsStr>));
+        athermal(&arguments).ended(0)
+    };
+    let joined = fit(&[]);
+    joined.tells(&["position.Z leaps once"]);
+    joined.tells(&["`--segments`"]);
+    let apart = fit(&["--segments"]);
+    assert!(!apart.told.contains("leaps"), "{}", apart.told);
+    assert!(apart.told.contains("--segments --data"), "{}", apart.told);
+    assert_eq!(
+        fit(&["--segments", "--format", "json"]).json()["segments"],
+        2
+    );
+}
+
+#[test]
+fn a_leap_between_usual_values_is_for_a_health_node_which_where_it_is_there_is_told_nothing_of() {
+    let scratch = Scratch::new("leap-within");
+    // The contact is bad for an hour: what it says is off by a kelvin and a half, as warm as the plate is now and then.
+    let data = scratch.file(
+        "data.csv",
+        log(|row, values| {
+            if (1000..1060).contains(&row) {
+                values[0] += if values[0] < 22.0 { 1.5 } else { -1.5 };
+            }
+        }),
+    );
+    let model = scratch.path("model.json");
+    let fit = |name: &str, text: &str| {
+        let graph = scratch.file(name, text);
+        athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model]).ended(0)
+    };
+    let plain = fit("plain.toml", GRAPH);
+    plain.tells(&["temperature.plate leaps", "`health` node", "`max_rate`"]);
+    assert!(!plain.told.contains("nine in ten"), "{}", plain.told);
+    let guarded = GRAPH.replace(
+        "inputs.features = \"temperature\"",
+        "inputs.features = \"sound\"",
+    ) + "[nodes.sound]\ntype = \"health\"\ninputs.signal = \"temperature\"\nmax_rate = \"0.5 K/min\"\n";
+    let guarded = fit("guarded.toml", &guarded);
+    assert!(!guarded.told.contains("leaps"), "{}", guarded.told);
+}
+
+#[test]
 fn a_starter_graph_keeps_what_a_failed_sensor_says_out_of_the_fit() {
     let scratch = Scratch::new("faulty-start");
     let data = scratch.file("log.csv", log(broken));
