@@ -460,3 +460,23 @@ fn what_was_not_measured_has_no_largest_value() {
     let told = reported.report(&[]).out;
     assert!(!told.contains("0.00"), "{told}");
 }
+
+#[test]
+fn responses_are_those_of_the_estimator_that_is_put_out_though_it_stands_for_no_set() {
+    let more = r#"
+[nodes.other]
+type = "linear"
+inputs.features = "gradients.chuck@*"
+inputs.truth = "drift.X1"
+ahead = "150s"
+[outputs]
+other = "other"
+"#;
+    let reported = Reported::new("report-put-out", more);
+    let folder = reported.scratch.path("plots");
+    reported.report(&[&"--plots", &folder]);
+    for kind in ["steps", "impulses"] {
+        let svg = std::fs::read_to_string(folder.join(format!("{kind}-X1.svg"))).unwrap();
+        assert!(svg.contains("response of other"), "{svg}");
+    }
+}
