@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use athermal::core::unit::Unit;
 use athermal::diagnosis::response::{Response, Responses};
 
 use super::instances::{axis_of, grouped, name_of};
@@ -107,17 +108,22 @@ impl<'a> Node<'a> {
         let Some(first) = sensors.first() else {
             return String::new();
         };
-        let mut rows = self.rows(sensors, |of| or_no_end(of.total));
+        let (unit, factor) = in_the_end(self.unit());
+        let in_unit = |total: Option<f64>| or_no_end(total.map(|total| factor * total));
+        let mut rows = self.rows(sensors, |of| in_unit(of.total));
         if sensors.len() > 1 {
             // What sensors that tell the same share among them means more than what each has of it.
-            let together = self.instances.iter().map(|of| together(of, sensors));
+            let together = self
+                .instances
+                .iter()
+                .map(|of| together(of, sensors, in_unit));
             rows.push(("all together".to_owned(), together.collect()));
         }
         format!(
             "{}: how far a step of {} moves what it predicts in the end, in {}\n{}",
             self.name,
             one(&first.sensor_unit),
-            in_the_end(self.unit()),
+            unit,
             matrix("sensor", &self.columns, &rows)
         )
     }
@@ -166,13 +172,13 @@ impl<'a> Node<'a> {
 }
 
 /// The sum of what an instance makes of the sensors; it may answer none of them.
-fn together(of: &Responses, sensors: &[&Response]) -> String {
+fn together(of: &Responses, sensors: &[&Response], told: impl Fn(Option<f64>) -> String) -> String {
     let among = |one: &&Response| sensors.iter().any(|other| other.sensor == one.sensor);
     let answers: Vec<&Response> = of.sensors.iter().filter(among).collect();
     if answers.is_empty() {
         return "-".to_owned();
     }
-    or_no_end(answers.iter().map(|of| of.total).sum())
+    told(answers.iter().map(|of| of.total).sum())
 }
 
 fn or_no_end(value: Option<f64>) -> String {
@@ -187,10 +193,15 @@ fn one(unit: &str) -> String {
     }
 }
 
-/// The unit of a sum over minutes: that of a position, where the truth is its drift per minute.
-fn in_the_end(unit: &str) -> String {
-    unit.strip_suffix("/min")
-        .map_or_else(|| format!("{unit}·min"), str::to_owned)
+/// The unit of a sum over minutes, and how many of it a sum of one is: that of a position, where the truth is its drift per time.
+fn in_the_end(unit: &str) -> (String, f64) {
+    let of_position = || {
+        let (position, _) = unit.rsplit_once('/')?;
+        let per_minute = Unit::parse(&format!("{position}/min")).ok()?;
+        let factor = Unit::parse(unit).ok()?.factor_to(&per_minute)?;
+        Some((position.to_owned(), factor))
+    };
+    of_position().unwrap_or_else(|| (format!("{unit}·min"), 1.0))
 }
 
 #[cfg(test)]
@@ -224,8 +235,9 @@ mod tests {
 
     #[test]
     fn a_drift_per_minute_ends_as_a_length() {
-        assert_eq!(in_the_end("nm/min"), "nm");
-        assert_eq!(in_the_end("W/m2"), "W/m2·min");
+        assert_eq!(in_the_end("nm/min"), ("nm".to_owned(), 1.0));
+        assert_eq!(in_the_end("um/h"), ("um".to_owned(), 1.0 / 60.0));
+        assert_eq!(in_the_end("W/m2"), ("W/m2·min".to_owned(), 1.0));
     }
 
     #[test]
