@@ -78,12 +78,15 @@ fn options() -> impl Strategy<Value = Options> {
         Just(Some(Format::Csv)),
         Just(Some(Format::JsonLines))
     ];
-    (formats, any::<[bool; 3]>()).prop_map(|(format, [lenient, joins, goes_on])| Options {
-        format,
-        delimiter: None,
-        lenient,
-        joins,
-        goes_on,
+    (formats, any::<[bool; 4]>()).prop_map(|(format, [lenient, joins, goes_on, segments])| {
+        Options {
+            format,
+            delimiter: None,
+            lenient,
+            joins,
+            goes_on,
+            segments,
+        }
     })
 }
 
