@@ -20,7 +20,8 @@ pub(crate) struct Gathered {
     whole: Option<Instant>,
     /// Whether all have that stamp.
     together: bool,
-    /// Whether any of the slots, read without a lag, has a new value at this tick.
+    /// Whether any of the slots, read without a lag, is another than it was: it has a new value at this tick, or where values are
+    /// held, the run of this tick gave nothing and so ended the hold.
     pub(crate) fresh: bool,
     read: Read,
     origin: Origin,
@@ -78,8 +79,9 @@ struct Past {
 
 /// What is known of values that have been looked at.
 struct Glance {
-    /// Whether one was given at the present tick, and whether one was not even run.
+    /// Whether one was given at the present tick, whether one was run, and whether one was not.
     fresh: bool,
+    ran: bool,
     late: bool,
     /// Whether one is not there.
     lacks: bool,
@@ -90,6 +92,7 @@ struct Glance {
 impl Glance {
     const NOTHING: Self = Self {
         fresh: false,
+        ran: false,
         late: false,
         lacks: false,
         oldest: Instant::MAX,
@@ -100,6 +103,7 @@ impl Glance {
     fn add(&mut self, value: f64, given: &Given, tick: u64) {
         let (ran, there) = (given.tick == tick, !value.is_nan());
         self.fresh |= ran & there;
+        self.ran |= ran;
         self.late |= !ran;
         self.lacks |= !there;
         self.oldest = self.oldest.min(given.stamp);
@@ -173,7 +177,7 @@ impl Gathered {
         let to = self.values.iter_mut().zip(&mut self.stamps);
         for ((to, (&value, given)), &max_age) in to.zip(from).zip(&self.ages) {
             let ran = given.tick == slots.tick;
-            self.fresh |= ran && !value.is_nan();
+            self.fresh |= ran && (self.read == Read::Held || !value.is_nan());
             *to.0 = seen(value, self.read, ran, now - given.stamp, max_age);
             *to.1 = given.stamp;
         }
@@ -224,7 +228,10 @@ impl Gathered {
             Read::Fresh => glance.late,
             Read::Held | Read::Truth => glance.oldest < now - self.shortest,
         };
-        self.fresh = glance.fresh;
+        self.fresh = match self.read {
+            Read::Held => glance.ran,
+            Read::Fresh | Read::Truth => glance.fresh,
+        };
         let whole = of_past.filter(|_| !(glance.lacks | hides));
         self.whole = whole.map(|of_past| of_past.min(glance.oldest));
         if hides {
