@@ -5,12 +5,11 @@
 
 mod workbench;
 
-use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
+use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use workbench::{Finished, Scratch, athermal, athermal_fed};
+use workbench::{Finished, Live, Scratch, athermal, athermal_fed};
 
 /// Two predictions of a drift, of which the graph shows one.
 const GRAPH: &str = r#"
@@ -335,10 +334,7 @@ fn a_graph_that_gives_a_column_in_another_unit_is_refused() {
     let before = live.revision();
     let graph = GRAPH.replace("nm/min", "um/min");
     scratch.file("graph.toml", graph.replace("\"shown\"", "\"other\""));
-    for _ in 0..50 {
-        assert_eq!(live.revision(), before);
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    live.stays(&before);
     assert!(live.told().contains("in um/min and what runs in nm/min: "));
 }
 
@@ -347,90 +343,6 @@ fn a_time_after_the_data_is_told_at_the_end() {
     let scratch = desk("never");
     let finished = run(&scratch, &[&swap(&scratch, "9000", "still.toml")]).ended(0);
     finished.tells(&["still.toml did not take over: the data ended before"]);
-}
-
-/// A run that is fed row by row while its files change.
-struct Live {
-    child: std::process::Child,
-    rows: std::process::ChildStdin,
-    out: BufReader<std::process::ChildStdout>,
-    time: u32,
-}
-
-impl Live {
-    fn new(graph: &Path) -> Self {
-        Self::going_on(graph, &[], 0)
-    }
-
-    /// One that begins at a time of its own.
-    fn going_on(graph: &Path, more: &[&str], time: u32) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
-            .arg("run")
-            .arg(graph)
-            .args(["--input", "-", "--output", "-", "--watch"])
-            .args(more)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut rows = child.stdin.take().unwrap();
-        rows.write_all(b"time_s,Z\n").unwrap();
-        let mut live = Self {
-            rows,
-            out: BufReader::new(child.stdout.take().unwrap()),
-            child,
-            time,
-        };
-        live.row();
-        assert_eq!(live.line(), "time_s,predicted.Z,revision");
-        live.line();
-        live
-    }
-
-    fn row(&mut self) {
-        self.time += 10;
-        writeln!(self.rows, "{},{}", self.time, self.time).unwrap();
-        self.rows.flush().unwrap();
-    }
-
-    fn line(&mut self) -> String {
-        let mut line = String::new();
-        self.out.read_line(&mut line).unwrap();
-        line.trim_end().to_owned()
-    }
-
-    fn revision(&mut self) -> String {
-        self.row();
-        self.line().rsplit(',').next().unwrap().to_owned()
-    }
-
-    /// Feeds rows until another revision makes them.
-    fn until_swapped(&mut self, before: &str) -> String {
-        let began = Instant::now();
-        while began.elapsed() < Duration::from_secs(60) {
-            let now = self.revision();
-            if now != before {
-                return now;
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        panic!("revision {before} goes on");
-    }
-
-    /// Ends it as a failure of power does, and gives the time of its last row.
-    fn killed(mut self) -> u32 {
-        self.child.kill().unwrap();
-        self.child.wait().unwrap();
-        self.time
-    }
-
-    fn told(self) -> String {
-        drop(self.rows);
-        let output = self.child.wait_with_output().unwrap();
-        assert!(output.status.success());
-        String::from_utf8(output.stderr).unwrap()
-    }
 }
 
 #[test]
@@ -450,22 +362,14 @@ fn a_watched_graph_is_taken_over_when_any_of_its_files_changes() {
     let third = live.until_swapped(&second);
     // A mistake is told, and putting it right is noticed.
     scratch.file("model.toml", "schema = 1\n[modules.model\n");
-    let began = Instant::now();
-    while began.elapsed() < Duration::from_millis(600) {
-        assert_eq!(live.revision(), third);
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    live.stays(&third);
     scratch.file("model.toml", module("same"));
     assert_eq!(live.until_swapped(&third), second, "the same graph again");
     scratch.file(
         "own.toml",
         "schema = 1\nextends = \"graph.toml\"\n[outputs]\nmore = \"drift\"\n",
     );
-    let began = Instant::now();
-    while began.elapsed() < Duration::from_millis(600) {
-        assert_eq!(live.revision(), second);
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    live.stays(&second);
     let told = live.told();
     for part in [
         "error[A001]",
@@ -531,11 +435,7 @@ fn what_took_over_goes_on_after_a_kill_though_its_file_is_broken_since() {
 
     scratch.file("graph.toml", slower.replace("[outputs]", "[outputs"));
     let mut live = Live::going_on(&graph, &kept, time);
-    let began = Instant::now();
-    while began.elapsed() < Duration::from_secs(2) {
-        assert_eq!(live.revision(), second);
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    live.stays(&second);
     let told = live.told();
     for part in [
         "is not what ran last",

@@ -4,11 +4,13 @@
 #![allow(dead_code, unused_imports)] // each test file uses its part
 
 mod bench;
+mod live;
 mod program;
 mod regression;
 mod simulated;
 
 pub use bench::{Bench, Read, compiled, linear, plan, problems, secs, slot};
+pub use live::Live;
 pub use program::{
     Finished, Folder, Scratch, athermal, athermal_fed, athermal_on, athermal_unread,
 };
