@@ -7,12 +7,13 @@ use std::sync::Arc;
 
 use athermal::core::compile::Wanted;
 use athermal::core::document::TimeBase;
-use athermal::core::live::{Control, Feed, StageError};
+use athermal::core::live::{Control, Feed, StageError, Staged};
 use athermal::core::time::Civil;
 use athermal::files::{TimeColumn, TimeForm};
 use athermal::{Duration, Instant, Model};
 use clap::Args;
 
+use super::ran;
 use super::watched::Watched;
 use crate::command::model::{self, check_fitted, few, tell_unfitted};
 use crate::figures::length;
@@ -273,9 +274,18 @@ impl<'a> Course<'a> {
             return Ok(());
         }
         told::notices(self.terminal, control.pump());
+        if look {
+            self.look(control, now);
+        }
         // One at a time: what is committed takes over with this row, and only then may the next be staged.
         if self.staged.is_some() {
-            return self.judge(control);
+            return match self.judge(control) {
+                Err(error) if self.watched.is_some() => {
+                    self.refuse(control, &error);
+                    Ok(())
+                }
+                judged => judged.map_err(refused),
+            };
         }
         if due
             && let Some(Swap {
@@ -283,15 +293,13 @@ impl<'a> Course<'a> {
             }) = self.waiting.pop()
         {
             model.take_fits_of(&self.running);
-            return self.stage(control, model, path, now);
-        }
-        if look {
-            self.look(control, now);
+            return self.stage(control, model, path, now).map_err(refused);
         }
         Ok(())
     }
 
-    /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on.
+    /// Stages the watched file where it has changed; a mistake in it is told, and what runs goes on. What is in the shadow goes when it
+    /// stands in the file no more.
     fn look(&mut self, control: &mut Control, now: Instant) {
         self.looked = std::time::Instant::now();
         let Some(watched) = &mut self.watched else {
@@ -302,13 +310,31 @@ impl<'a> Course<'a> {
         }
         let path = watched.path.clone();
         *watched = Watched::of(&path);
-        let model = match load(&path, std::iter::once(&self.running), self.terminal) {
+        let loaded = load(&path, std::iter::once(&self.running), self.terminal);
+        if self.staged.is_some() {
+            let revision = loaded.as_ref().ok().and_then(ran::revision);
+            let staged = control.staged().map(Staged::revision);
+            if revision.is_some() && revision.as_deref() == staged {
+                self.staged = loaded.ok().zip(Some(path));
+                return;
+            }
+            self.staged = None;
+            control.discard();
+            let words = "has changed: as it was in the shadow until now, it does not take over";
+            self.terminal
+                .warning(told::not_taken_over(&path, "changed", words));
+            if revision.is_some() && revision == ran::revision(&self.running) {
+                let words = format_args!("{} is what runs again", path.display());
+                self.terminal.note(words);
+                return;
+            }
+        }
+        let model = match loaded {
             Ok(model) => model,
             Err(failure) => {
                 self.terminal.setback(&failure);
-                let words = "is not taken over; what runs goes on";
                 self.terminal
-                    .warning(told::not_taken_over(&path, "refused", words));
+                    .warning(told::unusable(&path, "what runs goes on"));
                 return;
             }
         };
@@ -323,9 +349,21 @@ impl<'a> Course<'a> {
             );
             self.terminal
                 .warning(told::not_taken_over(&path, "no_column", words));
-        } else if let Err(failure) = self.stage(control, model, path, now) {
-            self.terminal.setback(&failure);
+        } else if let Err(error) = self.stage(control, model, path, now) {
+            self.refuse(control, &error);
         }
+    }
+
+    /// Tells why the watched file, as it has become, does not take over, and lets go of it.
+    fn refuse(&mut self, control: &mut Control, error: &StageError) {
+        self.staged = None;
+        control.discard();
+        let Some(Watched { path, .. }) = &self.watched else {
+            return;
+        };
+        let why = Failure::Request(format!("{}: {error}", path.display()));
+        self.terminal.setback(&why);
+        self.terminal.warning(told::refused(path));
     }
 
     fn stage(
@@ -334,8 +372,8 @@ impl<'a> Course<'a> {
         model: Model,
         path: PathBuf,
         now: Instant,
-    ) -> Result<(), Failure> {
-        let staged = control.stage(&model, false).map_err(refused)?;
+    ) -> Result<(), StageError> {
+        let staged = control.stage(&model, false)?;
         self.tell_lacking(&model, &path);
         self.terminal.note(told::staged(&path, staged));
         let (past, mut silent) = staged.silent();
@@ -352,9 +390,7 @@ impl<'a> Course<'a> {
         }
         self.staged = Some((model, path));
         match self.options.shadow {
-            Some(duration) => control
-                .shadow(duration, self.options.margin)
-                .map_err(refused),
+            Some(duration) => control.shadow(duration, self.options.margin),
             None => self.commit(control),
         }
     }
@@ -391,10 +427,14 @@ impl<'a> Course<'a> {
         }
     }
 
-    fn judge(&mut self, control: &mut Control) -> Result<(), Failure> {
+    fn judge(&mut self, control: &mut Control) -> Result<(), StageError> {
         let Some(verdict) = control.verdict().filter(|verdict| verdict.over) else {
             return Ok(());
         };
+        // A file that is being written is read first.
+        if self.watched.as_ref().is_some_and(Watched::differs) {
+            return Ok(());
+        }
         self.terminal.note(told::shadow(&verdict));
         if verdict.passes == Some(true) {
             return self.commit(control);
@@ -412,8 +452,8 @@ impl<'a> Course<'a> {
         Ok(())
     }
 
-    fn commit(&mut self, control: &mut Control) -> Result<(), Failure> {
-        control.commit().map_err(refused)?;
+    fn commit(&mut self, control: &mut Control) -> Result<(), StageError> {
+        control.commit()?;
         if let Some((model, _)) = self.staged.take() {
             self.running = model;
         }

@@ -59,15 +59,28 @@ impl Watched {
     /// Whether a file has been written since, and none is being written: they are as they were at the last look. Half of a graph
     /// may be a graph too. A file that is gone is about to be written again.
     pub(super) fn changed(&mut self) -> bool {
-        let now: Vec<Written> = self.files.iter().map(|(path, _)| written(path)).collect();
-        let mut pairs = now.iter().zip(&self.files);
-        if !pairs.any(|(now, (_, seen))| now.is_some() && now != seen) {
+        let now = self.now();
+        if !self.differ(&now) {
             self.changing = None;
             return false;
         }
         let is_done = self.changing.as_ref() == Some(&now);
         self.changing = Some(now);
         is_done
+    }
+
+    /// Whether a file is not as it was when it was read, be it that it is still being written.
+    pub(super) fn differs(&self) -> bool {
+        self.differ(&self.now())
+    }
+
+    fn now(&self) -> Vec<Written> {
+        self.files.iter().map(|(path, _)| written(path)).collect()
+    }
+
+    fn differ(&self, now: &[Written]) -> bool {
+        let mut pairs = now.iter().zip(&self.files);
+        pairs.any(|(now, (_, seen))| now.is_some() && now != seen)
     }
 }
 

@@ -87,6 +87,17 @@ pub fn not_taken_over(path: &Path, reason: &str, words: impl std::fmt::Display) 
     )
 }
 
+/// That what stands in a file is no graph that can be run, and what goes on.
+pub fn unusable(path: &Path, goes_on: &str) -> Message {
+    let words = format_args!("is not taken over; {goes_on}");
+    not_taken_over(path, "refused", words)
+}
+
+/// That a graph does not take over from what runs.
+pub fn refused(path: &Path) -> Message {
+    unusable(path, "what runs goes on")
+}
+
 /// Tells what has happened.
 pub fn notices(terminal: &Terminal, notices: Vec<Notice>) {
     for notice in notices {
