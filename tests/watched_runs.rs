@@ -118,3 +118,52 @@ fn a_mistake_that_comes_into_the_file_takes_out_of_the_shadow_what_was_there() {
     let refused = "graph.toml is not taken over; what runs goes on";
     assert_told(&live.told(), &[CHANGED, "error[A001]", refused]);
 }
+
+#[test]
+fn a_restart_without_the_graphs_file_says_so_and_takes_the_file_when_it_comes() {
+    let scratch = desk("mistyped");
+    let (graph, state) = (scratch.path("graph.toml"), scratch.path("state"));
+    let kept = ["--state", state.to_str().unwrap()];
+    let mut live = Live::going_on(&graph, &kept, 0);
+    let first = live.revision();
+    let time = live.time;
+    live.told();
+
+    let typo = scratch.path("typo.toml");
+    let mut live = Live::going_on(&typo, &kept, time);
+    live.stays(&first);
+    scratch.file("typo.toml", over("40s"));
+    live.until_swapped(&first);
+    let told = live.told();
+    assert_told(
+        &told,
+        &[
+            "error[A002]",
+            "typo.toml is not taken over; what ran last goes on",
+        ],
+    );
+    assert!(!told.contains("is not what ran last"), "{told}");
+}
+
+#[test]
+fn a_watched_file_that_goes_is_told_once_and_again_when_it_is_back() {
+    let scratch = desk("gone");
+    let graph = scratch.path("graph.toml");
+    let mut live = Live::new(&graph);
+    let first = live.revision();
+    let aside = scratch.path("aside.toml");
+    std::fs::rename(&graph, &aside).unwrap();
+    live.stays(&first);
+    live.stays(&first);
+    std::fs::rename(&aside, &graph).unwrap();
+    live.stays(&first);
+    let told = live.told();
+    let gone =
+        "graph.toml is no longer there: what runs goes on until it is there again with a change";
+    assert_eq!(told.matches(gone).count(), 1, "{told}");
+    assert_eq!(
+        told.matches("graph.toml is there again, as it was").count(),
+        1,
+        "{told}"
+    );
+}

@@ -143,6 +143,8 @@ impl Run {
     fn load(&self, terminal: &Terminal) -> Result<(Model, Watched), Failure> {
         let ran = self.ran().zip(self.state.as_ref());
         let last = ran.and_then(|(ran, state)| ran.of_state(state));
+        // As it is before it is read, so that no change is missed.
+        let watched = Watched::of(&self.model);
         let given = model::load(&self.model, Wanted::default(), terminal);
         if let Ok(given) = &given {
             unread::tell(terminal, &self.model, &given.graph);
@@ -150,19 +152,26 @@ impl Run {
         let Some(last) = last else {
             let given = given?;
             check_fitted(&given, &self.model)?;
-            return Ok((given, Watched::of(&self.model)));
+            return Ok((given, watched));
         };
-        if let Ok(mut given) = given {
-            given.take_fits_of(&last);
-            if ran::revision(&given) == ran::revision(&last) {
-                return Ok((given, Watched::of(&self.model)));
+        match given {
+            Ok(mut given) => {
+                given.take_fits_of(&last);
+                if ran::revision(&given) == ran::revision(&last) {
+                    return Ok((given, watched));
+                }
+                terminal.warning(format_args!(
+                    "{} is not what ran last: that goes on, and the file is taken as a change of it",
+                    self.model.display()
+                ));
+                Ok((last, watched.unlike()))
+            }
+            Err(failure) => {
+                terminal.setback(&failure);
+                terminal.warning(swap::told::unusable(&self.model, "what ran last goes on"));
+                Ok((last, watched))
             }
         }
-        terminal.warning(format_args!(
-            "{} is not what ran last: that goes on, and the file is taken as a change of it",
-            self.model.display()
-        ));
-        Ok((last, Watched::unlike(&self.model)))
     }
 
     /// Runs so that the graph can be replaced; the rows say which revision made them.

@@ -1,6 +1,6 @@
 //! Decides when a graph is replaced while recorded data run through it.
 
-mod told;
+pub(super) mod told;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -306,6 +306,9 @@ impl<'a> Course<'a> {
             return;
         };
         if !watched.changed() {
+            if let Some(went) = watched.went() {
+                told::went(self.terminal, &went);
+            }
             return;
         }
         let path = watched.path.clone();

@@ -13,6 +13,14 @@ use athermal::core::model::named_model;
 /// When a file was written, and how long it is; none where there is no file.
 type Written = Option<(SystemTime, u64)>;
 
+/// Where a file went.
+pub(super) enum Went {
+    /// Nowhere to be seen.
+    Away(PathBuf),
+    /// To where it was, unchanged.
+    Back(PathBuf),
+}
+
 /// A graph on disk, as it was when it was last looked at.
 pub(super) struct Watched {
     /// Its own file.
@@ -20,6 +28,10 @@ pub(super) struct Watched {
     files: Vec<(PathBuf, Written)>,
     /// How files that have changed were at the last look.
     changing: Option<Vec<Written>>,
+    /// A file that was not there at the last look.
+    gone: Option<PathBuf>,
+    /// One of which that has been told.
+    told_gone: Option<PathBuf>,
 }
 
 impl Watched {
@@ -44,16 +56,17 @@ impl Watched {
             path: path.to_owned(),
             files: noting.files.into_inner(),
             changing: None,
+            gone: None,
+            told_gone: None,
         }
     }
 
     /// The same where something else runs, so that it has changed as soon as it is there.
-    pub(super) fn unlike(path: &Path) -> Self {
-        let mut watched = Self::of(path);
-        for (_, seen) in &mut watched.files {
+    pub(super) fn unlike(mut self) -> Self {
+        for (_, seen) in &mut self.files {
             *seen = None;
         }
-        watched
+        self
     }
 
     /// Whether a file has been written since, and none is being written: they are as they were at the last look. Half of a graph
@@ -72,6 +85,19 @@ impl Watched {
     /// Whether a file is not as it was when it was read, be it that it is still being written.
     pub(super) fn differs(&self) -> bool {
         self.differ(&self.now())
+    }
+
+    /// Where a file went, once. One that is away at one look alone is being written.
+    pub(super) fn went(&mut self) -> Option<Went> {
+        let mut files = self.files.iter();
+        let gone = files.find(|(path, seen)| seen.is_some() && written(path).is_none());
+        let gone = gone.map(|(path, _)| path.clone());
+        let before = std::mem::replace(&mut self.gone, gone.clone());
+        if gone != before || gone == self.told_gone {
+            return None;
+        }
+        let told = std::mem::replace(&mut self.told_gone, gone.clone());
+        gone.map(Went::Away).or(told.map(Went::Back))
     }
 
     fn now(&self) -> Vec<Written> {

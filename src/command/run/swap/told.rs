@@ -7,6 +7,7 @@ use athermal::core::engine::Carry;
 use athermal::core::live::{Notice, Staged, Verdict};
 use serde_json::{Value, json};
 
+use crate::command::run::watched::Went;
 use crate::figures::{count, counted, length, number, seconds};
 use crate::message::Message;
 use crate::terminal::Terminal;
@@ -91,6 +92,19 @@ pub fn not_taken_over(path: &Path, reason: &str, words: impl std::fmt::Display) 
 pub fn unusable(path: &Path, goes_on: &str) -> Message {
     let words = format_args!("is not taken over; {goes_on}");
     not_taken_over(path, "refused", words)
+}
+
+/// That a watched file has gone, or is back.
+pub fn went(terminal: &Terminal, went: &Went) {
+    match went {
+        Went::Away(path) => terminal.warning(format_args!(
+            "{} is no longer there: what runs goes on until it is there again with a change",
+            path.display()
+        )),
+        Went::Back(path) => {
+            terminal.note(format_args!("{} is there again, as it was", path.display()))
+        }
+    }
 }
 
 /// That a graph does not take over from what runs.
