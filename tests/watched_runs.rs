@@ -5,7 +5,7 @@
 
 mod workbench;
 
-use workbench::{Live, Scratch};
+use workbench::{Live, Scratch, athermal_fed};
 
 /// No drift at all, which is wrong of a position that moves evenly.
 const GRAPH: &str = r#"
@@ -117,6 +117,100 @@ fn a_mistake_that_comes_into_the_file_takes_out_of_the_shadow_what_was_there() {
     assert_eq!(past_the_shadow(&mut live), [first]);
     let refused = "graph.toml is not taken over; what runs goes on";
     assert_told(&live.told(), &[CHANGED, "error[A001]", refused]);
+}
+
+#[test]
+fn a_graph_that_cannot_take_over_is_named_with_the_way_to_run_it_to_people_and_programs() {
+    let scratch = desk("refused");
+    let graph = scratch.path("graph.toml");
+    let way = "what runs goes on; a run that begins with other files for `--output` and `--state` takes it";
+    let renamed = GRAPH.replace("max_age", "column = \"height\"\nmax_age");
+    let other_time = GRAPH.replace("\"time_s\"", "\"time_s\"\nunit = \"ms\"");
+    for (text, why) in [
+        (renamed, "graph.toml: the new graph reads position.Z"),
+        (other_time, "graph.toml: the new graph reads time from"),
+    ] {
+        for format in ["table", "json"] {
+            scratch.file("graph.toml", GRAPH);
+            // The rows of programs are those of people here.
+            let out = scratch.path(&format!("{format}.csv"));
+            let mut arguments = vec!["--quiet", "--format", format];
+            if format == "json" {
+                arguments.extend(["-o", out.to_str().unwrap()]);
+            }
+            let told = refused_with(&graph, &arguments, || {
+                scratch.file("graph.toml", &text);
+            });
+            assert_told(
+                &told,
+                &[why, &format!("graph.toml is not taken over; {way}")],
+            );
+            let event = "\"event\":\"not_taken_over\"";
+            assert_eq!(told.contains(event), format == "json", "{told}");
+        }
+    }
+    scratch.file("graph.toml", GRAPH);
+    let mut live = Live::new(&graph);
+    let first = live.revision();
+    scratch.file("graph.toml", GRAPH.to_owned() + "more = \"drift\"\n");
+    live.stays(&first);
+    let lacks = "graph.toml has the output `more.Z`, for which there is no column; ";
+    assert_told(&live.told(), &[&format!("{lacks}{way}")]);
+}
+
+/// What is told of a change of a graph by a run that is fed for longer than the file is looked at twice.
+fn refused_with(graph: &std::path::Path, more: &[&str], change: impl FnOnce()) -> String {
+    use std::io::Write;
+    use std::process::{Command, Stdio};
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        .arg("run")
+        .arg(graph)
+        .args(["-i", "-", "--watch"])
+        .args(more)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut feed = child.stdin.take().unwrap();
+    feed.write_all(b"time_s,Z\n0,0\n").unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    change();
+    for nth in 1..50 {
+        writeln!(feed, "{0},{0}", 10 * nth).unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    drop(feed);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    String::from_utf8(output.stderr).unwrap()
+}
+
+#[test]
+fn a_restart_with_a_graph_for_other_columns_says_that_what_ran_last_lacks_them_and_how_the_graph_is_run()
+ {
+    let scratch = desk("renamed");
+    let (graph, state) = (scratch.path("graph.toml"), scratch.path("state"));
+    let run = |state: &std::path::Path, rows: &str| {
+        athermal_fed(
+            &[&"run", &graph, &"-i", &"-", &"--watch", &"--state", &state],
+            rows.as_bytes(),
+        )
+    };
+    run(&state, "time_s,Z\n0,0\n10,10\n").ended(0);
+    let renamed = GRAPH.replace("max_age", "column = \"height\"\nmax_age");
+    scratch.file("graph.toml", renamed);
+    let log = "time_s,height\n20,20\n30,30\n";
+    let refused = run(&state, log).ended(2);
+    refused.tells(&[
+        "graph.toml is not what ran last: that goes on, and the file is taken as a change of it",
+        "there is no column `Z`",
+        "(that is what the graph reads that ran last and would go on; ",
+        "graph.toml holds another: a run that begins with other files for `--output` and `--state` takes it)",
+    ]);
+    assert_eq!(refused.out, "");
+    run(&scratch.path("another"), log).ended(0);
 }
 
 #[test]

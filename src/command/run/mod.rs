@@ -185,7 +185,8 @@ impl Run {
         let (feed, mut columns) = swap::union(&model, &swaps);
         let options = self.reading();
         let read = swap::reading(&model, &swaps, &feed);
-        let mut reader = self.open(terminal, layout(&read), options)?;
+        let opened = self.open(terminal, layout(&read), options);
+        let mut reader = opened.map_err(|failure| swap::told::not_read(failure, &watched))?;
         let mut engine = model.engine()?;
         let state = self.state.as_deref();
         let mut kept = Kept::begin(terminal, state, self.ran(), &mut engine, &model)?;

@@ -347,8 +347,9 @@ impl<'a> Course<'a> {
             .find(|output| !self.columns.contains(&output.name))
         {
             let words = format_args!(
-                "has the output `{}`, for which there is no column; what runs goes on",
-                new.name
+                "has the output `{}`, for which there is no column; what runs goes on; {}",
+                new.name,
+                told::ANOTHER_RUN
             );
             self.terminal
                 .warning(told::not_taken_over(&path, "no_column", words));
@@ -366,7 +367,7 @@ impl<'a> Course<'a> {
         };
         let why = Failure::Request(format!("{}: {error}", path.display()));
         self.terminal.setback(&why);
-        self.terminal.warning(told::refused(path));
+        self.terminal.warning(told::refused(path, error));
     }
 
     fn stage(

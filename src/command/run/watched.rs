@@ -28,6 +28,8 @@ pub(super) struct Watched {
     files: Vec<(PathBuf, Written)>,
     /// How files that have changed were at the last look.
     changing: Option<Vec<Written>>,
+    /// Whether something else ran when it was first looked at.
+    pub(super) is_unlike: bool,
     /// A file that was not there at the last look.
     gone: Option<PathBuf>,
     /// One of which that has been told.
@@ -56,6 +58,7 @@ impl Watched {
             path: path.to_owned(),
             files: noting.files.into_inner(),
             changing: None,
+            is_unlike: false,
             gone: None,
             told_gone: None,
         }
@@ -66,6 +69,7 @@ impl Watched {
         for (_, seen) in &mut self.files {
             *seen = None;
         }
+        self.is_unlike = true;
         self
     }
 

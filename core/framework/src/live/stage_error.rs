@@ -76,7 +76,7 @@ impl fmt::Display for StageError {
         match self {
             Self::MissingChannels { channels } => write!(
                 f,
-                "the new graph reads {}, for which no samples are given: name all graphs at the start, or add the channels",
+                "the new graph reads {}, for which no samples are given: what is read is settled when the run begins, by the graphs and channels that it is given then",
                 channels.join(", ")
             ),
             Self::OtherTime { running, new } => write!(

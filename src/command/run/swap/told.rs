@@ -4,13 +4,17 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use athermal::core::engine::Carry;
-use athermal::core::live::{Notice, Staged, Verdict};
+use athermal::core::live::{Notice, StageError, Staged, Verdict};
 use serde_json::{Value, json};
 
-use crate::command::run::watched::Went;
+use crate::command::run::watched::{Watched, Went};
 use crate::figures::{count, counted, length, number, seconds};
 use crate::message::Message;
-use crate::terminal::Terminal;
+use crate::terminal::{Failure, Terminal};
+
+/// How a graph is run that cannot take over, since what is read and written is settled when a run begins.
+pub const ANOTHER_RUN: &str =
+    "a run that begins with other files for `--output` and `--state` takes it";
 
 /// What becomes of each node of a graph that is ready to take over.
 pub fn staged(path: &Path, staged: &Staged) -> Message {
@@ -107,9 +111,27 @@ pub fn went(terminal: &Terminal, went: &Went) {
     }
 }
 
-/// That a graph does not take over from what runs.
-pub fn refused(path: &Path) -> Message {
-    unusable(path, "what runs goes on")
+/// Why an input cannot be read: where it is not the watched graph that runs, that may be the one for it.
+pub fn not_read(failure: Failure, watched: &Watched) -> Failure {
+    match failure {
+        Failure::Request(why) if watched.is_unlike => Failure::Request(format!(
+            "{why} (that is what the graph reads that ran last and would go on; {} holds another: {ANOTHER_RUN})",
+            watched.path.display()
+        )),
+        other => other,
+    }
+}
+
+/// That a graph does not take over from what runs, with the way to run it where there is one.
+pub fn refused(path: &Path, error: &StageError) -> Message {
+    match error {
+        StageError::MissingChannels { .. }
+        | StageError::OtherTime { .. }
+        | StageError::OtherUnit { .. } => {
+            unusable(path, &format!("what runs goes on; {ANOTHER_RUN}"))
+        }
+        _ => unusable(path, "what runs goes on"),
+    }
 }
 
 /// Tells what has happened.
