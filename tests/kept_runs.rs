@@ -368,6 +368,39 @@ fn a_state_that_cannot_be_written_is_told_before_the_first_row() {
     assert_eq!(run.out, "");
 }
 
+/// As on a disk that is full, or where it may be read alone.
+#[test]
+fn a_state_that_was_read_and_cannot_be_written_for_a_while_is_gone_on_from() {
+    let (scratch, model, data, whole) = desk("full");
+    let text = std::fs::read_to_string(&data).unwrap();
+    let lines: Vec<_> = text.lines().collect();
+    let half = lines[..2000].join("\n") + "\n";
+    let state = scratch.path("state");
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 6] =
+        [&"run", &model, &"-i", &"-", &"--state", &state];
+    let before = athermal_fed(&arguments, half.as_bytes()).ended(0).out;
+    let kept = std::fs::read(&state).unwrap();
+    // Where it is written aside.
+    let aside = scratch.path("state.part");
+    std::fs::create_dir(&aside).unwrap();
+    let after = athermal_fed(&arguments, text.as_bytes());
+    after.tells(&[
+        "cannot write",
+        "the run goes on from what was read, and tries again after the first row",
+        "tries again in a minute",
+    ]);
+    assert_eq!(after.status, 3, "nothing of it is kept at the end");
+    assert_eq!(
+        before.clone() + after.out.split_once('\n').unwrap().1,
+        whole
+    );
+    assert_eq!(std::fs::read(&state).unwrap(), kept);
+
+    std::fs::remove_dir(&aside).unwrap();
+    let after = athermal_fed(&arguments, text.as_bytes()).ended(0);
+    assert_eq!(before + after.out.split_once('\n').unwrap().1, whole);
+}
+
 #[test]
 fn a_state_is_no_stream() {
     let (_scratch, model, data, _) = desk("stream");

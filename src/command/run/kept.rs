@@ -36,7 +36,7 @@ impl Kept {
     /// Lets the engine of a model go on from a file, if it is there; without a file nothing is kept.
     ///
     /// # Errors
-    /// When the file is not one of the same graph and fit, or cannot be written.
+    /// When the file is not one of the same graph and fit, or cannot be written where it is not there yet.
     pub fn begin(
         terminal: &Terminal,
         path: Option<&Path>,
@@ -54,7 +54,9 @@ impl Kept {
             seen: None,
         };
         let Some(path) = path else { return Ok(kept) };
-        match std::fs::read(path) {
+        let read = std::fs::read(path);
+        let is_read = read.is_ok();
+        match read {
             Ok(bytes) => {
                 engine.restore(&bytes).map_err(|error| {
                     Failure::Request(format!(
@@ -76,8 +78,13 @@ impl Kept {
                 return Err(Failure::Outside(cannot));
             }
         }
-        // Better now than after the first minute.
-        kept.write(engine, model).map_err(outside)?;
+        // Better now than after the first minute. What was read needs not be written yet: a disk may be full for a while.
+        match kept.write(engine, model) {
+            Err(error) if is_read => terminal.warning(format_args!(
+                "{error}; the run goes on from what was read, and tries again after the first row"
+            )),
+            written => written.map_err(outside)?,
+        }
         Ok(kept)
     }
 
