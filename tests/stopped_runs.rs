@@ -50,7 +50,12 @@ struct Live {
 
 impl Live {
     fn new(scratch: &Scratch, more: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_athermal"))
+        let program = Command::new(env!("CARGO_BIN_EXE_athermal"));
+        Self::by(program, scratch, more)
+    }
+
+    fn by(mut program: Command, scratch: &Scratch, more: &[&str]) -> Self {
+        let mut child = program
             .arg("run")
             .arg(scratch.path("graph.toml"))
             .args(["--input", "-", "--lenient", "--state"])
@@ -104,7 +109,9 @@ fn desk(test: &str) -> Scratch {
 
 #[test]
 fn a_run_that_is_told_to_stop_ends_in_order_and_the_next_goes_on_from_there() {
-    for (signal, more) in [("TERM", &[][..]), ("INT", &["--watch"][..])] {
+    let hangup = cfg!(target_os = "linux").then_some(("HUP", &[][..]));
+    let signals = [("TERM", &[][..]), ("INT", &["--watch"][..])];
+    for (signal, more) in signals.into_iter().chain(hangup) {
         let scratch = desk(signal);
         let names = "time_s,Z\n".to_owned();
         let mut live = Live::new(&scratch, more);
@@ -112,6 +119,10 @@ fn a_run_that_is_told_to_stop_ends_in_order_and_the_next_goes_on_from_there() {
         // What is begun is no row yet.
         live.rows.write_all(b"500,1").unwrap();
         live.tell(signal);
+        if signal == "HUP" {
+            // A session that closes hangs up more than once.
+            live.tell(signal);
+        }
         let (status, rest, told) = live.ended();
         assert_eq!((status, rest.as_str()), (Some(0), ""), "{told}");
         assert!(told.contains("5 × unreadable cell"), "{told}");
@@ -144,6 +155,23 @@ fn a_run_that_is_told_to_stop_before_anything_came_is_fine() {
     let (status, rest, told) = live.ended();
     assert_eq!((status, rest.as_str()), (Some(0), ""), "{told}");
     assert!(!told.contains("error"), "{told}");
+}
+
+/// As with `nohup`.
+#[test]
+fn a_run_that_ignores_a_hangup_goes_on_with_it() {
+    let scratch = desk("nohup");
+    let mut program = Command::new("sh");
+    let ignoring = "trap '' HUP; exec \"$0\" \"$@\"";
+    program.args(["-c", ignoring, env!("CARGO_BIN_EXE_athermal")]);
+    let mut live = Live::by(program, &scratch, &[]);
+    live.feed(&("time_s,Z\n".to_owned() + &rows(0, 10)), 11);
+    live.tell("HUP");
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    live.feed(&rows(10, 20), 10);
+    live.tell("TERM");
+    let (status, rest, told) = live.ended();
+    assert_eq!((status, rest.as_str()), (Some(0), ""), "{told}");
 }
 
 #[test]

@@ -21,7 +21,8 @@ pub fn is_told() -> bool {
 type Piece = io::Result<Vec<u8>>;
 
 /// An input that may never end by itself: from here on SIGINT or SIGTERM ends it, after all that has been read of it until then, and a
-/// second one ends the program at once. Where there are no signals it is as it was.
+/// second one ends the program at once. SIGHUP ends it as they do where it is not ignored, and no more than that: a session that closes
+/// may send several. Where there are no signals it is as it was.
 pub fn until_told(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
     let (give, pieces) = sync_channel(WAITING);
     if !listen(give.clone()) {
@@ -35,16 +36,17 @@ pub fn until_told(input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
 /// Ends the input at the first signal; whether signals can be listened to.
 #[cfg(unix)]
 fn listen(give: SyncSender<Piece>) -> bool {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
+    let hangs_up = is_told_of_a_hangup().then_some(SIGHUP);
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(hangs_up)) else {
         return false;
     };
     std::thread::spawn(move || {
         for signal in signals.forever() {
-            if TOLD.swap(true, Ordering::Relaxed) {
+            if TOLD.swap(true, Ordering::Relaxed) && signal != SIGHUP {
                 let _ = emulate_default_handler(signal);
             }
             // There may be no room yet, and the second signal is listened to meanwhile.
@@ -53,6 +55,16 @@ fn listen(give: SyncSender<Piece>) -> bool {
         }
     });
     true
+}
+
+/// Whether SIGHUP is there to end the program, and not ignored as under `nohup`, which listening to it would undo. Where that cannot be
+/// known, nobody listens.
+#[cfg(unix)]
+fn is_told_of_a_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_some_and(|mask| mask >> (signal_hook::consts::SIGHUP - 1) & 1 == 0)
 }
 
 #[cfg(not(unix))]
