@@ -175,6 +175,47 @@ fn a_run_that_ignores_a_hangup_goes_on_with_it() {
 }
 
 #[test]
+fn a_file_that_a_run_keeps_or_writes_is_refused_to_another_until_the_first_is_dead() {
+    let scratch = desk("held");
+    let (graph, state, out) = (
+        scratch.path("graph.toml"),
+        scratch.path("state"),
+        scratch.path("out.csv"),
+    );
+    let mut live = Live::new(&scratch, &["--watch"]);
+    live.feed(&("time_s,Z\n".to_owned() + &rows(0, 10)), 11);
+    let more: [&dyn AsRef<std::ffi::OsStr>; 6] = [&"run", &graph, &"-i", &"-", &"--state", &state];
+    let refused = athermal_fed(&more, b"time_s,Z\n500,1\n").ended(3);
+    refused.tells(&[
+        "state: another run keeps there what it knows",
+        "end that one first, or name another file with `--state`",
+    ]);
+    assert_eq!(refused.out, "");
+    live.child.kill().unwrap();
+    live.child.wait().unwrap();
+    athermal_fed(&more, b"time_s,Z\n500,1\n").ended(0);
+    assert!(!scratch.path("state.held").exists());
+
+    let output = out.display().to_string();
+    let mut live = Live::new(&scratch, &["-o", &output]);
+    live.rows.write_all(b"time_s,Z\n600,1\n").unwrap();
+    let begun = || std::fs::read_to_string(&out).is_ok_and(|text| text.contains("600"));
+    while !begun() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let other = [&more[..4], &[&"-o" as &dyn AsRef<_>, &out]].concat();
+    let refused = athermal_fed(&other, b"time_s,Z\n500,1\n").ended(3);
+    refused.tells(&[
+        "out.csv: another run writes it",
+        "name another file with `--output`",
+    ]);
+    assert!(begun(), "it stays as it is");
+    live.tell("TERM");
+    assert_eq!(live.ended().0, Some(0));
+    athermal_fed(&other, b"time_s,Z\n500,1\n").ended(0);
+}
+
+#[test]
 fn an_input_that_ends_ends_the_run_as_before() {
     let scratch = desk("whole");
     let log = scratch.file("log.csv", format!("time_s,Z\n{}", rows(0, 100)));

@@ -1,6 +1,7 @@
 //! `athermal run`: rows in, the graph's outputs out.
 
 mod heard;
+mod held;
 mod kept;
 mod ran;
 mod rejected;
@@ -32,6 +33,7 @@ use crate::figures::{counted, instant, length, seconds};
 use crate::message::Message;
 use crate::terminal::{Answer, Failure, Format, Terminal, outside};
 use heard::Heard;
+use held::Held;
 use kept::Kept;
 use ran::Ran;
 use rejected::Ranged;
@@ -64,7 +66,7 @@ pub struct Run {
     frozen: bool,
     /// Go on from what an earlier run knew and had learned, if the file is there, and keep it: after the first row, at least once a
     /// minute while rows come, and when the input ends. Rows up to the last one known are passed over. An output file of an earlier run
-    /// is gone on with, also where the run begins cold, and never begun anew. With `--watch` it is
+    /// is gone on with, also where the run begins cold, and never begun anew. Two runs at once do not keep one file. With `--watch` it is
     /// kept of whatever graph runs, and that graph beside it, in FILE.graph.json
     #[arg(long, value_name = "FILE", conflicts_with = "swap_at")]
     state: Option<PathBuf>,
@@ -99,6 +101,8 @@ impl Run {
                 check_apart("--state", beside, others())?;
             }
         }
+        let _state = self.state.as_deref().map(Held::state).transpose()?;
+        let _output = Held::output(&self.output)?;
         let (model, watched) = self.load(terminal)?;
         tell_unfitted(terminal, &model, &self.model);
         if let Some(told) = feedback::in_words(&model.plan) {
