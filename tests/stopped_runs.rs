@@ -216,6 +216,35 @@ fn a_file_that_a_run_keeps_or_writes_is_refused_to_another_until_the_first_is_de
 }
 
 #[test]
+fn an_output_that_is_moved_while_it_is_written_is_told() {
+    let scratch = desk("moved");
+    let out = scratch.path("out.csv");
+    let output = out.display().to_string();
+    for is_moved in [true, false] {
+        let mut live = Live::new(&scratch, &["-o", &output]);
+        let from = if is_moved { 0 } else { 100 };
+        let text = "time_s,Z\n".to_owned() + &rows(from, from + 10);
+        live.rows.write_all(text.as_bytes()).unwrap();
+        let last = format!("\n{},", 10 * (from + 9));
+        while !std::fs::read_to_string(&out).is_ok_and(|text| text.contains(&last)) {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        if is_moved {
+            std::fs::rename(&out, scratch.path("rotated.csv")).unwrap();
+            std::fs::write(&out, "").unwrap();
+        }
+        live.rows
+            .write_all(rows(from + 10, from + 12).as_bytes())
+            .unwrap();
+        live.tell("TERM");
+        let (status, _, told) = live.ended();
+        assert_eq!(status, Some(0), "{told}");
+        let words = "out.csv was removed, moved or replaced while it is written";
+        assert_eq!(told.contains(words), is_moved, "{told}");
+    }
+}
+
+#[test]
 fn an_input_that_ends_ends_the_run_as_before() {
     let scratch = desk("whole");
     let log = scratch.file("log.csv", format!("time_s,Z\n{}", rows(0, 100)));

@@ -9,6 +9,7 @@ use athermal::{Engine, Instant, Model};
 use serde_json::json;
 
 use super::ran::Ran;
+use super::standing::Standing;
 use crate::command::aside::{not_written, whole_aside};
 use crate::figures::{count, length};
 use crate::message::Message;
@@ -30,6 +31,8 @@ pub struct Kept {
     revision: String,
     /// The last instant that the run before had seen.
     seen: Option<Instant>,
+    /// The output, which is looked at as often.
+    output: Option<Standing>,
 }
 
 impl Kept {
@@ -52,6 +55,7 @@ impl Kept {
             ran,
             revision: String::new(),
             seen: None,
+            output: None,
         };
         let Some(path) = path else { return Ok(kept) };
         let read = std::fs::read(path);
@@ -86,6 +90,11 @@ impl Kept {
             written => written.map_err(outside)?,
         }
         Ok(kept)
+    }
+
+    /// The output that is written beside what is known.
+    pub fn write_beside(&mut self, output: Standing) {
+        self.output = Some(output);
     }
 
     /// The last instant that the run before had seen.
@@ -125,13 +134,20 @@ impl Kept {
         model: &Model,
         sink: &mut dyn Sink,
     ) -> Result<(), SinkError> {
-        let is_due = self.is_before_first
-            || self.written.elapsed() >= KEEP_EVERY
-            || engine.revision() != self.revision;
-        if self.path.is_none() || !is_due {
+        let is_time = self.is_before_first || self.written.elapsed() >= KEEP_EVERY;
+        if is_time {
+            self.is_before_first = false;
+            self.look_at_output();
+        }
+        if self.path.is_none() {
+            if is_time {
+                self.written = Clock::now();
+            }
             return Ok(());
         }
-        self.is_before_first = false;
+        if !is_time && engine.revision() == self.revision {
+            return Ok(());
+        }
         sink.flush()?;
         if let Err(error) = self.write(engine, model) {
             self.terminal.warning(format_args!(
@@ -151,10 +167,17 @@ impl Kept {
         model: &Model,
         sink: &mut dyn Sink,
     ) -> Result<(), SinkError> {
+        self.look_at_output();
         if self.path.is_some() {
             sink.flush()?;
         }
         self.write(engine, model)
+    }
+
+    fn look_at_output(&mut self) {
+        if let Some(output) = &mut self.output {
+            output.look(&self.terminal);
+        }
     }
 
     /// Keeps what is known.

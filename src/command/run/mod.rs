@@ -6,6 +6,7 @@ mod kept;
 mod ran;
 mod rejected;
 mod sensors;
+mod standing;
 mod stop;
 mod swap;
 mod watched;
@@ -38,6 +39,7 @@ use kept::Kept;
 use ran::Ran;
 use rejected::Ranged;
 use sensors::Sensors;
+use standing::Standing;
 use watched::Watched;
 
 /// Run a model: rows in, predictions out
@@ -123,6 +125,7 @@ impl Run {
             .map(|output| output.name.clone())
             .collect();
         let mut writer = self.writer(terminal, &kept, reader.layout(), &columns)?;
+        kept.write_beside(Standing::at(&self.output));
         let mut rest = kept.rest(&mut reader, writer.stood(), !self.ends());
         let usual = model.sample_ranges();
         let mut ranged = Ranged::new(terminal, &mut rest, self.ranged(&plan), usual);
@@ -198,6 +201,7 @@ impl Run {
         self.widen(&mut columns);
         let writer = self.writer(terminal, &kept, reader.layout(), &columns)?;
         let names = &columns[..columns.len() - 1];
+        kept.write_beside(Standing::at(&self.output));
         let mut rest = kept.rest(&mut reader, writer.stood(), !self.ends());
         let mut writer = WithRevision(writer);
         let mut heard = Heard::of(&mut writer);
