@@ -5,6 +5,8 @@ use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
+use athermal_core::time::{Civil, Instant};
+
 use crate::csv_rows::CsvRows;
 use crate::error::quoted;
 use crate::lines::{LONGEST_ROW, Lines};
@@ -19,7 +21,8 @@ pub(crate) struct Begun {
 }
 
 impl Begun {
-    /// Looks at a file; none where it is empty or no file.
+    /// Looks at a file; none where it is empty or no file. `seen` is what is known to have been read when it was written, which may
+    /// tell what a time means that comes twice.
     ///
     /// # Errors
     /// The file cannot be read, or is not one with these columns.
@@ -28,6 +31,7 @@ impl Begun {
         format: Format,
         time: &TimeColumn,
         columns: &[String],
+        seen: Option<Instant>,
     ) -> Result<Option<Self>, FileError> {
         if !path.metadata().is_ok_and(|of| of.is_file() && of.len() > 0) {
             return Ok(None);
@@ -52,17 +56,42 @@ impl Begun {
         let rows = match format {
             Format::Csv if ends.is_one_line => None,
             Format::Csv => Some([&*ends.first, &*ends.last].concat()),
-            Format::JsonLines => Some(ends.last),
+            Format::JsonLines => Some(ends.last.clone()),
         };
-        let last_ns = rows
-            .map(|rows| last_instant(&file, rows, format, time))
+        let time = time.written();
+        let last = rows
+            .map(|rows| last_row(&file, rows, format, &time))
             .transpose()
             .map_err(|error| other(error.to_string()))?
             .flatten();
+        let last_ns = match last {
+            Some(last) if later(&time, &last.time_text) != Some(last.time_ns) => {
+                let among = || ends.instant_among_rows(path, format, &time, &last.time_text);
+                let by_rows = among().map_err(|source| FileError::cannot_open(path, source))?;
+                let known = by_rows.unwrap_or(last.time_ns);
+                match seen {
+                    Some(seen) if known < seen.as_ns() => later(&time, &last.time_text),
+                    _ => Some(known),
+                }
+            }
+            last => last.map(|last| last.time_ns),
+        };
         Ok(Some(Self {
             length: ends.length,
             last_ns,
         }))
+    }
+}
+
+/// The later of the instants that a time can stand for.
+fn later(time: &TimeColumn, text: &str) -> Option<i64> {
+    instant(time.read(text.as_bytes(), Some((Instant::MAX, 0))))
+}
+
+fn instant(read: Option<Civil>) -> Option<i64> {
+    match read {
+        Some(Civil::At(at)) => Some(at.as_ns()),
+        _ => None,
     }
 }
 
@@ -81,6 +110,8 @@ struct Ends {
     last: Vec<u8>,
     is_one_line: bool,
     length: u64,
+    /// Where the last line begins.
+    last_at: u64,
 }
 
 impl Ends {
@@ -102,12 +133,59 @@ impl Ends {
         };
         tail.truncate(end + 1);
         let before = tail[..end].iter().rposition(|&byte| byte == b'\n');
+        let last_at = before.map_or(0, |before| before + 1);
         Ok(Some(Self {
             first,
             is_one_line: before.is_none(),
-            last: tail.split_off(before.map_or(0, |before| before + 1)),
+            last: tail.split_off(last_at),
             length: begin + end as u64 + 1,
+            last_at: begin + last_at as u64,
         }))
+    }
+
+    /// The instant of the last row by those before it, from one on whose time comes only once; none where there are none.
+    fn instant_among_rows(
+        &self,
+        path: &Path,
+        format: Format,
+        time: &TimeColumn,
+        text: &str,
+    ) -> io::Result<Option<i64>> {
+        let mut looked_at = 2 * LONGEST_ROW as u64;
+        loop {
+            let begin = self.last_at.saturating_sub(looked_at);
+            looked_at *= 2;
+            let mut rows = BufReader::new(File::open(path)?);
+            rows.seek(SeekFrom::Start(begin))?;
+            let mut rows = rows.take(self.last_at - begin);
+            let names: &[u8] = match format {
+                Format::Csv if begin > 0 => &self.first,
+                _ => &[],
+            };
+            if begin > 0 {
+                rows.skip_until(b'\n')?;
+            }
+            let rows = Cursor::new(names.to_vec()).chain(rows);
+            let Ok(mut reader) = reader("", rows, format, time) else {
+                return Ok(None);
+            };
+            let mut row = Row::default();
+            let mut is_first = true;
+            let begins_twice = loop {
+                match reader.next_into(&mut row) {
+                    Ok(true) => {}
+                    Ok(false) | Err(_) => break false,
+                }
+                let comes_twice = later(time, &row.time_text) != Some(row.time_ns);
+                if std::mem::take(&mut is_first) && begin > 0 && comes_twice {
+                    break true;
+                }
+            };
+            if !begins_twice {
+                let read = time.read(text.as_bytes(), reader.last());
+                return Ok(instant(read));
+            }
+        }
     }
 
     fn names(&self, format: Format) -> Result<Vec<String>, FileError> {
@@ -129,14 +207,26 @@ impl Ends {
     }
 }
 
-fn last_instant(
+fn last_row(
     file: &str,
     rows: Vec<u8>,
     format: Format,
     time: &TimeColumn,
-) -> Result<Option<i64>, FileError> {
+) -> Result<Option<Row>, FileError> {
+    let mut row = Row::default();
+    let mut reader = reader(file, Cursor::new(rows), format, time)?;
+    Ok(reader.next_into(&mut row)?.then_some(row))
+}
+
+/// Reads the times of rows that were written.
+fn reader(
+    file: &str,
+    rows: impl Read + Send + 'static,
+    format: Format,
+    time: &TimeColumn,
+) -> Result<Reader, FileError> {
     let layout = Layout {
-        time: time.written(),
+        time: time.clone(),
         channels: Vec::new(),
     };
     let options = Options {
@@ -144,7 +234,5 @@ fn last_instant(
         delimiter: Some(b','),
         ..Options::default()
     };
-    let mut row = Row::default();
-    let mut reader = Reader::from_read(file, Cursor::new(rows), layout, options)?;
-    Ok(reader.next_into(&mut row)?.then_some(row.time_ns))
+    Reader::from_read(file, rows, layout, options)
 }

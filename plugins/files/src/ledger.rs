@@ -103,12 +103,14 @@ pub(crate) struct Ledger {
     lenient: bool,
     /// Rows that name the columns again and are left out.
     unusable_headers: Count,
+    /// The last instant known before the first row, if anything was read before this.
+    before_ns: Option<i64>,
     last_ns: Option<i64>,
     /// How long after the one before it that was.
     step_ns: i64,
     /// How many rows one after the other were not after it.
     behind: u64,
-    /// The time cell of the row at that instant.
+    /// The time cell of the row at that instant; before the first row, what was read before says of it.
     last_time: Vec<u8>,
     /// The decimal mark of the first time that has one, with its line.
     time_mark: Mark,
@@ -125,6 +127,7 @@ impl Ledger {
             goes_on: false,
             lenient,
             unusable_headers: Count::default(),
+            before_ns: None,
             last_ns: None,
             step_ns: 0,
             behind: 0,
@@ -134,17 +137,25 @@ impl Ledger {
         }
     }
 
-    /// The instant of the last row taken, and how long after the one before it that was, in ns.
+    /// Goes on after an instant, which is told so.
+    pub fn begin_after(&mut self, before: Instant, told: &str) {
+        self.before_ns = Some(before.as_ns());
+        self.last_time = told.as_bytes().to_vec();
+    }
+
+    /// The instant of the last row taken, and how long after the one before it that was, in ns. Before the first row of what is still
+    /// being written it is what was known before: a file may as well be read from its beginning again.
     pub fn last(&self) -> Option<(Instant, i64)> {
-        self.last_ns
-            .map(|last_ns| (Instant::from_ns(last_ns), self.step_ns))
+        let before_ns = self.before_ns.filter(|_| !self.joins);
+        let last_ns = self.last_ns.or(before_ns);
+        last_ns.map(|last_ns| (Instant::from_ns(last_ns), self.step_ns))
     }
 
     /// How a row at this instant would follow the last one taken.
     #[inline]
     pub fn follows(&self, time_ns: i64) -> Follows {
         match self.last_ns {
-            None => Follows::Next,
+            None => self.follows_before(time_ns),
             Some(last_ns) if time_ns < last_ns => Follows::Behind,
             Some(last_ns) if time_ns == last_ns => Follows::Again,
             Some(last_ns) => {
@@ -158,9 +169,18 @@ impl Ledger {
         }
     }
 
-    /// Whether a last row that leaps is left out: two rows do not tell how far apart rows are.
+    /// How the first row would follow what was read before. One that is not after that stands in a log that is read again.
+    fn follows_before(&self, time_ns: i64) -> Follows {
+        match self.before_ns {
+            Some(before_ns) if time_ns.saturating_sub(before_ns) > LEAP_NS => Follows::Leaping,
+            _ => Follows::Next,
+        }
+    }
+
+    /// Whether a last row that leaps is left out: two rows do not tell how far apart rows are. That of what goes on is read again, save
+    /// where it is the only one.
     pub fn knows_leaps(&self) -> bool {
-        self.goes_on || self.step_ns > 0
+        self.goes_on && self.last_ns.is_some() || self.step_ns > 0
     }
 
     /// Whether a row that follows so is left out.
@@ -176,9 +196,8 @@ impl Ledger {
     /// Takes a row that is after the last one, by its time cell.
     #[inline]
     pub fn take(&mut self, time_ns: i64, cell: &[u8]) {
-        self.step_ns = self
-            .last_ns
-            .map_or(0, |last_ns| time_ns.saturating_sub(last_ns));
+        let last_ns = self.last_ns.or(self.before_ns).unwrap_or(time_ns);
+        self.step_ns = time_ns.saturating_sub(last_ns).max(0);
         self.last_ns = Some(time_ns);
         self.behind = 0;
         self.last_time.clear();

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use athermal_core::time::Civil;
+use athermal_core::time::{Civil, Instant};
 
 use crate::cell;
 use crate::cells::Cells;
@@ -166,6 +166,17 @@ impl Reader {
     /// Tells of what is met for the first time as soon as it is: who reads what never ends gets no report at its end.
     pub fn tell_first(&mut self, tell: impl FnMut(&FileError) + Send + 'static) {
         self.ledger.tell = Some(Box::new(tell));
+    }
+
+    /// Goes on after an instant that is known before the first row, and is told so. Where that row is after it, it is followed like a
+    /// row before; where it is not, what was read is read again.
+    pub fn begin_after(&mut self, before: Instant, told: &str) {
+        self.ledger.begin_after(before, told);
+    }
+
+    /// The instant of the last row, and how long after the one before it that was, in ns.
+    pub(crate) fn last(&self) -> Option<(Instant, i64)> {
+        self.ledger.last()
     }
 
     /// What was met so far.

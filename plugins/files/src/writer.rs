@@ -76,7 +76,8 @@ impl Writer {
     }
 
     /// Goes on with a file that was written with the same columns before: a last line that was cut off is removed, and rows up to the
-    /// last one, which stand there already, are passed over. What is not there yet, empty or no file is created.
+    /// last one, which stand there already, are passed over. What is not there yet, empty or no file is created. `seen` is up to
+    /// where the rows that it was written from were read, if that is known: a time that comes twice may be told by it.
     ///
     /// # Errors
     /// The file cannot be read or written, or was written with other columns; nothing is then changed.
@@ -84,11 +85,12 @@ impl Writer {
         path: impl AsRef<Path>,
         time: &TimeColumn,
         columns: &[String],
+        seen: Option<Instant>,
         flush: Flush,
     ) -> Result<Self, FileError> {
         let path = path.as_ref();
         let format = format_of(path);
-        let Some(begun) = Begun::of(path, format, time, columns)? else {
+        let Some(begun) = Begun::of(path, format, time, columns, seen)? else {
             return Self::create(path, &time.columns.title(), columns, flush);
         };
         let open = || {
@@ -444,7 +446,7 @@ mod tests {
         for (name, header) in [("out.csv", "t,a\n"), ("out.jsonl", "")] {
             let path = folder.join(name);
             let create = || Writer::create(&path, "t", &columns, Flush::EachRow).unwrap();
-            let resume = || Writer::resume(&path, &time, &columns, Flush::EachRow).unwrap();
+            let resume = || Writer::resume(&path, &time, &columns, None, Flush::EachRow).unwrap();
             for open in [&create as &dyn Fn() -> Writer, &resume] {
                 let mut writer = open();
                 writer.write_row("1", 1_000_000_000, &[1.0]).unwrap();

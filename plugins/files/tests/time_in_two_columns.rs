@@ -205,7 +205,8 @@ fn an_output_has_the_whole_time_in_one_column_and_is_gone_on_with_by_that() {
     ] {
         let path = folder.join(name);
         let write = |seconds: &[i64]| {
-            let mut writer = Writer::resume(&path, &german(), &columns, Flush::Buffered).unwrap();
+            let mut writer =
+                Writer::resume(&path, &german(), &columns, None, Flush::Buffered).unwrap();
             for second in seconds {
                 let text = format!("01.03.2026 08:00:{second}");
                 let value = *second as f64 / 10.0;

@@ -5,13 +5,14 @@ use std::time::{Duration, Instant as Clock};
 
 use athermal::core::live::{Samples, Sink, SinkError, Source, SourceError};
 use athermal::core::recording::Event;
+use athermal::files::Reader;
 use athermal::{Engine, Instant, Model};
 use serde_json::json;
 
 use super::ran::Ran;
 use super::standing::Standing;
 use crate::command::aside::{not_written, whole_aside};
-use crate::figures::{count, length};
+use crate::figures::{count, instant, length, seconds};
 use crate::message::Message;
 use crate::terminal::{Failure, Terminal, outside};
 
@@ -106,15 +107,19 @@ impl Kept {
     /// `at_once` says whether rows may never end.
     pub fn rest<'a>(
         &self,
-        source: &'a mut dyn Source,
+        source: &'a mut Reader,
         stood: Option<Instant>,
         at_once: bool,
     ) -> Rest<'a> {
+        let stood = stood.filter(|_| self.path.is_some());
+        if let Some(last) = self.seen.max(stood) {
+            source.begin_after(last, &instant(seconds(last)));
+        }
         Rest {
             terminal: self.terminal,
             source,
             seen: self.seen,
-            stood: stood.filter(|_| self.path.is_some()),
+            stood,
             at_once,
             passed_over: 0,
             before: athermal::Duration::ZERO,

@@ -353,9 +353,10 @@ impl Run {
         if self.state.is_none() {
             return Ok(Writer::create(&self.output, &time, columns, self.flush())?);
         }
-        let writer = Writer::resume(&self.output, &read.time, columns, self.flush())?;
+        let seen = kept.seen();
+        let writer = Writer::resume(&self.output, &read.time, columns, seen, self.flush())?;
         let output = self.output.display();
-        match (writer.stood(), kept.seen()) {
+        match (writer.stood(), seen) {
             (Some(last), Some(seen)) if last < seen => terminal.warning(format_args!(
                 "{output}: its last row is {} before what the run before saw last: what was predicted between stands in another file, or is lost",
                 length(seen - last)

@@ -1,0 +1,142 @@
+//! A run that is restarted where its source gives only what is new, as a controller does: what it reads then, and what it tells. What a
+//! node keeps is decided elsewhere.
+
+#![allow(clippy::unwrap_used)]
+
+mod workbench;
+
+use std::path::Path;
+
+use workbench::{Finished, Scratch, athermal, athermal_fed};
+
+/// A temperature, by the clock on a wall in Berlin.
+const BERLIN: &str = r#"
+schema = 1
+name = "berlin"
+time = { column = "t", format = "%Y-%m-%d %H:%M:%S", zone = "Europe/Berlin" }
+signals.room = { unit = "Cel", channels = ["a"], max_age = "1h" }
+outputs.room = "room"
+"#;
+
+/// The same by a clock of seconds.
+const SECONDS: &str = r#"
+schema = 1
+name = "seconds"
+signals.room = { unit = "Cel", channels = ["a"], max_age = "1min" }
+outputs.room = "room"
+"#;
+
+/// Runs a graph on rows of a pipe, with a state and more options.
+fn run(graph: &Path, state: &Path, more: &[&dyn AsRef<std::ffi::OsStr>], text: &str) -> Finished {
+    let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+        vec![&"run", &graph, &"-i", &"-", &"--state", &state];
+    arguments.extend(more);
+    athermal_fed(&arguments, text.as_bytes())
+}
+
+/// Rows below the name of the time, which are numbered in their only value.
+fn log(time: &str, times: &[&str]) -> String {
+    let rows = times.iter().enumerate();
+    let rows = rows.map(|(nth, at)| format!("{at},{nth}\n"));
+    format!("{time},a\n{}", rows.collect::<String>())
+}
+
+/// Times of the night in which the clocks go back from three to two.
+fn night(clock: &[&str]) -> Vec<String> {
+    let clock = clock.iter();
+    clock.map(|at| format!("2026-10-25 {at}:00")).collect()
+}
+
+/// The times of the rows that came out.
+fn times(out: &str) -> Vec<&str> {
+    let rows = out.lines().skip(1);
+    rows.map(|row| row.split_once(',').unwrap().0).collect()
+}
+
+#[test]
+fn in_the_hour_that_comes_twice_a_run_goes_on_where_it_was() {
+    let scratch = Scratch::new("restarted-pipes-twice");
+    let (graph, state) = (scratch.file("g.toml", BERLIN), scratch.path("state"));
+    let clock = [
+        "02:52", "02:56", "02:00", "02:04", "02:08", "02:12", "02:16",
+    ];
+    let all = night(&clock);
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    // In the first pass of the hour, at its end, and in the second.
+    for cut in 1..all.len() {
+        let _ = std::fs::remove_file(&state);
+        let first = run(&graph, &state, &[], &log("t", &all[..cut])).ended(0);
+        let second = run(&graph, &state, &[], &log("t", &all[cut..])).ended(0);
+        assert_eq!(times(&first.out), all[..cut]);
+        assert_eq!(times(&second.out), all[cut..], "{cut}: {}", second.told);
+        assert!(!second.told.contains("warning"), "{}", second.told);
+    }
+}
+
+#[test]
+fn an_output_that_ends_in_the_hour_that_comes_twice_gets_no_row_again_nor_lacks_one() {
+    let scratch = Scratch::new("restarted-pipes-twice-output");
+    let graph = scratch.file("g.toml", BERLIN);
+    let clock = [
+        "01:56", "02:00", "02:04", "02:56", "02:00", "02:04", "02:08", "03:00",
+    ];
+    let all = night(&clock);
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    // From what begins before the hour and in its first pass.
+    for (begin, ending) in [(0, "csv"), (1, "csv"), (0, "jsonl")] {
+        let all = &all[begin..];
+        let state = scratch.path("state");
+        let out = scratch.path(&format!("out.{ending}"));
+        let to: [&dyn AsRef<std::ffi::OsStr>; 2] = [&"-o", &out];
+        let read = || std::fs::read_to_string(&out).unwrap();
+        for cut in 2..all.len() {
+            let _ = (std::fs::remove_file(&state), std::fs::remove_file(&out));
+            run(&graph, &state, &to, &log("t", &all[..1])).ended(0);
+            let kept = std::fs::read(&state).unwrap();
+            run(&graph, &state, &to, &log("t", &all[1..cut])).ended(0);
+            // As after a kill: the state is from after the first row, and the whole log is given again.
+            std::fs::write(&state, kept).unwrap();
+            if begin == 0 {
+                run(&graph, &state, &to, &log("t", all)).ended(0);
+            } else {
+                let whole = scratch.file("log.csv", log("t", all));
+                athermal(&[
+                    &"run", &graph, &"-i", &whole, &"-o", &out, &"--state", &state,
+                ])
+                .ended(0);
+            }
+            let rows = read();
+            let written: Vec<&str> = rows
+                .lines()
+                .filter_map(|row| row.find("2026").map(|at| &row[at..at + all[0].len()]))
+                .collect();
+            assert_eq!(written, all, "{begin} {ending} {cut}");
+        }
+    }
+}
+
+#[test]
+fn the_first_row_after_a_restart_is_guarded_against_a_wrong_time_as_any_other() {
+    let scratch = Scratch::new("restarted-pipes-leap");
+    let graph = scratch.file("g.toml", SECONDS);
+    for more in [&[][..], &[&"--watch" as &dyn AsRef<std::ffi::OsStr>]] {
+        let state = scratch.path(&format!("state{}", more.len()));
+        run(&graph, &state, more, &log("time_s", &["0", "10"])).ended(0);
+        let second = run(&graph, &state, more, &log("time_s", &["99999", "30", "40"])).ended(0);
+        assert_eq!(times(&second.out), ["30", "40"]);
+        second.tells(&["the time `99999` is far after `10 s`, and the next one, `30`, is not"]);
+        let third = run(&graph, &state, more, &log("time_s", &["50", "60"])).ended(0);
+        assert_eq!(times(&third.out), ["50", "60"]);
+        // After a gap the rows say the same.
+        let after = run(&graph, &state, more, &log("time_s", &["9000", "9010"])).ended(0);
+        assert_eq!(times(&after.out), ["9000", "9010"]);
+        // A single row does not say how far apart rows are.
+        let single = run(&graph, &state, more, &log("time_s", &["9900"])).ended(0);
+        assert_eq!(times(&single.out), ["9900"]);
+        // A log that is given again from its beginning tells nothing of its time.
+        let again = ["0", "10", "30", "9900", "9910"];
+        let again = run(&graph, &state, more, &log("time_s", &again)).ended(0);
+        assert_eq!(times(&again.out), ["9910"]);
+        assert!(!again.told.contains("warning"), "{}", again.told);
+    }
+}
