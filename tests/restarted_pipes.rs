@@ -26,6 +26,14 @@ signals.room = { unit = "Cel", channels = ["a"], max_age = "1min" }
 outputs.room = "room"
 "#;
 
+/// Two temperatures, of which a line may have either.
+const BOTH: &str = r#"
+schema = 1
+name = "both"
+signals.room = { unit = "Cel", channels = ["a", "b"], max_age = "1min" }
+outputs.room = "room"
+"#;
+
 /// Runs a graph on rows of a pipe, with a state and more options.
 fn run(graph: &Path, state: &Path, more: &[&dyn AsRef<std::ffi::OsStr>], text: &str) -> Finished {
     let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
@@ -139,4 +147,25 @@ fn the_first_row_after_a_restart_is_guarded_against_a_wrong_time_as_any_other() 
         assert_eq!(times(&again.out), ["9910"]);
         assert!(!again.told.contains("warning"), "{}", again.told);
     }
+}
+
+#[test]
+fn lines_that_end_before_each_key_has_come_once_end_a_live_run_in_order() {
+    let scratch = Scratch::new("restarted-pipes-keys");
+    let graph = scratch.file("g.toml", BOTH);
+    for more in [&[][..], &[&"--watch" as &dyn AsRef<std::ffi::OsStr>]] {
+        let state = scratch.path(&format!("state{}", more.len()));
+        let first = "{\"time_s\":0,\"a\":1}\n{\"time_s\":1,\"a\":2}\n";
+        let first = run(&graph, &state, more, first).ended(0);
+        assert_eq!(times(&first.out), ["0", "1"]);
+        assert_eq!(first.told.matches("there is no column `b`").count(), 1);
+        first.tells(&["(missing until a line has it)"]);
+        let second = "{\"time_s\":1,\"a\":2}\n{\"time_s\":2,\"b\":2}\n";
+        let second = run(&graph, &state, more, second).ended(0);
+        assert_eq!(times(&second.out), ["2"], "{}", second.told);
+    }
+    // A file has an end by which to tell that the key is misspelt.
+    let file = scratch.file("log.jsonl", "{\"time_s\":0,\"a\":1,\"bb\":1}\n");
+    let told = athermal(&[&"run", &graph, &"-i", &file]).ended(2);
+    told.tells(&["there is no column `b`", "did you mean `bb`?"]);
 }

@@ -148,7 +148,7 @@ impl Reader {
     ///
     /// # Errors
     /// A cell, row or line that cannot be read, with its place, unless [`Options::lenient`]; at the end of JSON lines also
-    /// a channel that no line had.
+    /// a channel that no line had, unless that was told at once ([`Reader::tell_first`]).
     pub fn next_into(&mut self, row: &mut Row) -> Result<bool, FileError> {
         let Self {
             rows,
