@@ -169,3 +169,66 @@ fn lines_that_end_before_each_key_has_come_once_end_a_live_run_in_order() {
     let told = athermal(&[&"run", &graph, &"-i", &file]).ended(2);
     told.tells(&["there is no column `b`", "did you mean `bb`?"]);
 }
+
+#[test]
+fn a_run_that_ends_on_a_row_that_cannot_be_read_keeps_what_it_knows() {
+    let scratch = Scratch::new("restarted-pipes-unreadable");
+    let graph = scratch.file("g.toml", SECONDS);
+    for more in [&[][..], &[&"--watch" as &dyn AsRef<std::ffi::OsStr>]] {
+        let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
+        let _ = (std::fs::remove_file(&state), std::fs::remove_file(&out));
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"-o", &out];
+        arguments.extend(more);
+        let first = "time_s,a\n0,1\n1,1\n2,1\nnever,1\n3,1\n";
+        let first = run(&graph, &state, &arguments, first).ended(2);
+        first.tells(&["expected a decimal number, found `never`"]);
+        assert_eq!(
+            times(&std::fs::read_to_string(&out).unwrap()),
+            ["0", "1", "2"]
+        );
+        let second = run(&graph, &state, &arguments, "time_s,a\n1,1\n2,1\n3,1\n").ended(0);
+        second.tells(&["the row of 1 was seen by the run before"]);
+        assert!(!second.told.contains("warning"), "{}", second.told);
+        assert_eq!(
+            times(&std::fs::read_to_string(&out).unwrap()),
+            ["0", "1", "2", "3"]
+        );
+    }
+}
+
+#[test]
+fn a_run_tells_that_its_output_does_not_end_where_the_run_before_did() {
+    let scratch = Scratch::new("restarted-pipes-apart");
+    let graph = scratch.file("g.toml", SECONDS);
+    let (state, out) = (scratch.path("state"), scratch.path("out.csv"));
+    let to: [&dyn AsRef<std::ffi::OsStr>; 2] = [&"-o", &out];
+    run(&graph, &state, &to, "time_s,a\n0,1\n").ended(0);
+    let kept = std::fs::read(&state).unwrap();
+    run(&graph, &state, &to, "time_s,a\n10,1\n20,1\n").ended(0);
+    // As after a kill: rows stand there of which the state knows nothing, and the pipe goes on behind them.
+    std::fs::write(&state, &kept).unwrap();
+    let ahead = run(&graph, &state, &to, "time_s,a\n30,1\n").ended(0);
+    ahead.tells(&[
+        "warning: ",
+        "out.csv: its last row is 20s after what the run before kept: what this run does not read again of that time it does not know",
+    ]);
+    // A file is read again.
+    std::fs::write(&state, kept).unwrap();
+    let log = scratch.file("log.csv", "time_s,a\n0,1\n10,1\n20,1\n30,1\n40,1\n");
+    let whole = athermal(&[&"run", &graph, &"-i", &log, &"--state", &state, &"-o", &out]);
+    assert!(!whole.ended(0).told.contains("warning"));
+    for gone in [None, Some("time_s,room.a\n")] {
+        match gone {
+            None => std::fs::remove_file(&out).unwrap(),
+            Some(header) => std::fs::write(&out, header).unwrap(),
+        }
+        let told = run(&graph, &state, &to, "time_s,a\n40,1\n").ended(0);
+        told.tells(&[
+            "warning: ",
+            "out.csv: none of the rows up to 40 s stand there, which the run before saw: what was predicted stands in another file, or \
+             is lost",
+        ]);
+    }
+    let elsewhere = run(&graph, &state, &[], "time_s,a\n40,1\n").ended(0);
+    assert!(!elsewhere.told.contains("warning"), "{}", elsewhere.told);
+}

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use athermal::core::compile::{Plan, SourceChannel, Wanted};
 use athermal::core::document::{NO_FILE, lasts};
 use athermal::core::engine::SampleRange;
-use athermal::core::live::{self, Frame, LiveOptions, Samples, Sink, Source, pair_from};
+use athermal::core::live::{self, Frame, LiveOptions, RunError, Samples, Sink, Source, pair_from};
 use athermal::core::recording::Event;
 use athermal::diagnosis::feedback;
 use athermal::files::{
@@ -132,8 +132,14 @@ impl Run {
         let mut sensors = Sensors::new(terminal, &mut ranged, &plan, !self.ends());
         let mut keep = |engine: &Engine, sink: &mut dyn Sink| kept.after_tick(engine, &model, sink);
         let mut heard = Heard::of(&mut writer);
-        live::run_keeping(&mut engine, &mut sensors, &mut heard, &mut keep)?;
-        kept.end(&engine, &model, &mut heard).map_err(outside)?;
+        let ended = live::run_keeping(&mut engine, &mut sensors, &mut heard, &mut keep);
+        // Also where something cannot be read: what came before it is known, and is out.
+        let kept_on = match ended {
+            Ok(()) | Err(RunError::Source(_)) => kept.end(&engine, &model, &mut heard),
+            Err(_) => Ok(()),
+        };
+        ended?;
+        kept_on.map_err(outside)?;
         heard.end(terminal, &engine);
         sensors.end();
         self.tell(terminal, &engine, heard.rows(), &reader, usual);
@@ -220,7 +226,12 @@ impl Run {
         let mut shown = vec![f64::NAN; names.len()];
         let mut samples = Samples::default();
         let mut places = (std::ptr::null(), Vec::new());
-        while let Some(event) = sensors.next(&mut samples).map_err(outside)? {
+        let read = loop {
+            let event = match sensors.next(&mut samples) {
+                Ok(Some(event)) => event,
+                Ok(None) => break Ok(()),
+                Err(error) => break Err(error),
+            };
             let Event::Row(time) = event else {
                 stepper.segment();
                 continue;
@@ -257,10 +268,12 @@ impl Run {
             heard.put(&frame).map_err(outside)?;
             let kept_on = kept.after_tick(stepper.engine(), course.running(), &mut heard);
             kept_on.map_err(outside)?;
-        }
-        heard.finish().map_err(outside)?;
-        let ended = kept.end(stepper.engine(), course.running(), &mut heard);
-        ended.map_err(outside)?;
+        };
+        let finished = heard.finish();
+        // Also where something cannot be read: what came before it is known, and is out.
+        let ended =
+            finished.and_then(|()| kept.end(stepper.engine(), course.running(), &mut heard));
+        read.and(ended).map_err(outside)?;
         course.end(&mut control);
         sensors.end();
         let engine = stepper.engine();
@@ -360,6 +373,18 @@ impl Run {
             (Some(last), Some(seen)) if last < seen => terminal.warning(format_args!(
                 "{output}: its last row is {} before what the run before saw last: what was predicted between stands in another file, or is lost",
                 length(seen - last)
+            )),
+            (Some(last), Some(seen)) if last > seen && !self.ends() => {
+                terminal.warning(format_args!(
+                    "{output}: its last row is {} after what the run before kept: what this run does not read again of that time it \
+                     does not know",
+                    length(last - seen)
+                ));
+            }
+            (None, Some(seen)) if self.output.is_file() => terminal.warning(format_args!(
+                "{output}: none of the rows up to {} stand there, which the run before saw: what was predicted stands in another file, or \
+                 is lost",
+                instant(seconds(seen))
             )),
             (Some(last), None) => terminal.warning(format_args!(
                 "{output}: rows of a run before stand there and stay, though this one begins cold: none up to the last of them, of {}, is \
