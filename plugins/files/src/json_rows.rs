@@ -393,6 +393,12 @@ mod tests {
     }
 
     #[test]
+    fn files_with_a_mark_that_are_put_behind_each_other_are_read_as_one() {
+        let line = |t: u32| format!("\u{feff}{{\"t\":{t},\"a\":1,\"b\":2}}\n");
+        assert_eq!(read(&(line(0) + &line(1))), "0 [1.0, 2.0]; 1 [1.0, 2.0]");
+    }
+
+    #[test]
     fn null_and_a_missing_key_are_no_value() {
         assert_eq!(
             read("{\"t\":0,\"a\":null}\n{\"t\":1,\"b\":2,\"a\":1}\n{\"t\":2}\n"),

@@ -1,5 +1,5 @@
 //! Lines of a byte stream, each as soon as it is there, in constant memory, in UTF-8 also where the stream begins with a
-//! mark that says UTF-16. Not what a line means, save that blank lines and comments mean nothing.
+//! mark that says UTF-16. Not what a line means, save that blank lines, comments and the mark of UTF-8 mean nothing.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -16,6 +16,9 @@ pub(crate) const LONGEST_ROW: usize = 1 << 20;
 
 /// Bytes read ahead, or held back when writing, at most.
 pub(crate) const BUFFER: usize = 64 * 1024;
+
+/// What begins a text in UTF-8 that says so. Where files are put behind each other it begins a line.
+pub(crate) const MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// What `-` is called where something is told of it.
 pub const STANDARD_INPUT: &str = "standard input";
@@ -103,6 +106,9 @@ impl Lines {
         }
         self.number += 1;
         self.is_cut_short = self.line.len() > LONGEST_ROW && !self.is_complete();
+        if self.line.starts_with(MARK) && !self.is_cut_short {
+            self.line.drain(..MARK.len());
+        }
         self.check_length()
     }
 
@@ -241,6 +247,17 @@ mod tests {
         let mut lines = lines(&b"\xef\xbb\xbf# made by hand\n\r\n  # more\n \t\na,b\r\n"[..]);
         assert!(lines.advance_to_content().unwrap());
         assert_eq!((lines.text(), lines.number()), (&b"a,b\r\n"[..], 5));
+        assert!(!lines.advance_to_content().unwrap());
+    }
+
+    #[test]
+    fn the_mark_that_begins_a_file_in_utf_8_is_left_out_wherever_it_begins_a_line() {
+        let text = "\u{feff}a\n\u{feff}b\u{feff}\n\u{feff}\n\u{feff}c";
+        let mut lines = lines(text.as_bytes());
+        for expected in ["a\n", "b\u{feff}\n", "c"] {
+            assert!(lines.advance_to_content().unwrap());
+            assert_eq!(lines.text(), expected.as_bytes());
+        }
         assert!(!lines.advance_to_content().unwrap());
     }
 
