@@ -6,6 +6,7 @@ use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
 use crate::cell::{self, is_number, trim};
 use crate::cells::Cells;
 use crate::columns::{self, Columns};
+use crate::glued::names_behind;
 use crate::header::{self, Head};
 use crate::ledger::{Ledger, Report};
 use crate::lines::{LONGEST_ROW, Lines};
@@ -54,8 +55,8 @@ enum Record {
     },
     /// The stream ends within a quoted cell, and within a line.
     Cut,
-    /// A quoted cell does not end: the row is its first line, and those after it are read anew.
-    Unclosed,
+    /// A quoted cell does not end: the row is its first line, which is this, and those after it are read anew.
+    Unclosed(Vec<u8>),
 }
 
 /// How many rows are looked at to tell why a column is missing.
@@ -132,7 +133,7 @@ impl CsvRows {
         };
         let cells = match rows.read_record()? {
             Record::Row { cells, .. } => cells,
-            Record::Unclosed | Record::Cut => {
+            Record::Unclosed(_) | Record::Cut => {
                 return Err(FileError::UnclosedQuote {
                     place: rows.place(),
                 });
@@ -244,8 +245,9 @@ impl CsvRows {
             is_number(&text) && !self.names.iter().any(|name| *name == text)
         };
         let is_above = self.above.contains(&columns::name(self.column(0)));
-        if (0..cells).any(is_value) {
-            return Ok(is_above);
+        if let Some(last) = (0..cells).rev().find(|&at| is_value(at)) {
+            let is_behind = !is_above && ledger.is_lenient();
+            return Ok(is_above || is_behind && self.takes_names_behind(cells, last, ledger)?);
         }
         let mut names = self.current(cells);
         if self.is_comment() {
@@ -259,6 +261,13 @@ impl CsvRows {
         }
         if !lacking.is_empty() && !self.lines.is_complete() {
             ledger.report.truncated = Some(self.place());
+            return Ok(true);
+        }
+        if !lacking.is_empty()
+            && ledger.is_lenient()
+            && let Some(names) = self.names_behind()
+        {
+            self.take_names_behind(names, ledger)?;
             return Ok(true);
         }
         let unusable = match columns::check_unique(&names, || self.place()) {
@@ -287,6 +296,62 @@ impl CsvRows {
             self.doubted = Some(again);
         }
         Ok(true)
+    }
+
+    /// All names that are known, where they stand behind the beginning of a row in the current line.
+    fn names_behind(&self) -> Option<Vec<String>> {
+        names_behind(self.lines.text(), self.delimiter, &self.names)
+    }
+
+    /// Takes the columns by names that stand behind the beginning of a row, up to its last value, if they do. Where they are not those
+    /// known before, it is not known where rows from here on have what.
+    fn takes_names_behind(
+        &mut self,
+        cells: usize,
+        last: usize,
+        ledger: &mut Ledger,
+    ) -> Result<bool, FileError> {
+        if let Some(names) = self.names_behind() {
+            self.take_names_behind(names, ledger)?;
+            return Ok(true);
+        }
+        let names = self.current(cells).split_off(last + 1);
+        let moved = self.layout.as_ref().is_some_and(|layout| {
+            let columns = Columns::of(layout, &names);
+            columns.are_named(layout) && !columns.agree_with(&self.columns)
+        });
+        if moved {
+            ledger.refuse_row(|| FileError::HeaderBehind {
+                place: self.place(),
+                taken: false,
+            })?;
+            self.columns.time.fill(None);
+        }
+        Ok(moved)
+    }
+
+    fn take_names_behind(
+        &mut self,
+        names: Vec<String>,
+        ledger: &mut Ledger,
+    ) -> Result<(), FileError> {
+        ledger.refuse_row(|| FileError::HeaderBehind {
+            place: self.place(),
+            taken: true,
+        })?;
+        let Some(layout) = &self.layout else {
+            return Ok(());
+        };
+        let columns = Columns::of(layout, &names);
+        let lacking = columns.lacking(layout).into_iter().map(str::to_owned);
+        let again = NamesAgain {
+            place: self.place(),
+            lacking: lacking.collect(),
+            names,
+            columns,
+        };
+        self.take_names(again, ledger);
+        Ok(())
     }
 
     /// Takes the columns by these names from here on.
@@ -380,12 +445,14 @@ impl CsvRows {
     }
 
     /// Leaves only the first of these lines to a row whose quoted cell began in it, and gives the others and the current one again.
-    fn unclosed(&mut self, mut before: Vec<(u64, Vec<u8>)>) -> Record {
-        let mut after = before.split_off(1);
+    fn unclosed(&mut self, before: Vec<(u64, Vec<u8>)>) -> Record {
+        let mut lines = before.into_iter();
+        let (_, first) = lines.next().unwrap_or_default();
+        let mut after: Vec<_> = lines.collect();
         after.extend(self.lines.take_any());
         self.lines.hold(after);
         self.splitter.reset();
-        Record::Unclosed
+        Record::Unclosed(first)
     }
 
     /// Goes to the next line of a quoted cell that began within these. It does not go on for long, nor in what is a row by itself.
@@ -471,10 +538,14 @@ impl Cells for CsvRows {
                     ledger.report.truncated = Some(self.place());
                     return Ok(false);
                 }
-                Ok(Record::Unclosed) => {
-                    ledger.refuse_row(|| FileError::UnclosedQuote {
-                        place: self.place(),
-                    })?;
+                Ok(Record::Unclosed(line)) => {
+                    let behind = names_behind(&line, self.delimiter, &self.names);
+                    match behind.filter(|_| ledger.is_lenient()) {
+                        Some(names) => self.take_names_behind(names, ledger)?,
+                        None => ledger.refuse_row(|| FileError::UnclosedQuote {
+                            place: self.place(),
+                        })?,
+                    }
                     continue;
                 }
                 Err(error) if error.is_of_line() => {

@@ -233,6 +233,13 @@ pub enum FileError {
         /// Those that must be there and are not; only when reading leniently.
         lacking: Vec<String>,
     },
+    /// The names of the columns stand behind the beginning of a row; only when reading leniently.
+    HeaderBehind {
+        /// The row.
+        place: Place,
+        /// Whether they are those known before, and values are taken by them.
+        taken: bool,
+    },
     /// The log has a row for each value.
     LongFormat {
         /// The header.
@@ -316,6 +323,7 @@ impl FileError {
             | Self::TimeLeaps { place, .. }
             | Self::TimeStaysBehind { place, .. }
             | Self::HeaderAgain { place, .. }
+            | Self::HeaderBehind { place, .. }
             | Self::LongFormat { place, .. }
             | Self::CellCount { place, .. }
             | Self::BadObject { place, .. }

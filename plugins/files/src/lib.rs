@@ -34,6 +34,7 @@ mod decimal;
 mod description;
 mod error;
 mod format;
+mod glued;
 mod header;
 mod instant;
 mod joined;

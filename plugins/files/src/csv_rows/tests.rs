@@ -1,3 +1,4 @@
+mod behind;
 mod lines;
 
 use crate::{FileError, Layout, Options, Reader, Row, TimeForm};

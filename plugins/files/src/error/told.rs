@@ -303,6 +303,18 @@ impl FileError {
                     }
                 }
             }
+            Self::HeaderBehind { place, taken } => {
+                write!(
+                    f,
+                    "{place}: the names of the columns stand here behind the beginning of a row, which was left out"
+                )?;
+                match taken {
+                    true => Ok(()),
+                    false => f.write_str(
+                        "; since they are not those from before, no row is taken until a line of its own names the columns",
+                    ),
+                }
+            }
             Self::LongFormat { place, long } => write!(f, "{place}: {long}"),
             Self::CellCount {
                 place,
