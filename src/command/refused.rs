@@ -44,6 +44,7 @@ fn facts(error: &FileError) -> (&'static str, Value) {
         FileError::BadCell { column, found, .. } | FileError::MixedMarks { column, found, .. } => {
             (CELLS, json!({ "column": column, "found": found }))
         }
+        FileError::StaysUnreadable { newest, .. } => facts(newest),
         FileError::HeaderAgain { .. } => ("header_again", json!({})),
         FileError::MissingColumns { missing, .. } => {
             let columns: Vec<_> = missing.iter().map(|of| &of.name).collect();

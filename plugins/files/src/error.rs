@@ -224,6 +224,13 @@ pub enum FileError {
         /// The newest time before them.
         previous: String,
     },
+    /// Rows that cannot be read, and none since the last one that was taken that can; told only while the recording is read leniently.
+    StaysUnreadable {
+        /// What is wrong with the newest of them.
+        newest: Box<FileError>,
+        /// How many they are.
+        rows: u64,
+    },
     /// A row within a recording that names its columns again.
     HeaderAgain {
         /// The row.
@@ -305,6 +312,7 @@ impl FileError {
             | Self::Empty { .. }
             | Self::NotBegun { .. }
             | Self::ValueCount { .. } => None,
+            Self::StaysUnreadable { newest, .. } => newest.place(),
             Self::Read { place, .. }
             | Self::NotText { place }
             | Self::TooLong { place, .. }

@@ -70,8 +70,7 @@ fn other_mark(known: &mut Mark, number: &[u8], line: impl FnOnce() -> u64) -> Ma
 /// Who is told at once of what is met for the first time.
 pub(crate) type Tell = Box<dyn FnMut(&FileError) + Send>;
 
-/// Whether so many rows, one after the other, that are not after the one before are worth another word: nothing comes of the data
-/// while it goes on. That is at 10, 100 and so on.
+/// Whether so many rows, one after the other, that are left out are worth another word: nothing comes of the data while it goes on. That is at 10, 100 and so on.
 fn stays_behind(rows: u64) -> bool {
     rows >= 10 && 10_u64.pow(rows.ilog10()) == rows
 }
@@ -110,6 +109,8 @@ pub(crate) struct Ledger {
     step_ns: i64,
     /// How many rows one after the other were not after it.
     behind: u64,
+    /// How many rows since then could not be read.
+    unreadable: u64,
     /// The time cell of the row at that instant; before the first row, what was read before says of it.
     last_time: Vec<u8>,
     /// The decimal mark of the first time that has one, with its line.
@@ -131,6 +132,7 @@ impl Ledger {
             last_ns: None,
             step_ns: 0,
             behind: 0,
+            unreadable: 0,
             last_time: Vec::new(),
             time_mark: None,
             value_mark: None,
@@ -199,7 +201,7 @@ impl Ledger {
         let last_ns = self.last_ns.or(self.before_ns).unwrap_or(time_ns);
         self.step_ns = time_ns.saturating_sub(last_ns).max(0);
         self.last_ns = Some(time_ns);
-        self.behind = 0;
+        (self.behind, self.unreadable) = (0, 0);
         self.last_time.clear();
         self.last_time.extend_from_slice(cell);
         self.report.rows += 1;
@@ -327,7 +329,16 @@ impl Ledger {
         if !self.lenient {
             return Err(error());
         }
-        self.report.refused_rows.add(error, &mut self.tell);
+        self.unreadable += 1;
+        let (refused, rows) = (&mut self.report.refused_rows, self.unreadable);
+        match &mut self.tell {
+            Some(tell) if stays_behind(rows) => {
+                refused.count += 1;
+                let newest = Box::new(error());
+                tell(&FileError::StaysUnreadable { newest, rows });
+            }
+            tell => refused.add(error, tell),
+        }
         Ok(())
     }
 }
@@ -375,5 +386,46 @@ mod tests {
         assert_eq!(reader.report().refused_time.count, 150);
         assert_eq!(reader.report().repeated_time.count, 1);
         assert_eq!(reader.report().rows, 5);
+    }
+
+    #[test]
+    fn rows_that_cannot_be_read_are_told_again_and_again_while_nothing_comes_of_them() {
+        let rows = |count: u32, from: u32| -> String {
+            let broken = (0..count).map(|nth| format!("{},x,1\n", from + nth));
+            broken.chain([format!("{},1\n", from + count)]).collect()
+        };
+        let text = format!("t,a\n0,1\n{}{}", rows(150, 1), rows(12, 1000));
+        let layout = Layout::new("t", TimeForm::SECONDS, ["a"]);
+        let options = Options {
+            lenient: true,
+            ..Options::default()
+        };
+        let text = std::io::Cursor::new(text.into_bytes());
+        let mut reader = Reader::from_read("pipe", text, layout, options).unwrap();
+        let told = Arc::new(Mutex::new(Vec::new()));
+        reader.tell_first({
+            let told = Arc::clone(&told);
+            move |error| told.lock().unwrap().push(error.to_string())
+        });
+        let mut row = Row::default();
+        while reader.next_into(&mut row).unwrap() {}
+        let first = "pipe:3: 3 cells where the header has 2; correct the row, or read leniently (`--lenient`) to leave it out";
+        let stays = |line: u32, rows: u32| {
+            format!(
+                "pipe:{line}: 3 cells where the header has 2; correct the row; {rows} rows could not be read and were left out since the \
+                 last one that was taken"
+            )
+        };
+        assert_eq!(
+            *told.lock().unwrap(),
+            [
+                first.to_owned(),
+                stays(12, 10),
+                stays(102, 100),
+                stays(163, 10)
+            ]
+        );
+        assert_eq!(reader.report().refused_rows.count, 162);
+        assert_eq!(reader.report().rows, 3);
     }
 }

@@ -314,7 +314,9 @@ impl Run {
                     let words = format_args!("{first} (missing until a line has it)");
                     refused::message(first, None, words)
                 }
-                FileError::TimeStaysBehind { .. } | FileError::HeaderAgain { moved: true, .. } => {
+                FileError::TimeStaysBehind { .. }
+                | FileError::StaysUnreadable { .. }
+                | FileError::HeaderAgain { moved: true, .. } => {
                     refused::message(first, None, first)
                 }
                 _ => {

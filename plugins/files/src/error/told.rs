@@ -285,6 +285,13 @@ impl FileError {
                 "{place}: the last {rows} rows were all left out, up to the time `{time}`, since `{previous}` came before them: has the \
                  clock been set back, or was that time wrong? Rows are taken again once they are after it"
             ),
+            Self::StaysUnreadable { newest, rows } => {
+                newest.tell(f, false)?;
+                write!(
+                    f,
+                    "; {rows} rows could not be read and were left out since the last one that was taken"
+                )
+            }
             Self::HeaderAgain {
                 place,
                 moved,
