@@ -260,9 +260,13 @@ fn an_output_that_no_run_like_it_wrote_is_left_as_it_is() {
         (
             "time.csv",
             "time_s,predicted.X,predicted.Y\nnever,1,2\n",
-            "found `never`",
+            "wrote it: its last line: column `time_s`: expected a decimal number, found `never`",
         ),
-        ("text.jsonl", "once\n", "an object"),
+        (
+            "text.jsonl",
+            "once\n",
+            "wrote it: its last line: it is no JSON object",
+        ),
         ("line.csv", "a note of mine", "it has no whole line"),
         (
             "keys.jsonl",

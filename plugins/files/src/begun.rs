@@ -42,10 +42,25 @@ impl Begun {
             file: file.clone(),
             reason,
         };
+        // Only a part of the file is read, whose lines are counted from where it begins.
+        let of_line = |line: &str, error: FileError| {
+            let told = match (&error, format) {
+                (FileError::Empty { .. }, Format::Csv) => "it names no columns".to_owned(),
+                (FileError::Empty { .. }, Format::JsonLines) => "it is no JSON object".to_owned(),
+                _ => error.to_string(),
+            };
+            let place = error.place().map(|place| format!("{place}: "));
+            let what = place.and_then(|place| told.strip_prefix(&place));
+            other(format!("{line}: {}", what.unwrap_or(&told)))
+        };
         let ends = ends.ok_or_else(|| other("it has no whole line".to_owned()))?;
         let expected = [&[time.columns.title()], columns].concat();
         let found = ends.names(format);
-        let found = found.map_err(|error| other(error.to_string()))?;
+        let named = match format {
+            Format::Csv => FIRST_LINE,
+            Format::JsonLines => LAST_LINE,
+        };
+        let found = found.map_err(|error| of_line(named, error))?;
         if found != expected {
             return Err(other(format!(
                 "its columns are {} and not {}",
@@ -62,7 +77,7 @@ impl Begun {
         let last = rows
             .map(|rows| last_row(&file, rows, format, &time))
             .transpose()
-            .map_err(|error| other(error.to_string()))?
+            .map_err(|error| of_line(LAST_LINE, error))?
             .flatten();
         let last_ns = match last {
             Some(last) if later(&time, &last.time_text) != Some(last.time_ns) => {
@@ -103,6 +118,10 @@ pub fn begun_columns(path: &Path) -> Option<Vec<String>> {
     let format = Format::from_path(path).unwrap_or(Format::Csv);
     ends.names(format).ok()
 }
+
+/// What lines are called where one of them is no such as a run wrote.
+const FIRST_LINE: &str = "its first line";
+const LAST_LINE: &str = "its last line";
 
 /// The first and the last whole line of a file; `of` gives none where there is no whole line.
 struct Ends {
@@ -196,14 +215,14 @@ impl Ends {
     }
 
     fn csv_names(&self) -> Result<Vec<String>, FileError> {
-        let lines = Lines::new("its first line".into(), Cursor::new(self.first.clone()));
+        let lines = Lines::new(FIRST_LINE.into(), Cursor::new(self.first.clone()));
         let rows = CsvRows::headed(lines, Some(b','), None)?;
         Ok(rows.names().to_vec())
     }
 
     fn json_names(&self) -> Result<Vec<String>, FileError> {
         let line = Cursor::new(self.last.clone());
-        Ok(Description::of_read("its last line", line, Some(Format::JsonLines), 1)?.columns)
+        Ok(Description::of_read(LAST_LINE, line, Some(Format::JsonLines), 1)?.columns)
     }
 }
 
