@@ -208,8 +208,8 @@ pub enum FileError {
         place: Place,
         /// Its time, as the file gives it.
         time: String,
-        /// The time before it.
-        previous: String,
+        /// The time before it; none where it is the first.
+        previous: Option<String>,
         /// The time after it, if a row follows.
         next: Option<String>,
     },

@@ -13,7 +13,7 @@ pub struct Report {
     /// Rows given.
     pub rows: u64,
     /// Rows left out because their time was before the one before ([`FileError::TimeNotAfter`]), or far after it and after the next
-    /// one too, or without a next one ([`FileError::TimeLeaps`]).
+    /// one too, or without a next one, or of the first row of a file after the next alone ([`FileError::TimeLeaps`]).
     pub refused_time: Count,
     /// Rows left out because their time was that of the row before ([`FileError::TimeAgain`]).
     pub repeated_time: Count,
@@ -105,6 +105,10 @@ pub(crate) struct Ledger {
     /// The last instant known before the first row, if anything was read before this.
     before_ns: Option<i64>,
     last_ns: Option<i64>,
+    /// Where the first row stands, while the next may show that its time is wrong.
+    first: Option<Place>,
+    /// Whether that was shown by the row taken last.
+    first_is_wrong: bool,
     /// How long after the one before it that was.
     step_ns: i64,
     /// How many rows one after the other were not after it.
@@ -130,6 +134,8 @@ impl Ledger {
             unusable_headers: Count::default(),
             before_ns: None,
             last_ns: None,
+            first: None,
+            first_is_wrong: false,
             step_ns: 0,
             behind: 0,
             unreadable: 0,
@@ -207,6 +213,42 @@ impl Ledger {
         self.report.rows += 1;
     }
 
+    /// Lets the time of the first row, where it has just been taken and is held, be doubted until the next.
+    #[inline]
+    pub fn doubt_first(&mut self, place: impl FnOnce() -> Place) {
+        self.first = None;
+        if self.joins && self.report.rows == 1 && self.report.refused_time.count == 0 {
+            self.first = Some(place());
+        }
+    }
+
+    /// Leaves out the first row, since it is far after the next one, by its time cell and instant; whether it is.
+    #[cold]
+    pub fn refuse_first(&mut self, time_ns: i64, cell: &[u8]) -> bool {
+        let is_far = |last_ns: i64| last_ns.saturating_sub(time_ns) > LEAP_NS;
+        let is_wrong = self.report.rows == 1 && self.last_ns.is_some_and(is_far);
+        let Some(place) = self.first.take().filter(|_| is_wrong) else {
+            return false;
+        };
+        let error = || FileError::TimeLeaps {
+            place,
+            time: excerpt(&self.last_time),
+            previous: None,
+            next: Some(excerpt(cell)),
+        };
+        self.report.refused_time.add(error, &mut self.tell);
+        self.report.rows -= 1;
+        self.last_ns = None;
+        self.first_is_wrong = true;
+        true
+    }
+
+    /// Whether the row taken last has shown that the time of the first is wrong; told once.
+    #[inline]
+    pub fn takes_place_of_first(&mut self) -> bool {
+        std::mem::take(&mut self.first_is_wrong)
+    }
+
     /// Leaves out a row that is not put together with the last one, whose time it has.
     #[cold]
     pub fn refuse_again(&mut self, cell: &[u8], place: impl FnOnce() -> Place, why: Again) {
@@ -253,7 +295,7 @@ impl Ledger {
         let error = || FileError::TimeLeaps {
             place,
             time: excerpt(cell),
-            previous: excerpt(&self.last_time),
+            previous: Some(excerpt(&self.last_time)),
             next: next.map(excerpt),
         };
         self.report.refused_time.add(error, &mut self.tell);

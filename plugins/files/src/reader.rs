@@ -50,8 +50,10 @@ pub struct Row {
 /// A row is left out and counted when its time is not after the one before, save one of the same time that is put together with it
 /// ([`Options::joins`]). One that leaps, by more than five minutes and more than
 /// thirty times the step before, waits for the next row: it is left out and counted when that lies between the two, since then
-/// its time is wrong and no row after it is to be lost; so is it when no row follows, unless it is the second. A last line without an end that lacks cells
-/// (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never an error.
+/// its time is wrong and no row after it is to be lost; so is it when no row follows, unless it is the second. Where rows are put
+/// together the first one waits too, and is left out and counted when it is more than five minutes after the next. A last line without
+/// an end that lacks cells (CSV) or is no whole object (JSON lines) was cut off while it was written: it is left out and reported, never
+/// an error.
 pub struct Reader {
     rows: Rows,
     layout: Layout,
@@ -216,6 +218,13 @@ fn next_joined<C: Cells>(
             _ => None,
         };
         let read = next(rows, layout, ledger, ahead, &mut held.row);
+        if ledger.takes_place_of_first() {
+            if !matches!(read, Ok(true)) {
+                return read;
+            }
+            std::mem::swap(row, &mut held.row);
+            continue;
+        }
         if matches!(read, Ok(true)) && held.row.time_ns == row.time_ns {
             let place = || stands.unwrap_or_else(|| rows.place());
             match joined::join(&mut row.values, &held.row.values) {
@@ -257,7 +266,10 @@ fn next<C: Cells>(
             return next_doubted(rows, layout, ledger, ahead, doubted, row);
         }
         Some(Follows::Again) => {}
-        Some(_) => ledger.take(row.time_ns, cell::trim(rows.time())),
+        Some(_) => {
+            ledger.take(row.time_ns, cell::trim(rows.time()));
+            ledger.doubt_first(|| rows.place());
+        }
     }
     Ok(true)
 }
@@ -307,10 +319,14 @@ fn read<C: Cells>(
         let Some(time_ns) = read_time(rows, layout, ledger, &mut row.time_text)? else {
             continue;
         };
-        let follows = ledger.follows(time_ns);
+        let mut follows = ledger.follows(time_ns);
         if ledger.refuses(follows) {
-            ledger.refuse(follows, cell::trim(rows.time()), || rows.place());
-            continue;
+            let cell = cell::trim(rows.time());
+            if !ledger.refuse_first(time_ns, cell) {
+                ledger.refuse(follows, cell, || rows.place());
+                continue;
+            }
+            follows = Follows::Next;
         }
         row.time_ns = time_ns;
         read_values(rows, layout, ledger, &mut row.values)?;

@@ -264,16 +264,18 @@ impl FileError {
                 previous,
                 next,
             } => {
-                write!(
-                    f,
-                    "{place}: the time `{time}` is far after `{previous}`, and "
-                )?;
-                match next {
-                    Some(next) => write!(f, "the next one, `{next}`, is not; the row was left out"),
-                    None => f.write_str(
-                        "no row follows by which to tell a gap from a wrong time; the row was left out",
-                    ),
+                write!(f, "{place}: the time `{time}` is far after ")?;
+                if let Some(previous) = previous {
+                    write!(f, "`{previous}`, and ")?;
                 }
+                match (next, previous) {
+                    (Some(next), Some(_)) => write!(f, "the next one, `{next}`, is not")?,
+                    (Some(next), None) => write!(f, "the next one, `{next}`")?,
+                    (None, _) => {
+                        f.write_str("no row follows by which to tell a gap from a wrong time")?
+                    }
+                }
+                f.write_str("; the row was left out")
             }
             Self::TimeStaysBehind {
                 place,
