@@ -255,3 +255,57 @@ fn reader(
     };
     Reader::from_read(file, rows, layout, options)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2026-10-25T00:00:00Z, when it is two o'clock in Berlin; an hour later the clocks go back to two.
+    const AUTUMN_S: i64 = 1_792_886_400;
+
+    /// What is found of a file with rows at these times, in s since then, up to where its rows were read.
+    fn last(name: &str, times: impl Iterator<Item = i64>, seen_s: Option<i64>) -> i64 {
+        let clock = |at: i64| {
+            let at = at + if at < 3600 { 7200 } else { 3600 };
+            let (hours, minutes) = (at / 3600, at / 60 % 60);
+            format!("2026-10-25 {hours:02}:{minutes:02}:{:02}", at % 60)
+        };
+        // Wide enough for two hours of seconds to be more than is looked at first.
+        let value = format!("1.{:0400}", 0);
+        let is_csv = name.ends_with("csv");
+        let row = |at| match is_csv {
+            true => format!("{},{value}\n", clock(at)),
+            false => format!("{{\"t\":\"{}\",\"a\":{value}}}\n", clock(at)),
+        };
+        let names = is_csv.then(|| "t,a\n".to_owned());
+        let text: String = names.into_iter().chain(times.map(row)).collect();
+        let path =
+            std::env::temp_dir().join(format!("athermal-begun-{}-{name}", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let time = TimeColumn {
+            columns: "t".parse().unwrap(),
+            form: crate::TimeForm::Format("%Y-%m-%d %H:%M:%S".parse().unwrap()),
+            zone: Some("Europe/Berlin".parse().unwrap()),
+        };
+        let seen = seen_s.map(|at| Instant::from_ns((AUTUMN_S + at) * 1_000_000_000));
+        let format = Format::from_path(&path).unwrap();
+        let begun = Begun::of(&path, format, &time, &["a".to_owned()], seen);
+        std::fs::remove_file(&path).unwrap();
+        begun.unwrap().unwrap().last_ns.unwrap() / 1_000_000_000 - AUTUMN_S
+    }
+
+    #[test]
+    fn a_last_time_that_comes_twice_is_told_by_the_rows_before_it_however_many_and_by_what_was_read()
+     {
+        for name in ["a.csv", "a.jsonl"] {
+            for end in [1800, 3599, 3600, 5400, 7199, 7200] {
+                assert_eq!(last(name, -1800..=end, None), end, "{name}");
+            }
+            let single = |at: i64, seen_s| last(name, std::iter::once(at), seen_s);
+            assert_eq!(single(4200, None), 600, "nothing tells");
+            assert_eq!(single(4200, Some(4200)), 4200);
+            assert_eq!(single(4200, Some(4190)), 4200);
+            assert_eq!(single(600, Some(590)), 600);
+        }
+    }
+}
