@@ -245,10 +245,7 @@ fn a_machine_file_in_another_unit_is_held_to_the_range_of_the_fit_in_its_own() {
     let text = page().replacen(window, &format!("{window}\nunit = \"mK/min\""), 1);
     let graph = scratch.file("celsius.toml", &text);
     let model = scratch.path("machine.json");
-    athermal(&[
-        &"fit", &graph, &"--data", &data, &"-o", &model, &"-q", &"--force",
-    ])
-    .ended(0);
+    athermal(&[&"fit", &graph, &"--data", &data, &"-o", &model, &"-q"]).ended(0);
     let machine = scratch.file("fahrenheit.toml", text.replace("\"Cel\"", "\"[degF]\""));
     let told = |name: &str, warmer: f64| {
         let log = scratch.file(name, in_fahrenheit(warmer));

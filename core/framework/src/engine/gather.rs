@@ -20,9 +20,10 @@ pub(crate) struct Gathered {
     whole: Option<Instant>,
     /// Whether all have that stamp.
     together: bool,
-    /// Whether any of the slots, read without a lag, is another than it was: it has a new value at this tick, or where values are
-    /// held, the run of this tick gave nothing and so ended the hold.
+    /// Whether any of the slots, read without a lag, has a new value at this tick.
     pub(crate) fresh: bool,
+    /// Whether one whose value would be held ran and gave nothing, which ends the hold.
+    pub(crate) ended: bool,
     read: Read,
     origin: Origin,
     conversions: Box<[Conversion]>,
@@ -79,9 +80,9 @@ struct Past {
 
 /// What is known of values that have been looked at.
 struct Glance {
-    /// Whether one was given at the present tick, whether one was run, and whether one was not.
+    /// Whether one was given at the present tick, whether one ran and gave nothing, and whether one did not run.
     fresh: bool,
-    ran: bool,
+    ended: bool,
     late: bool,
     /// Whether one is not there.
     lacks: bool,
@@ -92,7 +93,7 @@ struct Glance {
 impl Glance {
     const NOTHING: Self = Self {
         fresh: false,
-        ran: false,
+        ended: false,
         late: false,
         lacks: false,
         oldest: Instant::MAX,
@@ -103,7 +104,7 @@ impl Glance {
     fn add(&mut self, value: f64, given: &Given, tick: u64) {
         let (ran, there) = (given.tick == tick, !value.is_nan());
         self.fresh |= ran & there;
-        self.ran |= ran;
+        self.ended |= ran & !there;
         self.late |= !ran;
         self.lacks |= !there;
         self.oldest = self.oldest.min(given.stamp);
@@ -120,6 +121,7 @@ impl Gathered {
             whole: None,
             together: false,
             fresh: false,
+            ended: false,
             read: gather.read,
             origin: Origin::new(&gather.entries),
             conversions: gather.conversions.clone().into(),
@@ -167,20 +169,24 @@ impl Gathered {
             self.values.copy_from_slice(&slots.values[range]);
             self.stamps.fill(given.stamp);
             self.fresh = given.tick == slots.tick;
+            self.ended = false;
             self.whole = Some(given.stamp);
             self.together = true;
             return;
         }
         self.whole = None;
         self.fresh = false;
+        self.ended = false;
         let from = slots.values[range.clone()].iter().zip(&slots.given[range]);
         let to = self.values.iter_mut().zip(&mut self.stamps);
         for ((to, (&value, given)), &max_age) in to.zip(from).zip(&self.ages) {
             let ran = given.tick == slots.tick;
-            self.fresh |= ran && (self.read == Read::Held || !value.is_nan());
+            self.fresh |= ran && !value.is_nan();
+            self.ended |= ran && value.is_nan();
             *to.0 = seen(value, self.read, ran, now - given.stamp, max_age);
             *to.1 = given.stamp;
         }
+        self.ended &= self.read == Read::Held;
     }
 
     #[inline(never)]
@@ -228,10 +234,8 @@ impl Gathered {
             Read::Fresh => glance.late,
             Read::Held | Read::Truth => glance.oldest < now - self.shortest,
         };
-        self.fresh = match self.read {
-            Read::Held => glance.ran,
-            Read::Fresh | Read::Truth => glance.fresh,
-        };
+        self.fresh = glance.fresh;
+        self.ended = glance.ended && self.read == Read::Held;
         let whole = of_past.filter(|_| !(glance.lacks | hides));
         self.whole = whole.map(|of_past| of_past.min(glance.oldest));
         if hides {
@@ -287,6 +291,7 @@ impl Gathered {
         self.values.fill(ABSENT);
         self.forget_places();
         self.fresh = false;
+        self.ended = false;
         self.whole = None;
     }
 }

@@ -36,8 +36,11 @@ impl Turn<'_> {
                 closes_loops,
                 slots,
             } => {
-                let fresh = |&gather: &usize| self.gathered[gather].fresh;
-                if *every_tick || gathers.iter().any(fresh) {
+                let changed = |&gather: &usize| {
+                    let gathered = &self.gathered[gather];
+                    gathered.fresh | gathered.ended
+                };
+                if *every_tick || gathers.iter().any(changed) {
                     self.operator(&mut **operator, slots.clone(), gathers, *closes_loops);
                 }
             }
