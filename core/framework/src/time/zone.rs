@@ -83,13 +83,39 @@ impl FromStr for Zone {
 
     fn from_str(text: &str) -> Result<Self, UnknownZone> {
         static PARSER: DateTimeParser = DateTimeParser::new();
-        let zone = PARSER.parse_time_zone_with(&ZONES, text);
-        let zone = zone.map_err(|_| UnknownZone {
-            nearest: nearest_to(text),
+        // A rule of POSIX is none of both: in it `UTC+1` is an hour west of UTC, and whoever writes that means east.
+        let zone = match text.starts_with(['+', '-']) {
+            true => PARSER.parse_time_zone_with(&ZONES, text).ok(),
+            false => ZONES.get(text).ok(),
+        };
+        let zone = zone.ok_or_else(|| UnknownZone {
+            nearest: offset_meant(text).or_else(|| nearest_to(text)),
         })?;
         let name = text.to_owned();
         Ok(Self { name, zone })
     }
+}
+
+/// The offset that was meant: `+01:00` by `UTC+1`, `GMT+0100` or `+1`.
+fn offset_meant(text: &str) -> Option<String> {
+    let upper = text.trim().to_uppercase();
+    let named = ["UTC", "GMT"]
+        .iter()
+        .find_map(|name| upper.strip_prefix(name));
+    let offset = named.unwrap_or(&upper).trim_start();
+    let west = offset.strip_prefix(['-', '\u{2212}']);
+    let (sign, clock) = match west {
+        Some(clock) => ('-', clock),
+        None => ('+', offset.strip_prefix('+')?),
+    };
+    let clock = clock.trim_start();
+    let (hours, minutes) = match clock.split_once(':') {
+        Some(parts) => parts,
+        None if clock.len() > 2 => clock.split_at_checked(clock.len() - 2)?,
+        None => (clock, "0"),
+    };
+    let [hours, minutes] = [hours.parse::<u8>().ok()?, minutes.parse().ok()?];
+    (hours < 24 && minutes < 60).then(|| format!("{sign}{hours:02}:{minutes:02}"))
 }
 
 /// The zone that was meant, by its whole name or the city in it.
@@ -124,10 +150,17 @@ pub struct UnknownZone {
 impl fmt::Display for UnknownZone {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("there is no such time zone; ")?;
-        if let Some(nearest) = &self.nearest {
-            write!(f, "did you mean \"{nearest}\"? ")?;
-        }
-        f.write_str("Write one of the tz database such as \"Europe/Berlin\", or an offset such as \"+01:00\"")
+        let write = match &self.nearest {
+            Some(nearest) => {
+                write!(f, "did you mean \"{nearest}\"? ")?;
+                "Write"
+            }
+            None => "write",
+        };
+        write!(
+            f,
+            "{write} one of the tz database such as \"Europe/Berlin\", or an offset such as \"+01:00\""
+        )
     }
 }
 
@@ -205,6 +238,37 @@ mod tests {
         let told = |text: &str| text.parse::<Zone>().unwrap_err().to_string();
         assert!(told("Europe/Berlim").contains("did you mean \"Europe/Berlin\"?"));
         assert!(told("berlin").contains("did you mean \"Europe/Berlin\"?"));
-        assert!(told("").starts_with("there is no such time zone; Write one"));
+        assert!(told("").starts_with("there is no such time zone; write one"));
+    }
+
+    #[test]
+    fn an_offset_behind_a_name_is_no_zone_and_is_told_as_an_offset_alone() {
+        for (text, meant) in [
+            ("UTC+1", "+01:00"),
+            ("UTC+01:00", "+01:00"),
+            ("utc +5:30", "+05:30"),
+            ("GMT-5", "-05:00"),
+            ("GMT+0100", "+01:00"),
+            ("UTC\u{2212}3", "-03:00"),
+            ("+1", "+01:00"),
+        ] {
+            let told = text.parse::<Zone>().unwrap_err().to_string();
+            let expected = format!("did you mean \"{meant}\"? Write one of");
+            assert!(told.contains(&expected), "{text}: {told}");
+            assert!(meant.parse::<Zone>().is_ok(), "{meant}");
+        }
+        for rule in ["CET-1CEST", "<+03>-3", "UTC+99", "GMT+1:75", "UTC+", "+"] {
+            assert!(rule.parse::<Zone>().is_err(), "{rule}");
+        }
+    }
+
+    #[test]
+    fn zones_of_the_database_keep_their_meaning_whatever_is_in_their_names() {
+        let at = Instant::from_ns(AUTUMN);
+        for (name, east_of_utc) in [("Etc/GMT+1", -1), ("GMT+0", 0), ("UTC", 0), ("-05", -5)] {
+            let zone: Zone = name.parse().unwrap();
+            let civil = Instant::from_ns(AUTUMN + east_of_utc * HOUR);
+            assert_eq!(zone.instant(civil, None), Civil::At(at), "{name}");
+        }
     }
 }
